@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_CONTEXT_H
+#define QMAT_CORE_CONTEXT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/arena.h"
+#include "core/status.h"
+
+/* Where and what went wrong. Empty strings, element -1 and line 0 mean "does not apply". */
+typedef struct qmat_error {
+  qmat_status status;
+  char node_id[64];      /* the node's id in the graph */
+  char node_type[64];    /* "medial.simplify" */
+  char field[64];        /* parameter, port or option */
+  char element_kind[32]; /* "vertex", "facet", "accessor", ... */
+  int64_t element;
+  char file[512];
+  int line, column; /* from 1 */
+  char message[512];
+  char hint[256];
+} qmat_error;
+
+/* Called with what is done of the running node. Returns false to cancel the run. Called from the thread that
+ * runs the node, never from two threads at once. total is 0 where it is not known. */
+typedef bool qmat_progress_fn(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                              const char *unit);
+
+/* One run's surroundings. A zeroed context is valid: no progress, all processors. One thread at a time uses it;
+ * nodes that work in parallel give each OpenMP thread its own slice and report from the calling thread. */
+typedef struct qmat_context {
+  qmat_error error;
+  qmat_progress_fn *progress;
+  void *progress_user;
+  int threads; /* 0: as many as there are processors */
+  qmat_arena arena; /* scratch; emptied after each node */
+  const char *node_id, *node_type; /* of the running node; NULL outside */
+} qmat_context;
+
+/* Frees the context's scratch memory. Works on a zeroed and on a failed context. */
+void qmat_context_uninit(qmat_context *context);
+
+/* The number of OpenMP threads to use: context->threads or the number of processors, at least 1. */
+int qmat_threads(const qmat_context *context);
+
+/* Records an error (status, message, and the running node's names) and returns `status`. The newest wins;
+ * what was recorded before is cleared, so add field, element, file and hint after it. */
+qmat_status qmat_fail(qmat_context *context, qmat_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* Additions to the newest error; each returns its status, so that they can be chained with return. */
+qmat_status qmat_fail_field(qmat_context *context, const char *field);
+qmat_status qmat_fail_element(qmat_context *context, const char *kind, int64_t element);
+qmat_status qmat_fail_at(qmat_context *context, const char *file, int line, int column);
+qmat_status qmat_fail_hint(qmat_context *context, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* QMAT_ERROR_MEMORY with the usual message; `what` names what did not fit ("samples"). */
+qmat_status qmat_fail_memory(qmat_context *context, const char *what);
+
+/* Reports progress; QMAT_CANCELLED (recorded) when the progress function asks to stop, else QMAT_OK.
+ * Cheap enough to be called a few thousand times a second. */
+qmat_status qmat_progress(qmat_context *context, uint64_t done, uint64_t total, const char *unit);
+
+/* Writes the error on one line: "file:line:column: node 'id' (type): field: element 7: message (hint)".
+ * `text` holds `size` bytes; always terminated when size > 0. */
+void qmat_error_format(const qmat_error *error, char *text, size_t size);
+
+#endif

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_DIGEST_H
+#define QMAT_CORE_DIGEST_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/status.h"
+
+/* A SHA-256 digest. */
+typedef struct qmat_digest {
+  uint8_t bytes[32];
+} qmat_digest;
+
+/* An incremental SHA-256 (OpenSSL). */
+typedef struct qmat_hasher {
+  void *state;
+} qmat_hasher;
+
+/* Starts a hash; QMAT_ERROR_MEMORY or QMAT_ERROR_DEPENDENCY when OpenSSL cannot. */
+qmat_status qmat_hasher_init(qmat_hasher *hasher);
+/* Adds `size` bytes. */
+void qmat_hasher_add(qmat_hasher *hasher, const void *bytes, size_t size);
+/* Gives the digest and frees the hasher; NULL `digest` only frees. Safe after a failed init. */
+void qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest);
+
+/* Writes the 64 lower-case hexadecimal digits and a terminating zero. */
+void qmat_digest_hex(const qmat_digest *digest, char text[65]);
+
+#endif

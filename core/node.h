@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_NODE_H
+#define QMAT_CORE_NODE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/value.h"
+
+/* A node is one constant descriptor at the foot of its file. Defaults, parsing, range errors, help, the listing of
+ * nodes and the generated tests all come from it. */
+
+typedef enum qmat_param_type {
+  QMAT_PARAM_BOOL,   /* bool */
+  QMAT_PARAM_INT,    /* int64_t */
+  QMAT_PARAM_FLOAT,  /* double */
+  QMAT_PARAM_ENUM,   /* int: index into choices */
+  QMAT_PARAM_STRING, /* const char * */
+  QMAT_PARAM_PATH    /* const char *: relative to the graph file, or to the working folder on the command line */
+} qmat_param_type;
+
+enum {
+  QMAT_PARAM_REQUIRED = 1,      /* a string or path that has no default */
+  QMAT_PARAM_RELATIVE = 2,      /* a length as a fraction of the bounding-box diagonal; "1%" is read as 0.01 */
+  QMAT_PARAM_OUTPUT_FORMAT = 4, /* an enum that the ending of an output path sets */
+  QMAT_PARAM_INPUT_FILE = 8     /* a path whose bytes the node reads */
+};
+
+typedef struct qmat_param {
+  const char *name;
+  const char *unit; /* "diagonal", "rays", "degrees", "1", "" */
+  const char *doc;  /* one line, no full stop */
+  qmat_param_type type;
+  double default_number;    /* bool 0/1, int, float, enum index */
+  const char *default_text; /* string, path; NULL with QMAT_PARAM_REQUIRED */
+  double min, max;          /* inclusive, int and float */
+  const char *const *choices; /* NULL-terminated, enum only */
+  unsigned flags;
+  size_t offset; /* in the node's parameter struct */
+} qmat_param;
+
+typedef struct qmat_port {
+  const char *name;
+  qmat_value_type type;
+  bool optional; /* an input that may stay unconnected: the node sees NULL */
+  const char *doc;
+} qmat_port;
+
+typedef struct qmat_node {
+  const char *name;     /* "medial.simplify" */
+  uint32_t version;     /* raised whenever the same input may give other bytes */
+  const char *summary;  /* one line */
+  const char *doc;      /* a few sentences */
+  const char *citation; /* paper section and equations, or "" */
+  size_t params_size;
+  const qmat_param *params; /* ended by a row without a name; NULL: none */
+  const qmat_port *inputs;  /* ended by a row without a name; NULL: none */
+  const qmat_port *outputs; /* ended by a row without a name */
+  /* Rules between parameters; NULL: none. Fails with qmat_fail + qmat_fail_field. */
+  qmat_status (*check)(qmat_context *context, const void *params);
+  /* Makes every output, sealed, one reference each (the caller releases them). On failure no output is set.
+   * params and inputs are const; scratch comes from context->arena. */
+  qmat_status (*run)(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                     qmat_value *outputs[]);
+} qmat_node;
+
+/* The number of rows before the one without a name; 0 for NULL. */
+size_t qmat_param_count(const qmat_node *node);
+size_t qmat_input_count(const qmat_node *node);
+size_t qmat_output_count(const qmat_node *node);
+
+/* The parameter, input or output named `name`, or NULL / SIZE_MAX. */
+const qmat_param *qmat_param_find(const qmat_node *node, const char *name);
+size_t qmat_input_find(const qmat_node *node, const char *name);
+size_t qmat_output_find(const qmat_node *node, const char *name);
+
+/* Fills `params` (params_size bytes) with the defaults; required texts become NULL. Strings point into the
+ * descriptor. */
+void qmat_params_default(const qmat_node *node, void *params);
+
+/* Reads `text` into the parameter, checking type, range and choice; independent of the locale. Strings are not
+ * copied: `text` must outlive `params`. QMAT_ERROR_USAGE names the parameter, the range, and the nearest choice. */
+qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
+                             void *params);
+
+/* Required parameters present, and the node's own rules. */
+qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, const void *params);
+
+/* Writes the parameter's value as canonical text that qmat_param_parse reads back to the same value. */
+void qmat_param_format(const qmat_param *param, const void *params, char *text, size_t size);
+
+/* Of `count` names the one nearest to `text` by edit distance, or NULL when none is near. */
+const char *qmat_nearest_name(const char *text, const char *const *names, size_t count);
+
+/* A finite number from `text`, in full, with an optional '%' that divides by 100; independent of the locale. */
+bool qmat_parse_number(const char *text, double *number);
+
+#endif

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_THICKNESS_H
+#define QMAT_CORE_THICKNESS_H
+
+#include "core/value.h"
+
+/* The threshold theta of eq. 8 in the field's unit: `ratio` times the area-free mean of the facets' thickness. */
+double qmat_thickness_threshold(const qmat_field *thickness, double ratio);
+
+/* The thickness at each sample: a vertex takes the minimum of its facets, an added sample its facet's value.
+ * `out` holds samples->count doubles. */
+void qmat_thickness_of_samples(const qmat_mesh *mesh, const qmat_field *thickness, const qmat_samples *samples,
+                               double *out);
+
+#endif

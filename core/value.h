@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_VALUE_H
+#define QMAT_CORE_VALUE_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <jansson.h>
+
+#include "core/context.h"
+#include "core/digest.h"
+
+/* Values travel along the edges of a graph. A value is made by one node, sealed, and only read afterwards, by any
+ * number of threads. Each concrete type starts with a qmat_value; arrays are flat, 64-byte aligned and padded
+ * (qmat_alloc). Positions are double, in the units of the model; indices are uint32_t. */
+
+typedef enum qmat_value_type {
+  QMAT_SCENE,
+  QMAT_MESH,
+  QMAT_FIELD,
+  QMAT_SAMPLES,
+  QMAT_MEDIAL,
+  QMAT_REPORT,
+  QMAT_FILE,
+  QMAT_VALUE_TYPE_COUNT
+} qmat_value_type;
+
+typedef struct qmat_value {
+  qmat_value_type type;
+  atomic_uint references;
+  bool sealed;
+  qmat_digest digest; /* of the content; set by qmat_value_seal */
+} qmat_value;
+
+/* Where a value came from, and its name. */
+typedef struct qmat_scene {
+  qmat_value base;
+  char *name;   /* NUL-terminated UTF-8: the file's base name without its ending */
+  char *format; /* "off", "obj", "ply", "stl", "gltf", "glb", "ma" */
+} qmat_scene;
+
+/* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. */
+typedef struct qmat_mesh {
+  qmat_value base;
+  size_t vertex_count, triangle_count;
+  double *positions;   /* 3 * vertex_count: x y z */
+  uint32_t *triangles; /* 3 * triangle_count */
+  bool closed;         /* every edge lies on two triangles (an even number, where surfaces touch) */
+  bool oriented;       /* both triangles at every edge agree on its side */
+} qmat_mesh;
+
+typedef enum qmat_domain { QMAT_PER_FACET, QMAT_PER_VERTEX } qmat_domain;
+
+/* One number per facet or vertex of a mesh. */
+typedef struct qmat_field {
+  qmat_value base;
+  size_t count;
+  double *values; /* count */
+  qmat_domain domain;
+  char *unit; /* "model unit" or "1" */
+} qmat_field;
+
+/* Points on a surface: first every vertex of the mesh in its order, then the added ones by facet. */
+typedef struct qmat_samples {
+  qmat_value base;
+  size_t count, vertex_count; /* all samples, and how many of them are mesh vertices */
+  double *positions;          /* 3 * count */
+  uint32_t *facets;           /* count: the facet that a sample lies on; a vertex names its first facet */
+  double *barycentrics;       /* 3 * count, in that facet's corner order; each triple sums to 1 */
+} qmat_samples;
+
+/* A medial mesh: medial spheres joined by medial cones (edges) and medial slabs (triangles). */
+typedef struct qmat_medial {
+  qmat_value base;
+  size_t sphere_count, edge_count, triangle_count;
+  double *spheres;     /* 4 * sphere_count: x y z radius */
+  uint32_t *edges;     /* 2 * edge_count: lower id first, sorted; holds every edge of every triangle too */
+  uint32_t *triangles; /* 3 * triangle_count: ids rising within a triangle, triangles sorted */
+  /* The samples that each sphere answers for (the responsible region, eq. 11), in compressed rows:
+   * of sphere i, region_samples[region_offsets[i] .. region_offsets[i + 1]). No rows: region_offsets NULL. */
+  size_t region_offset_count, region_sample_count; /* sphere_count + 1 or 0; length of region_samples */
+  uint32_t *region_offsets;
+  uint32_t *region_samples;
+} qmat_medial;
+
+/* Named counts and errors as a JSON object; never times, so that equal work gives an equal digest. */
+typedef struct qmat_report {
+  qmat_value base;
+  json_t *root;
+} qmat_report;
+
+/* A finished file in memory: the main part first, then the files it refers to by relative name. */
+typedef struct qmat_file_part {
+  char *name; /* "" for the main part, whose name the user chooses; else a relative name without directories */
+  size_t size;
+  uint8_t *bytes;
+} qmat_file_part;
+
+typedef struct qmat_file {
+  qmat_value base;
+  char *format; /* "glb", "gltf", "ma", "ply" */
+  size_t part_count;
+  qmat_file_part *parts;
+} qmat_file;
+
+/* Makes an empty, unsealed value of one reference; NULL when memory is short. Fill it with qmat_alloc'd arrays and
+ * strings, which it then owns, and seal it. A report starts with an empty JSON object. */
+qmat_scene *qmat_scene_new(void);
+qmat_mesh *qmat_mesh_new(void);
+qmat_field *qmat_field_new(void);
+qmat_samples *qmat_samples_new(void);
+qmat_medial *qmat_medial_new(void);
+qmat_report *qmat_report_new(void);
+qmat_file *qmat_file_new(void);
+
+/* A copy of `text` that a value can own (qmat_free frees it); NULL when memory is short. */
+char *qmat_strdup(const char *text);
+
+/* Checks the value (every index in range, every number finite, counts consistent), computes its digest and makes it
+ * read-only. QMAT_ERROR_GEOMETRY names the first bad element. Cost: linear in the content. */
+qmat_status qmat_value_seal(qmat_context *context, qmat_value *value);
+
+/* One more reader. Returns its argument; NULL gives NULL. Safe from any thread. */
+qmat_value *qmat_value_retain(const qmat_value *value);
+/* One reader less; the last one frees. NULL is allowed. Safe from any thread. */
+void qmat_value_release(qmat_value *value);
+
+/* "mesh", "medial", ... Never NULL. */
+const char *qmat_value_type_name(qmat_value_type type);
+
+/* The bytes that the value's arrays hold. */
+size_t qmat_value_bytes(const qmat_value *value);
+
+/* The versioned little-endian binary form: what the digest is taken over. Writes a qmat_alloc'd buffer that the
+ * caller frees. */
+qmat_status qmat_value_serialize(qmat_context *context, const qmat_value *value, uint8_t **bytes, size_t *size);
+/* The value that `size` bytes describe, sealed; every length is checked against `size` before it is trusted. */
+qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, size_t size, qmat_value **value);
+
+#endif
