@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Scratch memory that is freed all at once. A zeroed arena is empty and valid. Not thread-safe. */
 typedef struct qmat_arena {
   struct qmat_arena_block *newest;
@@ -30,5 +34,9 @@ void qmat_free(void *memory);
  * doubles); keeps its contents. `*capacity` is in elements. Returns 0 on success; on shortage -1 and both are
  * unchanged. `*array` may be NULL with capacity 0. */
 int qmat_grow(void **array, size_t *capacity, size_t needed, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include "core/arena.h"
 #include "core/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Where and what went wrong. Empty strings, element -1 and line 0 mean "does not apply". */
 typedef struct qmat_error {
   qmat_status status;
@@ -66,5 +70,9 @@ qmat_status qmat_progress(qmat_context *context, uint64_t done, uint64_t total, 
 /* Writes the error on one line: "file:line:column: node 'id' (type): field: element 7: message (hint)".
  * `text` holds `size` bytes; always terminated when size > 0. */
 void qmat_error_format(const qmat_error *error, char *text, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -2,6 +2,10 @@
 #ifndef QMAT_CORE_STATUS_H
 #define QMAT_CORE_STATUS_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What a call came to. Everything but QMAT_OK leaves an error record in the run context. */
 typedef enum qmat_status {
   QMAT_OK = 0,
@@ -20,5 +24,9 @@ const char *qmat_status_name(qmat_status status);
 
 /* The process exit code of a status: 0 ok, 1 a run failed, 2 bad usage or bad graph, 3 cancelled. */
 int qmat_status_exit_code(qmat_status status);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
