@@ -23,21 +23,28 @@ const qmat_frame *qmat_surface_frame(const qmat_surface *surface);
 const double *qmat_surface_positions(const qmat_surface *surface);
 const qmat_mesh *qmat_surface_mesh(const qmat_surface *surface);
 
-/* Whether a point lies inside the solid. Closed surfaces: the majority of fixed rays, each of which looks at the side
- * of the first triangle it meets; open ones: the generalised winding number (Jacobson et al. 2013; Barill et al. 2018)
- * above one half. */
+/* Whether a point lies inside the solid: whether the surface winds around it. Closed and oriented surfaces: fixed rays,
+ * each of which adds up the sides of all triangles it crosses, two to seven of them until they agree; others: the
+ * generalised winding number (Jacobson et al. 2013; Barill et al. 2018) above one half. Overlapping parts count as
+ * their union. Points outside the bounding box are outside. Within 1e-7 of the surface either answer may come. */
 bool qmat_surface_inside(const qmat_surface *surface, const double point[3]);
 
-/* The distance to the surface, exact in double precision for the triangle found. `closest` (3 doubles) and `triangle`
- * may be NULL. Points that are farther than `limit` (INFINITY: none) give INFINITY and leave both unset. */
+/* The same for `count` points (3 doubles each) on `threads` OpenMP threads: inside[i] becomes 1 or 0. */
+void qmat_surface_inside_many(const qmat_surface *surface, const double *points, size_t count, uint8_t *inside,
+                              int threads);
+
+/* The distance to the surface, in double precision against the double positions. `closest` (3 doubles) and `triangle`
+ * (of equally close ones the smallest) may be NULL. Points that are farther than `limit` (INFINITY: none) give INFINITY
+ * and leave both unset. Beyond 10,000 diagonals every triangle is looked at. */
 double qmat_surface_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
                              uint32_t *triangle);
 
-/* The distance, negative inside the solid. */
+/* The distance, negative inside the solid as qmat_surface_inside has it. */
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]);
 
-/* What a ray from `origin` along the unit vector `direction` meets first beyond `start`: the distance, the triangle,
- * and the triangle's unit normal (3 doubles); any may be NULL. False when nothing. */
+/* What a ray from `origin` along the unit vector `direction` meets first beyond `start` (>= 0): the distance in double
+ * precision, the triangle (of equally far ones the smallest), and the triangle's unit normal (3 doubles, zero for a
+ * degenerate triangle); any may be NULL. False when nothing. */
 bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], const double direction[3], double start,
                        double *distance, uint32_t *triangle, double *normal);
 
