@@ -38,9 +38,10 @@ typedef struct qmat_context {
   qmat_error error;
   qmat_progress_fn *progress;
   void *progress_user;
-  int threads; /* 0: as many as there are processors */
-  qmat_arena arena; /* scratch; emptied after each node */
+  int threads;                     /* 0: as many as there are processors */
+  qmat_arena arena;                /* scratch; emptied after each node */
   const char *node_id, *node_type; /* of the running node; NULL outside */
+  int64_t progress_time;           /* monotonic nanoseconds of the last call of progress; 0: none yet */
 } qmat_context;
 
 /* Frees the context's scratch memory. Works on a zeroed and on a failed context. */
@@ -64,7 +65,8 @@ qmat_status qmat_fail_hint(qmat_context *context, const char *format, ...) __att
 qmat_status qmat_fail_memory(qmat_context *context, const char *what);
 
 /* Reports progress; QMAT_CANCELLED (recorded) when the progress function asks to stop, else QMAT_OK.
- * Cheap enough to be called a few thousand times a second. */
+ * Cheap enough to be called a few hundred thousand times a second: the progress function itself is called every 50 ms
+ * at most, and always for done == 0 and done == total. */
 qmat_status qmat_progress(qmat_context *context, uint64_t done, uint64_t total, const char *unit);
 
 /* Writes the error on one line: "file:line:column: node 'id' (type): field: element 7: message (hint)".

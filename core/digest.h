@@ -19,10 +19,11 @@ typedef struct qmat_hasher {
 
 /* Starts a hash; QMAT_ERROR_MEMORY or QMAT_ERROR_DEPENDENCY when OpenSSL cannot. */
 qmat_status qmat_hasher_init(qmat_hasher *hasher);
-/* Adds `size` bytes. */
+/* Adds `size` bytes; NULL is allowed for 0. Does nothing after a failed init. */
 void qmat_hasher_add(qmat_hasher *hasher, const void *bytes, size_t size);
-/* Gives the digest and frees the hasher; NULL `digest` only frees. Safe after a failed init. */
-void qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest);
+/* Gives the digest and frees the hasher; NULL `digest` only frees. Safe after a failed init: QMAT_ERROR_DEPENDENCY and
+ * a digest of zeros when the hasher never started or OpenSSL failed on the way. */
+qmat_status qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest);
 
 /* Writes the 64 lower-case hexadecimal digits and a terminating zero. */
 void qmat_digest_hex(const qmat_digest *digest, char text[65]);

@@ -32,9 +32,9 @@ typedef struct qmat_param {
   const char *unit; /* "diagonal", "rays", "degrees", "1", "" */
   const char *doc;  /* one line, no full stop */
   qmat_param_type type;
-  double default_number;    /* bool 0/1, int, float, enum index */
-  const char *default_text; /* string, path; NULL with QMAT_PARAM_REQUIRED */
-  double min, max;          /* inclusive, int and float */
+  double default_number;      /* bool 0/1, int, float, enum index */
+  const char *default_text;   /* string, path; NULL with QMAT_PARAM_REQUIRED */
+  double min, max;            /* inclusive, int and float */
   const char *const *choices; /* NULL-terminated, enum only */
   unsigned flags;
   size_t offset; /* in the node's parameter struct */
@@ -84,7 +84,7 @@ void qmat_params_default(const qmat_node *node, void *params);
 qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
                              void *params);
 
-/* Required parameters present, and the node's own rules. */
+/* Required parameters present, every number within its range, and the node's own rules. QMAT_ERROR_USAGE. */
 qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, const void *params);
 
 /* Writes the parameter's value as canonical text that qmat_param_parse reads back to the same value. */
@@ -93,7 +93,12 @@ void qmat_param_format(const qmat_param *param, const void *params, char *text, 
 /* Of `count` names the one nearest to `text` by edit distance, or NULL when none is near. */
 const char *qmat_nearest_name(const char *text, const char *const *names, size_t count);
 
-/* A finite number from `text`, in full, with an optional '%' that divides by 100; independent of the locale. */
+/* A finite number from `text`, in full, with an optional '%' that divides by 100 ("0.1%" is the double nearest to
+ * 0.001); decimal digits only, no blanks; independent of the locale. False leaves `*number` alone. */
 bool qmat_parse_number(const char *text, double *number);
+
+/* Writes the shortest decimal text that reads back to the same double; independent of the locale. 32 bytes are enough;
+ * always terminated when size > 0. */
+void qmat_format_number(double number, char *text, size_t size);
 
 #endif

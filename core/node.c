@@ -1,0 +1,387 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/node.h"
+
+#include <errno.h>
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+size_t qmat_param_count(const qmat_node *node) {
+  size_t count = 0;
+  while (node->params != NULL && node->params[count].name != NULL) ++count;
+  return count;
+}
+
+static size_t port_count(const qmat_port *ports) {
+  size_t count = 0;
+  while (ports != NULL && ports[count].name != NULL) ++count;
+  return count;
+}
+
+size_t qmat_input_count(const qmat_node *node) {
+  return port_count(node->inputs);
+}
+
+size_t qmat_output_count(const qmat_node *node) {
+  return port_count(node->outputs);
+}
+
+const qmat_param *qmat_param_find(const qmat_node *node, const char *name) {
+  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+    if (strcmp(node->params[i].name, name) == 0) return &node->params[i];
+  }
+  return NULL;
+}
+
+static size_t port_find(const qmat_port *ports, const char *name) {
+  for (size_t i = 0; i < port_count(ports); ++i) {
+    if (strcmp(ports[i].name, name) == 0) return i;
+  }
+  return SIZE_MAX;
+}
+
+size_t qmat_input_find(const qmat_node *node, const char *name) {
+  return port_find(node->inputs, name);
+}
+
+size_t qmat_output_find(const qmat_node *node, const char *name) {
+  return port_find(node->outputs, name);
+}
+
+/* The parameter's place in the node's struct. */
+static void *slot(const qmat_param *param, void *params) {
+  return (char *)params + param->offset;
+}
+
+static const void *const_slot(const qmat_param *param, const void *params) {
+  return (const char *)params + param->offset;
+}
+
+void qmat_params_default(const qmat_node *node, void *params) {
+  if (node->params_size > 0) memset(params, 0, node->params_size);
+  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+    const qmat_param *param = &node->params[i];
+    void *place = slot(param, params);
+    switch (param->type) {
+      case QMAT_PARAM_BOOL:
+        *(bool *)place = param->default_number != 0;
+        break;
+      case QMAT_PARAM_INT:
+        *(int64_t *)place = (int64_t)param->default_number;
+        break;
+      case QMAT_PARAM_FLOAT:
+        *(double *)place = param->default_number;
+        break;
+      case QMAT_PARAM_ENUM:
+        *(int *)place = (int)param->default_number;
+        break;
+      case QMAT_PARAM_STRING:
+      case QMAT_PARAM_PATH:
+        *(const char **)place = (param->flags & QMAT_PARAM_REQUIRED) ? NULL : param->default_text;
+        break;
+    }
+  }
+}
+
+static bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/* Skips a run of digits. */
+static const char *skip_digits(const char *text) {
+  while (is_digit(*text)) ++text;
+  return text;
+}
+
+bool qmat_parse_number(const char *text, double *number) {
+  /* The grammar is checked here, so that strtod's blanks, hexadecimal digits, infinities and NaN stay out. */
+  const char *digits = text + (*text == '-' || *text == '+');
+  const char *end = skip_digits(digits);
+  size_t digit_count = (size_t)(end - digits);
+  if (*end == '.') {
+    const char *fraction = end + 1;
+    end = skip_digits(fraction);
+    digit_count += (size_t)(end - fraction);
+  }
+  if (digit_count == 0) return false;
+  const char *mantissa_end = end;
+  long exponent = 0;
+  if (*end == 'e' || *end == 'E') {
+    const char *exponent_digits = end + 1 + (end[1] == '-' || end[1] == '+');
+    end = skip_digits(exponent_digits);
+    if (end == exponent_digits) return false;
+    exponent = strtol(mantissa_end + 1, NULL, 10); /* saturates */
+  }
+
+  char shifted[160];
+  if (*end == '%') {
+    /* The exponent is lowered by two instead of dividing by 100, which would round twice. */
+    const size_t length = (size_t)(mantissa_end - text);
+    if (end[1] != '\0' || length + 32 > sizeof shifted) return false;
+    if (exponent < -100000) exponent = -100000;
+    if (exponent > 100000) exponent = 100000;
+    memcpy(shifted, text, length);
+    snprintf(shifted + length, sizeof shifted - length, "e%ld", exponent - 2);
+    text = shifted;
+  } else if (*end != '\0') {
+    return false;
+  }
+
+  const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+  if (plain == (locale_t)0) return false;
+  const double value = strtod_l(text, NULL, plain);
+  freelocale(plain);
+  if (!isfinite(value)) return false;
+  *number = value;
+  return true;
+}
+
+void qmat_format_number(double number, char *text, size_t size) {
+  if (size == 0) return;
+  text[0] = '\0';
+  const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+  if (plain == (locale_t)0) return;
+  const locale_t before = uselocale(plain);
+  char shortest[40];
+  for (int precision = 1; precision <= 17; ++precision) {
+    snprintf(shortest, sizeof shortest, "%.*g", precision, number);
+    if (strtod(shortest, NULL) == number) break;
+  }
+  uselocale(before);
+  freelocale(plain);
+  snprintf(text, size, "%s", shortest);
+}
+
+static size_t smaller(size_t a, size_t b) {
+  return a < b ? a : b;
+}
+
+enum { LONGEST_NAME = 63 };
+
+/* The optimal string alignment distance: insertions, deletions, substitutions and swaps of neighbours. */
+static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length) {
+  size_t rows[3][LONGEST_NAME + 1];
+  size_t *before = rows[0], *last = rows[1], *row = rows[2];
+  for (size_t j = 0; j <= b_length; ++j) last[j] = j;
+  for (size_t i = 1; i <= a_length; ++i) {
+    row[0] = i;
+    for (size_t j = 1; j <= b_length; ++j) {
+      row[j] = smaller(smaller(last[j], row[j - 1]) + 1, last[j - 1] + (a[i - 1] != b[j - 1]));
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = smaller(row[j], before[j - 2] + 1);
+    }
+    size_t *oldest = before;
+    before = last;
+    last = row;
+    row = oldest;
+  }
+  return last[b_length];
+}
+
+const char *qmat_nearest_name(const char *text, const char *const *names, size_t count) {
+  const size_t length = strnlen(text, LONGEST_NAME + 1);
+  if (length > LONGEST_NAME) return NULL;
+  const char *nearest = NULL;
+  size_t nearest_distance = smaller(1 + length / 3 + 1, length); /* a wholly different letter is not near */
+  for (size_t i = 0; i < count; ++i) {
+    const size_t name_length = strnlen(names[i], LONGEST_NAME + 1);
+    if (name_length > LONGEST_NAME) continue;
+    const size_t distance = edit_distance(text, length, names[i], name_length);
+    if (distance < nearest_distance) {
+      nearest = names[i];
+      nearest_distance = distance;
+    }
+  }
+  return nearest;
+}
+
+/* The unit in parentheses after a range, or nothing for plain numbers. */
+static void format_unit(const qmat_param *param, char *text, size_t size) {
+  text[0] = '\0';
+  if (param->unit != NULL && param->unit[0] != '\0' && strcmp(param->unit, "1") != 0) {
+    snprintf(text, size, " (%s)", param->unit);
+  }
+}
+
+static qmat_status fail_range(qmat_context *context, const qmat_param *param, const char *text) {
+  char min[40], max[40], unit[80];
+  qmat_format_number(param->min, min, sizeof min);
+  qmat_format_number(param->max, max, sizeof max);
+  format_unit(param, unit, sizeof unit);
+  const double huge = param->type == QMAT_PARAM_INT ? 0x1p53 : 1e300; /* such bounds say "none" */
+  if (param->max >= huge && param->min <= -huge) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s is out of range: %s", param->name, text);
+  } else if (param->max >= huge) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be at least %s%s, not %s", param->name, min, unit, text);
+  } else if (param->min <= -huge) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be at most %s%s, not %s", param->name, max, unit, text);
+  } else {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be between %s and %s%s, not %s", param->name, min, max, unit, text);
+  }
+  return qmat_fail_field(context, param->name);
+}
+
+static bool int_in_range(const qmat_param *param, int64_t value) {
+  const double low = ceil(param->min), high = floor(param->max);
+  const bool above = low < -0x1p63 || (low < 0x1p63 && value >= (int64_t)low);
+  const bool below = high >= 0x1p63 || (high >= -0x1p63 && value <= (int64_t)high);
+  return above && below;
+}
+
+static bool float_in_range(const qmat_param *param, double value) {
+  return isfinite(value) && value >= param->min && value <= param->max;
+}
+
+static qmat_status parse_bool(qmat_context *context, const qmat_param *param, const char *text, bool *value) {
+  static const char *const words[] = {"false", "true", "no", "yes", "off", "on"};
+  for (size_t i = 0; i < sizeof words / sizeof *words; ++i) {
+    if (strcmp(text, words[i]) == 0) {
+      *value = i % 2 == 1;
+      return QMAT_OK;
+    }
+  }
+  qmat_fail(context, QMAT_ERROR_USAGE, "%s must be true or false, not '%s'", param->name, text);
+  return qmat_fail_field(context, param->name);
+}
+
+static qmat_status parse_int(qmat_context *context, const qmat_param *param, const char *text, int64_t *value) {
+  const char *digits = text + (*text == '-' || *text == '+');
+  const char *end = skip_digits(digits);
+  if (end == digits || *end != '\0') {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a whole number, not '%s'", param->name, text);
+    return qmat_fail_field(context, param->name);
+  }
+  errno = 0;
+  const long long number = strtoll(text, NULL, 10);
+  if (errno == ERANGE || !int_in_range(param, number)) return fail_range(context, param, text);
+  *value = number;
+  return QMAT_OK;
+}
+
+static qmat_status parse_float(qmat_context *context, const qmat_param *param, const char *text, double *value) {
+  double number;
+  if (!qmat_parse_number(text, &number)) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a number, not '%s'", param->name, text);
+    return qmat_fail_field(context, param->name);
+  }
+  if (!(param->flags & QMAT_PARAM_RELATIVE) && strchr(text, '%') != NULL) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a plain number, not the percentage %s", param->name, text);
+    return qmat_fail_field(context, param->name);
+  }
+  if (!float_in_range(param, number)) return fail_range(context, param, text);
+  *value = number + 0.0; /* -0 becomes 0: one canonical zero */
+  return QMAT_OK;
+}
+
+static size_t choice_count(const qmat_param *param) {
+  size_t count = 0;
+  while (param->choices != NULL && param->choices[count] != NULL) ++count;
+  return count;
+}
+
+static qmat_status parse_enum(qmat_context *context, const qmat_param *param, const char *text, int *value) {
+  const size_t count = choice_count(param);
+  char list[400];
+  size_t used = 0;
+  list[0] = '\0';
+  for (size_t i = 0; i < count; ++i) {
+    if (strcmp(text, param->choices[i]) == 0) {
+      *value = (int)i;
+      return QMAT_OK;
+    }
+    const char *joint = i == 0 ? "" : i + 1 == count ? " or " : ", ";
+    if (used < sizeof list) {
+      used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", joint, param->choices[i]);
+    }
+  }
+  qmat_fail(context, QMAT_ERROR_USAGE, "%s must be %s, not '%s'", param->name, list, text);
+  const char *nearest = qmat_nearest_name(text, param->choices, count);
+  if (nearest != NULL) qmat_fail_hint(context, "did you mean '%s'?", nearest);
+  return qmat_fail_field(context, param->name);
+}
+
+static qmat_status parse_text(qmat_context *context, const qmat_param *param, const char *text, const char **value) {
+  if (text[0] == '\0' && (param->type == QMAT_PARAM_PATH || (param->flags & QMAT_PARAM_REQUIRED))) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must not be empty", param->name);
+    return qmat_fail_field(context, param->name);
+  }
+  *value = text;
+  return QMAT_OK;
+}
+
+qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
+                             void *params) {
+  (void)node;
+  void *place = slot(param, params);
+  switch (param->type) {
+    case QMAT_PARAM_BOOL:
+      return parse_bool(context, param, text, place);
+    case QMAT_PARAM_INT:
+      return parse_int(context, param, text, place);
+    case QMAT_PARAM_FLOAT:
+      return parse_float(context, param, text, place);
+    case QMAT_PARAM_ENUM:
+      return parse_enum(context, param, text, place);
+    case QMAT_PARAM_STRING:
+    case QMAT_PARAM_PATH:
+      return parse_text(context, param, text, place);
+  }
+  return qmat_fail(context, QMAT_ERROR_INTERNAL, "parameter %s has an unknown type", param->name);
+}
+
+qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, const void *params) {
+  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+    const qmat_param *param = &node->params[i];
+    const void *place = const_slot(param, params);
+    char text[40];
+    bool in_range = true;
+    if (param->type == QMAT_PARAM_INT) in_range = int_in_range(param, *(const int64_t *)place);
+    if (param->type == QMAT_PARAM_FLOAT) in_range = float_in_range(param, *(const double *)place);
+    if (!in_range) {
+      qmat_param_format(param, params, text, sizeof text);
+      return fail_range(context, param, text);
+    }
+    if (param->type == QMAT_PARAM_ENUM) {
+      const int choice = *(const int *)place;
+      if (choice < 0 || (size_t)choice >= choice_count(param)) {
+        qmat_fail(context, QMAT_ERROR_USAGE, "%s has no choice of number %d", param->name, choice);
+        return qmat_fail_field(context, param->name);
+      }
+    }
+    const bool is_text = param->type == QMAT_PARAM_STRING || param->type == QMAT_PARAM_PATH;
+    if (is_text && (param->flags & QMAT_PARAM_REQUIRED) && *(const char *const *)place == NULL) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "%s must be given", param->name);
+      return qmat_fail_field(context, param->name);
+    }
+  }
+  return node->check != NULL ? node->check(context, params) : QMAT_OK;
+}
+
+void qmat_param_format(const qmat_param *param, const void *params, char *text, size_t size) {
+  if (size == 0) return;
+  const void *place = const_slot(param, params);
+  text[0] = '\0';
+  switch (param->type) {
+    case QMAT_PARAM_BOOL:
+      snprintf(text, size, "%s", *(const bool *)place ? "true" : "false");
+      break;
+    case QMAT_PARAM_INT:
+      snprintf(text, size, "%lld", (long long)*(const int64_t *)place);
+      break;
+    case QMAT_PARAM_FLOAT:
+      qmat_format_number(*(const double *)place, text, size);
+      break;
+    case QMAT_PARAM_ENUM: {
+      const int choice = *(const int *)place;
+      if (choice >= 0 && (size_t)choice < choice_count(param)) snprintf(text, size, "%s", param->choices[choice]);
+      break;
+    }
+    case QMAT_PARAM_STRING:
+    case QMAT_PARAM_PATH: {
+      const char *value = *(const char *const *)place;
+      snprintf(text, size, "%s", value != NULL ? value : "");
+      break;
+    }
+  }
+}
