@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_DRACO_H
+#define QMAT_IO_DRACO_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/value.h"
+
+/* Medial meshes and skins as Draco bitstreams. Every function runs on the calling thread and gives the same bytes for
+ * the same input. */
+
+/* ---- how many bits ---- */
+
+/* The smallest number of quantisation bits, 1 to 30, whose error bound sqrt(components) / 2 * range / (2^bits - 1) is
+ * within `error`; 30 when none is, or when a number is not finite or `error` is not above zero. `components` is 3 for
+ * positions and 1 for radii; `range` is the largest extent over the components. Both lengths are in the same unit.
+ * Rounding to single precision comes on top of the bound. */
+int qmat_draco_bits_for(int components, double range, double error);
+
+/* The extents that Draco quantises: `*position_range` the largest side of the box of the centres, `*radius_range` the
+ * largest radius minus the smallest; model units. Neither pointer may be NULL. */
+void qmat_draco_medial_ranges(const qmat_medial *medial, double *position_range, double *radius_range);
+
+/* ---- medial meshes ---- */
+
+/* Encodes a medial mesh as a sequential Draco mesh: POSITION holds the centres and a GENERIC attribute the radii, each
+ * quantised on its own to `position_bits` and `radius_bits` (1 to 30). Spheres keep their order. The faces are the
+ * triangles in their order, then each edge (i, j) that lies on no triangle as (i, j, j), then each sphere i on no edge
+ * as (i, i, i). Edgebreaker would be smaller, but it reorders and splits vertices and drops degenerate faces.
+ * `*bytes` (qmat_free it) is NULL on failure. QMAT_ERROR_USAGE for bits out of range, QMAT_ERROR_GEOMETRY for a medial
+ * mesh without spheres or beyond the range of single precision, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY.
+ * Cost: linear, and a binary search per side of a triangle. */
+qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, int position_bits,
+                                     int radius_bits, uint8_t **bytes, size_t *size);
+
+/* The medial mesh, sealed, that `size` bytes made by qmat_draco_encode_medial describe. Sizes and ids are checked
+ * before they are trusted: QMAT_ERROR_FORMAT says what is wrong. `*medial` is NULL on failure; the caller releases it.
+ * Cost: linear. */
+qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes, size_t size, qmat_medial **medial);
+
+/* What encoding cost: the largest |dc| + |dr| over the spheres of two medial meshes of equally many spheres, in model
+ * units. Cones and slabs interpolate their spheres, so no point of the solid moves farther. */
+double qmat_draco_medial_loss(const qmat_medial *given, const qmat_medial *decoded);
+
+/* ---- triangle meshes, to be shown ---- */
+
+/* A compressed mesh as KHR_draco_mesh_compression asks for it. A zeroed one is empty and valid. */
+typedef struct qmat_draco_skin {
+  uint8_t *bytes; /* owned */
+  size_t size;
+  uint32_t position_id, normal_id; /* the attributes' unique ids */
+  uint32_t vertex_count, triangle_count; /* as decoded: vertices may be split, dropped or reordered */
+  float min[3], max[3];                  /* of the decoded positions */
+} qmat_draco_skin;
+
+/* Encodes a triangle mesh for display with edgebreaker: the order of a skin's vertices means nothing to a viewer, and
+ * edgebreaker takes about half the bytes of the sequential method. `positions` and `normals` hold 3 * vertex_count
+ * finite floats, `triangles` 3 * triangle_count ids below vertex_count; none may be empty. The result is decoded again
+ * for its counts and bounds. On failure `skin` is empty. QMAT_ERROR_USAGE, _MEMORY, _DEPENDENCY. */
+qmat_status qmat_draco_encode_mesh(qmat_context *context, const float *positions, const float *normals,
+                                   size_t vertex_count, const uint32_t *triangles, size_t triangle_count,
+                                   int position_bits, int normal_bits, qmat_draco_skin *skin);
+
+/* Frees the bytes; the skin is empty and usable again. */
+void qmat_draco_skin_uninit(qmat_draco_skin *skin);
+
+#endif

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_DRACO_DRACO_H
+#define QMAT_IO_DRACO_DRACO_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Draco as flat arrays. Bitstreams have version 2.2, the one that glTF names. Every function runs on the calling
+ * thread, gives the same bytes for the same input, and lets no C++ exception out: QMAT_ERROR_DEPENDENCY carries Draco's
+ * own text. */
+
+/* ---- writing ---- */
+
+typedef enum qmat_draco_meaning { QMAT_DRACO_POSITION, QMAT_DRACO_NORMAL, QMAT_DRACO_GENERIC } qmat_draco_meaning;
+
+/* One number or vector a point. Its unique id in the bitstream is its place among the attributes. */
+typedef struct qmat_draco_attribute {
+  qmat_draco_meaning meaning;
+  int components;      /* 1 to 4 */
+  int bits;            /* quantisation, 1 to 30 (2 to 30 for normals) */
+  const float *values; /* components * point_count, finite; not owned */
+} qmat_draco_attribute;
+
+/* Encodes a triangle mesh. `faces` holds 3 * face_count point ids below point_count; neither count may be 0. With
+ * `keep_order` (Draco's sequential method) points and faces come back in their order and degenerate faces stay; without
+ * (edgebreaker) the result is about half as large, but points are reordered and split, and degenerate faces and points
+ * on no face are dropped. `*bytes` (qmat_free it) is NULL on failure. QMAT_ERROR_USAGE for bits out of range,
+ * QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY. */
+qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute *attributes, size_t attribute_count,
+                              size_t point_count, const uint32_t *faces, size_t face_count, bool keep_order,
+                              uint8_t **bytes, size_t *size);
+
+/* ---- reading ---- */
+
+/* A decoded triangle mesh. */
+typedef struct qmat_draco_mesh qmat_draco_mesh;
+
+/* Decodes `size` bytes. Before Draco sees them, the counts in their header are checked against their size, so that a
+ * few bytes cannot ask for gigabytes; afterwards every face is checked against the number of points. `*mesh` is NULL
+ * on failure; free it with qmat_draco_mesh_free. QMAT_ERROR_FORMAT, _MEMORY. */
+qmat_status qmat_draco_mesh_new(qmat_context *context, const uint8_t *bytes, size_t size, qmat_draco_mesh **mesh);
+/* NULL is allowed. */
+void qmat_draco_mesh_free(qmat_draco_mesh *mesh);
+
+size_t qmat_draco_mesh_point_count(const qmat_draco_mesh *mesh);
+size_t qmat_draco_mesh_face_count(const qmat_draco_mesh *mesh);
+
+/* Writes the faces' corners: 3 * face_count point ids, each below point_count. */
+void qmat_draco_mesh_faces(const qmat_draco_mesh *mesh, uint32_t *corners);
+
+/* The unique id of the only attribute of that meaning, if it has `components` floats; false otherwise. */
+bool qmat_draco_mesh_find(const qmat_draco_mesh *mesh, qmat_draco_meaning meaning, int components, uint32_t *unique_id);
+
+/* Writes the attribute of that unique id for all points: `components` * point_count numbers, whole numbers as they are
+ * stored (nothing is normalised). QMAT_ERROR_FORMAT when there is no such attribute or it has other components. */
+qmat_status qmat_draco_mesh_attribute(qmat_context *context, const qmat_draco_mesh *mesh, uint32_t unique_id,
+                                      int components, double *values);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
