@@ -9,8 +9,11 @@
 #include <string.h>
 
 /* Embree stores single precision. In the unit frame coordinates are at most 1/2 and rays at most about 2 long, so that
- * its hit distances are good to a few 1e-7; everything within TIE of the nearest hit is looked at again in double. */
-#define TIE 1e-6
+ * its hits are within a few 1e-7 of the triangle's plane; everything within TIE of the nearest hit is looked at again
+ * in double. */
+#define TIE 4e-6
+/* How far along the ray the double precision hit may be from the single precision one. */
+#define LONGEST_CORRECTION 1e-4
 /* Where single precision is not spent on the model any more. */
 #define FAR_AWAY 1e4
 /* Barycentric coordinate and cosine below which a ray that counts crossings may have met an edge. */
@@ -88,14 +91,16 @@ static void triangle_normal(const qmat_surface *surface, uint32_t triangle, doub
 
 /* --- rays ------------------------------------------------------------------------------------------------------- */
 
-/* The distance at which the ray meets the triangle's plane; what single precision found where the ray runs along the
- * plane so that the plane says nothing. */
+/* The distance at which the ray meets the triangle's plane; what single precision found where the ray runs so close to
+ * along the plane that the plane says nothing. */
 static double refine_hit(const qmat_surface *surface, const query_context *query, uint32_t triangle, double found) {
   double normal[3], to_plane[3];
   triangle_normal(surface, triangle, normal);
   subtract(corner_position(surface, triangle, 0), query->origin, to_plane);
-  const double distance = dot(to_plane, normal) / dot(query->direction, normal);
-  return fabs(distance - found) <= 0.5 * TIE ? distance : found;
+  const double slope = dot(query->direction, normal);
+  const double distance = dot(to_plane, normal) / slope, correction = fabs(distance - found);
+  const bool meets_plane = correction * fabs(slope) <= TIE * sqrt(dot(normal, normal));
+  return meets_plane && correction <= LONGEST_CORRECTION ? distance : found;
 }
 
 /* Sees every hit of an occlusion ray and refuses it, so that Embree goes on: which hits come does not depend on the
@@ -166,20 +171,17 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
 
   /* What lies right at the start is found by its double precision distance alone. */
   bool found = nearest_between(surface, &query, 0, 3 * TIE) && query.distance - query.offset <= 2 * TIE;
-  if (!found) {
+  for (double near = 1.5 * TIE; !found;) {
     struct RTCRayHit hit;
-    set_ray(&hit.ray, origin, direction, query.offset, (float)(1.5 * TIE), INFINITY);
+    set_ray(&hit.ray, origin, direction, query.offset, (float)near, INFINITY);
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     hit.hit.primID = RTC_INVALID_GEOMETRY_ID;
     hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(surface->scene, &query.base, &hit);
     if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    const double near = (double)hit.ray.tfar;
-    found = nearest_between(surface, &query, fmax(1.5 * TIE, near - TIE), near + TIE);
-    if (!found) {
-      query.triangle = hit.hit.primID;
-      query.distance = fmax(refine_hit(surface, &query, query.triangle, query.offset + near), start);
-    }
+    const double nearest = (double)hit.ray.tfar;
+    found = nearest_between(surface, &query, fmax(near, nearest - TIE), nearest + TIE);
+    near = nearest + TIE; /* all that was there lies before `start` in double */
   }
   if (distance != NULL) *distance = query.distance;
   if (triangle != NULL) *triangle = query.triangle;
@@ -428,6 +430,18 @@ static void area_and_centroid(const qmat_surface *surface, uint32_t triangle, do
   }
 }
 
+static double farthest_corner(const qmat_surface *surface, size_t begin, size_t end, const double centre[3]) {
+  double square = 0;
+  for (size_t i = begin; i < end; i++) {
+    for (int corner = 0; corner < 3; corner++) {
+      double offset[3];
+      subtract(corner_position(surface, surface->order[i], corner), centre, offset);
+      square = fmax(square, dot(offset, offset));
+    }
+  }
+  return sqrt(square);
+}
+
 /* Area-weighted centre, dipole and radius of the triangles of one leaf. */
 static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t begin, size_t end, double *area) {
   double vector[3], centroid[3], mean[3] = {0, 0, 0};
@@ -444,13 +458,7 @@ static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t be
     }
   }
   for (int k = 0; k < 3; k++) node->centre[k] = *area > 0 ? node->centre[k] / *area : mean[k];
-  for (size_t i = begin; i < end; i++) {
-    for (int corner = 0; corner < 3; corner++) {
-      double offset[3];
-      subtract(corner_position(surface, surface->order[i], corner), node->centre, offset);
-      node->radius = fmax(node->radius, sqrt(dot(offset, offset)));
-    }
-  }
+  node->radius = farthest_corner(surface, begin, end, node->centre);
 }
 
 static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
@@ -492,16 +500,16 @@ static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surfa
     const double left_area = areas[2 * index], right_area = areas[2 * index + 1], area = left_area + right_area;
     areas[index] = area;
     const double share = area > 0 ? left_area / area : 0.5;
-    node->radius = 0;
     for (int k = 0; k < 3; k++) {
       node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
       node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
     }
-    for (int child = 0; child < 2; child++) {
-      double offset[3];
-      subtract(left[child].centre, node->centre, offset);
-      node->radius = fmax(node->radius, sqrt(dot(offset, offset)) + left[child].radius);
-    }
+    /* From the corners and not from the children's balls, which would be twice too large further up. */
+    size_t first = index, last = index + 1, begin, end, unused;
+    while (first < leaf_count) first *= 2, last *= 2;
+    leaf_range(surface, first - leaf_count, &begin, &unused);
+    leaf_range(surface, last - 1 - leaf_count, &unused, &end);
+    node->radius = farthest_corner(surface, begin, end, node->centre);
   }
 done:
   qmat_free(items);
