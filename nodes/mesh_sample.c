@@ -1,0 +1,516 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* mesh.sample: points on a surface, more of them on large and on thin facets (section 3.2, eq. 7 and 8). */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/frame.h"
+#include "core/hash.h"
+#include "core/node.h"
+#include "core/thickness.h"
+#include "core/triangle.h"
+
+#define MOST_PER_FACET 64
+#define MOST_SITES (MOST_PER_FACET + 3)
+/* A facet's cell starts with three corners, and every other site cuts off at most one more than it leaves. */
+#define MOST_CELL_CORNERS (MOST_SITES + 3)
+/* Neighbours smaller than this share of the median area count as this large in eq. 7, or slivers would ask for samples
+ * without end. */
+#define SMALLEST_NEIGHBOUR 1e-3
+/* Facets that are equal up to rounding must not ask for a sample because of it. */
+#define AREA_TOLERANCE 1e-9
+
+typedef struct mesh_sample_params {
+  double theta;
+  int64_t n_f;
+  int64_t lloyd_rounds;
+  int64_t max_per_facet;
+  int64_t max_samples;
+  int64_t seed;
+} mesh_sample_params;
+
+/* The two smallest areas among the facets at a vertex, of different facets. */
+typedef struct smallest_areas {
+  double area[2];
+  uint32_t facet[2];
+} smallest_areas;
+
+typedef struct sample_counts {
+  size_t by_area, by_thickness, thin, capped, degenerate;
+  size_t added, dropped;
+  double threshold;
+} sample_counts;
+
+/* --- how many: eq. 7 and 8 -------------------------------------------------------------------------------------- */
+
+static void exchange(double *a, double *b) {
+  const double kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+/* The number that stands at `rank` when the numbers are sorted; reorders them. Pivots come from a hash, so that no
+ * order of facets makes it slow. */
+static double select_number(double *numbers, size_t count, size_t rank) {
+  size_t low = 0, high = count;
+  while (high - low > 1) {
+    const double pivot = numbers[low + qmat_hash3(count, low, high) % (high - low)];
+    size_t less = low, i = low, more = high;
+    while (i < more) {
+      if (numbers[i] < pivot) {
+        exchange(numbers + less++, numbers + i++);
+      } else if (numbers[i] > pivot) {
+        exchange(numbers + i, numbers + --more);
+      } else {
+        i++;
+      }
+    }
+    if (rank >= less && rank < more) return pivot;
+    if (rank < less) {
+      high = less;
+    } else {
+      low = more;
+    }
+  }
+  return numbers[low];
+}
+
+/* The median of the positive areas; 0 without any. */
+static double median_area(const double *areas, size_t count, double *scratch) {
+  size_t positive = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (areas[i] > 0) scratch[positive++] = areas[i];
+  }
+  return positive > 0 ? select_number(scratch, positive, positive / 2) : 0;
+}
+
+static void note_area(smallest_areas *smallest, double area, uint32_t facet) {
+  if (area < smallest->area[0]) {
+    smallest->area[1] = smallest->area[0];
+    smallest->facet[1] = smallest->facet[0];
+    smallest->area[0] = area;
+    smallest->facet[0] = facet;
+  } else if (area < smallest->area[1]) {
+    smallest->area[1] = area;
+    smallest->facet[1] = facet;
+  }
+}
+
+/* The first term of eq. 7: how many times the smallest other facet that shares a vertex fits into this one, rounded up,
+ * less one. Degenerate neighbours are no patch to compare with and are passed over. */
+static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_t ids[3], uint32_t facet, double area,
+                                double floor_area, int64_t most) {
+  double smallest = INFINITY;
+  for (int k = 0; k < 3; k++) {
+    const smallest_areas *here = at_vertices + ids[k];
+    smallest = fmin(smallest, here->facet[0] == facet ? here->area[1] : here->area[0]);
+  }
+  const double count = ceil(area / fmax(smallest, floor_area) * (1 - AREA_TOLERANCE)) - 1;
+  return (int64_t)fmin(fmax(count, 0), (double)most);
+}
+
+/* Fills offsets (triangle_count + 1) with where each facet's added samples begin, before the limit on their sum. */
+static qmat_status count_samples(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
+                                 const qmat_field *thickness, const double *areas, uint64_t *offsets,
+                                 sample_counts *counts) {
+  double *scratch = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *scratch);
+  smallest_areas *at_vertices = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *at_vertices);
+  if (scratch == NULL || at_vertices == NULL) return qmat_fail_memory(context, "the areas around vertices");
+  for (size_t i = 0; i < mesh->vertex_count; i++) {
+    at_vertices[i] = (smallest_areas){{INFINITY, INFINITY}, {UINT32_MAX, UINT32_MAX}};
+  }
+  for (size_t i = 0; i < mesh->triangle_count; i++) {
+    const uint32_t *ids = mesh->triangles + 3 * i;
+    for (int k = 0; k < 3 && areas[i] > 0; k++) note_area(at_vertices + ids[k], areas[i], (uint32_t)i);
+  }
+  const double floor_area = SMALLEST_NEIGHBOUR * median_area(areas, mesh->triangle_count, scratch);
+  counts->threshold = qmat_thickness_threshold(thickness, params->theta);
+
+  offsets[0] = 0;
+  for (size_t i = 0; i < mesh->triangle_count; i++) {
+    const bool thin = thickness->values[i] <= counts->threshold;
+    counts->thin += thin;
+    offsets[i + 1] = offsets[i];
+    if (!(areas[i] > 0)) {
+      counts->degenerate++;
+      continue;
+    }
+    /* One more than the cap tells that it was reached. */
+    const int64_t by_thickness = thin ? params->n_f : 0;
+    const int64_t by_area = samples_for_area(at_vertices, mesh->triangles + 3 * i, (uint32_t)i, areas[i], floor_area,
+                                             params->max_per_facet + 1);
+    const int64_t wanted = by_area + by_thickness;
+    const int64_t count = wanted < params->max_per_facet ? wanted : params->max_per_facet;
+    const int64_t kept_thickness = by_thickness < count ? by_thickness : count;
+    counts->capped += wanted > count;
+    counts->by_thickness += (size_t)kept_thickness;
+    counts->by_area += (size_t)(count - kept_thickness);
+    offsets[i + 1] += (uint64_t)count;
+  }
+  return QMAT_OK;
+}
+
+/* Thins the counts out evenly, so that no more than `room` samples are added. */
+static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, sample_counts *counts) {
+  const uint64_t wanted = offsets[facet_count];
+  if (wanted > room) {
+    /* Rounding the running sum, not each count, keeps the share also where every facet wants a single sample. */
+    const double share = (double)room / (double)wanted;
+    for (size_t i = 0; i <= facet_count; i++) {
+      const uint64_t scaled = (uint64_t)floor((double)offsets[i] * share);
+      offsets[i] = scaled < room ? scaled : room;
+    }
+  }
+  counts->added = (size_t)offsets[facet_count];
+  counts->dropped = (size_t)(wanted - offsets[facet_count]);
+}
+
+/* --- where: Lloyd's relaxation on the bounded Voronoi diagram of a facet ------------------------------------------ */
+
+/* A facet in its own plane, its longest edge 1 long: corners (0, 0), (base, 0), (apex[0], apex[1]). */
+typedef struct flat_facet {
+  double base;
+  double apex[2];
+} flat_facet;
+
+static flat_facet flatten(const double *a, const double *b, const double *c) {
+  double ab[3], ac[3], bc[3];
+  for (int k = 0; k < 3; k++) ab[k] = b[k] - a[k], ac[k] = c[k] - a[k], bc[k] = c[k] - b[k];
+  const double base = sqrt(ab[0] * ab[0] + ab[1] * ab[1] + ab[2] * ab[2]);
+  const double side = sqrt(ac[0] * ac[0] + ac[1] * ac[1] + ac[2] * ac[2]);
+  const double last = sqrt(bc[0] * bc[0] + bc[1] * bc[1] + bc[2] * bc[2]);
+  const double scale = 1 / fmax(fmax(base, side), last);
+  double normal[3];
+  const double area = qmat_triangle_area(a, b, c, normal);
+  const double along = (ab[0] * ac[0] + ab[1] * ac[1] + ab[2] * ac[2]) / base;
+  return (flat_facet){base * scale, {along * scale, 2 * area / base * scale}};
+}
+
+/* Cuts off the part of a convex polygon that is nearer to `other` than to `site`; returns the new number of corners.
+ * In and out may not overlap. */
+static size_t clip_by_bisector(const double (*in)[2], size_t count, const double site[2], const double other[2],
+                               double (*out)[2]) {
+  const double normal[2] = {other[0] - site[0], other[1] - site[1]};
+  const double middle[2] = {0.5 * (other[0] + site[0]), 0.5 * (other[1] + site[1])};
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    const double *p = in[i], *q = in[i + 1 < count ? i + 1 : 0];
+    const double s = (p[0] - middle[0]) * normal[0] + (p[1] - middle[1]) * normal[1];
+    const double t = (q[0] - middle[0]) * normal[0] + (q[1] - middle[1]) * normal[1];
+    if (s <= 0) {
+      out[kept][0] = p[0];
+      out[kept++][1] = p[1];
+    }
+    if ((s < 0 && t > 0) || (s > 0 && t < 0)) {
+      const double cut = s / (s - t);
+      out[kept][0] = p[0] + cut * (q[0] - p[0]);
+      out[kept++][1] = p[1] + cut * (q[1] - p[1]);
+    }
+  }
+  return kept;
+}
+
+/* The square of how far the polygon reaches from a point. */
+static double squared_reach(const double (*polygon)[2], size_t count, const double point[2]) {
+  double reach = 0;
+  for (size_t i = 0; i < count; i++) {
+    const double x = polygon[i][0] - point[0], y = polygon[i][1] - point[1];
+    reach = fmax(reach, x * x + y * y);
+  }
+  return reach;
+}
+
+/* The centroid of a polygon; false when it has no area. */
+static bool polygon_centroid(const double (*polygon)[2], size_t count, double centroid[2]) {
+  double area = 0, x = 0, y = 0;
+  for (size_t i = 1; i + 1 < count; i++) {
+    const double u[2] = {polygon[i][0] - polygon[0][0], polygon[i][1] - polygon[0][1]};
+    const double v[2] = {polygon[i + 1][0] - polygon[0][0], polygon[i + 1][1] - polygon[0][1]};
+    const double part = u[0] * v[1] - u[1] * v[0];
+    area += part;
+    x += part * (u[0] + v[0]);
+    y += part * (u[1] + v[1]);
+  }
+  if (!(area > 0)) return false;
+  centroid[0] = polygon[0][0] + x / (3 * area);
+  centroid[1] = polygon[0][1] + y / (3 * area);
+  return true;
+}
+
+/* The centroid of a site's Voronoi cell within the facet (Tournois et al. 2010). Sites 0 to 2 are the corners. */
+static bool cell_centroid(const double (*sites)[2], size_t count, size_t index, double centroid[2]) {
+  double polygons[2][MOST_CELL_CORNERS][2];
+  memcpy(polygons[0], sites, 3 * sizeof sites[0]);
+  int current = 0;
+  size_t corners = 3;
+  double reach = squared_reach(polygons[0], corners, sites[index]);
+  for (size_t i = 0; i < count; i++) {
+    const double x = sites[i][0] - sites[index][0], y = sites[i][1] - sites[index][1], square = x * x + y * y;
+    /* Two sites in one place have no bisector, and one that is twice the cell's reach away cuts nothing. */
+    if (i == index || square == 0 || square >= 4 * reach) continue;
+    corners =
+        clip_by_bisector((const double(*)[2])polygons[current], corners, sites[index], sites[i], polygons[1 - current]);
+    current = 1 - current;
+    reach = squared_reach((const double(*)[2])polygons[current], corners, sites[index]);
+  }
+  return polygon_centroid((const double(*)[2])polygons[current], corners, centroid);
+}
+
+/* Spreads `count` samples over a facet: their barycentrics (3 each). */
+static void spread_samples(const mesh_sample_params *params, const double *a, const double *b, const double *c,
+                           uint32_t facet, size_t count, double *barycentrics) {
+  if (count == 1) {
+    for (int k = 0; k < 3; k++) barycentrics[k] = 1.0 / 3;
+    return;
+  }
+  const flat_facet flat = flatten(a, b, c);
+  double sites[2][MOST_SITES][2] = {{{0, 0}, {flat.base, 0}, {flat.apex[0], flat.apex[1]}}};
+  memcpy(sites[1], sites[0], 3 * sizeof sites[0][0]);
+  for (size_t i = 0; i < count; i++) {
+    /* Uniform on the triangle: the square root makes equal areas equally likely. */
+    const double u = sqrt(qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i)));
+    const double v = qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i + 1));
+    sites[0][3 + i][0] = u * (1 - v) * flat.base + u * v * flat.apex[0];
+    sites[0][3 + i][1] = u * v * flat.apex[1];
+  }
+  int current = 0;
+  for (int64_t round = 0; round < params->lloyd_rounds; round++) {
+    for (size_t i = 3; i < 3 + count; i++) {
+      const double(*now)[2] = (const double(*)[2])sites[current];
+      if (!cell_centroid(now, 3 + count, i, sites[1 - current][i])) {
+        memcpy(sites[1 - current][i], now[i], sizeof now[i]);
+      }
+    }
+    current = 1 - current;
+  }
+  for (size_t i = 0; i < count; i++) {
+    const double *site = sites[current][3 + i];
+    double *weights = barycentrics + 3 * i;
+    weights[2] = fmin(fmax(site[1] / flat.apex[1], 0), 1);
+    weights[1] = fmin(fmax((site[0] - weights[2] * flat.apex[0]) / flat.base, 0), 1 - weights[2]);
+    weights[0] = 1 - weights[2] - weights[1];
+  }
+}
+
+/* --- the node --------------------------------------------------------------------------------------------------- */
+
+static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness) {
+  if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu values per %s do not fit a mesh of %zu facets", thickness->count,
+              thickness->domain == QMAT_PER_FACET ? "facet" : "vertex", mesh->triangle_count);
+    return qmat_fail_field(context, "thickness");
+  }
+  return QMAT_OK;
+}
+
+/* The mesh's vertices as the first samples: each on the first facet that uses it. */
+static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh, qmat_samples *samples) {
+  memcpy(samples->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *samples->positions);
+  for (size_t i = 0; i < mesh->vertex_count; i++) samples->facets[i] = UINT32_MAX;
+  for (size_t i = 3 * mesh->triangle_count; i-- > 0;) {
+    const uint32_t vertex = mesh->triangles[i];
+    double *weights = samples->barycentrics + 3 * (size_t)vertex;
+    samples->facets[vertex] = (uint32_t)(i / 3);
+    for (size_t k = 0; k < 3; k++) weights[k] = k == i % 3;
+  }
+  for (size_t i = 0; i < mesh->vertex_count; i++) {
+    if (samples->facets[i] != UINT32_MAX) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "a vertex that no triangle uses is no point of the surface");
+    qmat_fail_field(context, "mesh");
+    qmat_fail_element(context, "vertex", (int64_t)i);
+    return qmat_fail_hint(context, "remove unused vertices");
+  }
+  return QMAT_OK;
+}
+
+/* Adds offsets[i + 1] - offsets[i] samples to each facet, all behind the vertices. */
+static qmat_status sample_facets(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
+                                 const double *unit_positions, const uint64_t *offsets, qmat_samples *samples) {
+  const size_t slice = 65536;
+  const int threads = qmat_threads(context);
+  for (size_t begin = 0; begin < mesh->triangle_count; begin += slice) {
+    const size_t end = mesh->triangle_count - begin < slice ? mesh->triangle_count : begin + slice;
+#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
+    for (size_t i = begin; i < end; i++) {
+      const size_t first = mesh->vertex_count + (size_t)offsets[i], count = (size_t)(offsets[i + 1] - offsets[i]);
+      if (count == 0) continue;
+      const uint32_t *ids = mesh->triangles + 3 * i;
+      spread_samples(params, unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
+                     unit_positions + 3 * (size_t)ids[2], (uint32_t)i, count, samples->barycentrics + 3 * first);
+      for (size_t s = first; s < first + count; s++) {
+        const double *weights = samples->barycentrics + 3 * s;
+        samples->facets[s] = (uint32_t)i;
+        for (size_t k = 0; k < 3; k++) {
+          samples->positions[3 * s + k] = weights[0] * mesh->positions[3 * (size_t)ids[0] + k] +
+                                          weights[1] * mesh->positions[3 * (size_t)ids[1] + k] +
+                                          weights[2] * mesh->positions[3 * (size_t)ids[2] + k];
+        }
+      }
+    }
+    const qmat_status status = qmat_progress(context, end, mesh->triangle_count, "facets");
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status fill_report(qmat_context *context, const qmat_mesh *mesh, const sample_counts *counts,
+                               qmat_report *report) {
+  json_t *root = json_pack(
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "samples", (json_int_t)(mesh->vertex_count + counts->added),
+      "vertices", (json_int_t)mesh->vertex_count, "added", (json_int_t)counts->added, "added_by_area",
+      (json_int_t)counts->by_area, "added_by_thickness", (json_int_t)counts->by_thickness, "thin_facets",
+      (json_int_t)counts->thin, "degenerate_facets", (json_int_t)counts->degenerate, "capped",
+      (json_int_t)counts->capped, "dropped", (json_int_t)counts->dropped, "thickness_threshold", counts->threshold);
+  if (root == NULL || json_object_update(report->root, root) != 0) {
+    json_decref(root);
+    return qmat_fail_memory(context, "the report");
+  }
+  json_decref(root);
+  return QMAT_OK;
+}
+
+/* The facets' areas, and the vertices, in the unit frame. */
+static qmat_status measure_areas(qmat_context *context, const qmat_mesh *mesh, double *unit_positions, double *areas) {
+  qmat_frame frame;
+  const qmat_status status = qmat_frame_of_mesh(context, mesh, &frame);
+  if (status != QMAT_OK) return qmat_fail_field(context, "mesh");
+  qmat_frame_to_unit(&frame, mesh->positions, mesh->vertex_count, unit_positions);
+  for (size_t i = 0; i < mesh->triangle_count; i++) {
+    const uint32_t *ids = mesh->triangles + 3 * i;
+    double normal[3];
+    areas[i] = qmat_triangle_area(unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
+                                  unit_positions + 3 * (size_t)ids[2], normal);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const mesh_sample_params *params = raw_params;
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  const qmat_field *thickness = (const qmat_field *)inputs[1];
+  qmat_samples *samples = qmat_samples_new();
+  qmat_report *report = qmat_report_new();
+  double *unit_positions = qmat_arena_alloc(&context->arena, 3 * mesh->vertex_count, sizeof *unit_positions);
+  double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
+  uint64_t *offsets = qmat_arena_alloc(&context->arena, mesh->triangle_count + 1, sizeof *offsets);
+  sample_counts counts = {0};
+  qmat_status status = QMAT_OK;
+  if (samples == NULL || report == NULL || unit_positions == NULL || areas == NULL || offsets == NULL) {
+    status = qmat_fail_memory(context, "the samples");
+    goto done;
+  }
+  status = check_inputs(context, mesh, thickness);
+  if (status == QMAT_OK) status = measure_areas(context, mesh, unit_positions, areas);
+  if (status == QMAT_OK) status = count_samples(context, params, mesh, thickness, areas, offsets, &counts);
+  if (status != QMAT_OK) goto done;
+  const uint64_t most = (uint64_t)params->max_samples;
+  limit_samples(offsets, mesh->triangle_count, most > mesh->vertex_count ? most - mesh->vertex_count : 0, &counts);
+
+  samples->vertex_count = mesh->vertex_count;
+  samples->count = mesh->vertex_count + counts.added;
+  samples->positions = qmat_alloc(3 * samples->count, sizeof *samples->positions);
+  samples->facets = qmat_alloc(samples->count, sizeof *samples->facets);
+  samples->barycentrics = qmat_alloc(3 * samples->count, sizeof *samples->barycentrics);
+  if (samples->positions == NULL || samples->facets == NULL || samples->barycentrics == NULL) {
+    status = qmat_fail_memory(context, "the samples");
+    goto done;
+  }
+  status = sample_vertices(context, mesh, samples);
+  if (status == QMAT_OK) status = sample_facets(context, params, mesh, unit_positions, offsets, samples);
+  if (status == QMAT_OK) status = fill_report(context, mesh, &counts, report);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &samples->base);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
+done:
+  if (status == QMAT_OK) {
+    outputs[0] = &samples->base;
+    outputs[1] = &report->base;
+    return QMAT_OK;
+  }
+  if (samples != NULL) qmat_value_release(&samples->base);
+  if (report != NULL) qmat_value_release(&report->base);
+  return status;
+}
+
+static const qmat_param params[] = {
+    {.name = "theta",
+     .unit = "1",
+     .doc = "A facet is thin up to this share of the mean thickness (eq. 8)",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.5,
+     .min = 0,
+     .max = 10,
+     .offset = offsetof(mesh_sample_params, theta)},
+    {.name = "n_f",
+     .unit = "samples",
+     .doc = "Samples that a thin facet gets beyond those for its area (eq. 7)",
+     .type = QMAT_PARAM_INT,
+     .default_number = 1,
+     .min = 0,
+     .max = 16,
+     .offset = offsetof(mesh_sample_params, n_f)},
+    {.name = "lloyd_rounds",
+     .unit = "rounds",
+     .doc = "Rounds of Lloyd's relaxation on each facet",
+     .type = QMAT_PARAM_INT,
+     .default_number = 5,
+     .min = 0,
+     .max = 100,
+     .offset = offsetof(mesh_sample_params, lloyd_rounds)},
+    {.name = "max_per_facet",
+     .unit = "samples",
+     .doc = "The most samples that are added to one facet",
+     .type = QMAT_PARAM_INT,
+     .default_number = MOST_PER_FACET,
+     .min = 0,
+     .max = MOST_PER_FACET,
+     .offset = offsetof(mesh_sample_params, max_per_facet)},
+    {.name = "max_samples",
+     .unit = "samples",
+     .doc = "The most samples in all; beyond it all facets get proportionally fewer, vertices always stay",
+     .type = QMAT_PARAM_INT,
+     .default_number = 4000000,
+     .min = 0,
+     .max = 100000000,
+     .offset = offsetof(mesh_sample_params, max_samples)},
+    {.name = "seed",
+     .unit = "",
+     .doc = "Selects the random points that the relaxation starts from",
+     .type = QMAT_PARAM_INT,
+     .default_number = 0,
+     .min = 0,
+     .max = UINT32_MAX,
+     .offset = offsetof(mesh_sample_params, seed)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface; every vertex lies on a triangle"},
+    {.name = "thickness", .type = QMAT_FIELD, .doc = "The thickness of each facet, from mesh.sdf"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "samples", .type = QMAT_SAMPLES, .doc = "All vertices, then the added points facet by facet"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "How many samples there are, and why"},
+    {0},
+};
+
+const qmat_node qmat_node_mesh_sample = {
+    .name = "mesh.sample",
+    .version = 1,
+    .summary = "Spread points over a surface, more of them on large and on thin facets",
+    .doc =
+        "Every vertex is a sample. A facet gets as many more as the smallest facet around it fits into it, less one, "
+        "and n_f more where it is thin. Neighbours count as at least a thousandth of the median area; degenerate "
+        "facets get none and are nobody's neighbours. A single sample lies at the centroid; several start at random "
+        "and are spread by Lloyd's relaxation on the facet's bounded Voronoi diagram, in which the corners stay. The "
+        "report counts samples, vertices and added ones; added_by_area and added_by_thickness (before max_samples); "
+        "thin and degenerate facets; facets capped by max_per_facet; and samples dropped by max_samples.",
+    .citation = "section 3.2, eq. 7 and 8; Tournois et al. 2010",
+    .params_size = sizeof(mesh_sample_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};

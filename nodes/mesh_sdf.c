@@ -1,0 +1,327 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* mesh.sdf: the thickness of a solid at each facet, by its shape diameter function (section 3.2). */
+#include <math.h>
+#include <string.h>
+
+#include "core/node.h"
+#include "core/surface.h"
+#include "core/triangle.h"
+
+#define MOST_RAYS 1024
+/* Rays start at the facet; its own plane is met at a distance of rounding. In the unit frame. */
+#define RAY_START 1e-9
+/* Cosine between the facet's normal and the normal of what a ray hits above which the hit is refused. A little above
+ * zero, so that walls at a right angle do not come and go with rounding. */
+#define SAME_SIDE 1e-6
+/* Facets around one vertex that are asked for their value: a fan of thousands must not cost its square. */
+#define MOST_NEIGHBOURS 256
+
+typedef struct mesh_sdf_params {
+  double cone_angle;
+  int64_t rays;
+} mesh_sdf_params;
+
+typedef enum facet_state { MEASURED, NO_VALID_RAY, DEGENERATE } facet_state;
+
+/* A ray in a facet's own frame (first edge, its perpendicular, inward normal), and its weight. */
+typedef struct cone_ray {
+  double direction[3];
+  double weight;
+} cone_ray;
+
+/* The facets around each vertex, in rising order: those of vertex v are facets[offsets[v] .. offsets[v + 1]). */
+typedef struct vertex_facets {
+  size_t *offsets;
+  uint32_t *facets;
+} vertex_facets;
+
+/* The same number of rays for equal parts of the cone's solid angle, turned by the golden angle from one to the next
+ * (Vogel 1979). Weights are the inverse of the angle to the axis, as in Shapira et al. 2008, section 3.1. */
+static void make_cone(double full_angle, size_t count, cone_ray *rays) {
+  const double pi = 3.14159265358979323846, golden_angle = 2.39996322972865332223;
+  if (count == 1) {
+    rays[0] = (cone_ray){{0, 0, 1}, 1};
+    return;
+  }
+  const double cap = 1 - cos(0.5 * full_angle * pi / 180);
+  for (size_t i = 0; i < count; i++) {
+    const double height = 1 - cap * ((double)i + 0.5) / (double)count, turn = golden_angle * (double)i;
+    const double reach = sqrt(1 - height * height);
+    rays[i] = (cone_ray){{reach * cos(turn), reach * sin(turn), height}, 1 / acos(height)};
+  }
+}
+
+/* Shell sort: in place, no allocation, fast for the few dozen rays of a facet (gaps of Ciura 2001). */
+static void sort_numbers(double *numbers, size_t count) {
+  static const size_t gaps[] = {701, 301, 132, 57, 23, 10, 4, 1};
+  for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; g++) {
+    for (size_t i = gaps[g]; i < count; i++) {
+      const double moved = numbers[i];
+      size_t j = i;
+      for (; j >= gaps[g] && numbers[j - gaps[g]] > moved; j -= gaps[g]) numbers[j] = numbers[j - gaps[g]];
+      numbers[j] = moved;
+    }
+  }
+}
+
+/* Sorts the numbers; the mean of the middle two when their count is even. */
+static double median_of(double *numbers, size_t count) {
+  sort_numbers(numbers, count);
+  return count % 2 == 1 ? numbers[count / 2] : 0.5 * (numbers[count / 2 - 1] + numbers[count / 2]);
+}
+
+/* The weighted mean of the lengths within 1.5 median absolute deviations of their median. */
+static double robust_mean(const double *lengths, const double *weights, size_t count) {
+  double scratch[MOST_RAYS];
+  memcpy(scratch, lengths, count * sizeof *scratch);
+  const double median = median_of(scratch, count);
+  for (size_t i = 0; i < count; i++) scratch[i] = fabs(lengths[i] - median);
+  /* Equal lengths deviate by rounding only. */
+  const double reach = 1.5 * median_of(scratch, count) + 1e-9 * median;
+  double sum = 0, total = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (fabs(lengths[i] - median) > reach) continue;
+    sum += weights[i] * lengths[i];
+    total += weights[i];
+  }
+  return sum / total; /* half of the lengths are within one deviation, so there are some */
+}
+
+static facet_state measure_facet(const qmat_surface *surface, const cone_ray *rays, size_t ray_count, uint32_t facet,
+                                 double *thickness) {
+  const uint32_t *ids = qmat_surface_mesh(surface)->triangles + 3 * (size_t)facet;
+  const double *positions = qmat_surface_positions(surface);
+  const double *a = positions + 3 * (size_t)ids[0], *b = positions + 3 * (size_t)ids[1],
+               *c = positions + 3 * (size_t)ids[2];
+  double normal[3], first[3], second[3], centroid[3];
+  if (!(qmat_triangle_area(a, b, c, normal) > 0)) return DEGENERATE;
+  double length = 0;
+  for (int k = 0; k < 3; k++) {
+    first[k] = b[k] - a[k];
+    length += first[k] * first[k];
+    centroid[k] = (a[k] + b[k] + c[k]) / 3;
+  }
+  length = sqrt(length);
+  for (int k = 0; k < 3; k++) first[k] /= length;
+  second[0] = normal[1] * first[2] - normal[2] * first[1];
+  second[1] = normal[2] * first[0] - normal[0] * first[2];
+  second[2] = normal[0] * first[1] - normal[1] * first[0];
+
+  double lengths[MOST_RAYS], weights[MOST_RAYS];
+  size_t count = 0;
+  for (size_t i = 0; i < ray_count; i++) {
+    const double *local = rays[i].direction;
+    double direction[3], hit_normal[3], distance;
+    for (int k = 0; k < 3; k++) direction[k] = local[0] * first[k] + local[1] * second[k] - local[2] * normal[k];
+    if (!qmat_surface_cast(surface, centroid, direction, RAY_START, &distance, NULL, hit_normal)) continue;
+    /* A surface that faces the same way was met from outside (Shapira et al. 2008, section 3.1). */
+    if (hit_normal[0] * normal[0] + hit_normal[1] * normal[1] + hit_normal[2] * normal[2] > SAME_SIDE) continue;
+    lengths[count] = distance;
+    weights[count++] = rays[i].weight;
+  }
+  if (count == 0) return NO_VALID_RAY;
+  *thickness = robust_mean(lengths, weights, count);
+  return MEASURED;
+}
+
+static qmat_status collect_vertex_facets(qmat_context *context, const qmat_mesh *mesh, vertex_facets *around) {
+  around->offsets = qmat_arena_calloc(&context->arena, mesh->vertex_count + 2, sizeof *around->offsets);
+  around->facets = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *around->facets);
+  if (around->offsets == NULL || around->facets == NULL) return qmat_fail_memory(context, "the facets around vertices");
+  size_t *offsets = around->offsets;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) offsets[mesh->triangles[i] + 2]++;
+  for (size_t v = 0; v < mesh->vertex_count; v++) offsets[v + 2] += offsets[v + 1];
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    around->facets[offsets[mesh->triangles[i] + 1]++] = (uint32_t)(i / 3);
+  }
+  return QMAT_OK;
+}
+
+static double squared_centroid_distance(const qmat_surface *surface, uint32_t left, uint32_t right) {
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  double square = 0;
+  for (size_t k = 0; k < 3; k++) {
+    double offset = 0;
+    for (size_t corner = 0; corner < 3; corner++) {
+      offset += positions[3 * (size_t)mesh->triangles[3 * (size_t)left + corner] + k];
+      offset -= positions[3 * (size_t)mesh->triangles[3 * (size_t)right + corner] + k];
+    }
+    square += offset * offset;
+  }
+  return square;
+}
+
+/* The value for a facet that has none, from the facets at its corners that have one (`known`): the median for one
+ * without a valid ray, the nearest one's for a degenerate one; `otherwise` when there are none. */
+static double borrow_value(const qmat_surface *surface, const vertex_facets *around, const double *values,
+                           const uint8_t *known, uint32_t facet, bool nearest, double otherwise) {
+  const uint32_t *ids = qmat_surface_mesh(surface)->triangles + 3 * (size_t)facet;
+  double found[3 * MOST_NEIGHBOURS], best = INFINITY;
+  uint32_t best_facet = UINT32_MAX;
+  size_t count = 0;
+  for (int corner = 0; corner < 3; corner++) {
+    const size_t begin = around->offsets[ids[corner]], end = around->offsets[ids[corner] + 1];
+    for (size_t i = begin; i < end && i < begin + MOST_NEIGHBOURS; i++) {
+      const uint32_t other = around->facets[i];
+      const uint32_t *theirs = qmat_surface_mesh(surface)->triangles + 3 * (size_t)other;
+      bool seen = !known[other];
+      for (int earlier = 0; earlier < corner; earlier++) {
+        for (int k = 0; k < 3; k++) seen |= theirs[k] == ids[earlier];
+      }
+      if (seen) continue;
+      const double distance = nearest ? squared_centroid_distance(surface, facet, other) : 0;
+      if (distance < best || (distance == best && other < best_facet)) {
+        best = distance;
+        best_facet = other;
+      }
+      found[count++] = values[other];
+    }
+  }
+  if (count == 0) return otherwise;
+  return nearest ? values[best_facet] : median_of(found, count);
+}
+
+/* Gives values to the facets that could not be measured. */
+static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface, const uint8_t *states,
+                             double *values) {
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const size_t count = mesh->triangle_count;
+  size_t measured = 0;
+  double sum = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (states[i] != MEASURED) continue;
+    measured++;
+    sum += values[i];
+  }
+  if (measured == count) return QMAT_OK;
+  if (measured == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "no ray from any facet meets an opposite side: the mesh encloses nothing");
+    qmat_fail_field(context, "mesh");
+    return qmat_fail_hint(context, "the normals of a solid point outwards");
+  }
+  const double mean = sum / (double)measured;
+  vertex_facets around;
+  uint8_t *known = qmat_arena_alloc(&context->arena, count, sizeof *known);
+  if (known == NULL) return qmat_fail_memory(context, "the facets' states");
+  qmat_status status = collect_vertex_facets(context, mesh, &around);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < count; i++) known[i] = states[i] == MEASURED;
+  for (size_t i = 0; i < count; i++) {
+    if (states[i] == NO_VALID_RAY) values[i] = borrow_value(surface, &around, values, known, (uint32_t)i, false, mean);
+  }
+  for (size_t i = 0; i < count; i++) known[i] = states[i] != DEGENERATE;
+  for (size_t i = 0; i < count; i++) {
+    if (states[i] == DEGENERATE) values[i] = borrow_value(surface, &around, values, known, (uint32_t)i, true, mean);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status measure_facets(qmat_context *context, const qmat_surface *surface, const cone_ray *rays,
+                                  size_t ray_count, uint8_t *states, double *values) {
+  const size_t count = qmat_surface_mesh(surface)->triangle_count;
+  /* About a tenth of a second of rays between two looks at the progress function. */
+  const size_t slice = 100000 / ray_count + 1;
+  const int threads = qmat_threads(context);
+  for (size_t begin = 0; begin < count; begin += slice) {
+    const size_t end = count - begin < slice ? count : begin + slice;
+#pragma omp parallel for schedule(dynamic, 16) num_threads(threads)
+    for (size_t i = begin; i < end; i++) {
+      states[i] = (uint8_t)measure_facet(surface, rays, ray_count, (uint32_t)i, values + i);
+    }
+    const qmat_status status = qmat_progress(context, end, count, "facets");
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const mesh_sdf_params *params = raw_params;
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  const size_t ray_count = (size_t)params->rays;
+  qmat_surface *surface = NULL;
+  qmat_field *field = NULL;
+  qmat_status status = qmat_surface_new(context, mesh, &surface);
+  if (status != QMAT_OK) goto done;
+
+  cone_ray *rays = qmat_arena_alloc(&context->arena, ray_count, sizeof *rays);
+  uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
+  field = qmat_field_new();
+  if (field != NULL) {
+    field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
+    field->unit = qmat_strdup("model unit");
+  }
+  if (rays == NULL || states == NULL || field == NULL || field->values == NULL || field->unit == NULL) {
+    status = qmat_fail_memory(context, "the thickness");
+    goto done;
+  }
+  field->count = mesh->triangle_count;
+  field->domain = QMAT_PER_FACET;
+
+  make_cone(params->cone_angle, ray_count, rays);
+  status = measure_facets(context, surface, rays, ray_count, states, field->values);
+  if (status == QMAT_OK) status = fill_gaps(context, surface, states, field->values);
+  if (status != QMAT_OK) goto done;
+  for (size_t i = 0; i < field->count; i++) field->values[i] *= qmat_surface_frame(surface)->diagonal;
+  status = qmat_value_seal(context, &field->base);
+done:
+  qmat_surface_free(surface);
+  if (status == QMAT_OK) {
+    outputs[0] = &field->base;
+  } else if (field != NULL) {
+    qmat_value_release(&field->base);
+  }
+  return status;
+}
+
+static const qmat_param params[] = {
+    {.name = "cone_angle",
+     .unit = "degrees",
+     .doc = "Full angle of the cone of rays around the inward normal",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 120,
+     .min = 10,
+     .max = 170,
+     .offset = offsetof(mesh_sdf_params, cone_angle)},
+    {.name = "rays",
+     .unit = "rays",
+     .doc = "Rays per facet; a single one follows the inward normal",
+     .type = QMAT_PARAM_INT,
+     .default_number = 30,
+     .min = 1,
+     .max = MOST_RAYS,
+     .offset = offsetof(mesh_sdf_params, rays)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface of a solid, normals outwards"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "thickness", .type = QMAT_FIELD, .doc = "The shape diameter of each facet, in model units"},
+    {0},
+};
+
+const qmat_node qmat_node_mesh_sdf = {
+    .name = "mesh.sdf",
+    .version = 1,
+    .summary = "Measure how thick a solid is at each facet",
+    .doc =
+        "The shape diameter function: from each facet's centroid a fixed pattern of rays goes into the solid within a "
+        "cone around the inward normal. Hits on surfaces that face the same way as the facet are ignored. The "
+        "thickness is the mean of the ray lengths within 1.5 median absolute deviations of their median, weighted by "
+        "the inverse of the angle to the normal. It is neither smoothed nor normalised. Facets without a valid ray "
+        "take the median of the facets at their corners, or the mean of all; degenerate facets take the value of the "
+        "nearest facet at their corners.",
+    .citation =
+        "section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
+        "diameter function",
+    .params_size = sizeof(mesh_sdf_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};
