@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/control_points.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/envelope.h"
+#include "core/medial_distance.h"
+
+enum { FINEST_GRID = 256 };
+
+/* Into how many parts the sides of facet t are divided. */
+static uint32_t grid_of(const double *positions, const uint32_t *corners, double spacing) {
+  double longest = 0;
+  for (int k = 0; k < 3; k++) {
+    const double *a = &positions[3 * (size_t)corners[k]], *b = &positions[3 * (size_t)corners[(k + 1) % 3]];
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    longest = fmax(longest, x * x + y * y + z * z);
+  }
+  const double parts = ceil(sqrt(longest) / spacing);
+  return parts < 1 ? 1 : parts > FINEST_GRID ? FINEST_GRID : (uint32_t)parts;
+}
+
+/* Points inside a facet's grid, and on those of its sides that run from a smaller to a larger vertex, so that the facet
+ * across has the others. */
+static size_t grid_points(const uint32_t *corners, uint32_t parts) {
+  size_t count = (size_t)(parts - 1) * (parts - 2) / 2;
+  for (int k = 0; k < 3; k++)
+    if (corners[k] < corners[(k + 1) % 3]) count += parts - 1;
+  return parts < 2 ? 0 : count;
+}
+
+static void fill_grid(const double *positions, const uint32_t *corners, uint32_t parts, double *points) {
+  const double *p[3];
+  for (int k = 0; k < 3; k++) p[k] = &positions[3 * (size_t)corners[k]];
+  for (uint32_t i = 0; i <= parts; i++)
+    for (uint32_t j = 0; i + j <= parts; j++) {
+      const uint32_t w[3] = {parts - i - j, i, j};
+      const int zeros = (w[0] == 0) + (w[1] == 0) + (w[2] == 0);
+      if (zeros > 1) continue;
+      if (zeros == 1) {
+        const int opposite = w[0] == 0 ? 0 : w[1] == 0 ? 1 : 2;
+        if (corners[(opposite + 1) % 3] > corners[(opposite + 2) % 3]) continue;
+      }
+      for (int d = 0; d < 3; d++) points[d] = (w[0] * p[0][d] + w[1] * p[1][d] + w[2] * p[2][d]) / parts;
+      points += 3;
+    }
+}
+
+/* Which spheres answer for each sample, and which samples lie in each facet besides its corners. */
+typedef struct {
+  const qmat_mesh *mesh;
+  const qmat_complex *complex;
+  size_t *sphere_starts; /* per sample, + 1 */
+  uint32_t *spheres;
+} answering;
+
+static qmat_status find_answering(qmat_context *context, const qmat_samples *samples, const qmat_medial *medial,
+                                  answering *a) {
+  a->sphere_starts = qmat_arena_calloc(&context->arena, samples->count + 2, sizeof *a->sphere_starts);
+  a->spheres = qmat_arena_alloc(&context->arena, medial->region_sample_count, sizeof *a->spheres);
+  if (!a->sphere_starts || !a->spheres) return qmat_fail_memory(context, "responsible regions");
+  for (size_t i = 0; i < medial->region_sample_count; i++) {
+    if (medial->region_samples[i] >= samples->count) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh answers for sample %u of %zu: it belongs to others",
+                medial->region_samples[i], samples->count);
+      return qmat_fail_field(context, "medial");
+    }
+    a->sphere_starts[medial->region_samples[i] + 2]++;
+  }
+  for (size_t i = 0; i < samples->count; i++) a->sphere_starts[i + 2] += a->sphere_starts[i + 1];
+  if (medial->region_offset_count)
+    for (size_t v = 0; v < medial->sphere_count; v++)
+      for (uint32_t i = medial->region_offsets[v]; i < medial->region_offsets[v + 1]; i++)
+        a->spheres[a->sphere_starts[medial->region_samples[i] + 1]++] = (uint32_t)v;
+  return QMAT_OK;
+}
+
+typedef struct {
+  double distance;
+  uint32_t vertices[3];
+  double weights[3];
+} witness;
+
+static void take_sphere(const answering *a, const double *point, uint32_t sample, witness *best) {
+  for (size_t i = a->sphere_starts[sample]; i < a->sphere_starts[sample + 1]; i++) {
+    const uint32_t v = a->spheres[i];
+    const double f = qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point);
+    if (f < best->distance) *best = (witness){f, {v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+  }
+}
+
+/* The primitives at a sphere. */
+static void take_star(const qmat_complex *complex, const double *point, uint32_t vertex, witness *best) {
+  size_t count;
+  const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
+    qmat_slab slab;
+    witness w = {.vertices = {t[0], t[1], t[2]}};
+    qmat_slab_prepare(&slab, &complex->spheres[4 * (size_t)t[0]], &complex->spheres[4 * (size_t)t[1]],
+                      &complex->spheres[4 * (size_t)t[2]]);
+    w.distance = qmat_slab_foot(&slab, point, w.weights);
+    if (w.distance < best->distance) *best = w;
+  }
+  at = qmat_complex_edges_at(complex, vertex, &count);
+  for (size_t i = 0; i < count; i++) {
+    if (complex->edge_triangles[at[i]]) continue;
+    const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
+    qmat_cone cone;
+    witness w = {.vertices = {ends[0], ends[1], QMAT_NONE}};
+    qmat_cone_prepare(&cone, &complex->spheres[4 * (size_t)ends[0]], &complex->spheres[4 * (size_t)ends[1]]);
+    w.distance = qmat_cone_foot(&cone, point, w.weights);
+    if (w.distance < best->distance) *best = w;
+  }
+}
+
+/* A point is content with a sphere that comes this close, as a part of epsilon; else it looks at the primitives around,
+ * and when those are farther than the second part it asks the whole envelope. */
+static const double content_with_sphere = 0.1, content_with_star = 0.5;
+
+static void store(qmat_control_points *control, size_t i, const witness *w) {
+  memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
+  memcpy(&control->weights[3 * i], w->weights, sizeof w->weights);
+  control->distances[i] = w->distance;
+}
+
+static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count,
+                        double epsilon, witness *best) {
+  *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
+  for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
+  if (!(best->distance > content_with_sphere * epsilon)) return;
+  for (size_t k = 0; k < count; k++)
+    for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++)
+      take_star(a->complex, point, a->spheres[i], best);
+}
+
+/* The nearest primitive of all, for the points that the regions leave far from their spheres. */
+static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double epsilon,
+                                qmat_control_points *control) {
+  size_t far = 0;
+  for (size_t i = 0; i < control->count; i++) far += !(control->distances[i] <= content_with_star * epsilon);
+  if (far == 0) return QMAT_OK;
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_new(context, complex->spheres, complex->vertex_count, complex->edges,
+                                         complex->edge_count, complex->triangles, complex->triangle_count, &envelope);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+  for (size_t i = 0; i < control->count; i++) {
+    if (control->distances[i] <= content_with_star * epsilon) continue;
+    const double *p = &control->points[3 * i];
+    size_t primitive;
+    witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
+    qmat_envelope_distance(envelope, p, &primitive);
+    const int count = qmat_envelope_primitive(envelope, primitive, w.vertices);
+    const double *s[3] = {NULL, NULL, NULL};
+    for (int k = 0; k < count; k++) s[k] = &complex->spheres[4 * (size_t)w.vertices[k]];
+    qmat_slab slab;
+    qmat_cone cone;
+    if (count == 3) {
+      qmat_slab_prepare(&slab, s[0], s[1], s[2]);
+      w.distance = qmat_slab_foot(&slab, p, w.weights);
+    } else if (count == 2) {
+      qmat_cone_prepare(&cone, s[0], s[1]);
+      w.distance = qmat_cone_foot(&cone, p, w.weights);
+    } else {
+      w.weights[0] = 1;
+      w.distance = qmat_sphere_distance(s[0], p);
+    }
+    for (int k = count; k < 3; k++) w.vertices[k] = QMAT_NONE;
+    store(control, i, &w);
+  }
+  qmat_envelope_free(envelope);
+  return QMAT_OK;
+}
+
+qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
+                                     size_t most, qmat_control_points *control) {
+  qmat_arena *arena = &context->arena;
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.5 * epsilon};
+  size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
+  uint32_t *parts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *parts);
+  answering a = {.mesh = mesh, .complex = complex};
+  if (!starts || !parts) return qmat_fail_memory(context, "control points");
+  qmat_status status = find_answering(context, samples, medial, &a);
+  if (status != QMAT_OK) return status;
+  for (size_t added = most + 1; added > most; control->spacing *= 1.25) {
+    added = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+      parts[t] = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
+      starts[t] = samples->count + added;
+      added += grid_points(&mesh->triangles[3 * t], parts[t]);
+    }
+    control->count = samples->count + added;
+  }
+  control->spacing /= 1.25;
+  control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
+  control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
+  if (!control->points || !control->witnesses || !control->weights || !control->distances)
+    return qmat_fail_memory(context, "control points");
+  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, control->points);
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+  for (size_t i = 0; i < samples->count; i++) {
+    const uint32_t sample = (uint32_t)i;
+    witness best;
+    look_around(&a, &control->points[3 * i], &sample, 1, epsilon, &best);
+    store(control, i, &best);
+  }
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const uint32_t *corners = &mesh->triangles[3 * t];
+    const size_t count = grid_points(corners, parts[t]);
+    if (count) fill_grid(positions, corners, parts[t], &control->points[3 * starts[t]]);
+    for (size_t i = starts[t]; i < starts[t] + count; i++) {
+      witness best;
+      look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);
+      store(control, i, &best);
+    }
+  }
+  return ask_envelope(context, complex, epsilon, control);
+}

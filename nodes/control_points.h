@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_CONTROL_POINTS_H
+#define QMAT_NODES_CONTROL_POINTS_H
+
+#include "core/medial_complex.h"
+#include "core/surface.h"
+
+/* The points of the surface at which the distance to the envelope is held: the samples, then a grid on each facet that
+ * is large against the wanted error. Each comes with its first witness. All arrays live in the context's arena. */
+typedef struct qmat_control_points {
+  size_t count, sample_count;
+  double *points;      /* 3 per point, unit frame */
+  uint32_t *witnesses; /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
+  double *weights;     /* 3 per point */
+  double *distances;   /* per point: F at the witness */
+  double spacing;      /* of the grid, unit frame */
+} qmat_control_points;
+
+/* Makes the control points of a model whose medial mesh `complex` (unit frame) is not yet changed. `medial` gives the
+ * responsible regions; without any the envelope is searched. `epsilon` is the error that is to be held (unit frame,
+ * > 0, may be INFINITY: samples only). At most `most` points are added; the spacing grows until they are few enough.
+ * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples). Uses all threads. */
+qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
+                                     size_t most, qmat_control_points *control);
+
+#endif

@@ -1,0 +1,637 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.delaunay: the initial medial mesh from the Delaunay tetrahedra of surface samples (Algorithm 1). */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/medial_build.h"
+#include "core/node.h"
+#include "core/surface.h"
+#include "core/thickness.h"
+#include "nodes/delaunay_cgal.h"
+
+typedef enum { COMPLETION_THIN, COMPLETION_ALL } completion;
+typedef enum { RADIUS_DISTANCE, RADIUS_CIRCUMRADIUS } radius_rule;
+
+typedef struct {
+  double theta;
+  int completion;
+  int radius;
+  double merge;
+  double speck;
+} medial_delaunay_params;
+
+#define NONE UINT32_MAX
+
+typedef enum { CELL_DROPPED, CELL_CIRCUMCENTRE, CELL_INCENTRE } cell_kind;
+
+/* What is known while the node runs; all arrays live in the context's arena. */
+typedef struct {
+  qmat_context *context;
+  const medial_delaunay_params *params;
+  const qmat_mesh *mesh;
+  const qmat_samples *samples;
+  qmat_surface *surface;
+  const double *points; /* samples in the unit frame */
+  const uint8_t *thin;  /* per sample */
+  qmat_tetrahedra cells;
+  uint8_t *kinds;    /* per cell */
+  double *spheres;   /* 4 per cell, unit frame */
+  uint32_t *sphere_of; /* per cell: its medial vertex, or NONE */
+  size_t sphere_count;
+  uint32_t *edges, *triangles;
+  size_t edge_count, triangle_count;
+  size_t torn_rings;
+} delaunay;
+
+static void subtract(const double *a, const double *b, double *d) {
+  for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+}
+
+static double dot(const double *a, const double *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double *a, const double *b, double *c) {
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double distance(const double *a, const double *b) {
+  double d[3];
+  subtract(a, b, d);
+  return sqrt(dot(d, d));
+}
+
+/* The circumcentre and circumradius of a tetrahedron; false when it is too flat to have one inside the unit frame. */
+static bool circumsphere(const double *const p[4], double sphere[4]) {
+  double e[3][3], square[3], normal[3][3];
+  for (int k = 0; k < 3; k++) {
+    subtract(p[k + 1], p[0], e[k]);
+    square[k] = dot(e[k], e[k]);
+  }
+  for (int k = 0; k < 3; k++) cross(e[(k + 1) % 3], e[(k + 2) % 3], normal[k]);
+  const double determinant = dot(e[0], normal[0]);
+  if (determinant == 0) return false;
+  double offset[3];
+  for (int i = 0; i < 3; i++) {
+    offset[i] =
+        (square[0] * normal[0][i] + square[1] * normal[1][i] + square[2] * normal[2][i]) / (2 * determinant);
+    sphere[i] = p[0][i] + offset[i];
+    if (!(fabs(sphere[i]) <= 0.5)) return false; /* outside the bounding box, or not finite */
+  }
+  sphere[3] = sqrt(dot(offset, offset));
+  return true;
+}
+
+/* The centre of the inscribed sphere: the corners weighted by the areas of the facets opposite them. */
+static void incentre(const double *const p[4], double centre[3]) {
+  double total = 0, sum[3] = {0, 0, 0};
+  for (int k = 0; k < 4; k++) {
+    const double *a = p[(k + 1) & 3], *b = p[(k + 2) & 3], *c = p[(k + 3) & 3];
+    double ab[3], ac[3], n[3];
+    subtract(b, a, ab);
+    subtract(c, a, ac);
+    cross(ab, ac, n);
+    const double area = sqrt(dot(n, n));
+    for (int i = 0; i < 3; i++) sum[i] += area * p[k][i];
+    total += area;
+  }
+  for (int i = 0; i < 3; i++)
+    centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
+}
+
+/* Algorithm 1 for one tetrahedron. With completion "all" a tetrahedron belongs to the solid when its incentre does;
+ * its medial vertex is the circumcentre where that is inside too. */
+static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sphere[4]) {
+  const uint32_t *corner = &d->cells.corners[4 * cell];
+  const double *p[4];
+  bool thin = true;
+  for (int k = 0; k < 4; k++) {
+    p[k] = &d->points[3 * (size_t)corner[k]];
+    thin = thin && d->thin[corner[k]];
+  }
+  double centre[3];
+  incentre(p, centre);
+  const bool all = d->params->completion == COMPLETION_ALL;
+  const bool in_solid = (all || thin) && qmat_surface_inside(d->surface, centre);
+  if (all && !in_solid) return CELL_DROPPED;
+  if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
+    if (d->params->radius == RADIUS_DISTANCE) {
+      const double nearest = qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL);
+      if (nearest < sphere[3]) sphere[3] = nearest;
+    }
+    return CELL_CIRCUMCENTRE;
+  }
+  if (!in_solid) return CELL_DROPPED;
+  memcpy(sphere, centre, sizeof centre);
+  sphere[3] = qmat_surface_distance(d->surface, centre, INFINITY, NULL, NULL);
+  return CELL_INCENTRE;
+}
+
+static qmat_status select_medial_vertices(delaunay *d) {
+  qmat_context *context = d->context;
+  const size_t count = d->cells.count, slice = 1 << 15;
+  d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);
+  d->spheres = qmat_arena_alloc(&context->arena, count, 4 * sizeof *d->spheres);
+  if (!d->kinds || !d->spheres) return qmat_fail_memory(context, "medial vertices");
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < count; first += slice) {
+    const qmat_status status = qmat_progress(context, first, count, "tetrahedra");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < count ? first + slice : count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t cell = first; cell < last; cell++)
+      d->kinds[cell] = (uint8_t)select_medial_vertex(d, cell, &d->spheres[4 * cell]);
+  }
+  return QMAT_OK;
+}
+
+static uint32_t find_root(uint32_t *parent, uint32_t i) {
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
+  }
+  return i;
+}
+
+/* Joins two sets; the smaller id leads, so that the result does not depend on the order. */
+static void join(uint32_t *parent, uint32_t a, uint32_t b) {
+  a = find_root(parent, a);
+  b = find_root(parent, b);
+  if (a < b) parent[b] = a;
+  if (b < a) parent[a] = b;
+}
+
+/* Numbers the medial vertices: one for each set of adjacent kept tetrahedra whose centres coincide. */
+static qmat_status number_medial_vertices(delaunay *d) {
+  const size_t count = d->cells.count;
+  uint32_t *parent = qmat_arena_alloc(&d->context->arena, count, sizeof *parent);
+  d->sphere_of = qmat_arena_alloc(&d->context->arena, count, sizeof *d->sphere_of);
+  if (!parent || !d->sphere_of) return qmat_fail_memory(d->context, "medial vertices");
+  for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
+  for (size_t i = 0; i < count; i++) {
+    if (!d->kinds[i]) continue;
+    for (int k = 0; k < 4; k++) {
+      const uint32_t j = d->cells.neighbours[4 * i + (size_t)k];
+      if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
+      if (distance(&d->spheres[4 * i], &d->spheres[4 * (size_t)j]) <= d->params->merge) join(parent, (uint32_t)i, j);
+    }
+  }
+  uint32_t next = 0;
+  for (size_t i = 0; i < count; i++) {
+    d->sphere_of[i] = NONE;
+    if (!d->kinds[i]) continue;
+    const uint32_t root = find_root(parent, (uint32_t)i);
+    d->sphere_of[i] = root == i ? next++ : d->sphere_of[root];
+  }
+  d->sphere_count = next;
+  return QMAT_OK;
+}
+
+/* The corner pairs of a tetrahedron's edges. */
+static const uint8_t edge_corners[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+static int corner_index(const uint32_t *corners, uint32_t id) {
+  for (int k = 0; k < 3; k++)
+    if (corners[k] == id) return k;
+  return 3;
+}
+
+/* Walks the tetrahedra around the Delaunay edge (a, b) from `start`. Returns their number when the ring is closed,
+ * `start` is its smallest tetrahedron and every member is kept; else 0, with `*torn` telling a ring that is only
+ * partly kept (counted once, at its smallest kept tetrahedron, is left to the caller). */
+static size_t walk_ring(const delaunay *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring, size_t capacity,
+                        bool *torn) {
+  *torn = false;
+  const uint32_t *corners = &d->cells.corners[4 * (size_t)start];
+  int across = 0;
+  while (corners[across] == a || corners[across] == b) across++;
+  uint32_t cell = start;
+  uint32_t leaving = corners[across]; /* the next tetrahedron is across the facet opposite this corner */
+  size_t count = 0;
+  do {
+    if (cell < start) return 0;
+    if (count == capacity) return 0;
+    ring[count++] = cell;
+    corners = &d->cells.corners[4 * (size_t)cell];
+    uint32_t entering = NONE;
+    for (int k = 0; k < 4; k++)
+      if (corners[k] != a && corners[k] != b && corners[k] != leaving) entering = corners[k];
+    const uint32_t next = d->cells.neighbours[4 * (size_t)cell + (size_t)corner_index(corners, leaving)];
+    if (next == QMAT_NO_TETRAHEDRON || !d->kinds[next]) {
+      *torn = true;
+      return 0;
+    }
+    cell = next;
+    leaving = entering;
+  } while (cell != start);
+  return count;
+}
+
+enum { RING_CAPACITY = 4096 };
+
+/* The dual polygon of a ring as a fan from its smallest medial vertex; coincident neighbours fall together. */
+static size_t fan(const uint32_t *polygon, size_t count, uint32_t *triangles) {
+  size_t first = 0, made = 0;
+  for (size_t i = 1; i < count; i++)
+    if (polygon[i] < polygon[first]) first = i;
+  for (size_t i = 1; i + 1 < count; i++) {
+    const uint32_t t[3] = {polygon[first], polygon[(first + i) % count], polygon[(first + i + 1) % count]};
+    if (t[0] == t[1] || t[1] == t[2] || t[0] == t[2]) continue;
+    memcpy(&triangles[3 * made++], t, sizeof t);
+  }
+  return made;
+}
+
+/* Connectivity from the triangulation: an edge across each facet between two kept tetrahedra, and for each Delaunay
+ * edge whose whole ring is kept the dual polygon in triangles. */
+static qmat_status connect(delaunay *d) {
+  qmat_context *context = d->context;
+  const size_t count = d->cells.count;
+  size_t edge_capacity = 0, triangle_capacity = 0;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count; i++) {
+    if (i % 65536 == 0 && (status = qmat_progress(context, i, count, "dual cells")) != QMAT_OK) return status;
+    if (!d->kinds[i]) continue;
+    if (qmat_grow((void **)&d->edges, &edge_capacity, 2 * d->edge_count + 8, sizeof *d->edges))
+      return qmat_fail_memory(context, "medial edges");
+    for (int k = 0; k < 4; k++) {
+      const uint32_t j = d->cells.neighbours[4 * i + (size_t)k];
+      if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j] || d->sphere_of[j] == d->sphere_of[i]) continue;
+      d->edges[2 * d->edge_count] = d->sphere_of[i];
+      d->edges[2 * d->edge_count + 1] = d->sphere_of[j];
+      d->edge_count++;
+    }
+    for (int e = 0; e < 6; e++) {
+      uint32_t ring[RING_CAPACITY];
+      const uint32_t *corners = &d->cells.corners[4 * i];
+      bool torn;
+      size_t n = walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring,
+                           RING_CAPACITY, &torn);
+      d->torn_rings += torn;
+      size_t polygon = 0;
+      for (size_t k = 0; k < n; k++) {
+        const uint32_t sphere = d->sphere_of[ring[k]];
+        if (polygon == 0 || ring[polygon - 1] != sphere) ring[polygon++] = sphere;
+      }
+      while (polygon > 1 && ring[polygon - 1] == ring[0]) polygon--;
+      if (polygon < 3) continue;
+      if (qmat_grow((void **)&d->triangles, &triangle_capacity, 3 * (d->triangle_count + polygon),
+                    sizeof *d->triangles))
+        return qmat_fail_memory(context, "medial slabs");
+      d->triangle_count += fan(ring, polygon, &d->triangles[3 * d->triangle_count]);
+    }
+  }
+  return QMAT_OK;
+}
+
+/* Components of the medial mesh, largest first, so that specks can be told from parts. */
+typedef struct {
+  uint32_t root, size;
+  double largest_radius;
+} component;
+
+static int larger_component(const void *left, const void *right) {
+  const component *a = left, *b = right;
+  if (a->size != b->size) return a->size < b->size ? 1 : -1;
+  return a->root < b->root ? -1 : 1;
+}
+
+/* Which connected part of the surface each vertex of the mesh belongs to, as its smallest vertex. */
+static uint32_t *surface_parts(delaunay *d) {
+  const qmat_mesh *mesh = d->mesh;
+  uint32_t *part = qmat_arena_alloc(&d->context->arena, mesh->vertex_count, sizeof *part);
+  if (!part) return NULL;
+  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = (uint32_t)i;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
+    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
+  }
+  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = find_root(part, (uint32_t)i);
+  return part;
+}
+
+/* Drops specks: components of surface slivers that are no larger than `speck` and touch only parts of the surface that
+ * a larger component answers for. They add no coverage and no topology. */
+static qmat_status drop_specks(delaunay *d, size_t *components, size_t *specks, size_t *speck_spheres) {
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *parent = qmat_arena_alloc(arena, d->sphere_count, sizeof *parent);
+  component *parts = qmat_arena_calloc(arena, d->sphere_count, sizeof *parts);
+  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
+  uint8_t *keep = qmat_arena_calloc(arena, d->sphere_count, sizeof *keep);
+  uint32_t *surface_part = surface_parts(d);
+  uint8_t *answered = qmat_arena_calloc(arena, d->mesh->vertex_count, sizeof *answered);
+  if (!parent || !parts || !index || !keep || !surface_part || !answered)
+    return qmat_fail_memory(d->context, "components");
+  for (size_t i = 0; i < d->sphere_count; i++) parent[i] = (uint32_t)i;
+  for (size_t e = 0; e < d->edge_count; e++) join(parent, d->edges[2 * e], d->edges[2 * e + 1]);
+  size_t count = 0;
+  for (size_t i = 0; i < d->sphere_count; i++) {
+    const uint32_t root = find_root(parent, (uint32_t)i);
+    if (root == i) {
+      index[i] = (uint32_t)count;
+      parts[count++].root = root;
+    }
+    parts[index[root]].size++;
+  }
+  for (size_t cell = 0; cell < d->cells.count; cell++) {
+    if (!d->kinds[cell]) continue;
+    component *part = &parts[index[find_root(parent, d->sphere_of[cell])]];
+    if (d->spheres[4 * cell + 3] > part->largest_radius) part->largest_radius = d->spheres[4 * cell + 3];
+  }
+  /* The surface parts that each component touches, by two passes over the cells in order of component size. */
+  qsort(parts, count, sizeof *parts, larger_component);
+  for (size_t i = 0; i < count; i++) index[parts[i].root] = (uint32_t)i;
+  size_t *offsets = qmat_arena_calloc(arena, count + 2, sizeof *offsets);
+  uint32_t *members = qmat_arena_alloc(arena, d->cells.count, sizeof *members);
+  if (!offsets || !members) return qmat_fail_memory(d->context, "components");
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) offsets[index[find_root(parent, d->sphere_of[cell])] + 2]++;
+  for (size_t i = 0; i < count; i++) offsets[i + 2] += offsets[i + 1];
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) members[offsets[index[find_root(parent, d->sphere_of[cell])] + 1]++] = (uint32_t)cell;
+  for (size_t i = 0; i < count; i++) {
+    bool needed = i == 0 || parts[i].largest_radius > d->params->speck;
+    for (int pass = 0; pass < 2; pass++)
+      for (size_t m = offsets[i]; m < offsets[i + 1]; m++)
+        for (int k = 0; k < 4; k++) {
+          const uint32_t sample = d->cells.corners[4 * (size_t)members[m] + (size_t)k];
+          const uint32_t facet = d->samples->facets[sample];
+          uint8_t *done = &answered[surface_part[d->mesh->triangles[3 * (size_t)facet]]];
+          if (pass == 0 && !*done) needed = true;
+          if (pass == 1 && needed) *done = 1;
+        }
+    keep[i] = needed;
+    *components += needed;
+    *specks += !needed;
+    *speck_spheres += needed ? 0 : parts[i].size;
+  }
+  uint32_t *renumbered = qmat_arena_alloc(arena, d->sphere_count, sizeof *renumbered);
+  if (!renumbered) return qmat_fail_memory(d->context, "medial vertices");
+  uint32_t next = 0;
+  for (size_t i = 0; i < d->sphere_count; i++)
+    renumbered[i] = keep[index[find_root(parent, (uint32_t)i)]] ? next++ : NONE;
+  for (size_t cell = 0; cell < d->cells.count; cell++) {
+    if (!d->kinds[cell]) continue;
+    d->sphere_of[cell] = renumbered[d->sphere_of[cell]];
+    if (d->sphere_of[cell] == NONE) d->kinds[cell] = CELL_DROPPED;
+  }
+  size_t kept = 0;
+  for (size_t e = 0; e < d->edge_count; e++) {
+    const uint32_t a = renumbered[d->edges[2 * e]], b = renumbered[d->edges[2 * e + 1]];
+    if (a == NONE) continue;
+    d->edges[2 * kept] = a;
+    d->edges[2 * kept++ + 1] = b;
+  }
+  d->edge_count = kept;
+  kept = 0;
+  for (size_t t = 0; t < d->triangle_count; t++) {
+    if (renumbered[d->triangles[3 * t]] == NONE) continue;
+    for (int k = 0; k < 3; k++) d->triangles[3 * kept + (size_t)k] = renumbered[d->triangles[3 * t + (size_t)k]];
+    kept++;
+  }
+  d->triangle_count = kept;
+  d->sphere_count = next;
+  return QMAT_OK;
+}
+
+static int by_number(const void *left, const void *right) {
+  const uint32_t a = *(const uint32_t *)left, b = *(const uint32_t *)right;
+  return a < b ? -1 : a > b;
+}
+
+/* The responsible regions: a medial vertex answers for the corners of its tetrahedra. */
+static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
+  const size_t count = d->sphere_count;
+  uint32_t *offsets = qmat_calloc(count + 1, sizeof *offsets);
+  medial->region_offsets = offsets;
+  medial->region_offset_count = count + 1;
+  size_t kept = 0;
+  for (size_t cell = 0; cell < d->cells.count; cell++) kept += d->kinds[cell] != CELL_DROPPED;
+  uint32_t *all = qmat_arena_alloc(&d->context->arena, 4 * kept, sizeof *all);
+  size_t *starts = qmat_arena_calloc(&d->context->arena, count + 2, sizeof *starts);
+  medial->region_samples = qmat_alloc(4 * kept, sizeof *medial->region_samples);
+  if (!offsets || !all || !starts || !medial->region_samples) return qmat_fail_memory(d->context, "regions");
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) starts[d->sphere_of[cell] + 2] += 4;
+  for (size_t i = 0; i < count; i++) starts[i + 2] += starts[i + 1];
+  for (size_t cell = 0; cell < d->cells.count; cell++) {
+    if (!d->kinds[cell]) continue;
+    size_t *end = &starts[d->sphere_of[cell] + 1];
+    memcpy(&all[*end], &d->cells.corners[4 * cell], 4 * sizeof *all);
+    *end += 4;
+  }
+  uint32_t next = 0;
+  for (size_t i = 0; i < count; i++) {
+    uint32_t *row = &all[starts[i]];
+    const size_t length = starts[i + 1] - starts[i];
+    qsort(row, length, sizeof *row, by_number);
+    for (size_t k = 0; k < length; k++)
+      if (k == 0 || row[k] != row[k - 1]) medial->region_samples[next++] = row[k];
+    offsets[i + 1] = next;
+  }
+  medial->region_sample_count = next;
+  return QMAT_OK;
+}
+
+static qmat_status make_medial(delaunay *d, qmat_medial *medial) {
+  medial->sphere_count = d->sphere_count;
+  medial->spheres = qmat_alloc(d->sphere_count, 4 * sizeof *medial->spheres);
+  if (!medial->spheres) return qmat_fail_memory(d->context, "medial spheres");
+  uint32_t next = 0; /* of coincident centres the first tetrahedron's stands for all */
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell] && d->sphere_of[cell] == next)
+      memcpy(&medial->spheres[4 * (size_t)next++], &d->spheres[4 * cell], 4 * sizeof *medial->spheres);
+  qmat_frame_spheres_to_model(qmat_surface_frame(d->surface), medial->spheres, d->sphere_count, medial->spheres);
+  qmat_status status =
+      qmat_medial_set_simplices(d->context, medial, d->edges, d->edge_count, d->triangles, d->triangle_count);
+  if (status == QMAT_OK) status = set_regions(d, medial);
+  if (status == QMAT_OK) status = qmat_value_seal(d->context, &medial->base);
+  return status;
+}
+
+static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
+                                const qmat_samples *samples) {
+  if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the thickness has %zu values, the mesh %zu facets", thickness->count,
+              mesh->triangle_count);
+    return qmat_fail_field(context, "thickness");
+  }
+  if (samples->vertex_count != mesh->vertex_count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the samples were taken of a mesh with %zu vertices, not %zu",
+              samples->vertex_count, mesh->vertex_count);
+    return qmat_fail_field(context, "samples");
+  }
+  for (size_t i = 0; i < samples->count; i++)
+    if (samples->facets[i] >= mesh->triangle_count) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "the sample lies on facet %u of a mesh with %zu", samples->facets[i],
+                mesh->triangle_count);
+      qmat_fail_field(context, "samples");
+      return qmat_fail_element(context, "sample", (int64_t)i);
+    }
+  return QMAT_OK;
+}
+
+static qmat_status mark_thin_samples(delaunay *d, const qmat_field *thickness) {
+  qmat_arena *arena = &d->context->arena;
+  const size_t count = d->samples->count;
+  double *values = qmat_arena_alloc(arena, count, sizeof *values);
+  uint8_t *thin = qmat_arena_alloc(arena, count, sizeof *thin);
+  if (!values || !thin) return qmat_fail_memory(d->context, "samples");
+  qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
+  const double theta = qmat_thickness_threshold(thickness, d->params->theta);
+  for (size_t i = 0; i < count; i++) thin[i] = values[i] <= theta;
+  d->thin = thin;
+  return QMAT_OK;
+}
+
+static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  delaunay d = {.context = context,
+                .params = params,
+                .mesh = (const qmat_mesh *)inputs[0],
+                .samples = (const qmat_samples *)inputs[2]};
+  const qmat_field *thickness = (const qmat_field *)inputs[1];
+  qmat_medial *medial = NULL;
+  qmat_report *report = NULL;
+  size_t components = 0, specks = 0, speck_spheres = 0, by_kind[3] = {0, 0, 0};
+  qmat_status status = check_inputs(context, d.mesh, thickness, d.samples);
+  if (status != QMAT_OK) return status;
+  if ((status = qmat_surface_new(context, d.mesh, &d.surface)) != QMAT_OK) return status;
+  double *points = qmat_arena_alloc(&context->arena, d.samples->count, 3 * sizeof *points);
+  if (!points) {
+    status = qmat_fail_memory(context, "samples");
+    goto done;
+  }
+  qmat_frame_to_unit(qmat_surface_frame(d.surface), d.samples->positions, d.samples->count, points);
+  d.points = points;
+  if ((status = mark_thin_samples(&d, thickness)) != QMAT_OK) goto done;
+  if ((status = qmat_delaunay_tetrahedra(context, points, d.samples->count, &d.cells)) != QMAT_OK) goto done;
+  if ((status = select_medial_vertices(&d)) != QMAT_OK) goto done;
+  for (size_t i = 0; i < d.cells.count; i++) by_kind[d.kinds[i]]++;
+  if ((status = number_medial_vertices(&d)) != QMAT_OK) goto done;
+  if (d.sphere_count == 0) {
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "no medial vertex lies inside the model: is its surface closed?");
+    goto done;
+  }
+  if ((status = connect(&d)) != QMAT_OK) goto done;
+  if ((status = drop_specks(&d, &components, &specks, &speck_spheres)) != QMAT_OK) goto done;
+  medial = qmat_medial_new();
+  report = qmat_report_new();
+  if (!medial || !report) {
+    status = qmat_fail_memory(context, "the medial mesh");
+    goto done;
+  }
+  if ((status = make_medial(&d, medial)) != QMAT_OK) goto done;
+  const struct {
+    const char *name;
+    size_t value;
+  } counts[] = {
+      {"tetrahedra", d.cells.count},
+      {"circumcentres", by_kind[CELL_CIRCUMCENTRE]},
+      {"incentres", by_kind[CELL_INCENTRE]},
+      {"spheres", medial->sphere_count},
+      {"edges", medial->edge_count},
+      {"triangles", medial->triangle_count},
+      {"components", components},
+      {"specks_dropped", specks},
+      {"speck_spheres_dropped", speck_spheres},
+  };
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+    if (json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value))) {
+      status = qmat_fail_memory(context, "the report");
+      goto done;
+    }
+  status = qmat_value_seal(context, &report->base);
+done:
+  if (status == QMAT_OK) {
+    outputs[0] = &medial->base;
+    outputs[1] = &report->base;
+  } else {
+    qmat_value_release(medial ? &medial->base : NULL);
+    qmat_value_release(report ? &report->base : NULL);
+  }
+  qmat_free(d.edges);
+  qmat_free(d.triangles);
+  qmat_surface_free(d.surface);
+  return status;
+}
+
+static const char *const completions[] = {"thin", "all", NULL};
+static const char *const radius_rules[] = {"distance", "circumradius", NULL};
+
+#define AT(field) offsetof(medial_delaunay_params, field)
+
+static const qmat_param params[] = {
+    {.name = "theta",
+     .unit = "mean thickness",
+     .doc = "A sample is thin when the thickness there is at most this ratio of the mean",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.5,
+     .min = 0,
+     .max = 10,
+     .offset = AT(theta)},
+    {.name = "completion",
+     .unit = "",
+     .doc = "Which tetrahedra may give their incentre: thin ones (Algorithm 1 as printed) or all inside the solid",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = COMPLETION_ALL,
+     .choices = completions,
+     .offset = AT(completion)},
+    {.name = "radius",
+     .unit = "",
+     .doc = "The radius at a circumcentre: at most the distance to the surface, or the circumradius as in the paper",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = RADIUS_DISTANCE,
+     .choices = radius_rules,
+     .offset = AT(radius)},
+    {.name = "merge",
+     .unit = "diagonal",
+     .doc = "Adjacent medial vertices no farther apart than this become one",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 1e-7,
+     .min = 0,
+     .max = 0.01,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = AT(merge)},
+    {.name = "speck",
+     .unit = "diagonal",
+     .doc = "A disconnected component whose spheres are all this small adds nothing and is dropped",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.002,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = AT(speck)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
+    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
+    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh: complete, dense and noisy"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Tetrahedra, medial vertices by kind, components"},
+    {0},
+};
+
+const qmat_node qmat_node_medial_delaunay = {
+    .name = "medial.delaunay",
+    .version = 1,
+    .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
+    .doc = "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
+           "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "
+           "edges and slabs are the duals of the facets and edges between such tetrahedra.",
+    .citation = "Section 3.2, Algorithm 1",
+    .params_size = sizeof(medial_delaunay_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};

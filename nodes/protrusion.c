@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/protrusion.h"
+
+#include <math.h>
+#include <string.h>
+
+static double distance(const double *a, const double *b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return sqrt(x * x + y * y + z * z);
+}
+
+static double maximum(double a, double b) {
+  return a > b ? a : b;
+}
+
+static double minimum(double a, double b) {
+  return a < b ? a : b;
+}
+
+/* The depth at a point, given a point of known depth to spare the question of the side. */
+static double ask_depth(const qmat_surface *surface, const double *point, const double *known, double known_depth) {
+  const double d = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
+  if (known && distance(point, known) < known_depth) return d;
+  return qmat_surface_inside(surface, point) ? d : -d;
+}
+
+/* One piece of a primitive: its corners, each with a lower bound of its depth. */
+typedef struct piece {
+  double spheres[3][4], depths[3];
+  int count;
+} piece;
+
+/* The bound of h over a piece by the Lipschitz constant from one point of known depth: convex, so largest at a corner. */
+static double bound_from(const piece *p, const double *centre, double depth) {
+  double bound = -INFINITY;
+  for (int j = 0; j < p->count; j++)
+    bound = maximum(bound, p->spheres[j][3] - depth + distance(p->spheres[j], centre));
+  return bound;
+}
+
+/* The least of the bounds from the corners; for an edge the crossing of the bounds from both ends is tighter. */
+static double bound_from_corners(const piece *p) {
+  if (p->count == 2) {
+    const double length = distance(p->spheres[0], p->spheres[1]), change = p->spheres[1][3] - p->spheres[0][3];
+    const double a = p->spheres[0][3] - p->depths[0], b = p->spheres[1][3] - p->depths[1];
+    /* a + t (length + change) and b + (1 - t) (length - change): the largest of their minimum is at an end or where
+     * they meet. */
+    const double ends = maximum(minimum(a, b + length - change), minimum(b, a + length + change));
+    const double t = length > 0 ? (b - a + length - change) / (2 * length) : 0;
+    return t > 0 && t < 1 ? maximum(ends, a + t * (length + change)) : ends;
+  }
+  double bound = INFINITY;
+  for (int i = 0; i < p->count; i++) bound = minimum(bound, bound_from(p, p->spheres[i], p->depths[i]));
+  return bound;
+}
+
+static void split(const piece *p, piece *low, piece *high) {
+  int a = 0, b = 1;
+  if (p->count == 3) {
+    double longest = -1;
+    for (int i = 0; i < 3; i++) {
+      const double length = distance(p->spheres[i], p->spheres[(i + 1) % 3]);
+      if (length > longest) {
+        longest = length;
+        a = i;
+        b = (i + 1) % 3;
+      }
+    }
+  }
+  double middle[4];
+  for (int k = 0; k < 4; k++) middle[k] = 0.5 * (p->spheres[a][k] + p->spheres[b][k]);
+  const double half = 0.5 * distance(p->spheres[a], p->spheres[b]);
+  const double depth = maximum(p->depths[a], p->depths[b]) - half;
+  *low = *high = *p;
+  memcpy(low->spheres[b], middle, sizeof middle);
+  memcpy(high->spheres[a], middle, sizeof middle);
+  low->depths[b] = high->depths[a] = depth;
+}
+
+/* Branch and bound over one primitive: depth first, at most this deep. */
+enum { DEEPEST = 28 };
+
+typedef struct search {
+  const qmat_surface *surface;
+  double accept;   /* a piece with a bound up to this is done */
+  double reject;   /* an h found above this ends the search */
+  double smallest; /* pieces no larger than this are not split */
+  double found;    /* the largest h found */
+  double bound;    /* the largest bound of a finished piece */
+  double tolerance; /* a piece whose bound is this close above `found` is done too */
+  uint64_t questions;
+} search;
+
+static bool search_piece(search *s, const piece *p, int level) {
+  double bound = bound_from_corners(p);
+  if (bound <= s->accept || bound <= s->found + s->tolerance) {
+    s->bound = maximum(s->bound, bound);
+    return true;
+  }
+  double centre[4] = {0, 0, 0, 0};
+  for (int i = 0; i < p->count; i++)
+    for (int k = 0; k < 4; k++) centre[k] += p->spheres[i][k] / p->count;
+  int nearest = 0;
+  for (int i = 1; i < p->count; i++)
+    if (p->depths[i] - distance(p->spheres[i], centre) > p->depths[nearest] - distance(p->spheres[nearest], centre))
+      nearest = i;
+  const double depth = ask_depth(s->surface, centre, p->spheres[nearest], p->depths[nearest]);
+  s->questions++;
+  const double h = centre[3] - depth;
+  s->found = maximum(s->found, h);
+  if (h > s->reject) return false;
+  bound = minimum(bound, bound_from(p, centre, depth));
+  if (bound <= s->accept || bound <= s->found + s->tolerance) {
+    s->bound = maximum(s->bound, bound);
+    return true;
+  }
+  double size = 0;
+  for (int i = 0; i < p->count; i++) size = maximum(size, distance(p->spheres[i], centre));
+  if (p->count == 1 || level == DEEPEST || size <= s->smallest) {
+    s->bound = maximum(s->bound, bound);
+    return bound <= s->reject;
+  }
+  piece low, high;
+  split(p, &low, &high);
+  for (int i = 0; i < p->count; i++) {
+    low.depths[i] = maximum(low.depths[i], depth - distance(low.spheres[i], centre));
+    high.depths[i] = maximum(high.depths[i], depth - distance(high.spheres[i], centre));
+  }
+  return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
+}
+
+double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double tolerance,
+                             double *found) {
+  piece p = {.count = count};
+  search s = {.surface = surface,
+              .accept = -INFINITY,
+              .reject = INFINITY,
+              .smallest = 1e-9,
+              .found = -INFINITY,
+              .bound = -INFINITY,
+              .tolerance = tolerance};
+  for (int i = 0; i < count; i++) {
+    memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
+    p.depths[i] = ask_depth(surface, spheres[i], NULL, 0);
+    s.found = maximum(s.found, spheres[i][3] - p.depths[i]);
+  }
+  if (count == 1) {
+    if (found) *found = s.found;
+    return s.found;
+  }
+  search_piece(&s, &p, 0);
+  if (found) *found = s.found;
+  return maximum(s.bound, s.found);
+}
+
+qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
+                                 const qmat_complex *complex, const double *depths, double limit) {
+  *protrusion = (qmat_protrusion){.surface = surface, .limit = limit};
+  protrusion->depths = qmat_alloc(complex->vertex_count, sizeof(double));
+  protrusion->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
+  protrusion->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
+  if (!protrusion->depths || !protrusion->edge_bounds || !protrusion->triangle_bounds)
+    return qmat_fail_memory(context, "protrusion bounds");
+  memcpy(protrusion->depths, depths, complex->vertex_count * sizeof *depths);
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads)
+  for (size_t i = 0; i < complex->edge_count + complex->triangle_count; i++) {
+    const bool is_edge = i < complex->edge_count;
+    const size_t id = is_edge ? i : i - complex->edge_count;
+    piece p = {.count = is_edge ? 2 : 3};
+    for (int k = 0; k < p.count; k++) {
+      const size_t v = is_edge ? complex->edges[2 * id + (size_t)k] : complex->triangles[3 * id + (size_t)k];
+      memcpy(p.spheres[k], &complex->spheres[4 * v], sizeof p.spheres[k]);
+      p.depths[k] = depths[v];
+    }
+    *(is_edge ? &protrusion->edge_bounds[id] : &protrusion->triangle_bounds[id]) = bound_from_corners(&p);
+  }
+  return QMAT_OK;
+}
+
+void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
+  qmat_free(protrusion->depths);
+  qmat_free(protrusion->edge_bounds);
+  qmat_free(protrusion->triangle_bounds);
+  qmat_free(protrusion->new_edge_bounds);
+  qmat_free(protrusion->new_triangle_bounds);
+  *protrusion = (qmat_protrusion){0};
+}
+
+bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
+                                 const qmat_collapse *collapse, const double sphere[4]) {
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  double depth = -INFINITY;
+  int nearest = 0;
+  for (int e = 0; e < 2; e++) {
+    const double from =
+        protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]);
+    if (from > depth) {
+      depth = from;
+      nearest = e;
+    }
+  }
+  if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
+    depth = ask_depth(protrusion->surface, sphere, &complex->spheres[4 * (size_t)ends[nearest]],
+                      protrusion->depths[ends[nearest]]);
+    protrusion->questions++;
+  }
+  protrusion->sphere_depth = depth;
+  return depth > 0 && sphere[3] - depth <= protrusion->limit;
+}
+
+bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_complex *complex,
+                                    const qmat_collapse *collapse, const double sphere[4]) {
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
+    const double half = 0.5 * distance(sphere, other);
+    if (half < protrusion->sphere_depth || half < protrusion->depths[collapse->neighbours[n]]) continue;
+    double middle[3];
+    for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
+    protrusion->questions++;
+    if (!qmat_surface_inside(protrusion->surface, middle)) return false;
+  }
+  return true;
+}
+
+/* The bound that an old primitive's bound gives for its image, `from` having moved to the merged sphere. */
+static double carry(double bound, const double *from, const double *sphere) {
+  return bound + maximum(0, distance(from, sphere) + sphere[3] - from[3]);
+}
+
+qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrusion, const qmat_complex *complex,
+                                 const qmat_collapse *collapse, const double sphere[4], bool *kept) {
+  if (qmat_grow((void **)&protrusion->new_edge_bounds, &protrusion->new_edge_capacity, collapse->neighbour_count,
+                sizeof(double)) ||
+      qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity,
+                collapse->triangle_count, sizeof(double)))
+    return qmat_fail_memory(context, "protrusion bounds");
+  const double *old_kept = &complex->spheres[4 * (size_t)collapse->kept];
+  const double *old_removed = &complex->spheres[4 * (size_t)collapse->removed];
+  search s = {.surface = protrusion->surface,
+              .accept = protrusion->limit,
+              .reject = protrusion->limit,
+              .smallest = 0.02 * protrusion->limit,
+              .tolerance = 0};
+  piece p;
+  memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
+  p.depths[0] = protrusion->sphere_depth;
+  *kept = true;
+  for (size_t t = 0; t < collapse->triangle_count + collapse->neighbour_count && *kept; t++) {
+    const bool is_edge = t >= collapse->triangle_count;
+    const size_t id = is_edge ? t - collapse->triangle_count : t;
+    const uint32_t mine = is_edge ? collapse->kept_edges[id] : collapse->kept_triangles[id];
+    const uint32_t theirs = is_edge ? collapse->removed_edges[id] : collapse->removed_triangles[id];
+    const double *bounds = is_edge ? protrusion->edge_bounds : protrusion->triangle_bounds;
+    double *result = is_edge ? &protrusion->new_edge_bounds[id] : &protrusion->new_triangle_bounds[id];
+    double bound = INFINITY;
+    if (mine != QMAT_NONE) bound = carry(bounds[mine], old_kept, sphere);
+    if (theirs != QMAT_NONE) bound = minimum(bound, carry(bounds[theirs], old_removed, sphere));
+    p.count = is_edge ? 2 : 3;
+    for (int k = 1; k < p.count; k++) {
+      const uint32_t v = is_edge ? collapse->neighbours[id] : collapse->triangle_pairs[2 * id + (size_t)k - 1];
+      memcpy(p.spheres[k], &complex->spheres[4 * (size_t)v], sizeof p.spheres[k]);
+      p.depths[k] = protrusion->depths[v];
+    }
+    bound = minimum(bound, bound_from_corners(&p));
+    if (is_edge) /* an edge of a triangle is as good as the triangle */
+      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > protrusion->limit; i++)
+        if (collapse->triangle_pairs[i] == collapse->neighbours[id])
+          bound = minimum(bound, protrusion->new_triangle_bounds[i / 2]);
+    if (bound > protrusion->limit) {
+      s.found = s.bound = -INFINITY;
+      *kept = search_piece(&s, &p, 0);
+      bound = s.bound;
+    }
+    *result = bound;
+  }
+  protrusion->questions += s.questions;
+  return QMAT_OK;
+}
+
+void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse) {
+  protrusion->depths[collapse->kept] = protrusion->sphere_depth;
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const uint32_t edge =
+        collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
+    protrusion->edge_bounds[edge] = protrusion->new_edge_bounds[n];
+  }
+  for (size_t t = 0; t < collapse->triangle_count; t++) {
+    const uint32_t triangle =
+        collapse->kept_triangles[t] != QMAT_NONE ? collapse->kept_triangles[t] : collapse->removed_triangles[t];
+    protrusion->triangle_bounds[triangle] = protrusion->new_triangle_bounds[t];
+  }
+}
