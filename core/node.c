@@ -149,6 +149,9 @@ void qmat_format_number(double number, char *text, size_t size) {
     snprintf(shortest, sizeof shortest, "%.*g", precision, number);
     if (strtod(shortest, NULL) == number) break;
   }
+  if (strchr(shortest, 'e') != NULL && fabs(number) >= 1 && fabs(number) < 1e15) {
+    snprintf(shortest, sizeof shortest, "%.0f", number); /* 1000 rather than 1e+03 */
+  }
   uselocale(before);
   freelocale(plain);
   snprintf(text, size, "%s", shortest);

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/node.h"
+
 /* One table per value type describes its content; freeing, counting, the binary form, the digest and the checks that
  * hold for every type come from it.
  *
@@ -529,7 +531,9 @@ static qmat_status check_samples(qmat_context *context, const qmat_value *value)
     const double *weights = samples->barycentrics + 3 * i;
     const double sum = weights[0] + weights[1] + weights[2];
     if (fabs(sum - 1) <= 1e-9) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the barycentric coordinates sum to %g, not 1", sum);
+    char number[32];
+    qmat_format_number(sum, number, sizeof number);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the barycentric coordinates sum to %s, not 1", number);
     return fail_element(context, "sample", i);
   }
   return QMAT_OK;
@@ -624,7 +628,9 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < medial->sphere_count; ++i) {
     if (medial->spheres[4 * i + 3] >= 0) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the radius %g is negative", medial->spheres[4 * i + 3]);
+    char number[32];
+    qmat_format_number(medial->spheres[4 * i + 3], number, sizeof number);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the radius %s is negative", number);
     return fail_element(context, "sphere", i);
   }
   status = check_simplices(context, medial->edges, medial->edge_count, 2, medial->sphere_count, "edge");
@@ -668,7 +674,7 @@ static qmat_status check_file(qmat_context *context, const qmat_value *value) {
       return fail_element(context, "part", i);
     }
     /* A name must not lead out of the folder that the main part is written to. */
-    if (strpbrk(name, "/\\") != NULL || strcmp(name, ".") == 0 || strcmp(name, "..") == 0) {
+    if (strpbrk(name, "/\\") != NULL || strcmp(name, ".") == 0 || strcmp(name, "..") == 0 || strlen(name) > 255) {
       qmat_fail(context, QMAT_ERROR_FORMAT, "its name '%s' is not a plain file name", name);
       return fail_element(context, "part", i);
     }

@@ -1,0 +1,478 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/node.h"
+
+#include <float.h>
+#include <locale.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/hash.h"
+
+typedef struct example_params {
+  bool caps;
+  int64_t rays;
+  int64_t seed;
+  double epsilon;
+  double angle;
+  double weight;
+  int method;
+  const char *label;
+  const char *path;
+} example_params;
+
+static const char *const methods[] = {"pairs", "greedy", "none", NULL};
+
+static const qmat_param example_rows[] = {
+    {.name = "caps", .type = QMAT_PARAM_BOOL, .default_number = 1, .offset = offsetof(example_params, caps)},
+    {.name = "rays",
+     .unit = "rays",
+     .type = QMAT_PARAM_INT,
+     .default_number = 30,
+     .min = 1,
+     .max = 1000,
+     .offset = offsetof(example_params, rays)},
+    {.name = "seed", .type = QMAT_PARAM_INT, .min = -0x1p63, .max = 0x1p63, .offset = offsetof(example_params, seed)},
+    {.name = "epsilon",
+     .unit = "diagonal",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.01,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = offsetof(example_params, epsilon)},
+    {.name = "angle",
+     .unit = "degrees",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 60,
+     .min = -DBL_MAX,
+     .max = 90,
+     .offset = offsetof(example_params, angle)},
+    {.name = "weight",
+     .unit = "1",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 1e-5,
+     .min = 0,
+     .max = INFINITY,
+     .offset = offsetof(example_params, weight)},
+    {.name = "method",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = 1,
+     .choices = methods,
+     .offset = offsetof(example_params, method)},
+    {.name = "label", .type = QMAT_PARAM_STRING, .default_text = "thin", .offset = offsetof(example_params, label)},
+    {.name = "path", .type = QMAT_PARAM_PATH, .flags = QMAT_PARAM_REQUIRED, .offset = offsetof(example_params, path)},
+    {.name = NULL}};
+
+static const qmat_port example_inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH}, {.name = "field", .type = QMAT_FIELD, .optional = true}, {.name = NULL}};
+static const qmat_port example_outputs[] = {{.name = "medial", .type = QMAT_MEDIAL}, {.name = NULL}};
+
+static qmat_status example_check(qmat_context *context, const void *params) {
+  const example_params *p = params;
+  if (p->rays != 13) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_USAGE, "rays must not be 13");
+  return qmat_fail_field(context, "rays");
+}
+
+static const qmat_node example = {.name = "test.example",
+                                  .params_size = sizeof(example_params),
+                                  .params = example_rows,
+                                  .inputs = example_inputs,
+                                  .outputs = example_outputs,
+                                  .check = example_check};
+
+static const qmat_node bare = {.name = "test.bare", .outputs = example_outputs};
+
+static qmat_status parse(qmat_context *context, const char *name, const char *text, example_params *params) {
+  const qmat_param *param = qmat_param_find(&example, name);
+  assert_non_null(param);
+  return qmat_param_parse(context, &example, param, text, params);
+}
+
+/* The parameter refuses the text with this line, and keeps its value. */
+static void assert_refused(const char *name, const char *text, const char *expected) {
+  qmat_context context = {0};
+  example_params params, before;
+  qmat_params_default(&example, &params);
+  qmat_params_default(&example, &before);
+  assert_int_equal(parse(&context, name, text, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.field, name);
+  char line[1024];
+  qmat_error_format(&context.error, line, sizeof line);
+  assert_string_equal(line, expected);
+  assert_memory_equal(&params, &before, sizeof params);
+}
+
+static void test_rows_are_counted_and_found_by_name(void **state) {
+  (void)state;
+  assert_int_equal(qmat_param_count(&example), 9);
+  assert_int_equal(qmat_input_count(&example), 2);
+  assert_int_equal(qmat_output_count(&example), 1);
+  assert_ptr_equal(qmat_param_find(&example, "epsilon"), &example_rows[3]);
+  assert_null(qmat_param_find(&example, "epsilo"));
+  assert_int_equal(qmat_input_find(&example, "field"), 1);
+  assert_int_equal(qmat_input_find(&example, "medial"), SIZE_MAX);
+  assert_int_equal(qmat_output_find(&example, "medial"), 0);
+  assert_int_equal(qmat_param_count(&bare), 0);
+  assert_int_equal(qmat_input_count(&bare), 0);
+  assert_null(qmat_param_find(&bare, "epsilon"));
+  assert_int_equal(qmat_input_find(&bare, "mesh"), SIZE_MAX);
+}
+
+static void test_defaults_come_from_the_rows(void **state) {
+  (void)state;
+  example_params params;
+  memset(&params, 0xFF, sizeof params);
+  qmat_params_default(&example, &params);
+  assert_true(params.caps);
+  assert_int_equal(params.rays, 30);
+  assert_int_equal(params.seed, 0);
+  assert_true(params.epsilon == 0.01);
+  assert_true(params.angle == 60);
+  assert_int_equal(params.method, 1);
+  assert_string_equal(params.label, "thin");
+  assert_null(params.path);
+  qmat_params_default(&bare, NULL);
+}
+
+static void test_texts_become_values(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  example_params params;
+  qmat_params_default(&example, &params);
+  const struct {
+    const char *text;
+    bool value;
+  } bools[] = {{"true", true}, {"false", false}, {"yes", true}, {"no", false}, {"on", true}, {"off", false}};
+  for (size_t i = 0; i < 6; ++i) {
+    assert_int_equal(parse(&context, "caps", bools[i].text, &params), QMAT_OK);
+    assert_int_equal(params.caps, bools[i].value);
+  }
+  assert_int_equal(parse(&context, "rays", "1000", &params), QMAT_OK);
+  assert_int_equal(params.rays, 1000);
+  assert_int_equal(parse(&context, "seed", "-9223372036854775808", &params), QMAT_OK);
+  assert_true(params.seed == INT64_MIN);
+  assert_int_equal(parse(&context, "seed", "+9223372036854775807", &params), QMAT_OK);
+  assert_true(params.seed == INT64_MAX);
+  assert_int_equal(parse(&context, "epsilon", "2.5e-2", &params), QMAT_OK);
+  assert_true(params.epsilon == 0.025);
+  assert_int_equal(parse(&context, "angle", "-1e300", &params), QMAT_OK);
+  assert_true(params.angle == -1e300);
+  assert_int_equal(parse(&context, "method", "none", &params), QMAT_OK);
+  assert_int_equal(params.method, 2);
+  assert_int_equal(parse(&context, "label", "", &params), QMAT_OK);
+  assert_string_equal(params.label, "");
+  const char *path = "models/a b.obj";
+  assert_int_equal(parse(&context, "path", path, &params), QMAT_OK);
+  assert_ptr_equal(params.path, path);
+}
+
+static void test_percentages_are_read_only_for_relative_lengths(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  example_params params;
+  qmat_params_default(&example, &params);
+  assert_int_equal(parse(&context, "epsilon", "3%", &params), QMAT_OK);
+  assert_true(params.epsilon == 0.03);
+  assert_int_equal(parse(&context, "epsilon", "100%", &params), QMAT_OK);
+  assert_true(params.epsilon == 1);
+  assert_refused("angle", "10%", "angle must be a plain number, not the percentage 10%");
+  assert_refused("epsilon", "101%", "epsilon must be between 0 and 1 (diagonal), not 101%");
+}
+
+static void test_bad_texts_are_refused_by_name_and_range(void **state) {
+  (void)state;
+  assert_refused("caps", "TRUE", "caps must be true or false, not 'TRUE'");
+  assert_refused("caps", "", "caps must be true or false, not ''");
+  assert_refused("rays", "0", "rays must be between 1 and 1000 (rays), not 0");
+  assert_refused("rays", "1001", "rays must be between 1 and 1000 (rays), not 1001");
+  assert_refused("rays", "1e2", "rays must be a whole number, not '1e2'");
+  assert_refused("rays", " 1", "rays must be a whole number, not ' 1'");
+  assert_refused("rays", "-", "rays must be a whole number, not '-'");
+  assert_refused("rays", "0x10", "rays must be a whole number, not '0x10'");
+  assert_refused("rays", "99999999999999999999", "rays must be between 1 and 1000 (rays), not 99999999999999999999");
+  assert_refused("seed", "9223372036854775808", "seed is out of range: 9223372036854775808");
+  assert_refused("seed", "-9223372036854775809", "seed is out of range: -9223372036854775809");
+  assert_refused("epsilon", "3", "epsilon must be between 0 and 1 (diagonal), not 3");
+  assert_refused("epsilon", "nan", "epsilon must be a number, not 'nan'");
+  assert_refused("epsilon", "0,5", "epsilon must be a number, not '0,5'");
+  assert_refused("angle", "90.5", "angle must be at most 90 (degrees), not 90.5");
+  assert_refused("weight", "-1e-9", "weight must be at least 0, not -1e-9");
+  assert_refused("method", "greddy", "method must be pairs, greedy or none, not 'greddy' (did you mean 'greedy'?)");
+  assert_refused("method", "voronoi", "method must be pairs, greedy or none, not 'voronoi'");
+  assert_refused("path", "", "path must not be empty");
+}
+
+static void test_negative_zero_is_read_as_zero(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  example_params params;
+  qmat_params_default(&example, &params);
+  assert_int_equal(parse(&context, "epsilon", "-0", &params), QMAT_OK);
+  assert_false(signbit(params.epsilon));
+}
+
+static void test_the_check_asks_for_required_texts_ranges_and_rules(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  example_params params;
+  qmat_params_default(&example, &params);
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "path must be given");
+  params.path = "a.off";
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_OK);
+  params.epsilon = (double)NAN;
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.field, "epsilon");
+  params.epsilon = 1.5;
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "epsilon must be between 0 and 1 (diagonal), not 1.5");
+  params.epsilon = 1;
+  params.method = 3;
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.field, "method");
+  params.method = 0;
+  params.rays = 13;
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "rays must not be 13");
+  params.rays = 1001;
+  assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "rays must be between 1 and 1000 (rays), not 1001");
+  assert_int_equal(qmat_params_check(&context, &bare, NULL), QMAT_OK);
+}
+
+static void test_formatted_values_read_back_to_themselves(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  for (uint64_t round = 0; round < 2000; ++round) {
+    example_params params, again;
+    qmat_params_default(&example, &params);
+    qmat_params_default(&example, &again);
+    params.caps = round % 2 == 0;
+    params.rays = (int64_t)(round % 1000) + 1;
+    params.seed = (int64_t)qmat_hash3(1, round, 0);
+    params.epsilon = qmat_hash_unit(qmat_hash3(1, round, 1));
+    params.weight = ldexp(qmat_hash_unit(qmat_hash3(1, round, 2)), (int)(round % 2000) - 1000);
+    params.method = (int)(round % 3);
+    params.path = "x.off";
+    char texts[9][64];
+    for (size_t i = 0; i < 9; ++i) {
+      qmat_param_format(&example_rows[i], &params, texts[i], sizeof texts[i]);
+      assert_int_equal(qmat_param_parse(&context, &example, &example_rows[i], texts[i], &again), QMAT_OK);
+    }
+    assert_int_equal(again.caps, params.caps);
+    assert_true(again.rays == params.rays && again.seed == params.seed);
+    assert_true(again.epsilon == params.epsilon && again.weight == params.weight && again.angle == params.angle);
+    assert_int_equal(again.method, params.method);
+    assert_string_equal(again.path, params.path);
+    assert_string_equal(again.label, params.label);
+  }
+}
+
+static void test_formatting_cuts_at_the_size_given(void **state) {
+  (void)state;
+  example_params params;
+  qmat_params_default(&example, &params);
+  params.path = "a long path";
+  char text[8];
+  qmat_param_format(&example_rows[8], &params, text, 7);
+  assert_string_equal(text, "a long");
+  text[0] = '#';
+  qmat_param_format(&example_rows[8], &params, text, 0);
+  assert_int_equal(text[0], '#');
+  params.path = NULL;
+  qmat_param_format(&example_rows[8], &params, text, sizeof text);
+  assert_string_equal(text, "");
+  params.method = 77;
+  qmat_param_format(&example_rows[6], &params, text, sizeof text);
+  assert_string_equal(text, "");
+}
+
+static void test_numbers_are_read_in_full(void **state) {
+  (void)state;
+  const struct {
+    const char *text;
+    double number;
+  } cases[] = {{"0", 0},
+               {"-1", -1},
+               {"+1.5", 1.5},
+               {".5", 0.5},
+               {"5.", 5},
+               {"1e3", 1000},
+               {"1E-3", 0.001},
+               {"1%", 0.01},
+               {"0.1%", 0.001},
+               {"1e-1%", 0.001},
+               {"-7.3%", -0.073},
+               {"1e400%", 0},
+               {"1e-400", 0},
+               {"1e-999999%", 0},
+               {"2.5e1%", 0.25},
+               {"1e309%", 1e307},
+               {"00012", 12},
+               {"1e-99999999999999999999", 0},
+               {"179769313486231570000000000000000000000%", 1797693134862315700000000000000000000.0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    double number = -99;
+    if (strcmp(cases[i].text, "1e400%") == 0) { /* beyond what a double holds, also after the percent */
+      assert_false(qmat_parse_number(cases[i].text, &number));
+      continue;
+    }
+    assert_true(qmat_parse_number(cases[i].text, &number));
+    assert_true(number == cases[i].number);
+  }
+}
+
+static void test_what_is_not_a_plain_finite_number_is_refused(void **state) {
+  (void)state;
+  const char *const texts[] = {"",     " ",      " 1",       "1 ",     "0x10", "0x1p3", "inf", "-inf",
+                               "nan",  "NAN(1)", "infinity", "e5",     ".",    "-",     "+",   "--1",
+                               "1e",   "1e+",    "1,5",      "1.2.3",  "%",    "1%%",   "1% ", "1e400",
+                               "1e5x", "\t1",    "1\n",      "-1e400", "١",    "1_000", ".e1", "-.%"};
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    double number = -99;
+    assert_false(qmat_parse_number(texts[i], &number));
+    assert_true(number == -99);
+  }
+}
+
+/* "p%" and p/100 as text are the same double for every p with up to six digits. */
+static void test_a_percentage_is_rounded_once(void **state) {
+  (void)state;
+  for (int i = 0; i < 100000; i += 7) {
+    char percent[32], plain[32];
+    double from_percent, from_plain;
+    snprintf(percent, sizeof percent, "%d.%03d%%", i / 1000, i % 1000);
+    snprintf(plain, sizeof plain, "%de-5", i);
+    assert_true(qmat_parse_number(percent, &from_percent));
+    assert_true(qmat_parse_number(plain, &from_plain));
+    assert_true(from_percent == from_plain);
+  }
+}
+
+static void test_numbers_are_written_short_and_exact(void **state) {
+  (void)state;
+  const struct {
+    double number;
+    const char *text;
+  } cases[] = {{0.01, "0.01"},
+               {1, "1"},
+               {-2.5, "-2.5"},
+               {0.1 + 0.2, "0.30000000000000004"},
+               {1e-5, "1e-05"},
+               {DBL_MAX, "1.7976931348623157e+308"},
+               {5e-324, "5e-324"},
+               {1000, "1000"},
+               {-123456789012340, "-123456789012340"},
+               {1e15, "1e+15"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    char text[32];
+    qmat_format_number(cases[i].number, text, sizeof text);
+    assert_string_equal(text, cases[i].text);
+  }
+  for (uint64_t i = 0; i < 5000; ++i) {
+    const uint64_t bits = qmat_hash3(9, i, 0);
+    double number, again;
+    memcpy(&number, &bits, sizeof number);
+    if (!isfinite(number)) continue;
+    char text[32];
+    qmat_format_number(number, text, sizeof text);
+    assert_true(qmat_parse_number(text, &again));
+    assert_memory_equal(&again, &number, sizeof number);
+  }
+}
+
+static void test_numbers_do_not_depend_on_the_locale(void **state) {
+  (void)state;
+  if (setlocale(LC_ALL, "de_DE.UTF-8") == NULL) skip();
+  char text[32], comma[8];
+  snprintf(comma, sizeof comma, "%.1f", 0.5);
+  double number = 0, refused = 0;
+  const bool read = qmat_parse_number("0.5", &number), read_comma = qmat_parse_number("0,5", &refused);
+  qmat_format_number(0.25, text, sizeof text);
+  qmat_context context = {0};
+  example_params params;
+  qmat_params_default(&example, &params);
+  const qmat_status status = parse(&context, "epsilon", "1.5", &params);
+  setlocale(LC_ALL, "C");
+  assert_string_equal(comma, "0,5"); /* the locale was in force */
+  assert_true(read && number == 0.5);
+  assert_false(read_comma);
+  assert_string_equal(text, "0.25");
+  assert_int_equal(status, QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "epsilon must be between 0 and 1 (diagonal), not 1.5");
+}
+
+static void test_the_nearest_name_is_found_within_the_limit(void **state) {
+  (void)state;
+  const char *const names[] = {"medial.simplify", "medial.skin", "mesh.sample", "mesh.sdf", "x"};
+  const struct {
+    const char *text, *nearest;
+  } cases[] = {{"medial.simplfy", "medial.simplify"}, /* a letter missing */
+               {"medial.ksin", "medial.skin"},        /* two swapped: one step */
+               {"mesh.sfd", "mesh.sdf"},
+               {"mesh.sampel", "mesh.sample"},
+               {"mesh.sdf", "mesh.sdf"},
+               {"mash.sof", "mesh.sdf"}, /* two of 8 letters: 1 + 8 / 3 = 3 allow it */
+               {"scene.write", NULL},
+               {"y", NULL},
+               {"", NULL}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    const char *nearest = qmat_nearest_name(cases[i].text, names, 5);
+    if (cases[i].nearest == NULL) {
+      assert_null(nearest);
+    } else {
+      assert_non_null(nearest);
+      assert_string_equal(nearest, cases[i].nearest);
+    }
+  }
+  assert_null(qmat_nearest_name("mesh.sdf", NULL, 0));
+}
+
+static void test_the_first_of_equally_near_names_wins(void **state) {
+  (void)state;
+  const char *const names[] = {"cat", "bat", "rat"};
+  assert_string_equal(qmat_nearest_name("hat", names, 3), "cat");
+}
+
+static void test_names_of_any_length_are_compared_safely(void **state) {
+  (void)state;
+  char lengthy[5000], fits[64];
+  memset(lengthy, 'a', sizeof lengthy);
+  lengthy[sizeof lengthy - 1] = '\0';
+  memset(fits, 'a', sizeof fits);
+  fits[63] = '\0';
+  const char *const names[] = {lengthy, fits};
+  assert_null(qmat_nearest_name(lengthy, names, 2));
+  assert_ptr_equal(qmat_nearest_name(fits, names, 2), fits);
+  assert_ptr_equal(qmat_nearest_name(fits + 1, names, 2), fits);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_rows_are_counted_and_found_by_name),
+      cmocka_unit_test(test_defaults_come_from_the_rows),
+      cmocka_unit_test(test_texts_become_values),
+      cmocka_unit_test(test_percentages_are_read_only_for_relative_lengths),
+      cmocka_unit_test(test_bad_texts_are_refused_by_name_and_range),
+      cmocka_unit_test(test_negative_zero_is_read_as_zero),
+      cmocka_unit_test(test_the_check_asks_for_required_texts_ranges_and_rules),
+      cmocka_unit_test(test_formatted_values_read_back_to_themselves),
+      cmocka_unit_test(test_formatting_cuts_at_the_size_given),
+      cmocka_unit_test(test_numbers_are_read_in_full),
+      cmocka_unit_test(test_what_is_not_a_plain_finite_number_is_refused),
+      cmocka_unit_test(test_a_percentage_is_rounded_once),
+      cmocka_unit_test(test_numbers_are_written_short_and_exact),
+      cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),
+      cmocka_unit_test(test_the_nearest_name_is_found_within_the_limit),
+      cmocka_unit_test(test_the_first_of_equally_near_names_wins),
+      cmocka_unit_test(test_names_of_any_length_are_compared_safely),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

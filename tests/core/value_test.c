@@ -1,0 +1,805 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/value.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/hash.h"
+
+static void *copy_of(const void *array, size_t bytes) {
+  void *copy = qmat_alloc(bytes, 1);
+  assert_non_null(copy);
+  if (bytes > 0) memcpy(copy, array, bytes);
+  return copy;
+}
+
+#define ASSIGN(field, ...) ((field) = copy_of((__VA_ARGS__), sizeof(__VA_ARGS__)))
+
+static qmat_scene *scene_example(void) {
+  qmat_scene *scene = qmat_scene_new();
+  assert_non_null(scene);
+  scene->name = qmat_strdup("Kr\xc3\xa4he");
+  scene->format = qmat_strdup("off");
+  return scene;
+}
+
+/* A tetrahedron. */
+static qmat_mesh *mesh_example(void) {
+  qmat_mesh *mesh = qmat_mesh_new();
+  assert_non_null(mesh);
+  mesh->vertex_count = 4;
+  mesh->triangle_count = 4;
+  ASSIGN(mesh->positions, (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+  ASSIGN(mesh->triangles, (uint32_t[]){0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3});
+  mesh->closed = mesh->oriented = true;
+  return mesh;
+}
+
+static qmat_field *field_example(void) {
+  qmat_field *field = qmat_field_new();
+  assert_non_null(field);
+  field->count = 3;
+  ASSIGN(field->values, (double[]){0.5, -0.0, 1e300});
+  field->domain = QMAT_PER_VERTEX;
+  field->unit = qmat_strdup("model unit");
+  return field;
+}
+
+static qmat_samples *samples_example(void) {
+  qmat_samples *samples = qmat_samples_new();
+  assert_non_null(samples);
+  samples->count = 2;
+  samples->vertex_count = 1;
+  ASSIGN(samples->positions, (double[]){0, 0, 0, 0.25, 0.5, 0});
+  ASSIGN(samples->facets, (uint32_t[]){0, 3});
+  ASSIGN(samples->barycentrics, (double[]){1, 0, 0, 0.25, 0.25, 0.5});
+  return samples;
+}
+
+/* A slab, a cone on sphere 3, and regions of which that of sphere 1 is empty. */
+static qmat_medial *medial_example(void) {
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  medial->sphere_count = 4;
+  medial->edge_count = 4;
+  medial->triangle_count = 1;
+  medial->region_offset_count = 5;
+  medial->region_sample_count = 6;
+  ASSIGN(medial->spheres, (double[]){0, 0, 0, 1, 1, 0, 0, 0.5, 0, 1, 0, 0.25, 0, 0, 9, 0});
+  ASSIGN(medial->edges, (uint32_t[]){0, 1, 0, 2, 1, 2, 1, 3});
+  ASSIGN(medial->triangles, (uint32_t[]){0, 1, 2});
+  ASSIGN(medial->region_offsets, (uint32_t[]){0, 2, 2, 5, 6});
+  ASSIGN(medial->region_samples, (uint32_t[]){4, 1, 0, 2, 3, 5});
+  return medial;
+}
+
+static qmat_report *report_example(void) {
+  qmat_report *report = qmat_report_new();
+  assert_non_null(report);
+  assert_int_equal(json_object_set_new(report->root, "spheres", json_integer(100)), 0);
+  assert_int_equal(json_object_set_new(report->root, "error", json_real(0.1)), 0);
+  assert_int_equal(json_object_set_new(report->root, "steps", json_pack("[i, f, s]", 1, 2.0, "a\"b")), 0);
+  return report;
+}
+
+static qmat_file *file_example(void) {
+  qmat_file *file = qmat_file_new();
+  assert_non_null(file);
+  file->format = qmat_strdup("gltf");
+  file->part_count = 3;
+  file->parts = qmat_calloc(3, sizeof *file->parts);
+  file->parts[0] = (qmat_file_part){qmat_strdup(""), 5, copy_of("{...}", 5)};
+  file->parts[1] = (qmat_file_part){qmat_strdup("medial.bin"), 3, copy_of("\0\1\2", 3)};
+  file->parts[2] = (qmat_file_part){qmat_strdup("empty.bin"), 0, NULL};
+  return file;
+}
+
+static qmat_value *example_of(qmat_value_type type) {
+  switch (type) {
+    case QMAT_SCENE:
+      return &scene_example()->base;
+    case QMAT_MESH:
+      return &mesh_example()->base;
+    case QMAT_FIELD:
+      return &field_example()->base;
+    case QMAT_SAMPLES:
+      return &samples_example()->base;
+    case QMAT_MEDIAL:
+      return &medial_example()->base;
+    case QMAT_REPORT:
+      return &report_example()->base;
+    case QMAT_FILE:
+      return &file_example()->base;
+    default:
+      return NULL;
+  }
+}
+
+static void assert_sealed(qmat_context *context, qmat_value *value) {
+  const qmat_status status = qmat_value_seal(context, value);
+  if (status != QMAT_OK) print_error("%s\n", context->error.message);
+  assert_int_equal(status, QMAT_OK);
+  assert_true(value->sealed);
+}
+
+/* Sealing fails with this line; the value stays open and is released. */
+static void assert_not_sealed(qmat_value *value, qmat_status expected, const char *expected_line) {
+  qmat_context context = {0};
+  char line[1024];
+  assert_int_equal(qmat_value_seal(&context, value), expected);
+  qmat_error_format(&context.error, line, sizeof line);
+  assert_string_equal(line, expected_line);
+  assert_false(value->sealed);
+  qmat_value_release(value);
+}
+
+static void test_types_have_names(void **state) {
+  (void)state;
+  assert_string_equal(qmat_value_type_name(QMAT_SCENE), "scene");
+  assert_string_equal(qmat_value_type_name(QMAT_MEDIAL), "medial");
+  assert_string_equal(qmat_value_type_name(QMAT_FILE), "file");
+  assert_string_equal(qmat_value_type_name(QMAT_VALUE_TYPE_COUNT), "unknown");
+  assert_string_equal(qmat_value_type_name((qmat_value_type)-1), "unknown");
+}
+
+static void test_new_values_are_empty_and_can_be_released_at_once(void **state) {
+  (void)state;
+  qmat_value *values[] = {&qmat_scene_new()->base,   &qmat_mesh_new()->base,   &qmat_field_new()->base,
+                          &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_report_new()->base,
+                          &qmat_file_new()->base};
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    assert_non_null(values[type]);
+    assert_int_equal(values[type]->type, type);
+    assert_int_equal(values[type]->references, 1);
+    assert_false(values[type]->sealed);
+    assert_int_equal(qmat_value_bytes(values[type]), type == QMAT_REPORT ? 2 : 0);
+    qmat_value_release(values[type]);
+  }
+  qmat_value_release(NULL);
+  assert_null(qmat_value_retain(NULL));
+}
+
+static void test_half_filled_values_are_released_whole(void **state) {
+  (void)state;
+  qmat_file *file = qmat_file_new();
+  file->part_count = 2;
+  file->parts = qmat_calloc(2, sizeof *file->parts);
+  file->parts[1].name = qmat_strdup("a.bin");
+  qmat_value_release(&file->base);
+  qmat_medial *medial = qmat_medial_new();
+  medial->spheres = qmat_alloc(4, sizeof(double));
+  qmat_value_release(&medial->base);
+  qmat_report *report = qmat_report_new();
+  json_decref(report->root);
+  report->root = NULL;
+  assert_int_equal(qmat_value_bytes(&report->base), 0);
+  qmat_value_release(&report->base);
+}
+
+static void test_bytes_count_what_the_arrays_hold(void **state) {
+  (void)state;
+  const size_t expected[] = {[QMAT_SCENE] = 6 + 3,
+                             [QMAT_MESH] = 12 * 8 + 12 * 4,
+                             [QMAT_FIELD] = 3 * 8 + 10,
+                             [QMAT_SAMPLES] = 6 * 8 + 2 * 4 + 6 * 8,
+                             [QMAT_MEDIAL] = 16 * 8 + 8 * 4 + 3 * 4 + 5 * 4 + 6 * 4,
+                             [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
+                                                    "\"steps\":[1,2.0,\"a\\\"b\"]}"),
+                             [QMAT_FILE] = 4 + 8};
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    qmat_value *value = example_of((qmat_value_type)type);
+    assert_int_equal(qmat_value_bytes(value), expected[type]);
+    qmat_value_release(value);
+  }
+}
+
+static void test_every_type_is_read_back_to_the_same_bytes_and_digest(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    qmat_value *value = example_of((qmat_value_type)type), *again = NULL;
+    uint8_t *bytes, *bytes_again;
+    size_t size, size_again;
+    assert_sealed(&context, value);
+    assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
+    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &again), QMAT_OK);
+    assert_int_equal(again->type, type);
+    assert_int_equal(again->references, 1);
+    assert_true(again->sealed);
+    assert_memory_equal(&again->digest, &value->digest, sizeof value->digest);
+    assert_int_equal(qmat_value_serialize(&context, again, &bytes_again, &size_again), QMAT_OK);
+    assert_int_equal(size_again, size);
+    assert_memory_equal(bytes_again, bytes, size);
+    qmat_free(bytes);
+    qmat_free(bytes_again);
+    qmat_value_release(value);
+    qmat_value_release(again);
+  }
+}
+
+static void test_the_content_comes_back_field_by_field(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = medial_example();
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *value;
+  assert_sealed(&context, &medial->base);
+  assert_int_equal(qmat_value_serialize(&context, &medial->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  const qmat_medial *again = (const qmat_medial *)value;
+  assert_int_equal(again->sphere_count, 4);
+  assert_int_equal(again->edge_count, 4);
+  assert_int_equal(again->triangle_count, 1);
+  assert_int_equal(again->region_offset_count, 5);
+  assert_int_equal(again->region_sample_count, 6);
+  assert_memory_equal(again->spheres, medial->spheres, 16 * sizeof(double));
+  assert_memory_equal(again->edges, medial->edges, 8 * sizeof(uint32_t));
+  assert_memory_equal(again->triangles, medial->triangles, 3 * sizeof(uint32_t));
+  assert_memory_equal(again->region_offsets, medial->region_offsets, 5 * sizeof(uint32_t));
+  assert_memory_equal(again->region_samples, medial->region_samples, 6 * sizeof(uint32_t));
+  assert_int_equal((uintptr_t)again->spheres % 64, 0);
+  qmat_free(bytes);
+  qmat_value_release(value);
+  qmat_value_release(&medial->base);
+
+  qmat_file *file = file_example();
+  assert_sealed(&context, &file->base);
+  assert_int_equal(qmat_value_serialize(&context, &file->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  const qmat_file *file_again = (const qmat_file *)value;
+  assert_string_equal(file_again->format, "gltf");
+  assert_int_equal(file_again->part_count, 3);
+  assert_string_equal(file_again->parts[1].name, "medial.bin");
+  assert_int_equal(file_again->parts[1].size, 3);
+  assert_memory_equal(file_again->parts[1].bytes, "\0\1\2", 3);
+  qmat_free(bytes);
+  qmat_value_release(value);
+  qmat_value_release(&file->base);
+}
+
+/* Written out by hand from the description at the head of value.c. */
+static void test_the_binary_form_is_as_described(void **state) {
+  (void)state;
+  static const uint8_t expected[] =
+      "QMAT\1\0\0\0"
+      "\5\0\0\0"
+      "field"
+      "\6\0\0\0"
+      "values"
+      "\3"
+      "\x18\0\0\0\0\0\0\0"
+      "\0\0\0\0\0\0\xe0\x3f"
+      "\0\0\0\0\0\0\0\x80"
+      "\x9c\x75\0\x88\x3c\xe4\x37\x7e"
+      "\6\0\0\0"
+      "domain"
+      "\7"
+      "\4\0\0\0\0\0\0\0"
+      "\1\0\0\0"
+      "\4\0\0\0"
+      "unit"
+      "\4"
+      "\x0a\0\0\0\0\0\0\0"
+      "model unit";
+  qmat_context context = {0};
+  qmat_field *field = field_example();
+  uint8_t *bytes;
+  size_t size;
+  assert_sealed(&context, &field->base);
+  assert_int_equal(qmat_value_serialize(&context, &field->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(size, sizeof expected - 1);
+  assert_memory_equal(bytes, expected, size);
+  qmat_hasher hasher;
+  qmat_digest digest;
+  assert_int_equal(qmat_hasher_init(&hasher), QMAT_OK);
+  qmat_hasher_add(&hasher, expected, sizeof expected - 1);
+  assert_int_equal(qmat_hasher_finish(&hasher, &digest), QMAT_OK);
+  assert_memory_equal(&field->base.digest, &digest, sizeof digest);
+  qmat_free(bytes);
+  qmat_value_release(&field->base);
+}
+
+/* Every array that is longer than the encoder's chunk. */
+static void test_long_arrays_come_back_whole(void **state) {
+  (void)state;
+  enum { COUNT = 12345 };
+  qmat_context context = {0};
+  qmat_mesh *mesh = qmat_mesh_new();
+  mesh->vertex_count = mesh->triangle_count = COUNT;
+  mesh->positions = qmat_alloc(3 * COUNT, sizeof(double));
+  mesh->triangles = qmat_alloc(3 * COUNT, sizeof(uint32_t));
+  for (size_t i = 0; i < 3 * COUNT; ++i) {
+    mesh->positions[i] = qmat_hash_unit(qmat_hash3(1, i, 0)) - 0.5;
+    mesh->triangles[i] = (uint32_t)(qmat_hash3(2, i, 0) % COUNT);
+  }
+  assert_sealed(&context, &mesh->base);
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *value;
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  const qmat_mesh *again = (const qmat_mesh *)value;
+  assert_memory_equal(again->positions, mesh->positions, 3 * COUNT * sizeof(double));
+  assert_memory_equal(again->triangles, mesh->triangles, 3 * COUNT * sizeof(uint32_t));
+  qmat_free(bytes);
+  qmat_value_release(value);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_empty_values_are_valid(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_field *field = qmat_field_new();
+  field->unit = qmat_strdup("");
+  qmat_value *values[] = {&qmat_mesh_new()->base, &field->base, &qmat_samples_new()->base, &qmat_medial_new()->base,
+                          &qmat_report_new()->base};
+  for (size_t i = 0; i < 5; ++i) {
+    assert_sealed(&context, values[i]);
+    uint8_t *bytes;
+    size_t size;
+    qmat_value *again;
+    assert_int_equal(qmat_value_serialize(&context, values[i], &bytes, &size), QMAT_OK);
+    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &again), QMAT_OK);
+    assert_memory_equal(&again->digest, &values[i]->digest, sizeof again->digest);
+    if (again->type == QMAT_MEDIAL) assert_null(((const qmat_medial *)again)->region_offsets);
+    for (size_t k = 0; k < i; ++k) {
+      assert_memory_not_equal(&values[i]->digest, &values[k]->digest, sizeof values[i]->digest);
+    }
+    qmat_free(bytes);
+    qmat_value_release(again);
+  }
+  for (size_t i = 0; i < 5; ++i) qmat_value_release(values[i]);
+}
+
+static void test_every_bit_of_content_moves_the_digest(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_digest digests[6];
+  for (int change = 0; change < 6; ++change) {
+    qmat_mesh *mesh = mesh_example();
+    if (change == 1) mesh->closed = false;
+    if (change == 2) mesh->oriented = false;
+    if (change == 3) mesh->positions[0] = -0.0;
+    if (change == 4) mesh->triangles[11] = 0;
+    if (change == 5) mesh->triangle_count = 3;
+    assert_sealed(&context, &mesh->base);
+    digests[change] = mesh->base.digest;
+    qmat_value_release(&mesh->base);
+    for (int k = 0; k < change; ++k) assert_memory_not_equal(&digests[change], &digests[k], sizeof(qmat_digest));
+  }
+}
+
+static void test_a_report_has_one_digest_for_any_order_of_its_keys(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_report *a = qmat_report_new(), *b = qmat_report_new();
+  for (int i = 0; i < 50; ++i) {
+    char first[16], second[16];
+    snprintf(first, sizeof first, "key%d", i);
+    snprintf(second, sizeof second, "key%d", 49 - i);
+    json_object_set_new(a->root, first, json_integer(i));
+    json_object_set_new(b->root, second, json_integer(49 - i));
+  }
+  assert_sealed(&context, &a->base);
+  assert_sealed(&context, &b->base);
+  assert_memory_equal(&a->base.digest, &b->base.digest, sizeof(qmat_digest));
+  qmat_value_release(&a->base);
+  qmat_value_release(&b->base);
+}
+
+static void test_sealing_twice_is_an_internal_error(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *mesh = mesh_example();
+  assert_sealed(&context, &mesh->base);
+  assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_ERROR_INTERNAL);
+  assert_string_equal(context.error.message, "a mesh was sealed twice");
+  qmat_value_release(&mesh->base);
+}
+
+static void test_an_open_value_cannot_be_serialized(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *mesh = mesh_example();
+  uint8_t *bytes = (uint8_t *)1;
+  size_t size = 1;
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_ERROR_INTERNAL);
+  assert_null(bytes);
+  assert_int_equal(size, 0);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_missing_arrays_and_texts_are_internal_errors(void **state) {
+  (void)state;
+  qmat_scene *scene = scene_example();
+  qmat_free(scene->format);
+  scene->format = NULL;
+  assert_not_sealed(&scene->base, QMAT_ERROR_INTERNAL, "format: the format of a scene is not set");
+  qmat_mesh *mesh = qmat_mesh_new();
+  mesh->vertex_count = 3;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_INTERNAL, "positions: a mesh counts 3 positions but holds none");
+  qmat_field *field = field_example();
+  field->count = SIZE_MAX;
+  char line[128];
+  snprintf(line, sizeof line, "values: a field counts %zu values but holds none", SIZE_MAX);
+  assert_not_sealed(&field->base, QMAT_ERROR_INTERNAL, line);
+  qmat_report *report = qmat_report_new();
+  json_decref(report->root);
+  report->root = json_array();
+  assert_not_sealed(&report->base, QMAT_ERROR_INTERNAL, "the root of a report is not a JSON object");
+}
+
+static void test_bad_meshes_name_the_first_bad_element(void **state) {
+  (void)state;
+  qmat_mesh *mesh = mesh_example();
+  mesh->positions[3 * 2 + 1] = (double)INFINITY;
+  mesh->positions[3 * 3] = (double)NAN;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "vertex 2: the position is not finite");
+  mesh = mesh_example();
+  mesh->triangles[3 * 1 + 2] = 4;
+  mesh->triangles[3 * 3] = UINT32_MAX;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "facet 1: corner 2 names vertex 4 of 4");
+  mesh = mesh_example();
+  mesh->vertex_count = 0;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "facet 0: corner 0 names vertex 0 of 0");
+}
+
+static void test_bad_scenes_and_fields_are_refused(void **state) {
+  (void)state;
+  qmat_scene *scene = scene_example();
+  scene->name[2] = (char)0xFF;
+  assert_not_sealed(&scene->base, QMAT_ERROR_FORMAT, "the name of the scene is not valid UTF-8");
+  qmat_field *field = field_example();
+  field->values[1] = (double)INFINITY;
+  assert_not_sealed(&field->base, QMAT_ERROR_GEOMETRY, "vertex 1: the value is not finite");
+  field = field_example();
+  field->domain = QMAT_PER_FACET;
+  field->values[2] = (double)NAN;
+  assert_not_sealed(&field->base, QMAT_ERROR_GEOMETRY, "facet 2: the value is not finite");
+  field = field_example();
+  memset(&field->domain, 7, sizeof field->domain);
+  assert_not_sealed(&field->base, QMAT_ERROR_GEOMETRY, "domain: the domain of a field is neither facets nor vertices");
+}
+
+static void test_bad_samples_name_the_first_bad_element(void **state) {
+  (void)state;
+  qmat_samples *samples = samples_example();
+  samples->positions[4] = (double)NAN;
+  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "sample 1: the position is not finite");
+  samples = samples_example();
+  samples->barycentrics[0] = -(double)INFINITY;
+  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "sample 0: the barycentric coordinate is not finite");
+  samples = samples_example();
+  samples->barycentrics[5] = 0.25;
+  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "sample 1: the barycentric coordinates sum to 0.75, not 1");
+  samples = samples_example();
+  samples->vertex_count = 3;
+  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "vertex_count: 3 of 2 samples are said to be vertices");
+}
+
+static void test_barycentrics_may_be_off_by_rounding(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_samples *samples = samples_example();
+  samples->barycentrics[5] += 9e-10;
+  assert_sealed(&context, &samples->base);
+  qmat_value_release(&samples->base);
+}
+
+static void test_bad_medial_meshes_name_the_first_bad_element(void **state) {
+  (void)state;
+  qmat_medial *medial = medial_example();
+  medial->spheres[4 * 3 + 3] = (double)NAN;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "sphere 3: the centre or radius is not finite");
+  medial = medial_example();
+  medial->spheres[4 * 1 + 3] = -0.5;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "sphere 1: the radius -0.5 is negative");
+  medial = medial_example();
+  medial->edges[7] = 4;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 3: it names sphere 4 of 4");
+  medial = medial_example();
+  medial->edges[0] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 0: its spheres 1 and 1 do not rise");
+  medial = medial_example();
+  medial->edges[3] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 1: it repeats the edge before it");
+  medial = medial_example();
+  medial->edges[4] = 0;
+  medial->edges[5] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 2: it sorts before the last edge");
+  medial = medial_example();
+  medial->triangles[1] = 2;
+  medial->triangles[2] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its spheres 2 and 1 do not rise");
+  medial = medial_example();
+  medial->triangles[2] = 3;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its side (0, 3) is not among the edges");
+  medial = medial_example();
+  medial->edge_count = 2;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its side (1, 2) is not among the edges");
+}
+
+static void test_bad_regions_are_refused(void **state) {
+  (void)state;
+  qmat_medial *medial = medial_example();
+  medial->region_offset_count = 4;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "region_offsets: 4 spheres need 5 region offsets, not 4");
+  medial = medial_example();
+  medial->region_offsets[0] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "region 0: the first region starts at 1, not 0");
+  medial = medial_example();
+  medial->region_offsets[2] = 1;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "region 1: it ends at 1, before its start at 2");
+  medial = medial_example();
+  medial->region_sample_count = 5;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "region_offsets: the regions end at 6 of 5 samples");
+  medial = medial_example();
+  medial->region_offset_count = 0;
+  assert_not_sealed(&medial->base, QMAT_ERROR_INTERNAL, "a medial mesh without region rows holds region data");
+}
+
+static void set_part_name(qmat_file *file, size_t part, const char *name) {
+  qmat_free(file->parts[part].name);
+  file->parts[part].name = qmat_strdup(name);
+}
+
+static void test_part_names_stay_in_one_folder_and_are_unique(void **state) {
+  (void)state;
+  const char *const bad[] = {"a/b", "/etc", "..", ".", "a\\b", "../x"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    qmat_file *file = file_example();
+    set_part_name(file, 2, bad[i]);
+    char line[128];
+    snprintf(line, sizeof line, "part 2: its name '%s' is not a plain file name", bad[i]);
+    assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, line);
+  }
+  qmat_file *file = file_example();
+  set_part_name(file, 2, "medial.bin");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 2: the name 'medial.bin' was given before");
+  file = file_example();
+  set_part_name(file, 1, "");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 1: it has no name");
+  file = file_example();
+  set_part_name(file, 0, "main.gltf");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 0: the main part has a name of its own");
+  file = file_example();
+  set_part_name(file, 1, "\xc3");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 1: the name is not valid UTF-8");
+  file = file_example();
+  qmat_free(file->parts[1].bytes);
+  file->parts[1].bytes = NULL;
+  assert_not_sealed(&file->base, QMAT_ERROR_INTERNAL, "part 1: a part of a file has no name or no bytes");
+  file = qmat_file_new();
+  file->format = qmat_strdup("ply");
+  assert_not_sealed(&file->base, QMAT_ERROR_INTERNAL, "a file has no main part");
+}
+
+/* The bytes are a copy of just their size, so that the sanitizer sees a read beyond them. */
+static qmat_status read_exactly(qmat_context *context, const uint8_t *bytes, size_t size, qmat_value **value) {
+  uint8_t *exact = test_malloc(size + (size == 0));
+  if (size > 0) memcpy(exact, bytes, size);
+  const qmat_status status = qmat_value_deserialize(context, exact, size, value);
+  test_free(exact);
+  return status;
+}
+
+static void test_cut_bytes_are_refused_at_every_length(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    qmat_value *value = example_of((qmat_value_type)type), *again;
+    uint8_t *bytes;
+    size_t size;
+    assert_sealed(&context, value);
+    assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
+    for (size_t cut = 0; cut < size; ++cut) {
+      again = value;
+      assert_int_equal(read_exactly(&context, bytes, cut, &again), QMAT_ERROR_FORMAT);
+      assert_null(again);
+      assert_string_equal(context.error.element_kind, "byte");
+      assert_in_range(context.error.element, 0, cut);
+    }
+    qmat_free(bytes);
+    qmat_value_release(value);
+  }
+}
+
+static void test_bytes_after_the_last_row_are_refused(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *mesh = mesh_example();
+  uint8_t *bytes, longer[4096];
+  size_t size;
+  qmat_value *again;
+  assert_sealed(&context, &mesh->base);
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
+  memcpy(longer, bytes, size);
+  longer[size] = 0;
+  assert_int_equal(read_exactly(&context, longer, size + 1, &again), QMAT_ERROR_FORMAT);
+  qmat_free(bytes);
+  qmat_value_release(&mesh->base);
+}
+
+/* Every bit of every byte flipped, and every byte set to its extremes: either an error, or a valid value whose bytes
+ * are those that were read. */
+static void test_spoilt_bytes_give_an_error_or_what_they_say(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  size_t refused = 0, accepted = 0;
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    qmat_value *value = example_of((qmat_value_type)type), *again;
+    uint8_t *bytes, *written;
+    size_t size, written_size;
+    assert_sealed(&context, value);
+    assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
+    for (size_t i = 0; i < size; ++i) {
+      const uint8_t before = bytes[i];
+      for (int change = 0; change < 10; ++change) {
+        bytes[i] = (uint8_t)(change < 8 ? before ^ (1 << change) : change == 8 ? 0xFF : 0x7F);
+        if (bytes[i] == before) continue;
+        const qmat_status status = read_exactly(&context, bytes, size, &again);
+        if (status != QMAT_OK) {
+          assert_int_equal(status, QMAT_ERROR_FORMAT);
+          assert_null(again);
+          ++refused;
+          continue;
+        }
+        ++accepted;
+        if (type != QMAT_REPORT) { /* JSON has many spellings of one value */
+          assert_int_equal(qmat_value_serialize(&context, again, &written, &written_size), QMAT_OK);
+          assert_int_equal(written_size, size);
+          assert_memory_equal(written, bytes, size);
+          qmat_free(written);
+        }
+        qmat_value_release(again);
+      }
+      bytes[i] = before;
+    }
+    qmat_free(bytes);
+    qmat_value_release(value);
+  }
+  assert_true(refused > 1000 && accepted > 1000);
+}
+
+static void test_a_huge_length_is_refused_before_it_is_allocated(void **state) {
+  (void)state;
+  static const uint8_t mesh[] =
+      "QMAT\1\0\0\0"
+      "\4\0\0\0"
+      "mesh"
+      "\x09\0\0\0"
+      "positions"
+      "\3"
+      "\0\0\0\0\0\0\0\x80";
+  static const uint8_t file[] =
+      "QMAT\1\0\0\0"
+      "\4\0\0\0"
+      "file"
+      "\6\0\0\0"
+      "format"
+      "\4"
+      "\3\0\0\0\0\0\0\0"
+      "glb"
+      "\5\0\0\0"
+      "parts"
+      "\x09"
+      "\x08\0\0\0\0\0\0\0"
+      "\xff\xff\xff\xff\xff\xff\xff\x0f";
+  qmat_context context = {0};
+  qmat_value *value;
+  assert_int_equal(read_exactly(&context, mesh, sizeof mesh - 1, &value), QMAT_ERROR_FORMAT);
+  assert_int_equal(read_exactly(&context, file, sizeof file - 1, &value), QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message,
+                      "this is not the binary form of a value: there are fewer parts than it says");
+  assert_string_equal(context.error.field, "parts");
+}
+
+static void test_another_version_is_refused_by_number(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_value *value;
+  assert_int_equal(read_exactly(&context, (const uint8_t *)"QMAT\2\0\0\0", 8, &value), QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message, "the binary form has version 2; this qmat reads version 1");
+}
+
+static void test_content_that_breaks_a_rule_is_a_format_error_when_read(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *mesh = mesh_example();
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *value;
+  assert_sealed(&context, &mesh->base);
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
+  const uint8_t corner[] = {0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0};
+  uint8_t *found = memmem(bytes, size, corner, sizeof corner);
+  assert_non_null(found);
+  found[4] = 200;
+  assert_int_equal(read_exactly(&context, bytes, size, &value), QMAT_ERROR_FORMAT);
+  assert_int_equal(context.error.status, QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message, "corner 1 names vertex 200 of 4");
+  qmat_free(bytes);
+  qmat_value_release(&mesh->base);
+}
+
+static void *retain_and_release(void *value) {
+  for (int i = 0; i < 20000; ++i) {
+    const qmat_mesh *mesh = (const qmat_mesh *)qmat_value_retain(value);
+    if (mesh->triangles[0] != 0) return value;
+    qmat_value_release((qmat_value *)mesh);
+  }
+  qmat_value_release(value); /* the reference that this thread was given */
+  return NULL;
+}
+
+static void test_references_are_counted_across_threads(void **state) {
+  (void)state;
+  enum { THREADS = 4 };
+  qmat_context context = {0};
+  qmat_mesh *mesh = mesh_example();
+  assert_sealed(&context, &mesh->base);
+  pthread_t threads[THREADS];
+  for (int i = 0; i < THREADS; ++i) {
+    assert_ptr_equal(qmat_value_retain(&mesh->base), &mesh->base);
+    assert_int_equal(pthread_create(&threads[i], NULL, retain_and_release, mesh), 0);
+  }
+  for (int i = 0; i < THREADS; ++i) {
+    void *result;
+    assert_int_equal(pthread_join(threads[i], &result), 0);
+    assert_null(result);
+  }
+  assert_int_equal(mesh->base.references, 1);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_copied_texts_are_equal_and_apart(void **state) {
+  (void)state;
+  const char *text = "caf\xc3\xa9";
+  char *copy = qmat_strdup(text);
+  assert_non_null(copy);
+  assert_ptr_not_equal(copy, text);
+  assert_string_equal(copy, text);
+  qmat_free(copy);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_types_have_names),
+      cmocka_unit_test(test_new_values_are_empty_and_can_be_released_at_once),
+      cmocka_unit_test(test_half_filled_values_are_released_whole),
+      cmocka_unit_test(test_bytes_count_what_the_arrays_hold),
+      cmocka_unit_test(test_every_type_is_read_back_to_the_same_bytes_and_digest),
+      cmocka_unit_test(test_the_content_comes_back_field_by_field),
+      cmocka_unit_test(test_the_binary_form_is_as_described),
+      cmocka_unit_test(test_long_arrays_come_back_whole),
+      cmocka_unit_test(test_empty_values_are_valid),
+      cmocka_unit_test(test_every_bit_of_content_moves_the_digest),
+      cmocka_unit_test(test_a_report_has_one_digest_for_any_order_of_its_keys),
+      cmocka_unit_test(test_sealing_twice_is_an_internal_error),
+      cmocka_unit_test(test_an_open_value_cannot_be_serialized),
+      cmocka_unit_test(test_missing_arrays_and_texts_are_internal_errors),
+      cmocka_unit_test(test_bad_meshes_name_the_first_bad_element),
+      cmocka_unit_test(test_bad_scenes_and_fields_are_refused),
+      cmocka_unit_test(test_bad_samples_name_the_first_bad_element),
+      cmocka_unit_test(test_barycentrics_may_be_off_by_rounding),
+      cmocka_unit_test(test_bad_medial_meshes_name_the_first_bad_element),
+      cmocka_unit_test(test_bad_regions_are_refused),
+      cmocka_unit_test(test_part_names_stay_in_one_folder_and_are_unique),
+      cmocka_unit_test(test_cut_bytes_are_refused_at_every_length),
+      cmocka_unit_test(test_bytes_after_the_last_row_are_refused),
+      cmocka_unit_test(test_spoilt_bytes_give_an_error_or_what_they_say),
+      cmocka_unit_test(test_a_huge_length_is_refused_before_it_is_allocated),
+      cmocka_unit_test(test_another_version_is_refused_by_number),
+      cmocka_unit_test(test_content_that_breaks_a_rule_is_a_format_error_when_read),
+      cmocka_unit_test(test_references_are_counted_across_threads),
+      cmocka_unit_test(test_copied_texts_are_equal_and_apart),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
