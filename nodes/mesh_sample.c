@@ -167,93 +167,87 @@ static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, 
 
 /* --- where: Lloyd's relaxation on the bounded Voronoi diagram of a facet ------------------------------------------ */
 
-/* A facet in its own plane, its longest edge 1 long: corners (0, 0), (base, 0), (apex[0], apex[1]). */
-typedef struct flat_facet {
-  double base;
-  double apex[2];
-} flat_facet;
+typedef struct flat_point {
+  double x, y;
+} flat_point;
 
-static flat_facet flatten(const double *a, const double *b, const double *c) {
-  double ab[3], ac[3], bc[3];
+/* The corners of a facet in its own plane, its longest edge 1 long: the first at the origin, the second on the x axis,
+ * the third above it. */
+static void flatten(const double *a, const double *b, const double *c, flat_point corners[3]) {
+  double ab[3], ac[3], bc[3], normal[3];
   for (int k = 0; k < 3; k++) ab[k] = b[k] - a[k], ac[k] = c[k] - a[k], bc[k] = c[k] - b[k];
   const double base = sqrt(ab[0] * ab[0] + ab[1] * ab[1] + ab[2] * ab[2]);
   const double side = sqrt(ac[0] * ac[0] + ac[1] * ac[1] + ac[2] * ac[2]);
   const double last = sqrt(bc[0] * bc[0] + bc[1] * bc[1] + bc[2] * bc[2]);
-  const double scale = 1 / fmax(fmax(base, side), last);
-  double normal[3];
-  const double area = qmat_triangle_area(a, b, c, normal);
+  const double longest = fmax(fmax(base, side), last);
   const double along = (ab[0] * ac[0] + ab[1] * ac[1] + ab[2] * ac[2]) / base;
-  return (flat_facet){base * scale, {along * scale, 2 * area / base * scale}};
+  corners[0] = (flat_point){0, 0};
+  corners[1] = (flat_point){base / longest, 0};
+  corners[2] = (flat_point){along / longest, 2 * qmat_triangle_area(a, b, c, normal) / base / longest};
 }
 
 /* Cuts off the part of a convex polygon that is nearer to `other` than to `site`; returns the new number of corners.
- * In and out may not overlap. */
-static size_t clip_by_bisector(const double (*in)[2], size_t count, const double site[2], const double other[2],
-                               double (*out)[2]) {
-  const double normal[2] = {other[0] - site[0], other[1] - site[1]};
-  const double middle[2] = {0.5 * (other[0] + site[0]), 0.5 * (other[1] + site[1])};
+ * `in` and `out` may not overlap. */
+static size_t clip_by_bisector(const flat_point *in, size_t count, flat_point site, flat_point other, flat_point *out) {
+  const flat_point normal = {other.x - site.x, other.y - site.y};
+  const flat_point middle = {0.5 * (other.x + site.x), 0.5 * (other.y + site.y)};
   size_t kept = 0;
-  for (size_t i = 0; i < count; i++) {
-    const double *p = in[i], *q = in[i + 1 < count ? i + 1 : 0];
-    const double s = (p[0] - middle[0]) * normal[0] + (p[1] - middle[1]) * normal[1];
-    const double t = (q[0] - middle[0]) * normal[0] + (q[1] - middle[1]) * normal[1];
-    if (s <= 0) {
-      out[kept][0] = p[0];
-      out[kept++][1] = p[1];
-    }
+  /* Rounding may bend a polygon and let the line cross it more than twice, but never past the end of the array. */
+  for (size_t i = 0; i < count && kept + 2 <= MOST_CELL_CORNERS; i++) {
+    const flat_point p = in[i], q = in[i + 1 < count ? i + 1 : 0];
+    const double s = (p.x - middle.x) * normal.x + (p.y - middle.y) * normal.y;
+    const double t = (q.x - middle.x) * normal.x + (q.y - middle.y) * normal.y;
+    if (s <= 0) out[kept++] = p;
     if ((s < 0 && t > 0) || (s > 0 && t < 0)) {
       const double cut = s / (s - t);
-      out[kept][0] = p[0] + cut * (q[0] - p[0]);
-      out[kept++][1] = p[1] + cut * (q[1] - p[1]);
+      out[kept++] = (flat_point){p.x + cut * (q.x - p.x), p.y + cut * (q.y - p.y)};
     }
   }
   return kept;
 }
 
 /* The square of how far the polygon reaches from a point. */
-static double squared_reach(const double (*polygon)[2], size_t count, const double point[2]) {
+static double squared_reach(const flat_point *polygon, size_t count, flat_point from) {
   double reach = 0;
   for (size_t i = 0; i < count; i++) {
-    const double x = polygon[i][0] - point[0], y = polygon[i][1] - point[1];
+    const double x = polygon[i].x - from.x, y = polygon[i].y - from.y;
     reach = fmax(reach, x * x + y * y);
   }
   return reach;
 }
 
-/* The centroid of a polygon; false when it has no area. */
-static bool polygon_centroid(const double (*polygon)[2], size_t count, double centroid[2]) {
+/* The centroid of a polygon; `otherwise` when it has no area. */
+static flat_point polygon_centroid(const flat_point *polygon, size_t count, flat_point otherwise) {
   double area = 0, x = 0, y = 0;
   for (size_t i = 1; i + 1 < count; i++) {
-    const double u[2] = {polygon[i][0] - polygon[0][0], polygon[i][1] - polygon[0][1]};
-    const double v[2] = {polygon[i + 1][0] - polygon[0][0], polygon[i + 1][1] - polygon[0][1]};
-    const double part = u[0] * v[1] - u[1] * v[0];
+    const flat_point u = {polygon[i].x - polygon[0].x, polygon[i].y - polygon[0].y};
+    const flat_point v = {polygon[i + 1].x - polygon[0].x, polygon[i + 1].y - polygon[0].y};
+    const double part = u.x * v.y - u.y * v.x;
     area += part;
-    x += part * (u[0] + v[0]);
-    y += part * (u[1] + v[1]);
+    x += part * (u.x + v.x);
+    y += part * (u.y + v.y);
   }
-  if (!(area > 0)) return false;
-  centroid[0] = polygon[0][0] + x / (3 * area);
-  centroid[1] = polygon[0][1] + y / (3 * area);
-  return true;
+  if (!(area > 0)) return otherwise;
+  return (flat_point){polygon[0].x + x / (3 * area), polygon[0].y + y / (3 * area)};
 }
 
 /* The centroid of a site's Voronoi cell within the facet (Tournois et al. 2010). Sites 0 to 2 are the corners. */
-static bool cell_centroid(const double (*sites)[2], size_t count, size_t index, double centroid[2]) {
-  double polygons[2][MOST_CELL_CORNERS][2];
-  memcpy(polygons[0], sites, 3 * sizeof sites[0]);
+static flat_point cell_centroid(const flat_point *sites, size_t count, size_t index) {
+  flat_point polygons[2][MOST_CELL_CORNERS];
+  memcpy(polygons[0], sites, 3 * sizeof *sites);
+  const flat_point site = sites[index];
   int current = 0;
   size_t corners = 3;
-  double reach = squared_reach(polygons[0], corners, sites[index]);
+  double reach = squared_reach(polygons[0], corners, site);
   for (size_t i = 0; i < count; i++) {
-    const double x = sites[i][0] - sites[index][0], y = sites[i][1] - sites[index][1], square = x * x + y * y;
+    const double x = sites[i].x - site.x, y = sites[i].y - site.y, square = x * x + y * y;
     /* Two sites in one place have no bisector, and one that is twice the cell's reach away cuts nothing. */
     if (i == index || square == 0 || square >= 4 * reach) continue;
-    corners =
-        clip_by_bisector((const double(*)[2])polygons[current], corners, sites[index], sites[i], polygons[1 - current]);
+    corners = clip_by_bisector(polygons[current], corners, site, sites[i], polygons[1 - current]);
     current = 1 - current;
-    reach = squared_reach((const double(*)[2])polygons[current], corners, sites[index]);
+    reach = squared_reach(polygons[current], corners, site);
   }
-  return polygon_centroid((const double(*)[2])polygons[current], corners, centroid);
+  return polygon_centroid(polygons[current], corners, site);
 }
 
 /* Spreads `count` samples over a facet: their barycentrics (3 each). */
@@ -263,31 +257,26 @@ static void spread_samples(const mesh_sample_params *params, const double *a, co
     for (int k = 0; k < 3; k++) barycentrics[k] = 1.0 / 3;
     return;
   }
-  const flat_facet flat = flatten(a, b, c);
-  double sites[2][MOST_SITES][2] = {{{0, 0}, {flat.base, 0}, {flat.apex[0], flat.apex[1]}}};
-  memcpy(sites[1], sites[0], 3 * sizeof sites[0][0]);
+  flat_point sites[2][MOST_SITES], corners[3];
+  flatten(a, b, c, corners);
+  memcpy(sites[0], corners, sizeof corners);
+  memcpy(sites[1], corners, sizeof corners);
   for (size_t i = 0; i < count; i++) {
     /* Uniform on the triangle: the square root makes equal areas equally likely. */
     const double u = sqrt(qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i)));
     const double v = qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i + 1));
-    sites[0][3 + i][0] = u * (1 - v) * flat.base + u * v * flat.apex[0];
-    sites[0][3 + i][1] = u * v * flat.apex[1];
+    sites[0][3 + i] = (flat_point){u * (1 - v) * corners[1].x + u * v * corners[2].x, u * v * corners[2].y};
   }
   int current = 0;
   for (int64_t round = 0; round < params->lloyd_rounds; round++) {
-    for (size_t i = 3; i < 3 + count; i++) {
-      const double(*now)[2] = (const double(*)[2])sites[current];
-      if (!cell_centroid(now, 3 + count, i, sites[1 - current][i])) {
-        memcpy(sites[1 - current][i], now[i], sizeof now[i]);
-      }
-    }
+    for (size_t i = 3; i < 3 + count; i++) sites[1 - current][i] = cell_centroid(sites[current], 3 + count, i);
     current = 1 - current;
   }
   for (size_t i = 0; i < count; i++) {
-    const double *site = sites[current][3 + i];
+    const flat_point site = sites[current][3 + i];
     double *weights = barycentrics + 3 * i;
-    weights[2] = fmin(fmax(site[1] / flat.apex[1], 0), 1);
-    weights[1] = fmin(fmax((site[0] - weights[2] * flat.apex[0]) / flat.base, 0), 1 - weights[2]);
+    weights[2] = fmin(fmax(site.y / corners[2].y, 0), 1);
+    weights[1] = fmin(fmax((site.x - weights[2] * corners[2].x) / corners[1].x, 0), 1 - weights[2]);
     weights[0] = 1 - weights[2] - weights[1];
   }
 }
