@@ -243,7 +243,10 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   qmat_surface *surface = NULL;
   qmat_field *field = NULL;
   qmat_status status = qmat_surface_new(context, mesh, &surface);
-  if (status != QMAT_OK) goto done;
+  if (status != QMAT_OK) {
+    qmat_fail_field(context, "mesh");
+    goto done;
+  }
 
   cone_ray *rays = qmat_arena_alloc(&context->arena, ray_count, sizeof *rays);
   uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
