@@ -52,17 +52,18 @@ size_t qmat_bytes_left(const qmat_byte_reader *reader);
 
 /* The number that starts at `text`, as in the C locale: an optional sign, decimal digits with an optional point, an
  * optional exponent, or "nan", "inf", "infinity" in any case. Correctly rounded. Returns the first character that is
- * not part of it, or NULL when there is no number or it does not end before `end`; `*end` must be readable. */
+ * not part of it, or NULL when there is no number. `*end` must be readable and a zero byte. */
 const char *qmat_scan_double(const char *text, const char *end, double *number);
 
-/* Walks through text as blank-separated tokens and knows the line and column. Blanks are space, tab, carriage return,
- * line feed (also alone a carriage return ends a line), vertical tab and form feed. */
+/* Walks through text as blank-separated tokens and knows the line and column. Blanks are space, tab, line feed,
+ * carriage return, vertical tab and form feed; "\n", "\r\n" and a lone "\r" end a line. */
 typedef struct qmat_scanner {
   qmat_context *context;
   const char *file;                  /* for errors */
-  const char *at, *end, *line_start; /* *end must be readable (qmat_bytes guarantees it) */
+  const char *at, *end, *line_start; /* *end is a readable zero byte, as after qmat_bytes */
   int line;                          /* from 1 */
   char comment;                      /* runs to the end of its line; 0: the text has no comments */
+  bool joins_lines;                  /* a backslash at the end of a line joins the next one to it (OBJ) */
 } qmat_scanner;
 
 /* Starts at the first byte of `size` bytes of text; skips a UTF-8 byte order mark. `text`, `file` and `context` must
@@ -92,8 +93,7 @@ qmat_status qmat_scan_number(qmat_scanner *scanner, const char *what, double *nu
 qmat_status qmat_scan_integer(qmat_scanner *scanner, const char *what, int64_t least, int64_t most, int64_t *number);
 
 /* QMAT_ERROR_FORMAT at the scanner's place, with file, line and column. */
-qmat_status qmat_scan_fail(const qmat_scanner *scanner, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+qmat_status qmat_scan_fail(const qmat_scanner *scanner, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* The bytes that are left: what a count in a header is checked against. */
 size_t qmat_scan_left(const qmat_scanner *scanner);
 
@@ -126,6 +126,10 @@ void qmat_writer_uninit(qmat_writer *writer);
  * empty afterwards, whatever the result. file->parts must hold that part, zeroed. */
 qmat_status qmat_writer_to_part(qmat_context *context, qmat_writer *writer, qmat_file *file, size_t part,
                                 const char *name);
+
+/* Makes a sealed file value of one part from what was written; the writer is empty afterwards, whatever the result.
+ * `format` is "ma", "ply", ...; the caller releases `*file`, which is NULL on failure. QMAT_ERROR_MEMORY. */
+qmat_status qmat_writer_to_file(qmat_context *context, qmat_writer *writer, const char *format, qmat_file **file);
 
 /* Saves every part: the main part as `path`, the others under their names in the same folder. All are written to
  * temporary files there and flushed to the disk before the first one is renamed; side parts first, the main part last.

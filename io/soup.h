@@ -44,17 +44,19 @@ qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const ui
 void qmat_soup_uninit(qmat_soup *soup);
 
 /* Makes a sealed triangle mesh of the soup: checks it, drops defects when told to, welds vertices of equal position,
- * triangulates polygons (the vertices stay in the order of their first mention in the file, triangles in the order of
- * the facets), and gives it one orientation, outward where it is closed. `path` names the file in errors; `report` (a
- * JSON object, may be NULL) gains these keys:
+ * triangulates polygons (vertices and triangles stay in the file's order), and gives it one orientation, outward where
+ * it is closed. `path` names the file in errors; `report` (a JSON object, may be NULL) gains these keys:
  *   vertices_read, facets_read, facets_dropped_as_defects, polygons_triangulated, vertices_welded,
- *   facets_collapsed_by_welding, facets_repeated_by_welding, opposite_facets, vertices_unreferenced, vertices,
- *   triangles, border_edges, nonmanifold_edges, components, euler_characteristic (whole numbers),
- *   closed, oriented (booleans), flipped (the number of triangles whose orientation was turned over).
- * QMAT_ERROR_FORMAT: a facet with fewer than 3 corners or an index that is out of range; QMAT_ERROR_GEOMETRY: no facet, a
- * coordinate that is not finite, a defect that is not to be dropped, or nothing left; both name the element. `*mesh` is
- * NULL on failure; the caller releases it. Deterministic, one thread. Cost: linear but for the ear clipping of concave
- * polygons, which is quadratic in their corners. */
+ *   facets_collapsed_by_welding, triangles_repeated_by_welding, opposite_facets (pairs), vertices_unreferenced,
+ *   vertices, triangles, border_edges, nonmanifold_edges, components (joined by vertices), inward_components (closed
+ *   ones that enclose a negative volume: cavities), euler_characteristic: whole numbers;
+ *   flipped: how many triangles were turned over; closed, oriented: booleans.
+ * Orientation: a part of the surface whose triangles disagree is made to agree and to enclose a positive volume; parts
+ * that agree stay as they are, unless the closed ones together enclose a negative volume: then those are turned over.
+ * QMAT_ERROR_FORMAT: a facet with fewer than 3 corners or an index that is out of range; QMAT_ERROR_GEOMETRY: no facet,
+ * a coordinate that is not finite, a defect that is not to be dropped, or nothing left; both name the element. `*mesh`
+ * is NULL on failure; the caller releases it. Deterministic, one thread. Cost: linear, but for concave polygons:
+ * quadratic in their corners, of which one may have 10000. */
 qmat_status qmat_soup_to_mesh(qmat_context *context, const qmat_soup *soup, const char *path,
                               const qmat_read_options *options, qmat_mesh **mesh, json_t *report);
 

@@ -1,0 +1,249 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/model.h"
+
+#include <string.h>
+
+#include "io/gltf.h"
+#include "io/ma.h"
+#include "io/mesh_formats.h"
+
+static const struct {
+  const char *title; /* as people write it */
+  const char *name;  /* as scenes and reports have it */
+} formats[QMAT_FORMAT_COUNT] = {
+    [QMAT_FORMAT_UNKNOWN] = {"unknown", ""},    [QMAT_FORMAT_OFF] = {"OFF", "off"},
+    [QMAT_FORMAT_OBJ] = {"OBJ", "obj"},         [QMAT_FORMAT_PLY] = {"PLY", "ply"},
+    [QMAT_FORMAT_STL] = {"STL", "stl"},         [QMAT_FORMAT_GLTF] = {"glTF", "gltf"},
+    [QMAT_FORMAT_GLB] = {"binary glTF", "glb"}, [QMAT_FORMAT_MA] = {"MA", "ma"},
+    [QMAT_FORMAT_USD] = {"USD", "usd"},         [QMAT_FORMAT_ZIP] = {"zip", "zip"},
+};
+
+static const struct {
+  const char *ending;
+  qmat_format format;
+} endings[] = {
+    {"off", QMAT_FORMAT_OFF}, {"obj", QMAT_FORMAT_OBJ},   {"ply", QMAT_FORMAT_PLY},  {"stl", QMAT_FORMAT_STL},
+    {"ma", QMAT_FORMAT_MA},   {"gltf", QMAT_FORMAT_GLTF}, {"glb", QMAT_FORMAT_GLB},  {"usd", QMAT_FORMAT_USD},
+    {"zip", QMAT_FORMAT_ZIP}, {"usda", QMAT_FORMAT_USD},  {"usdc", QMAT_FORMAT_USD}, {"usdz", QMAT_FORMAT_USD},
+};
+
+const char *qmat_format_title(qmat_format format) {
+  return formats[format].title;
+}
+
+static const char *base_name(const char *path) {
+  const char *slash = strrchr(path, '/');
+  return slash ? slash + 1 : path;
+}
+
+/* The ending's dot, or the end of the name; a dot at the start is part of the name. */
+static const char *ending_of(const char *base) {
+  const char *dot = strrchr(base, '.');
+  return dot && dot != base ? dot : base + strlen(base);
+}
+
+static bool is_word(const char *text, size_t length, const char *word) {
+  return length == strlen(word) && memcmp(text, word, length) == 0;
+}
+
+qmat_format qmat_format_of_name(const char *path) {
+  const char *ending = ending_of(base_name(path));
+  if (*ending == '.') ending++;
+  for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++) {
+    const char *wanted = endings[i].ending;
+    size_t k = 0;
+    while (wanted[k] && (ending[k] >= 'A' && ending[k] <= 'Z' ? ending[k] | 0x20 : ending[k]) == wanted[k]) k++;
+    if (!wanted[k] && !ending[k]) return endings[i].format;
+  }
+  return QMAT_FORMAT_UNKNOWN;
+}
+
+static bool starts(const qmat_bytes *bytes, const char *magic) {
+  const size_t length = strlen(magic);
+  return bytes->size >= length && memcmp(bytes->data, magic, length) == 0;
+}
+
+qmat_format qmat_format_of_bytes(const qmat_bytes *bytes) {
+  if (starts(bytes, "glTF")) return QMAT_FORMAT_GLB;
+  if (starts(bytes, "PXR-USDC") || starts(bytes, "#usda")) return QMAT_FORMAT_USD;
+  if (starts(bytes, "ply\n") || starts(bytes, "ply\r")) return QMAT_FORMAT_PLY;
+  if (starts(bytes, "PK\3\4") || starts(bytes, "PK\5\6")) {
+    /* USDZ is a zip whose first member is a USD layer; its name follows a header of 30 bytes. */
+    qmat_byte_reader reader = {.bytes = bytes->data, .size = bytes->size, .at = 4};
+    qmat_take_bytes(&reader, 22);
+    const size_t length = qmat_take_u16(&reader);
+    qmat_take_u16(&reader);
+    const char *name = (const char *)qmat_take_bytes(&reader, length);
+    bool usd = name && length >= 5 && memcmp(name + length - 5, ".usd", 4) == 0;
+    usd = usd || (name && length >= 4 && memcmp(name + length - 4, ".usd", 4) == 0);
+    return usd ? QMAT_FORMAT_USD : QMAT_FORMAT_ZIP;
+  }
+  if (qmat_stl_is_binary(bytes)) return QMAT_FORMAT_STL;
+
+  qmat_scanner scanner;
+  qmat_context nowhere = {0}; /* finding tokens cannot fail */
+  qmat_scanner_init(&scanner, &nowhere, "", (const char *)bytes->data, bytes->size, '#');
+  size_t length;
+  const char *word = qmat_scan_token(&scanner, &length);
+  if (length == 0) return QMAT_FORMAT_UNKNOWN;
+  if (word[0] == '{') return QMAT_FORMAT_GLTF;
+  if (length >= 3 && length <= 8 && is_word(word + length - 3, 3, "OFF")) return QMAT_FORMAT_OFF;
+  if (is_word(word, length, "ply")) return QMAT_FORMAT_PLY;
+  if (is_word(word, length, "solid")) return QMAT_FORMAT_STL;
+  static const char *const obj_words[] = {"v", "vn", "vt", "vp", "f", "o", "g", "s", "mtllib", "usemtl"};
+  for (size_t i = 0; i < sizeof obj_words / sizeof obj_words[0]; i++) {
+    if (is_word(word, length, obj_words[i])) return QMAT_FORMAT_OBJ;
+  }
+  return QMAT_FORMAT_UNKNOWN;
+}
+
+qmat_status qmat_format_choose(qmat_context *context, const char *path, const qmat_bytes *bytes, qmat_format *format) {
+  const qmat_format named = qmat_format_of_name(path), found = qmat_format_of_bytes(bytes);
+  const bool both = named != QMAT_FORMAT_UNKNOWN && found != QMAT_FORMAT_UNKNOWN;
+  *format = found != QMAT_FORMAT_UNKNOWN ? found : named;
+  if (*format == QMAT_FORMAT_USD) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "USD is not read yet");
+    qmat_fail_at(context, path, 0, 0);
+    return qmat_fail_hint(context, "convert the model to glTF");
+  }
+  if (both && named != found) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the name says %s, but the file holds %s", formats[named].title,
+              formats[found].title);
+    qmat_fail_at(context, path, 0, 0);
+    return qmat_fail_hint(context, "rename it or convert it");
+  }
+  if (*format == QMAT_FORMAT_ZIP || *format == QMAT_FORMAT_UNKNOWN) {
+    qmat_fail(context, QMAT_ERROR_FORMAT,
+              *format == QMAT_FORMAT_ZIP ? "archives are not read"
+                                         : "neither the bytes nor the ending of the file "
+                                           "show a format that is read");
+    qmat_fail_at(context, path, 0, 0);
+    return qmat_fail_hint(context, "models are read from .off, .obj, .ply, .stl, .gltf and .glb");
+  }
+  return QMAT_OK;
+}
+
+/* The length of the valid UTF-8 sequence at `text` (a zero ends it), or 0. */
+static size_t utf8_length(const unsigned char *text) {
+  const unsigned char c = text[0];
+  const size_t length = c < 0x80                ? 1
+                        : c >= 0xC2 && c < 0xE0 ? 2
+                        : c >= 0xE0 && c < 0xF0 ? 3
+                        : c >= 0xF0 && c < 0xF5 ? 4
+                                                : 0;
+  for (size_t i = 1; i < length; i++) {
+    if ((text[i] & 0xC0) != 0x80) return 0;
+  }
+  if ((c == 0xE0 && text[1] < 0xA0) || (c == 0xED && text[1] > 0x9F) || (c == 0xF0 && text[1] < 0x90) ||
+      (c == 0xF4 && text[1] > 0x8F)) {
+    return 0;
+  }
+  return length;
+}
+
+char *qmat_model_name(const char *path) {
+  const char *base = base_name(path), *end = ending_of(base);
+  if (base == end) return qmat_strdup("model");
+  char *name = qmat_alloc((size_t)(end - base) * 3 + 1, 1); /* U+FFFD has three bytes */
+  if (!name) return NULL;
+  size_t size = 0;
+  while (base < end) {
+    size_t length = utf8_length((const unsigned char *)base);
+    memcpy(name + size, length > 0 ? base : "\xEF\xBF\xBD", length > 0 ? length : 3);
+    size += length > 0 ? length : 3;
+    base += length > 0 ? length : 1;
+  }
+  name[size] = '\0';
+  return name;
+}
+
+static qmat_status read_surface(qmat_context *context, qmat_format format, const char *path, const qmat_bytes *bytes,
+                                qmat_soup *soup, json_t *report) {
+  switch (format) {
+    case QMAT_FORMAT_OFF:
+      return qmat_off_read(context, bytes, path, soup);
+    case QMAT_FORMAT_OBJ:
+      return qmat_obj_read(context, bytes, path, soup);
+    case QMAT_FORMAT_PLY:
+      return qmat_ply_read(context, bytes, path, soup);
+    case QMAT_FORMAT_STL:
+      return qmat_stl_read(context, bytes, path, soup);
+    case QMAT_FORMAT_GLTF:
+    case QMAT_FORMAT_GLB:
+      return qmat_gltf_parse(context, bytes->data, bytes->size, path, soup, report);
+    default:
+      qmat_fail(context, QMAT_ERROR_FORMAT, "the file holds a medial mesh, not a surface");
+      qmat_fail_at(context, path, 0, 0);
+      return qmat_fail_hint(context, "the node medial.read reads it");
+  }
+}
+
+static qmat_scene *make_scene(const char *path, qmat_format format) {
+  qmat_scene *scene = qmat_scene_new();
+  if (!scene) return NULL;
+  scene->name = qmat_model_name(path);
+  scene->format = qmat_strdup(formats[format].name);
+  if (scene->name && scene->format) return scene;
+  qmat_value_release(&scene->base);
+  return NULL;
+}
+
+qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
+                            qmat_scene **scene, qmat_mesh **mesh, qmat_report **report) {
+  *scene = NULL;
+  *mesh = NULL;
+  *report = NULL;
+  qmat_scene *made_scene = NULL;
+  qmat_mesh *made_mesh = NULL;
+  qmat_report *made_report = NULL;
+  qmat_bytes bytes = {0};
+  qmat_soup soup = {0};
+  qmat_format format = QMAT_FORMAT_UNKNOWN;
+  qmat_status status = qmat_bytes_read_file(context, path, &bytes);
+  if (status == QMAT_OK) status = qmat_format_choose(context, path, &bytes, &format);
+  if (status != QMAT_OK) goto done;
+
+  made_scene = make_scene(path, format);
+  made_report = qmat_report_new();
+  if (!made_scene || !made_report ||
+      json_object_set_new(made_report->root, "format", json_string(formats[format].name)) != 0) {
+    status = qmat_fail_memory(context, "the report");
+    goto done;
+  }
+  status = read_surface(context, format, path, &bytes, &soup, made_report->root);
+  qmat_bytes_uninit(&bytes);
+  if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made_mesh, made_report->root);
+  qmat_soup_uninit(&soup);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &made_scene->base);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &made_report->base);
+
+done:
+  qmat_bytes_uninit(&bytes);
+  qmat_soup_uninit(&soup);
+  if (status == QMAT_OK) {
+    *scene = made_scene;
+    *mesh = made_mesh;
+    *report = made_report;
+    return QMAT_OK;
+  }
+  if (made_scene) qmat_value_release(&made_scene->base);
+  if (made_mesh) qmat_value_release(&made_mesh->base);
+  if (made_report) qmat_value_release(&made_report->base);
+  return status;
+}
+
+qmat_status qmat_medial_read(qmat_context *context, const char *path, qmat_medial **medial) {
+  *medial = NULL;
+  qmat_bytes bytes = {0};
+  qmat_status status = qmat_bytes_read_file(context, path, &bytes);
+  if (status != QMAT_OK) return status;
+  const qmat_format found = qmat_format_of_bytes(&bytes);
+  if (found != QMAT_FORMAT_UNKNOWN) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the file holds %s, not a medial mesh (MA)", formats[found].title);
+    status = qmat_fail_at(context, path, 0, 0);
+  } else {
+    status = qmat_ma_read(context, &bytes, path, medial);
+  }
+  qmat_bytes_uninit(&bytes);
+  return status;
+}

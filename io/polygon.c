@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/polygon.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LARGEST_BEST_FAN = 64 };
+static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28; /* about a second */
+
+/* Twice the signed area of the corners a b c in the plane. */
+static double area(const double *flat, uint32_t a, uint32_t b, uint32_t c) {
+  const double *p = flat + 2 * (size_t)a, *q = flat + 2 * (size_t)b, *r = flat + 2 * (size_t)c;
+  return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+}
+
+static double square_distance(const double *flat, uint32_t a, uint32_t b) {
+  double x = flat[2 * (size_t)b] - flat[2 * (size_t)a], y = flat[2 * (size_t)b + 1] - flat[2 * (size_t)a + 1];
+  return x * x + y * y;
+}
+
+/* Area by squared sides: largest for equilateral triangles, 0 for slivers, negative for turned-over ones. */
+static double shape(const double *flat, uint32_t a, uint32_t b, uint32_t c) {
+  double sides = square_distance(flat, a, b) + square_distance(flat, b, c) + square_distance(flat, c, a);
+  return sides > 0 ? area(flat, a, b, c) / sides : 0;
+}
+
+/* Brings the corners into [-0.5, 0.5] without overflow, then into the plane of Newell's area vector. False when that
+ * vector is zero: the polygon has no plane. `flat` holds 3 * count numbers, of which 2 * count are left. */
+static bool flatten(const double *points, size_t count, double *flat) {
+  double low[3], high[3], size = 0;
+  for (int k = 0; k < 3; k++) low[k] = high[k] = points[k] * 0.5;
+  for (size_t i = 0; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], points[3 * i + (size_t)k] * 0.5);
+      high[k] = fmax(high[k], points[3 * i + (size_t)k] * 0.5);
+    }
+  }
+  for (int k = 0; k < 3; k++) size = fmax(size, high[k] * 0.5 - low[k] * 0.5);
+  if (!(size > 0)) size = 1;
+  for (size_t i = 0; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      size_t at = 3 * i + (size_t)k;
+      flat[at] = (points[at] * 0.25 - low[k] * 0.5) / size - 0.5;
+    }
+  }
+
+  double normal[3] = {0, 0, 0};
+  for (size_t i = 0; i < count; i++) {
+    const double *p = flat + 3 * i, *q = flat + 3 * (i + 1 < count ? i + 1 : 0);
+    normal[0] += (p[1] - q[1]) * (p[2] + q[2]);
+    normal[1] += (p[2] - q[2]) * (p[0] + q[0]);
+    normal[2] += (p[0] - q[0]) * (p[1] + q[1]);
+  }
+  double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+  if (!(length > 1e-300)) return false;
+  for (int k = 0; k < 3; k++) normal[k] /= length;
+
+  /* u is at right angles to the normal, v = normal x u. */
+  int least = fabs(normal[0]) <= fabs(normal[1]) ? 0 : 1;
+  if (fabs(normal[2]) < fabs(normal[least])) least = 2;
+  double u[3] = {-normal[least] * normal[0], -normal[least] * normal[1], -normal[least] * normal[2]};
+  u[least] += 1;
+  length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+  for (int k = 0; k < 3; k++) u[k] /= length;
+  double v[3] = {normal[1] * u[2] - normal[2] * u[1], normal[2] * u[0] - normal[0] * u[2],
+                 normal[0] * u[1] - normal[1] * u[0]};
+  for (size_t i = 0; i < count; i++) {
+    double p[3];
+    memcpy(p, flat + 3 * i, sizeof p);
+    flat[2 * i] = p[0] * u[0] + p[1] * u[1] + p[2] * u[2];
+    flat[2 * i + 1] = p[0] * v[0] + p[1] * v[1] + p[2] * v[2];
+  }
+  return true;
+}
+
+/* Clearly better, so that rounding does not choose between equals. */
+static bool is_better(double shape, double than) {
+  return shape > than + 1e-9 * fabs(than);
+}
+
+static void set_triangle(uint32_t *triangle, uint32_t a, uint32_t b, uint32_t c) {
+  triangle[0] = a;
+  triangle[1] = b;
+  triangle[2] = c;
+}
+
+static void fan(uint32_t apex, size_t count, uint32_t *triangles) {
+  for (size_t i = 1; i + 1 < count; i++) {
+    set_triangle(triangles + 3 * (i - 1), apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count));
+  }
+}
+
+/* Turns left everywhere, once around: all the way there are only two changes between going up and down. */
+static bool is_convex(const double *flat, size_t count) {
+  int turns = 0;
+  double before = 0;
+  for (size_t i = 0; i < count; i++) {
+    uint32_t a = (uint32_t)i, b = (uint32_t)((i + 1) % count), c = (uint32_t)((i + 2) % count);
+    if (area(flat, a, b, c) < -1e-12) return false;
+    double rise = flat[2 * (size_t)b + 1] - flat[2 * (size_t)a + 1];
+    if (fabs(rise) < 1e-12) continue;
+    if (before != 0 && rise * before < 0) turns++;
+    before = rise;
+  }
+  return turns <= 2;
+}
+
+/* The apex whose worst triangle is best; the first of equals. */
+static uint32_t best_fan(const double *flat, size_t count) {
+  uint32_t best = 0;
+  double best_shape = 0;
+  for (uint32_t apex = 0; apex < count; apex++) {
+    double worst = INFINITY;
+    for (size_t i = 1; i + 1 < count; i++) {
+      worst = fmin(worst, shape(flat, apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count)));
+    }
+    if (apex == 0 || is_better(worst, best_shape)) {
+      best_shape = worst;
+      best = apex;
+    }
+  }
+  return best;
+}
+
+/* The corners that are not cut off yet, as a ring, and what is known of each as the tip of an ear. */
+typedef struct ears {
+  const double *flat;
+  const uint32_t *ids;
+  size_t count;
+  uint32_t *next, *previous, *reflex; /* reflex: a list of the corners that may block an ear */
+  uint32_t *state;
+  double *shapes;
+  size_t reflex_count;
+  uint64_t tests_left;
+} ears;
+
+enum { CUT_OFF, NO_EAR, EAR };
+
+static bool is_reflex(const ears *e, uint32_t corner) {
+  return !(area(e->flat, e->previous[corner], corner, e->next[corner]) > 0);
+}
+
+static bool is_blocked(ears *e, uint32_t a, uint32_t b, uint32_t c) {
+  size_t kept = 0;
+  bool blocked = false;
+  for (size_t i = 0; i < e->reflex_count; i++) {
+    uint32_t p = e->reflex[i];
+    /* A corner that became convex stays convex: it leaves the list. */
+    if (e->state[p] == CUT_OFF || !is_reflex(e, p)) continue;
+    e->reflex[kept++] = p;
+    uint32_t id = e->ids[p];
+    if (blocked || id == e->ids[a] || id == e->ids[b] || id == e->ids[c]) continue;
+    blocked = area(e->flat, a, b, p) >= 0 && area(e->flat, b, c, p) >= 0 && area(e->flat, c, a, p) >= 0;
+  }
+  e->tests_left = e->tests_left > e->reflex_count ? e->tests_left - e->reflex_count : 0;
+  e->reflex_count = kept;
+  return blocked;
+}
+
+static void look_at(ears *e, uint32_t corner) {
+  uint32_t a = e->previous[corner], c = e->next[corner];
+  e->shapes[corner] = shape(e->flat, a, corner, c);
+  bool ear = e->shapes[corner] > 0 && (e->tests_left == 0 || !is_blocked(e, a, corner, c));
+  e->state[corner] = ear ? EAR : NO_EAR;
+}
+
+/* The ear of best shape, or the corner of best shape when `any`; the first of equals; count when there is none. */
+static uint32_t best_corner(const ears *e, bool any) {
+  uint32_t best = (uint32_t)e->count;
+  for (uint32_t i = 0; i < e->count; i++) {
+    if (e->state[i] != EAR && !(any && e->state[i] == NO_EAR)) continue;
+    if (best == e->count || is_better(e->shapes[i], e->shapes[best])) best = i;
+  }
+  return best;
+}
+
+static void clip_ears(ears *e, uint32_t *triangles) {
+  uint32_t count = (uint32_t)e->count;
+  for (uint32_t i = 0; i < count; i++) {
+    e->next[i] = i + 1 < count ? i + 1 : 0;
+    e->previous[i] = i > 0 ? i - 1 : count - 1;
+    e->state[i] = NO_EAR;
+  }
+  for (uint32_t i = 0; i < count; i++) {
+    if (is_reflex(e, i)) e->reflex[e->reflex_count++] = i;
+  }
+  for (uint32_t i = 0; i < count; i++) look_at(e, i);
+
+  for (size_t left = e->count; left > 3; left--) {
+    uint32_t tip = best_corner(e, false);
+    if (tip == count) {
+      /* What blocked an ear may be gone by now. */
+      for (uint32_t i = 0; i < count; i++) {
+        if (e->state[i] != CUT_OFF) look_at(e, i);
+      }
+      tip = best_corner(e, false);
+    }
+    if (tip == count) tip = best_corner(e, true); /* it crosses itself */
+    uint32_t a = e->previous[tip], c = e->next[tip];
+    set_triangle(triangles, a, tip, c);
+    triangles += 3;
+    e->state[tip] = CUT_OFF;
+    e->next[a] = c;
+    e->previous[c] = a;
+    look_at(e, a);
+    look_at(e, c);
+  }
+  for (uint32_t i = 0; i < count; i++) {
+    if (e->state[i] == CUT_OFF) continue;
+    set_triangle(triangles, e->previous[i], i, e->next[i]);
+    break;
+  }
+}
+
+bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t count, double *flat, uint32_t *links,
+                              uint32_t *triangles) {
+  if (count == 3 || !flatten(points, count, flat)) {
+    fan(0, count, triangles);
+    return true;
+  }
+  bool convex = is_convex(flat, count);
+  if (count > QMAT_LARGEST_CONCAVE_POLYGON) {
+    if (!convex) return false;
+    fan(0, count, triangles);
+    return true;
+  }
+  /* Of a concave quadrilateral only one diagonal leaves both shapes positive, and a fan over either of its ends is it.
+   */
+  if (count == 4 || (convex && count <= LARGEST_BEST_FAN)) {
+    fan(best_fan(flat, count), count, triangles);
+    return true;
+  }
+  ears e = {.flat = flat,
+            .ids = ids,
+            .count = count,
+            .next = links,
+            .previous = links + count,
+            .reflex = links + 2 * count,
+            .state = links + 3 * count,
+            .shapes = flat + 2 * count,
+            .tests_left = MOST_POINT_TESTS};
+  clip_ears(&e, triangles);
+  return true;
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/node.h"
+#include "io/model.h"
+
+typedef struct medial_read_params {
+  const char *path;
+} medial_read_params;
+
+static const qmat_param params[] = {{.name = "path",
+                                     .doc = "the medial mesh: a .ma file",
+                                     .unit = "",
+                                     .type = QMAT_PARAM_PATH,
+                                     .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
+                                     .offset = offsetof(medial_read_params, path)},
+                                    {0}};
+
+static const qmat_port outputs[] = {
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "its spheres, edges and triangles, sorted"}, {0}};
+
+static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
+                       qmat_value *made[]) {
+  (void)inputs;
+  const medial_read_params *p = raw_params;
+  qmat_medial *medial;
+  const qmat_status status = qmat_medial_read(context, p->path, &medial);
+  if (status == QMAT_OK) made[0] = &medial->base;
+  return status;
+}
+
+const qmat_node qmat_node_medial_read = {
+    .name = "medial.read",
+    .version = 1,
+    .summary = "Reads a medial mesh from a .ma file",
+    .doc =
+        "Numbers and indices are checked; edges and triangles are sorted, repeated ones are left out, and edges of "
+        "triangles are added where the file lacks them.",
+    .citation = "",
+    .params_size = sizeof(medial_read_params),
+    .params = params,
+    .outputs = outputs,
+    .run = run,
+};

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/node.h"
+#include "io/model.h"
+
+typedef struct scene_read_params {
+  const char *path;
+  int defects; /* qmat_defects */
+} scene_read_params;
+
+static const char *const defects_choices[] = {"refuse", "drop", NULL};
+
+static const qmat_param params[] = {
+    {.name = "path",
+     .doc = "the model: .off, .obj, .ply, .stl, .gltf or .glb",
+     .unit = "",
+     .type = QMAT_PARAM_PATH,
+     .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
+     .offset = offsetof(scene_read_params, path)},
+    {.name = "defects",
+     .doc = "what becomes of facets that name a vertex twice or repeat another facet's vertices",
+     .unit = "",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = QMAT_DEFECTS_REFUSE,
+     .choices = defects_choices,
+     .offset = offsetof(scene_read_params, defects)},
+    {0}};
+
+enum { SCENE, MESH, REPORT };
+
+static const qmat_port outputs[] = {
+    [SCENE] = {.name = "scene", .type = QMAT_SCENE, .doc = "the model's name and format"},
+    [MESH] = {.name = "mesh", .type = QMAT_MESH, .doc = "its surface as triangles"},
+    [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "what was read and what was done to it"},
+    {0}};
+
+static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
+                       qmat_value *made[]) {
+  (void)inputs;
+  const scene_read_params *p = raw_params;
+  const qmat_read_options options = {.defects = (qmat_defects)p->defects};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  const qmat_status status = qmat_model_read(context, p->path, &options, &scene, &mesh, &report);
+  if (status != QMAT_OK) return status;
+  made[SCENE] = &scene->base;
+  made[MESH] = &mesh->base;
+  made[REPORT] = &report->base;
+  return QMAT_OK;
+}
+
+const qmat_node qmat_node_scene_read = {
+    .name = "scene.read",
+    .version = 1,
+    .summary = "Reads a 3D model as one triangle mesh",
+    .doc =
+        "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "
+        "become one, polygons are cut into triangles, unused vertices are left out, and the triangles get one "
+        "orientation, outward where the surface is closed. The report counts all of this, border edges, "
+        "non-manifold edges, components and the Euler characteristic.",
+    .citation = "",
+    .params_size = sizeof(scene_read_params),
+    .params = params,
+    .outputs = outputs,
+    .run = run,
+};
