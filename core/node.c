@@ -2,6 +2,7 @@
 #include "core/node.h"
 
 #include <errno.h>
+#include <float.h>
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
@@ -145,12 +146,11 @@ void qmat_format_number(double number, char *text, size_t size) {
   if (plain == (locale_t)0) return;
   const locale_t before = uselocale(plain);
   char shortest[40];
-  for (int precision = 1; precision <= 17; ++precision) {
+  /* "%.15g" drops trailing zeros and so is the shortest where 15 digits do, but for numbers of reduced precision. */
+  const int first = number != 0 && fabs(number) < DBL_MIN ? 1 : 15;
+  for (int precision = first; precision <= 17; ++precision) {
     snprintf(shortest, sizeof shortest, "%.*g", precision, number);
     if (strtod(shortest, NULL) == number) break;
-  }
-  if (strchr(shortest, 'e') != NULL && fabs(number) >= 1 && fabs(number) < 1e15) {
-    snprintf(shortest, sizeof shortest, "%.0f", number); /* 1000 rather than 1e+03 */
   }
   uselocale(before);
   freelocale(plain);

@@ -18,7 +18,6 @@ enum { FORM_VERSION = 1, JSON_FLAGS = JSON_SORT_KEYS | JSON_COMPACT | JSON_REAL_
 
 /* The numbers are part of the binary form. */
 typedef enum element {
-  ELEMENT_U8 = 1,   /* array of uint8_t */
   ELEMENT_U32 = 2,  /* array of uint32_t */
   ELEMENT_F64 = 3,  /* array of double */
   ELEMENT_TEXT = 4, /* char *, NUL-terminated */
@@ -42,7 +41,7 @@ typedef struct row {
 #define SCALAR(type, field, kind) \
   { #field, ELEMENT_##kind, offsetof(type, field), 0, 0 }
 #define END \
-  { NULL, ELEMENT_U8, 0, 0, 0 }
+  { NULL, ELEMENT_U32, 0, 0, 0 }
 
 static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT), SCALAR(qmat_scene, format, TEXT), END};
 static const row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),
@@ -100,8 +99,6 @@ static bool is_array(const row *r) {
 /* Bytes of one element in memory; 0 for what is not a flat array. */
 static size_t element_size(element kind) {
   switch (kind) {
-    case ELEMENT_U8:
-      return 1;
     case ELEMENT_U32:
       return 4;
     case ELEMENT_F64:
@@ -279,10 +276,6 @@ static void put_text(sink *to, const char *text) {
 static void put_array(sink *to, element kind, const void *array, size_t length) {
   enum { CHUNK = 512 };
   const size_t size = element_size(kind);
-  if (kind == ELEMENT_U8) {
-    put(to, array, length);
-    return;
-  }
   if (to->hasher == NULL && to->bytes == NULL) {
     to->used += length * size;
     return;
@@ -314,7 +307,6 @@ static int put_json(const char *text, size_t size, void *to) {
 static bool write_content(sink *to, const qmat_value *value, const row *r) {
   const void *place = slot(value, r->offset);
   switch (r->element) {
-    case ELEMENT_U8:
     case ELEMENT_U32:
     case ELEMENT_F64:
       put_array(to, r->element, pointer_of(value, r), count_of(value, r) * r->components);
@@ -771,9 +763,7 @@ static qmat_status read_array(qmat_context *context, reader *from, qmat_value *v
   *count = size / stride;
   const uint8_t *bytes = take(from, size);
   const size_t length = *count * r->components;
-  if (r->element == ELEMENT_U8) {
-    memcpy(array, bytes, size);
-  } else if (r->element == ELEMENT_U32) {
+  if (r->element == ELEMENT_U32) {
     for (size_t i = 0; i < length; ++i) ((uint32_t *)array)[i] = decode_u32(bytes + 4 * i);
   } else {
     for (size_t i = 0; i < length; ++i) {
@@ -831,7 +821,6 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
   uint64_t large;
   const uint8_t *byte;
   switch (r->element) {
-    case ELEMENT_U8:
     case ELEMENT_U32:
     case ELEMENT_F64:
       return read_array(context, from, value, r);

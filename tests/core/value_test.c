@@ -759,6 +759,62 @@ static void test_references_are_counted_across_threads(void **state) {
   qmat_value_release(&mesh->base);
 }
 
+static void test_counts_beyond_32_bits_are_refused_before_the_arrays_are_read(void **state) {
+  (void)state;
+  qmat_mesh *mesh = mesh_example();
+  mesh->vertex_count = (size_t)UINT32_MAX + 1;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_MEMORY, "4294967296 vertices are more than 32-bit indices can name");
+  qmat_medial *medial = medial_example();
+  medial->triangle_count = (size_t)1 << 33;
+  assert_not_sealed(&medial->base, QMAT_ERROR_MEMORY, "8589934592 triangles are more than 32-bit indices can name");
+}
+
+/* The linker sends every aligned_alloc of the program here (tests/core/CMakeLists.txt). */
+void *__real_aligned_alloc(size_t alignment, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+static size_t allocations_left = SIZE_MAX;
+
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+  if (allocations_left == 0) return NULL;
+  if (allocations_left != SIZE_MAX) --allocations_left;
+  return __real_aligned_alloc(alignment, size);
+}
+
+static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+    qmat_value *value = example_of((qmat_value_type)type), *again = value;
+    uint8_t *bytes, *none;
+    size_t size, none_size;
+    assert_sealed(&context, value);
+    assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
+    allocations_left = 0;
+    assert_int_equal(qmat_value_serialize(&context, value, &none, &none_size), QMAT_ERROR_MEMORY);
+    assert_null(none);
+    size_t granted = 0;
+    for (qmat_status status = QMAT_ERROR_MEMORY; status != QMAT_OK; ++granted) {
+      allocations_left = granted;
+      status = qmat_value_deserialize(&context, bytes, size, &again);
+      if (status == QMAT_OK) break;
+      assert_int_equal(status, QMAT_ERROR_MEMORY);
+      assert_int_equal(context.error.status, QMAT_ERROR_MEMORY);
+      assert_null(again);
+    }
+    allocations_left = SIZE_MAX;
+    assert_true(granted >= 1);
+    qmat_value_release(again);
+    qmat_value_release(value);
+    qmat_free(bytes);
+  }
+  allocations_left = 0;
+  qmat_report *report = qmat_report_new();
+  char *copy = qmat_strdup("text");
+  allocations_left = SIZE_MAX;
+  assert_null(report);
+  assert_null(copy);
+}
+
 static void test_copied_texts_are_equal_and_apart(void **state) {
   (void)state;
   const char *text = "caf\xc3\xa9";
@@ -799,6 +855,8 @@ int main(void) {
       cmocka_unit_test(test_another_version_is_refused_by_number),
       cmocka_unit_test(test_content_that_breaks_a_rule_is_a_format_error_when_read),
       cmocka_unit_test(test_references_are_counted_across_threads),
+      cmocka_unit_test(test_counts_beyond_32_bits_are_refused_before_the_arrays_are_read),
+      cmocka_unit_test(test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing),
       cmocka_unit_test(test_copied_texts_are_equal_and_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
