@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_GRAPHS_COMMAND_H
+#define QMAT_GRAPHS_COMMAND_H
+
+#include "graphs/graph_file.h"
+
+/* The commands of the command line. Each is one constant descriptor at the foot of its file; parsing, mistakes and help
+ * come from its table of options. */
+
+/* One option. A table of them ends with a row without a name. */
+typedef struct qmat_option {
+  const char *name;  /* without the dashes */
+  char letter;       /* the short form; 0: none */
+  const char *value; /* what help calls its value ("PATH"); NULL: it takes none */
+  const char *doc;   /* one sentence, no full stop */
+} qmat_option;
+
+/* An option that was given. */
+typedef struct qmat_given_option {
+  const char *name, *value;
+} qmat_given_option;
+
+enum { QMAT_MAX_OPTIONS = 48, QMAT_OPTION_DOC_SIZE = 256 };
+
+typedef struct qmat_command qmat_command;
+
+/* One call of a command. */
+typedef struct qmat_invocation {
+  const qmat_command *command;
+  qmat_registry registry;
+  qmat_option options[QMAT_MAX_OPTIONS]; /* the command's, then those that it adds itself */
+  size_t option_count;
+  char docs[QMAT_MAX_OPTIONS][QMAT_OPTION_DOC_SIZE]; /* for options that are added */
+  qmat_given_option *given;                          /* in the order of the command line */
+  size_t given_count;
+  const char **arguments; /* what is not an option */
+  size_t argument_count;
+  bool help;        /* --help was given */
+  qmat_graph graph; /* of commands that add its inputs as options, or read one */
+} qmat_invocation;
+
+struct qmat_command {
+  const char *name, *arguments, *summary, *doc;
+  const qmat_option *options; /* NULL: none */
+  size_t least, most;         /* arguments that are not options */
+  /* Adds options that depend on a graph; NULL: none. */
+  qmat_status (*add_options)(qmat_context *context, qmat_invocation *invocation);
+  qmat_status (*run)(qmat_context *context, qmat_invocation *invocation);
+};
+
+extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_check, qmat_command_dot, qmat_command_nodes,
+    qmat_command_node, qmat_command_version, qmat_command_help;
+
+/* All commands, in the order in which help lists them. */
+extern const qmat_command *const qmat_commands[];
+extern const size_t qmat_command_count;
+
+/* The command of that name; QMAT_ERROR_USAGE suggests the nearest. */
+qmat_status qmat_command_find(qmat_context *context, const char *name, const qmat_command **command);
+
+/* Prepares an empty call: the command's options, and those that it adds. Free with qmat_invocation_uninit. */
+qmat_status qmat_invocation_init(qmat_context *context, const qmat_command *command, const qmat_registry *registry,
+                                 qmat_invocation *invocation);
+void qmat_invocation_uninit(qmat_invocation *invocation);
+
+/* Adds an option; the texts must outlive the invocation. */
+qmat_status qmat_invocation_add_option(qmat_context *context, qmat_invocation *invocation, qmat_option option);
+
+/* Reads `count` words after the command's name. Options may stand before and after arguments; "--" ends them.
+ * QMAT_ERROR_USAGE: an unknown option (with the nearest), a missing or an unwanted value, too many or too few
+ * arguments; the latter not with --help. */
+qmat_status qmat_invocation_parse(qmat_context *context, qmat_invocation *invocation, char *const *words, size_t count);
+
+/* The last value that was given for an option: NULL when it was not given, "" when it takes no value. */
+const char *qmat_invocation_value(const qmat_invocation *invocation, const char *option);
+
+/* Prints the help of a command, or the list of commands. */
+void qmat_command_print_help(const qmat_invocation *invocation);
+void qmat_commands_print(void);
+
+/* Prints `text` wrapped at 80 columns, with `indent` blanks before every line but the first, which starts at column
+ * `column`. */
+void qmat_print_wrapped(const char *text, int column, int indent);
+
+/* ---- what `run` and `mat` share ---- */
+
+/* The options that both have. */
+#define QMAT_RUN_OPTIONS                                                                                              \
+  {"set", 0, "NAME=VALUE", "Set a parameter: node.parameter=value, or input=value; may be repeated"},                 \
+      {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},               \
+      {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},         \
+      {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"}, \
+      {"report", 0, "FILE", "Write what was done, or the error, as JSON"}, {                                          \
+    "quiet", 'q', NULL, "Print nothing but errors"                                                                    \
+  }
+
+/* Makes invocation->graph with `prepare`, sets what --set says, runs it, and prints and writes what came of it. */
+qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
+                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation));
+
+#endif

@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/command.h"
+
+// One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip.
+static const char *type_colour(qmat_value_type type) {
+  static const char *const colours[QMAT_VALUE_TYPE_COUNT] = {
+      [QMAT_SCENE] = "#7f7f7f",  [QMAT_MESH] = "#0072b2",   [QMAT_FIELD] = "#56b4e9", [QMAT_SAMPLES] = "#009e73",
+      [QMAT_MEDIAL] = "#d55e00", [QMAT_REPORT] = "#cc79a7", [QMAT_FILE] = "#000000",
+  };
+  return colours[type];
+}
+
+// Ids and descriptor names are ASCII words, but paths and texts of parameters are anything.
+static void print_escaped(const char *text) {
+  for (; *text; text++) {
+    switch (*text) {
+      case '&':
+        fputs("&amp;", stdout);
+        break;
+      case '<':
+        fputs("&lt;", stdout);
+        break;
+      case '>':
+        fputs("&gt;", stdout);
+        break;
+      case '"':
+        fputs("&quot;", stdout);
+        break;
+      case '\\':
+        fputs("&#92;", stdout);
+        break;
+      default:
+        putchar((unsigned char)*text < 0x20 ? ' ' : *text);
+    }
+  }
+}
+
+static void print_ports(const qmat_port *ports, size_t count, const char *prefix) {
+  if (count == 0) return;
+  printf("<tr>");
+  for (size_t i = 0; i < count; i++)
+    printf("<td port=\"%s%zu\" bgcolor=\"white\"><font point-size=\"9\" color=\"%s\">%s</font></td>", prefix, i,
+           type_colour(ports[i].type), ports[i].name);
+  printf("</tr>");
+}
+
+static void print_node(const qmat_graph *graph, size_t index) {
+  const qmat_graph_node *node = &graph->nodes[index];
+  size_t inputs = qmat_input_count(node->type), outputs = qmat_output_count(node->type);
+  printf("  n%zu [label=<<table border=\"0\" cellborder=\"0\" cellspacing=\"0\" cellpadding=\"3\">", index);
+  if (inputs > 0) {
+    printf("<tr><td><table border=\"0\" cellborder=\"0\" cellspacing=\"4\" cellpadding=\"2\">");
+    print_ports(node->type->inputs, inputs, "i");
+    printf("</table></td></tr>");
+  }
+  printf("<tr><td><b>%s</b><br/><font point-size=\"10\" color=\"#555555\">%s</font></td></tr>", node->id,
+         node->type->name);
+  for (size_t row = 0; row < qmat_param_count(node->type); row++) {
+    if (!node->texts[row]) continue;
+    printf("<tr><td><font point-size=\"9\">%s = ", node->type->params[row].name);
+    print_escaped(node->texts[row]);
+    printf("</font></td></tr>");
+  }
+  if (outputs > 0) {
+    printf("<tr><td><table border=\"0\" cellborder=\"0\" cellspacing=\"4\" cellpadding=\"2\">");
+    print_ports(node->type->outputs, outputs, "o");
+    printf("</table></td></tr>");
+  }
+  printf("</table>>];\n");
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  qmat_status status =
+      qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
+  if (status != QMAT_OK) return status;
+  const qmat_graph *graph = &invocation->graph;
+  printf("digraph qmat {\n  rankdir=TB;\n  fontname=\"sans-serif\";\n");
+  printf(
+      "  node [shape=box, style=\"rounded,filled\", color=\"#999999\", fillcolor=\"#f2f2f2\", "
+      "fontname=\"sans-serif\", fontsize=12];\n");
+  printf("  edge [fontname=\"sans-serif\", fontsize=9, arrowsize=0.7, penwidth=1.4];\n");
+  for (size_t i = 0; i < graph->node_count; i++) print_node(graph, i);
+  for (size_t i = 0; i < graph->node_count; i++) {
+    const qmat_graph_node *node = &graph->nodes[i];
+    for (size_t port = 0; port < qmat_input_count(node->type); port++) {
+      const qmat_graph_link *link = &node->links[port];
+      if (link->node == SIZE_MAX) continue;
+      qmat_value_type type = node->type->inputs[port].type;
+      printf("  n%zu:o%zu:s -> n%zu:i%zu:n [color=\"%s\", fontcolor=\"%s\", label=\"%s\"];\n", link->node, link->port,
+             i, port, type_colour(type), type_colour(type), qmat_value_type_name(type));
+    }
+  }
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    qmat_value_type type = graph->nodes[output->node].type->outputs[output->port].type;
+    printf("  out%zu [shape=note, style=filled, fillcolor=white, label=\"%s\"];\n", i, output->name);
+    printf("  n%zu:o%zu:s -> out%zu [color=\"%s\", fontcolor=\"%s\", label=\"%s\"];\n", output->node, output->port, i,
+           type_colour(type), type_colour(type), qmat_value_type_name(type));
+  }
+  printf("}\n");
+  return QMAT_OK;
+}
+
+const qmat_command qmat_command_dot = {
+    .name = "dot",
+    .arguments = "GRAPH",
+    .summary = "Draw a graph file (Graphviz)",
+    .doc =
+        "Prints a graph file in the language of Graphviz: qmat dot GRAPH | dot -Tsvg -o graph.svg. Inputs stand above "
+        "a node's name and outputs below; colours are the types of values.",
+    .least = 1,
+    .most = 1,
+    .run = run,
+};

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/built_in.h"
+#include "graphs/command.h"
+#include "graphs/node_json.h"
+
+// The first input of the built-in graph is the argument, the others are options: one of each name.
+static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
+  qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, &invocation->graph);
+  if (status != QMAT_OK) return status;
+  const qmat_graph *graph = &invocation->graph;
+  for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
+    const qmat_graph_input *input = &graph->inputs[i];
+    const qmat_node *type = graph->nodes[input->node].type;
+    const qmat_param *param = &type->params[input->param];
+    char *doc = invocation->docs[invocation->option_count];
+    int length = snprintf(doc, QMAT_OPTION_DOC_SIZE, "%s: ", param->doc);
+    if (length > 0 && length < QMAT_OPTION_DOC_SIZE)
+      qmat_param_describe(type, param, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
+    status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
+  }
+  return status;
+}
+
+static qmat_status set_input(qmat_context *context, qmat_graph *graph, const char *name, const char *value) {
+  size_t node, param;
+  qmat_status status = qmat_graph_find_param(context, graph, name, &node, &param);
+  return status == QMAT_OK ? qmat_graph_set(context, graph, node, param, value) : status;
+}
+
+static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
+  qmat_graph *graph = &invocation->graph;
+  qmat_status status = set_input(context, graph, graph->inputs[0].name, invocation->arguments[0]);
+  // Whoever asks for a number of spheres wants that number, whatever the distance.
+  if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
+      !qmat_invocation_value(invocation, "epsilon"))
+    status = set_input(context, graph, "epsilon", "0");
+  for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
+    const char *value = qmat_invocation_value(invocation, graph->inputs[i].name);
+    if (value) status = set_input(context, graph, graph->inputs[i].name, value);
+  }
+  return status;
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  if (!qmat_invocation_value(invocation, "output")) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "where to save the result is not given");
+    return qmat_fail_hint(context, "-o PATH");
+  }
+  return qmat_execute(context, invocation, set_inputs);
+}
+
+static const qmat_option options[] = {QMAT_RUN_OPTIONS, {0}};
+
+const qmat_command qmat_command_mat = {
+    .name = "mat",
+    .arguments = "INPUT -o OUTPUT",
+    .summary = "Describe a model by medial spheres, cones and slabs",
+    .doc =
+        "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
+        "0, which means no bound on the distance. Every other parameter is reached by --set; 'qmat nodes' lists the "
+        "nodes and 'qmat node NAME' their parameters.",
+    .options = options,
+    .least = 1,
+    .most = 1,
+    .add_options = add_options,
+    .run = run,
+};

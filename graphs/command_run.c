@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/command.h"
+
+static qmat_status read_graph(qmat_context *context, qmat_invocation *invocation) {
+  return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  return qmat_execute(context, invocation, read_graph);
+}
+
+static const qmat_option options[] = {
+    QMAT_RUN_OPTIONS,
+    {"to", 0, "NODE", "Stop at this node: run it and what it needs"},
+    {0},
+};
+
+const qmat_command qmat_command_run = {
+    .name = "run",
+    .arguments = "GRAPH",
+    .summary = "Run a graph file",
+    .doc =
+        "Runs a graph file. Files are written only when everything has succeeded. Paths in the graph are relative to "
+        "the graph file, paths given here to the working folder.",
+    .options = options,
+    .least = 1,
+    .most = 1,
+    .run = run,
+};

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/command.h"
+#include "graphs/progress.h"
+#include "graphs/run_report.h"
+
+static qmat_status read_threads(qmat_context *context, const char *text) {
+  double number = 0;
+  if (!text) return QMAT_OK;
+  if (!qmat_parse_number(text, &number) || strchr(text, '%') || number < 0 || number > 1024 ||
+      number != (double)(int)number) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "a whole number from 0 to 1024 belongs here, not '%s'", qmat_show(text).text);
+    return qmat_fail_field(context, "--threads");
+  }
+  context->threads = (int)number;
+  return QMAT_OK;
+}
+
+// Reads "NAME=PATH", or "PATH" when only one output of the graph is a file.
+static qmat_status read_save(qmat_context *context, const qmat_graph *graph, const char *text, qmat_run_save *save) {
+  const char *equals = strchr(text, '=');
+  char name[QMAT_GRAPH_NAME_SIZE];
+  if (equals && (size_t)(equals - text) < sizeof name && !memchr(text, '/', (size_t)(equals - text)) &&
+      !memchr(text, '.', (size_t)(equals - text))) {
+    memcpy(name, text, (size_t)(equals - text));
+    name[equals - text] = 0;
+    save->path = equals + 1;
+    return qmat_graph_find_output(context, graph, name, &save->output);
+  }
+  size_t files = 0;
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    if (graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE) continue;
+    save->output = i;
+    files++;
+  }
+  save->path = text;
+  if (files == 1) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' does not say which output it is for: the graph makes %zu files",
+            qmat_show(text).text, files);
+  if (files > 0)
+    qmat_fail_hint(context, "-o %s=%s", graph->outputs[save->output].name, qmat_show(text).text);
+  else if (graph->output_count > 0)
+    qmat_fail_hint(context, "-o %s=PATH saves output '%s'", graph->outputs[0].name, graph->outputs[0].name);
+  return context->error.status;
+}
+
+static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, qmat_run_save *saves, qmat_run *run) {
+  qmat_run_options options = {.saves = saves, .to_node = qmat_invocation_value(invocation, "to")};
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    if (strcmp(invocation->given[i].name, "output") != 0) continue;
+    qmat_status status =
+        read_save(context, &invocation->graph, invocation->given[i].value, &saves[options.save_count++]);
+    if (status != QMAT_OK) return qmat_fail_field(context, "--output");
+  }
+  return qmat_run_plan(context, &invocation->graph, &options, run);
+}
+
+// A report of a failure must not replace what the run would have read or written, however early it failed.
+static bool may_write_error(const qmat_invocation *invocation, const char *path) {
+  for (size_t i = 0; i < invocation->argument_count; i++)
+    if (qmat_same_file(path, invocation->arguments[i])) return false;
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    const char *value = invocation->given[i].value, *equals = strchr(value, '=');
+    if (strcmp(invocation->given[i].name, "output") != 0 && strcmp(invocation->given[i].name, "set") != 0) continue;
+    if (qmat_same_file(path, value) || (equals && qmat_same_file(path, equals + 1))) return false;
+  }
+  const qmat_graph *graph = &invocation->graph;
+  for (size_t i = 0; i < graph->node_count; i++)
+    for (size_t row = 0; row < qmat_param_count(graph->nodes[i].type); row++) {
+      const char *text = graph->nodes[i].texts[row];
+      bool is_path = graph->nodes[i].type->params[row].type == QMAT_PARAM_PATH;
+      if (is_path && text && qmat_same_file(path, text)) return false;
+    }
+  for (size_t i = 0; i < graph->output_count; i++)
+    if (graph->outputs[i].path && qmat_same_file(path, graph->outputs[i].path)) return false;
+  return true;
+}
+
+qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
+                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation)) {
+  const char *report_path = qmat_invocation_value(invocation, "report");
+  bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
+  const char *mode = qmat_invocation_value(invocation, "progress");
+  qmat_progress_view view = {0};
+  qmat_run_observer observer;
+  qmat_run run = {0};
+  qmat_run_save *saves = qmat_calloc(invocation->given_count, sizeof *saves);
+  qmat_status status = saves ? QMAT_OK : qmat_fail_memory(context, "options");
+  if (status == QMAT_OK) status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
+  if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
+  if (status == QMAT_OK) status = prepare(context, invocation);
+  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
+    if (strcmp(invocation->given[i].name, "set") == 0) {
+      status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
+      if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
+    }
+  if (status == QMAT_OK) status = plan(context, invocation, saves, &run);
+  if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, &run, "the report", report_path);
+  bool planned = status == QMAT_OK, reported = false;
+  if (status == QMAT_OK) {
+    qmat_progress_view_connect(&view, context, &observer);
+    status = qmat_run_execute(context, &run, &observer);
+    qmat_progress_view_end(&view);
+    context->progress = NULL;
+  }
+  if (status == QMAT_OK) status = qmat_run_write(context, &run);
+  if (status == QMAT_OK && report_path) {
+    json_t *report = qmat_run_report(context, &run);
+    status = qmat_save_json(context, report, report_path);
+    json_decref(report);
+    reported = true;
+  }
+  if (status == QMAT_OK && !quiet) qmat_run_print(&run, stdout);
+  if (status != QMAT_OK && report_path && !reported && (planned || may_write_error(invocation, report_path))) {
+    // The first error is the one to be told, also when its report cannot be written.
+    const qmat_error error = context->error;
+    json_t *report = qmat_error_report(&error);
+    qmat_save_json(context, report, report_path);
+    json_decref(report);
+    context->error = error;
+  }
+  qmat_run_uninit(&run);
+  qmat_free(saves);
+  return status;
+}

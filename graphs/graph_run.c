@@ -1,0 +1,701 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/graph_run.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "io/bytes.h"
+
+static double now(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+const char *const *qmat_value_count_names(qmat_value_type type) {
+  static const char *const none[] = {NULL}, *const mesh[] = {"vertices", "triangles", NULL},
+                           *const field[] = {"values", NULL}, *const samples[] = {"samples", NULL},
+                           *const medial[] = {"spheres", "cones", "slabs", NULL}, *const file[] = {"parts", NULL};
+  switch (type) {
+    case QMAT_MESH:
+      return mesh;
+    case QMAT_FIELD:
+      return field;
+    case QMAT_SAMPLES:
+      return samples;
+    case QMAT_MEDIAL:
+      return medial;
+    case QMAT_FILE:
+      return file;
+    default:
+      return none;
+  }
+}
+
+void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
+  counts[0] = counts[1] = counts[2] = 0;
+  switch (value->type) {
+    case QMAT_MESH:
+      counts[0] = ((const qmat_mesh *)value)->vertex_count;
+      counts[1] = ((const qmat_mesh *)value)->triangle_count;
+      break;
+    case QMAT_FIELD:
+      counts[0] = ((const qmat_field *)value)->count;
+      break;
+    case QMAT_SAMPLES:
+      counts[0] = ((const qmat_samples *)value)->count;
+      break;
+    case QMAT_MEDIAL:
+      counts[0] = ((const qmat_medial *)value)->sphere_count;
+      counts[1] = ((const qmat_medial *)value)->edge_count;
+      counts[2] = ((const qmat_medial *)value)->triangle_count;
+      break;
+    case QMAT_FILE:
+      counts[0] = ((const qmat_file *)value)->part_count;
+      break;
+    default:
+      break;
+  }
+}
+
+/* ---- paths ---- */
+
+// The bytes before the name of the file: "" or a folder with its slash.
+static size_t folder_length(const char *path) {
+  const char *slash = strrchr(path, '/');
+  return slash ? (size_t)(slash - path) + 1 : 0;
+}
+
+// The folder of `path` as one that can be asked about; the caller frees it with qmat_free.
+static char *folder_of(const char *path) {
+  size_t length = folder_length(path);
+  char *folder = qmat_calloc(length + 2, 1);
+  if (!folder) return NULL;
+  if (length == 0)
+    folder[0] = '.';
+  else
+    memcpy(folder, path, length);
+  return folder;
+}
+
+bool qmat_same_file(const char *a, const char *b) {
+  struct stat first, second;
+  bool first_is = stat(a, &first) == 0, second_is = stat(b, &second) == 0;
+  if (first_is && second_is) return first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+  if (first_is != second_is || strcmp(a + folder_length(a), b + folder_length(b)) != 0) return false;
+  char *first_folder = folder_of(a), *second_folder = folder_of(b);
+  bool same = first_folder && second_folder && stat(first_folder, &first) == 0 && stat(second_folder, &second) == 0 &&
+              first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+  qmat_free(first_folder);
+  qmat_free(second_folder);
+  return same;
+}
+
+// Refuses a path that is the graph file or a file that a step reads.
+static qmat_status check_not_an_input(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
+  if (qmat_same_file(path, run->graph->file)) {
+    return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the graph file", what, path);
+  }
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];
+    for (size_t row = 0; row < qmat_param_count(node->type); row++) {
+      const qmat_param *param = &node->type->params[row];
+      if (param->type != QMAT_PARAM_PATH || !(param->flags & QMAT_PARAM_INPUT_FILE)) continue;
+      const char *input;
+      memcpy(&input, (const char *)run->steps[i].params + param->offset, sizeof input);
+      if (input && qmat_same_file(path, input)) {
+        return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the file that node '%s' reads", what, path,
+                         node->id);
+      }
+    }
+  }
+  return QMAT_OK;
+}
+
+// So that a run of minutes does not end in a mistyped folder.
+static qmat_status check_can_write(qmat_context *context, const char *path) {
+  struct stat info;
+  qmat_status status = QMAT_OK;
+  char *folder = folder_of(path);
+  if (!folder) return qmat_fail_memory(context, "output path");
+  if (stat(folder, &info) != 0)
+    qmat_fail(context, status = QMAT_ERROR_IO, "the folder of the output cannot be used: %s", strerror(errno));
+  else if (!S_ISDIR(info.st_mode))
+    qmat_fail(context, status = QMAT_ERROR_IO, "what should be the folder of the output is a file");
+  else if (access(folder, W_OK | X_OK) != 0)
+    qmat_fail(context, status = QMAT_ERROR_IO, "the folder of the output cannot be written to: %s", strerror(errno));
+  else if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
+    qmat_fail(context, status = QMAT_ERROR_IO, "the output is a folder");
+  qmat_free(folder);
+  return status == QMAT_OK ? status : qmat_fail_at(context, path, 0, 0);
+}
+
+qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
+  qmat_status status = check_not_an_input(context, run, what, path);
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++)
+    if (qmat_same_file(path, run->files[i].path))
+      status = qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite output '%s'", what, path,
+                         run->graph->outputs[run->files[i].output].name);
+  return status == QMAT_OK ? check_can_write(context, path) : status;
+}
+
+/* ---- planning ---- */
+
+typedef struct run_planner {
+  qmat_context *context;
+  const qmat_graph *graph;
+  const qmat_run_options *options;
+  qmat_run *run;
+  int *formats;      /* per file: the format that its step runs in, or -1 */
+  bool *within;      /* per node: it is --to's node or comes before it */
+  bool *replaced;    /* per node: values are given for it */
+  bool *needed;      /* per node: it runs with its own parameters */
+  size_t *base_step; /* per node: the step that does so */
+} run_planner;
+
+static int choice_of(const qmat_node *type, const void *params) {
+  const qmat_param *format = qmat_output_format_param(type);
+  int choice = -1;
+  if (format) memcpy(&choice, (const char *)params + format->offset, sizeof choice);
+  return choice;
+}
+
+// Marks `start` and what it depends on.
+static void mark_within(const qmat_graph *graph, size_t start, bool *within) {
+  within[start] = true;
+  for (size_t k = graph->node_count; k-- > 0;) {
+    const qmat_graph_node *node = &graph->nodes[graph->order[k]];
+    for (size_t port = 0; within[graph->order[k]] && port < qmat_input_count(node->type); port++)
+      if (node->links[port].node != SIZE_MAX) within[node->links[port].node] = true;
+  }
+}
+
+static qmat_status add_file(run_planner *planner, size_t output, const char *path, int *format) {
+  qmat_run *run = planner->run;
+  const qmat_graph_output *made = &planner->graph->outputs[output];
+  if (!*path) return qmat_fail(planner->context, QMAT_ERROR_USAGE, "the path of output '%s' is empty", made->name);
+  qmat_status status = qmat_graph_output_format(planner->context, planner->graph, output, path, format);
+  if (status != QMAT_OK) return status;
+  const qmat_graph_node *maker = &planner->graph->nodes[made->node];
+  if (*format < 0) *format = choice_of(maker->type, maker->params);
+  if (!planner->within[made->node]) {
+    return qmat_fail(planner->context, QMAT_ERROR_USAGE, "output '%s' is made after node '%s', where the run stops",
+                     made->name, planner->options->to_node);
+  }
+  for (size_t i = 0; i < run->file_count; i++)
+    if (qmat_same_file(path, run->files[i].path))
+      return qmat_fail(planner->context, QMAT_ERROR_USAGE, "two outputs have the path '%s'", path);
+  char *copy = qmat_strdup(path);
+  if (!copy) return qmat_fail_memory(planner->context, "output path");
+  run->files[run->file_count++] = (qmat_run_file){.output = output, .path = copy};
+  return QMAT_OK;
+}
+
+static bool has_save(const qmat_run_options *options, size_t output) {
+  for (size_t i = 0; i < options->save_count; i++)
+    if (options->saves[i].output == output) return true;
+  return false;
+}
+
+static qmat_status plan_files(run_planner *planner) {
+  const qmat_graph *graph = planner->graph;
+  const qmat_run_options *options = planner->options;
+  qmat_run *run = planner->run;
+  size_t most = options->save_count + graph->output_count;
+  run->files = qmat_calloc(most, sizeof *run->files);
+  planner->formats = qmat_calloc(most, sizeof *planner->formats);
+  if (!run->files || !planner->formats) return qmat_fail_memory(planner->context, "outputs");
+  for (size_t i = 0; i < options->save_count; i++) {
+    qmat_status status =
+        add_file(planner, options->saves[i].output, options->saves[i].path, &planner->formats[run->file_count]);
+    if (status != QMAT_OK) return status;
+  }
+  for (size_t i = 0; i < graph->output_count && !options->only_wanted; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    if (!output->path || has_save(options, i) || !planner->within[output->node]) continue;
+    qmat_status status = add_file(planner, i, output->path, &planner->formats[run->file_count]);
+    if (status != QMAT_OK)
+      return qmat_fail_at(planner->context, graph->file, output->path_mark.line, output->path_mark.column);
+  }
+  return QMAT_OK;
+}
+
+// Whether file `index` is the first of its node that asks for its format, and the node does not run in it anyway.
+static bool asks_for_step(const run_planner *planner, size_t index) {
+  const qmat_graph *graph = planner->graph;
+  size_t node = graph->outputs[planner->run->files[index].output].node;
+  int format = planner->formats[index];
+  if (planner->replaced[node]) return false;
+  if (planner->needed[node] && choice_of(graph->nodes[node].type, graph->nodes[node].params) == format) return false;
+  for (size_t i = 0; i < index; i++)
+    if (graph->outputs[planner->run->files[i].output].node == node && planner->formats[i] == format) return false;
+  return true;
+}
+
+static void plan_needs(run_planner *planner) {
+  const qmat_graph *graph = planner->graph;
+  const qmat_run_options *options = planner->options;
+  for (size_t i = 0; i < options->want_count; i++) planner->needed[options->wants[i].node] = true;
+  if (options->to_node) {
+    for (size_t i = 0; i < graph->node_count; i++)
+      if (strcmp(graph->nodes[i].id, options->to_node) == 0) planner->needed[i] = true;
+  } else if (!options->only_wanted) {
+    for (size_t i = 0; i < graph->output_count; i++) {
+      bool saved = has_save(options, i) || graph->outputs[i].path;
+      if (!saved) planner->needed[graph->outputs[i].node] = true;
+    }
+    for (size_t i = 0; i < graph->node_count; i++)
+      if (qmat_output_count(graph->nodes[i].type) == 0) planner->needed[i] = true;
+  }
+  for (size_t k = graph->node_count; k-- > 0;) {
+    size_t index = graph->order[k];
+    bool runs = planner->needed[index];
+    for (size_t i = 0; i < planner->run->file_count; i++)
+      if (graph->outputs[planner->run->files[i].output].node == index) runs = true;
+    if (!runs || planner->replaced[index]) continue;
+    const qmat_graph_node *node = &graph->nodes[index];
+    for (size_t port = 0; port < qmat_input_count(node->type); port++)
+      if (node->links[port].node != SIZE_MAX) planner->needed[node->links[port].node] = true;
+  }
+}
+
+static qmat_status add_step(run_planner *planner, size_t index, int format) {
+  const qmat_graph_node *node = &planner->graph->nodes[index];
+  qmat_run *run = planner->run;
+  qmat_run_step *step = &run->steps[run->step_count++];
+  *step = (qmat_run_step){.node = index, .format = format, .first_slot = run->slot_count};
+  size_t outputs = qmat_output_count(node->type);
+  run->slot_count += outputs;
+  step->params = qmat_calloc(1, node->type->params_size);
+  step->inputs = qmat_calloc(qmat_input_count(node->type), sizeof *step->inputs);
+  step->made = qmat_calloc(outputs, sizeof *step->made);
+  if (!step->params || !step->inputs || !step->made) return qmat_fail_memory(planner->context, "plan");
+  if (node->type->params_size > 0) memcpy(step->params, node->params, node->type->params_size);
+  const qmat_param *param = qmat_output_format_param(node->type);
+  if (param) memcpy((char *)step->params + param->offset, &format, sizeof format);
+  return qmat_graph_check_node(planner->context, planner->graph, index, step->params);
+}
+
+static qmat_status plan_steps(run_planner *planner) {
+  const qmat_graph *graph = planner->graph;
+  qmat_run *run = planner->run;
+  run->steps = qmat_calloc(graph->node_count + run->file_count, sizeof *run->steps);
+  if (!run->steps) return qmat_fail_memory(planner->context, "plan");
+  for (size_t k = 0; k < graph->node_count; k++) {
+    size_t index = graph->order[k];
+    planner->base_step[index] = SIZE_MAX;
+    if (planner->replaced[index]) continue;
+    if (planner->needed[index]) {
+      planner->base_step[index] = run->step_count;
+      qmat_status status = add_step(planner, index, choice_of(graph->nodes[index].type, graph->nodes[index].params));
+      if (status != QMAT_OK) return status;
+    }
+    for (size_t i = 0; i < run->file_count; i++) {
+      if (graph->outputs[run->files[i].output].node != index || !asks_for_step(planner, i)) continue;
+      qmat_status status = add_step(planner, index, planner->formats[i]);
+      if (status != QMAT_OK) return status;
+    }
+  }
+  return QMAT_OK;
+}
+
+// The slot of an output port of a node that runs with its own parameters, or whose value is given.
+static qmat_status find_slot(run_planner *planner, size_t node, size_t port, size_t *slot) {
+  const qmat_run *run = planner->run;
+  if (!planner->replaced[node]) {
+    *slot = run->steps[planner->base_step[node]].first_slot + port;
+    return QMAT_OK;
+  }
+  for (size_t i = 0; i < run->given_count; i++)
+    if (run->given[i].node == node && run->given[i].port == port) {
+      *slot = run->slot_count - run->given_count + i;
+      return QMAT_OK;
+    }
+  const qmat_graph_node *owner = &planner->graph->nodes[node];
+  return qmat_fail(planner->context, QMAT_ERROR_USAGE, "values are given for node '%s', but not for its output '%s'",
+                   owner->id, owner->type->outputs[port].name);
+}
+
+static qmat_status plan_slots(run_planner *planner) {
+  const qmat_graph *graph = planner->graph;
+  const qmat_run_options *options = planner->options;
+  qmat_run *run = planner->run;
+  run->given = qmat_calloc(options->given_count, sizeof *run->given);
+  run->slots = qmat_calloc(run->slot_count + options->given_count, sizeof *run->slots);
+  if (!run->given || !run->slots) return qmat_fail_memory(planner->context, "plan");
+  for (size_t i = 0; i < options->given_count; i++) {
+    run->given[i] = options->given[i];
+    run->slots[run->slot_count + i] =
+        (qmat_run_slot){.value = qmat_value_retain(options->given[i].value), .kept = true};
+  }
+  run->given_count = options->given_count;
+  run->slot_count += options->given_count;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < run->step_count; i++) {
+    qmat_run_step *step = &run->steps[i];
+    const qmat_graph_node *node = &graph->nodes[step->node];
+    for (size_t port = 0; port < qmat_input_count(node->type); port++) {
+      const qmat_graph_link *link = &node->links[port];
+      step->inputs[port] = SIZE_MAX;
+      if (link->node == SIZE_MAX) continue;
+      status = find_slot(planner, link->node, link->port, &step->inputs[port]);
+      if (status != QMAT_OK) return status;
+      run->slots[step->inputs[port]].readers++;
+    }
+  }
+  for (size_t i = 0; i < options->want_count; i++) {
+    size_t slot;
+    status = find_slot(planner, options->wants[i].node, options->wants[i].port, &slot);
+    if (status != QMAT_OK) return status;
+    run->slots[slot].kept = true;
+  }
+  for (size_t i = 0; i < run->file_count; i++) {
+    qmat_run_file *file = &run->files[i];
+    const qmat_graph_output *output = &graph->outputs[file->output];
+    if (planner->replaced[output->node]) {
+      status = find_slot(planner, output->node, output->port, &file->slot);
+      if (status != QMAT_OK) return status;
+      continue;
+    }
+    for (size_t k = 0; k < run->step_count; k++)
+      if (run->steps[k].node == output->node && run->steps[k].format == planner->formats[i])
+        file->slot = run->steps[k].first_slot + output->port;
+    run->slots[file->slot].kept = true;
+  }
+  return QMAT_OK;
+}
+
+static void name_run(qmat_run *run) {
+  const char *file = run->graph->file + folder_length(run->graph->file);
+  snprintf(run->name, sizeof run->name, "%s", file);
+  char *dot = strrchr(run->name, '.');
+  if (dot && dot != run->name) *dot = 0;
+  for (size_t i = 0; i < run->given_count; i++)
+    if (run->given[i].value->type == QMAT_SCENE) {
+      snprintf(run->name, sizeof run->name, "%s", ((const qmat_scene *)run->given[i].value)->name);
+      return;
+    }
+}
+
+qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const qmat_run_options *options,
+                          qmat_run *run) {
+  *run = (qmat_run){.graph = graph};
+  run_planner planner = {.context = context, .graph = graph, .options = options, .run = run};
+  planner.within = qmat_calloc(graph->node_count, sizeof *planner.within);
+  planner.replaced = qmat_calloc(graph->node_count, sizeof *planner.replaced);
+  planner.needed = qmat_calloc(graph->node_count, sizeof *planner.needed);
+  planner.base_step = qmat_calloc(graph->node_count, sizeof *planner.base_step);
+  qmat_status status = QMAT_OK;
+  if (!planner.within || !planner.replaced || !planner.needed || !planner.base_step) {
+    status = qmat_fail_memory(context, "plan");
+    goto cleanup;
+  }
+  if (options->to_node) {
+    size_t node;
+    status = qmat_graph_find_node(context, graph, options->to_node, &node);
+    if (status != QMAT_OK) goto cleanup;
+    mark_within(graph, node, planner.within);
+  } else {
+    memset(planner.within, true, graph->node_count * sizeof *planner.within);
+  }
+  for (size_t i = 0; i < options->given_count; i++) planner.replaced[options->given[i].node] = true;
+  status = plan_files(&planner);
+  if (status != QMAT_OK) goto cleanup;
+  plan_needs(&planner);
+  status = plan_steps(&planner);
+  if (status == QMAT_OK) status = plan_slots(&planner);
+  if (status != QMAT_OK) goto cleanup;
+  name_run(run);
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
+    char what[QMAT_GRAPH_NAME_SIZE + 16];
+    snprintf(what, sizeof what, "output '%s':", graph->outputs[run->files[i].output].name);
+    status = check_not_an_input(context, run, what, run->files[i].path);
+    if (status == QMAT_OK) status = check_can_write(context, run->files[i].path);
+  }
+cleanup:
+  qmat_free(planner.formats);
+  qmat_free(planner.within);
+  qmat_free(planner.replaced);
+  qmat_free(planner.needed);
+  qmat_free(planner.base_step);
+  return status;
+}
+
+/* ---- running ---- */
+
+static void release_slot(qmat_run_slot *slot) {
+  qmat_value_release(slot->value);
+  slot->value = NULL;
+}
+
+static qmat_status check_made(qmat_context *context, const qmat_node *type, qmat_value *const values[]) {
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    const qmat_value *value = values[port];
+    if (!value || !value->sealed || value->type != type->outputs[port].type) {
+      qmat_fail(context, QMAT_ERROR_INTERNAL, "the node did not make its output '%s'", type->outputs[port].name);
+      return qmat_fail_field(context, type->outputs[port].name);
+    }
+  }
+  return QMAT_OK;
+}
+
+static void note_made(qmat_run *run, qmat_run_step *step, const qmat_node *type) {
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    const qmat_value *value = run->slots[step->first_slot + port].value;
+    qmat_run_made *made = &step->made[port];
+    made->digest = value->digest;
+    made->bytes = qmat_value_bytes(value);
+    qmat_value_counts(value, made->counts);
+    if (value->type == QMAT_REPORT && !step->report) step->report = json_incref(((const qmat_report *)value)->root);
+  }
+}
+
+static qmat_status run_step(qmat_context *context, qmat_run *run, size_t index) {
+  qmat_run_step *step = &run->steps[index];
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  size_t input_count = qmat_input_count(type), output_count = qmat_output_count(type);
+  const qmat_value **inputs = qmat_calloc(input_count, sizeof *inputs);
+  qmat_value **outputs = qmat_calloc(output_count, sizeof *outputs);
+  qmat_status status = QMAT_OK;
+  if (!inputs || !outputs) {
+    status = qmat_fail_memory(context, "values");
+    goto cleanup;
+  }
+  for (size_t port = 0; port < input_count; port++) {
+    if (step->inputs[port] == SIZE_MAX) continue;
+    inputs[port] = run->slots[step->inputs[port]].value;
+    if (type->inputs[port].type == QMAT_MESH && step->mesh_triangles == 0)
+      step->mesh_triangles = ((const qmat_mesh *)inputs[port])->triangle_count;
+  }
+  double start = now();
+  status = type->run(context, step->params, inputs, outputs);
+  step->seconds = now() - start;
+  if (status == QMAT_OK)
+    status = check_made(context, type, outputs);
+  else if (context->error.status != status)
+    qmat_fail(context, status, "the node failed and did not say why");
+  if (status != QMAT_OK) goto cleanup;
+  for (size_t port = 0; port < output_count; port++) {
+    run->slots[step->first_slot + port].value = outputs[port];
+    outputs[port] = NULL;
+  }
+  note_made(run, step, type);
+  step->done = true;
+cleanup:
+  for (size_t port = 0; outputs && port < output_count; port++) qmat_value_release(outputs[port]);
+  qmat_free(inputs);
+  qmat_free(outputs);
+  qmat_arena_uninit(&context->arena);
+  return status;
+}
+
+// Lets go of what nobody reads any more.
+static void finish_step(qmat_run *run, const qmat_run_step *step) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (step->inputs[port] == SIZE_MAX) continue;
+    qmat_run_slot *slot = &run->slots[step->inputs[port]];
+    if (--slot->readers == 0 && !slot->kept) release_slot(slot);
+  }
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    qmat_run_slot *slot = &run->slots[step->first_slot + port];
+    if (slot->readers == 0 && !slot->kept) release_slot(slot);
+  }
+}
+
+// Takes the run's name from the first scene.
+static void take_name(qmat_run *run, const qmat_run_step *step, bool *named) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_output_count(type) && !*named; port++) {
+    const qmat_value *value = run->slots[step->first_slot + port].value;
+    if (value->type != QMAT_SCENE || !((const qmat_scene *)value)->name[0]) continue;
+    snprintf(run->name, sizeof run->name, "%s", ((const qmat_scene *)value)->name);
+    *named = true;
+  }
+}
+
+qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer) {
+  const char *outer_id = context->node_id, *outer_type = context->node_type;
+  double start = now();
+  qmat_status status = QMAT_OK;
+  bool named = false;
+  for (size_t i = 0; i < run->given_count; i++)
+    if (run->given[i].value->type == QMAT_SCENE) named = true;
+  for (size_t i = 0; i < run->step_count && status == QMAT_OK; i++) {
+    const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];
+    context->node_id = node->id;
+    context->node_type = node->type->name;
+    if (observer && observer->started) observer->started(observer->user, run, i);
+    status = qmat_progress(context, 0, 0, "");
+    if (status == QMAT_OK) status = run_step(context, run, i);
+    if (status != QMAT_OK) break;
+    take_name(run, &run->steps[i], &named);
+    finish_step(run, &run->steps[i]);
+    if (observer && observer->done) observer->done(observer->user, run, i);
+  }
+  context->node_id = outer_id;
+  context->node_type = outer_type;
+  run->seconds = now() - start;
+  return status;
+}
+
+/* ---- writing ---- */
+
+// The parts that will be files, side by side in one folder: the shape that qmat_file_save takes.
+typedef struct part_group {
+  qmat_file_part *parts;
+  size_t count, capacity;
+} part_group;
+
+static qmat_status add_part(qmat_context *context, part_group *group, const char *name, const void *bytes,
+                            size_t size) {
+  if (qmat_grow((void **)&group->parts, &group->capacity, group->count + 1, sizeof *group->parts) != 0)
+    return qmat_fail_memory(context, "output");
+  // The saver reads the bytes and the names only.
+  group->parts[group->count++] = (qmat_file_part){.name = (char *)name, .size = size, .bytes = (uint8_t *)bytes};
+  return QMAT_OK;
+}
+
+static qmat_status digest_bytes(qmat_context *context, const void *bytes, size_t size, qmat_digest *digest) {
+  qmat_hasher hasher = {0};
+  qmat_status status = qmat_hasher_init(&hasher);
+  if (status != QMAT_OK) return qmat_fail(context, status, "the digest of an output cannot be computed");
+  qmat_hasher_add(&hasher, bytes, size);
+  qmat_hasher_finish(&hasher, digest);
+  return QMAT_OK;
+}
+
+// Refuses side files that would overwrite an input: their names were not known before the run.
+static qmat_status check_side_part(qmat_context *context, const qmat_run *run, const char *path, const char *name) {
+  size_t folder = folder_length(path), length = strlen(name);
+  char *side = qmat_alloc(folder + length + 1, 1);
+  if (!side) return qmat_fail_memory(context, "output path");
+  memcpy(side, path, folder);
+  memcpy(side + folder, name, length + 1);
+  qmat_status status = check_not_an_input(context, run, "the output's side file", side);
+  qmat_free(side);
+  return status;
+}
+
+static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run_file *file, part_group *group,
+                                  char **text) {
+  const qmat_value *value = run->slots[file->slot].value;
+  // Inside a group the first main part has no name, which stands for the path given to the saver.
+  const char *main_name = group->count == 0 ? "" : file->path + folder_length(file->path);
+  if (value->type == QMAT_REPORT) {
+    *text = json_dumps(((const qmat_report *)value)->root, JSON_INDENT(2) | JSON_SORT_KEYS);
+    if (!*text) return qmat_fail_memory(context, "report");
+    size_t size = strlen(*text);
+    (*text)[size] = '\n';  // takes the place of the terminating zero
+    file->bytes = size + 1;
+    qmat_status status = digest_bytes(context, *text, file->bytes, &file->sha256);
+    return status == QMAT_OK ? add_part(context, group, main_name, *text, file->bytes) : status;
+  }
+  const qmat_file *made = (const qmat_file *)value;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < made->part_count && status == QMAT_OK; i++) {
+    if (i == 0) {
+      file->bytes = made->parts[0].size;
+      status = digest_bytes(context, made->parts[0].bytes, file->bytes, &file->sha256);
+    } else {
+      status = check_side_part(context, run, file->path, made->parts[i].name);
+    }
+    if (status == QMAT_OK)
+      status = add_part(context, group, i ? made->parts[i].name : main_name, made->parts[i].bytes, made->parts[i].size);
+  }
+  return status;
+}
+
+static bool same_folder(const char *a, const char *b) {
+  size_t length = folder_length(a);
+  return length == folder_length(b) && memcmp(a, b, length) == 0;
+}
+
+static qmat_status write_group(qmat_context *context, qmat_run *run, size_t first, char **texts) {
+  part_group group = {0};
+  qmat_status status = QMAT_OK;
+  const char *path = run->files[first].path;
+  for (size_t i = first; i < run->file_count && status == QMAT_OK; i++)
+    if (same_folder(path, run->files[i].path)) status = add_file_parts(context, run, &run->files[i], &group, &texts[i]);
+  if (status == QMAT_OK) {
+    const qmat_file together = {.base = {.type = QMAT_FILE}, .part_count = group.count, .parts = group.parts};
+    status = qmat_file_save(context, &together, path);
+  }
+  qmat_free(group.parts);
+  return status;
+}
+
+qmat_status qmat_run_write(qmat_context *context, qmat_run *run) {
+  if (run->file_count == 0) return QMAT_OK;
+  char **texts = qmat_calloc(run->file_count, sizeof *texts);
+  if (!texts) return qmat_fail_memory(context, "outputs");
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
+    bool written = false;
+    for (size_t before = 0; before < i; before++)
+      if (same_folder(run->files[before].path, run->files[i].path)) written = true;
+    if (!written) status = write_group(context, run, i, texts);
+  }
+  for (size_t i = 0; i < run->file_count; i++) free(texts[i]);
+  qmat_free(texts);
+  return status;
+}
+
+/* ---- results ---- */
+
+const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port) {
+  for (size_t i = 0; i < run->given_count; i++)
+    if (run->given[i].node == node && run->given[i].port == port) return run->given[i].value;
+  for (size_t i = 0; i < run->step_count; i++)
+    if (run->steps[i].node == node) return run->slots[run->steps[i].first_slot + port].value;
+  return NULL;
+}
+
+static bool take_number(const json_t *report, const char *key, double *number) {
+  const json_t *value = json_object_get(report, key);
+  if (!json_is_number(value)) return false;
+  *number = json_number_value(value);
+  return true;
+}
+
+bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
+  for (size_t i = run->step_count; i-- > 0;) {
+    const qmat_run_step *step = &run->steps[i];
+    const qmat_node *type = run->graph->nodes[step->node].type;
+    bool medial = false;
+    for (size_t port = 0; port < qmat_output_count(type); port++)
+      if (type->outputs[port].type == QMAT_MEDIAL) medial = true;
+    if (!step->done || !medial || !step->report) continue;
+    double spheres;
+    *summary = (qmat_run_summary){.step = i, .triangles = step->mesh_triangles};
+    if (take_number(step->report, "spheres", &spheres) && spheres >= 0 && spheres < 0x1p53 &&
+        take_number(step->report, "epsilon", &summary->epsilon) &&
+        take_number(step->report, "surface_to_envelope", &summary->surface_to_envelope) &&
+        take_number(step->report, "envelope_to_surface", &summary->envelope_to_surface)) {
+      summary->spheres = (uint64_t)spheres;
+      return true;
+    }
+  }
+  return false;
+}
+
+void qmat_run_uninit(qmat_run *run) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    qmat_free(run->steps[i].params);
+    qmat_free(run->steps[i].inputs);
+    qmat_free(run->steps[i].made);
+    json_decref(run->steps[i].report);
+  }
+  for (size_t i = 0; run->slots && i < run->slot_count; i++) release_slot(&run->slots[i]);
+  for (size_t i = 0; i < run->file_count; i++) qmat_free(run->files[i].path);
+  qmat_free(run->steps);
+  qmat_free(run->slots);
+  qmat_free(run->files);
+  qmat_free(run->given);
+  *run = (qmat_run){0};
+}

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_GRAPHS_GRAPH_RUN_H
+#define QMAT_GRAPHS_GRAPH_RUN_H
+
+#include "graphs/graph_file.h"
+
+/* Running a graph: plan (everything that can be refused is refused here), execute, write. */
+
+/* An output of the graph, and the path that it is saved as. */
+typedef struct qmat_run_save {
+  size_t output;
+  const char *path;
+} qmat_run_save;
+
+/* An output port of a node. */
+typedef struct qmat_run_port {
+  size_t node, port;
+} qmat_run_port;
+
+/* A value that stands for what a node would make. */
+typedef struct qmat_run_given {
+  size_t node, port;
+  qmat_value *value; /* sealed, of the port's type */
+} qmat_run_given;
+
+/* What to run. The arrays are read by qmat_run_plan only. */
+typedef struct qmat_run_options {
+  const qmat_run_save *saves; /* instead of the paths that the file gives to these outputs */
+  size_t save_count;
+  const qmat_run_port *wants; /* values that qmat_run_value gives after the run */
+  size_t want_count;
+  const qmat_run_given *given;
+  size_t given_count;
+  bool only_wanted;    /* leave out what neither `saves` nor `wants` needs; else every output of the graph is made */
+  const char *to_node; /* stop there: only this node and what it needs; NULL: the whole graph */
+} qmat_run_options;
+
+/* What is known of a value that a node has made, also after the value is gone. */
+typedef struct qmat_run_made {
+  qmat_digest digest;
+  size_t bytes;
+  size_t counts[3]; /* see qmat_value_counts */
+} qmat_run_made;
+
+/* One run of one node. */
+typedef struct qmat_run_step {
+  size_t node;
+  int format;        /* value of its output format parameter; -1: it has none */
+  void *params;      /* type->params_size bytes; texts are the graph's */
+  size_t *inputs;    /* per input port its slot; SIZE_MAX: not connected */
+  size_t first_slot; /* of its output ports */
+  bool done;
+  double seconds;
+  qmat_run_made *made;   /* per output port */
+  json_t *report;        /* root of its first report output; NULL: it makes none */
+  size_t mesh_triangles; /* of its first mesh input; 0: none */
+} qmat_run_step;
+
+/* A value on its way between steps. */
+typedef struct qmat_run_slot {
+  qmat_value *value;
+  size_t readers; /* steps that still read it */
+  bool kept;      /* until the run is uninitialised */
+} qmat_run_slot;
+
+/* One file that a run writes. */
+typedef struct qmat_run_file {
+  size_t output, slot;
+  char *path;
+  size_t bytes;       /* of the main part */
+  qmat_digest sha256; /* of the main part's bytes */
+} qmat_run_file;
+
+/* One plan, and what came of it. A zeroed run is empty and may be uninitialised. */
+typedef struct qmat_run {
+  const qmat_graph *graph;
+  size_t step_count, slot_count, file_count, given_count;
+  qmat_run_step *steps; /* in the order in which they run */
+  qmat_run_slot *slots; /* of the steps, then of the given values */
+  qmat_run_file *files;
+  qmat_run_given *given; /* given[i] is in slots[slot_count - given_count + i] */
+  char name[128];        /* of the first scene that was made or given; else of the graph file */
+  double seconds;
+} qmat_run;
+
+/* Hears of every step; either function may be NULL. */
+typedef struct qmat_run_observer {
+  void *user;
+  void (*started)(void *user, const qmat_run *run, size_t step);
+  void (*done)(void *user, const qmat_run *run, size_t step);
+} qmat_run_observer;
+
+/* Plans a run. The graph must outlive it and stay as it is. `*run` is freed with qmat_run_uninit, also after a failure.
+ * A node runs once for each format that its files are saved in, everything before it once. QMAT_ERROR_USAGE: missing
+ * parameters, broken rules between them, an unknown ending, two outputs with one path, an output path that is one of
+ * the input files or the graph. QMAT_ERROR_IO: a path whose folder is not there or cannot be written to. */
+qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const qmat_run_options *options,
+                          qmat_run *run);
+
+/* Whether both paths lead to one file, which need not be there yet. */
+bool qmat_same_file(const char *a, const char *b);
+
+/* Whether a file of `path` can be written, and may be beside what the run reads and writes; `what` names it in the
+ * error. QMAT_ERROR_USAGE, QMAT_ERROR_IO. */
+qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path);
+
+/* Runs the steps one after another; a value is released when its last reader is done. Nothing is written. Returns the
+ * first failing node's status; QMAT_CANCELLED when the context's progress function asks to stop. Once per plan. */
+qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer);
+
+/* Writes the files of a finished run: those of one folder together, all through temporaries. */
+qmat_status qmat_run_write(qmat_context *context, qmat_run *run);
+
+/* A value that was wanted, or NULL. The run owns it. */
+const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port);
+
+/* Frees what the run holds. Works on a zeroed and on a failed run. */
+void qmat_run_uninit(qmat_run *run);
+
+/* The names of what a value of this type counts ("spheres", "cones", "slabs"), in the plural, ended by NULL. */
+const char *const *qmat_value_count_names(qmat_value_type type);
+/* The counts under those names. */
+void qmat_value_counts(const qmat_value *value, size_t counts[3]);
+
+/* In how far the spheres that a step made describe its mesh. Fractions are of the bounding-box diagonal. */
+typedef struct qmat_run_summary {
+  size_t step;
+  uint64_t spheres;
+  size_t triangles; /* of the mesh that they describe; 0: not known */
+  double epsilon, surface_to_envelope, envelope_to_surface;
+} qmat_run_summary;
+
+/* The summary of the last step that made a medial mesh and a report with the numbers "spheres", "epsilon",
+ * "surface_to_envelope" and "envelope_to_surface"; false when there is none. */
+bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary);
+
+#endif

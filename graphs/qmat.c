@@ -1,0 +1,413 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/qmat.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "graphs/built_in.h"
+#include "graphs/graph_run.h"
+#include "graphs/node_json.h"
+#include "graphs/run_report.h"
+#include "io/soup.h"
+#include "nodes/nodes.h"
+
+typedef struct job_save {
+  size_t output;
+  char *path;
+} job_save;
+
+struct qmat_job {
+  qmat_context context;
+  qmat_graph graph;
+  qmat_run run;
+  bool loaded; /* a job whose graph could not be read keeps that error, whatever is done with it */
+  bool ran;
+  job_save *saves;
+  size_t save_count, save_capacity;
+  qmat_run_port *wants;
+  size_t want_count, want_capacity;
+  qmat_run_given *given;
+  size_t given_count, given_capacity;
+  qmat_job_progress progress;
+  void *progress_user;
+  qmat_job_problem problem;
+  char problem_text[2048];
+};
+
+const char *qmat_version(void) {
+  return QMAT_VERSION;
+}
+
+char *qmat_nodes_json(void) {
+  const qmat_registry registry = {qmat_nodes, qmat_node_count};
+  json_t *nodes = qmat_registry_json(&registry);
+  char *text = nodes ? json_dumps(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  json_decref(nodes);
+  return text;
+}
+
+void qmat_text_free(char *text) {
+  free(text);
+}
+
+// Ends a call: keeps the error for qmat_job_error.
+static qmat_result finish(qmat_job *job, qmat_status status) {
+  qmat_result result = (qmat_result)qmat_status_exit_code(status);
+  if (result == QMAT_RESULT_OK) return result;
+  const qmat_error *error = &job->context.error;
+  qmat_error_format(error, job->problem_text, sizeof job->problem_text);
+  job->problem = (qmat_job_problem){
+      .result = result,
+      .status = qmat_status_name(error->status),
+      .node = error->node_id,
+      .type = error->node_type,
+      .field = error->field,
+      .element_kind = error->element_kind,
+      .element = error->element,
+      .file = error->file,
+      .line = error->line,
+      .column = error->column,
+      .message = error->message,
+      .hint = error->hint,
+      .text = job->problem_text,
+  };
+  return result;
+}
+
+const qmat_job_problem *qmat_job_error(const qmat_job *job) {
+  static const qmat_job_problem no_memory = {
+      .result = QMAT_RESULT_FAILED,
+      .status = "memory",
+      .node = "",
+      .type = "",
+      .field = "",
+      .element_kind = "",
+      .element = -1,
+      .file = "",
+      .message = "not enough memory for a job",
+      .hint = "",
+      .text = "not enough memory for a job",
+  };
+  return job ? &job->problem : &no_memory;
+}
+
+/* ---- making ---- */
+
+static qmat_job *new_job(void) {
+  qmat_job *job = qmat_calloc(1, sizeof *job);
+  if (job)
+    job->problem = (qmat_job_problem){.status = "ok",
+                                      .node = "",
+                                      .type = "",
+                                      .field = "",
+                                      .element_kind = "",
+                                      .element = -1,
+                                      .file = "",
+                                      .message = "",
+                                      .hint = "",
+                                      .text = ""};
+  return job;
+}
+
+static qmat_registry all_nodes(void) {
+  return (qmat_registry){qmat_nodes, qmat_node_count};
+}
+
+qmat_result qmat_job_new(qmat_job **job) {
+  *job = new_job();
+  if (!*job) return QMAT_RESULT_FAILED;
+  const qmat_registry nodes = all_nodes();
+  qmat_status status = qmat_graph_read_built_in(&(*job)->context, &nodes, &(*job)->graph);
+  (*job)->loaded = status == QMAT_OK;
+  return finish(*job, status);
+}
+
+qmat_result qmat_job_new_from_file(qmat_job **job, const char *path) {
+  *job = new_job();
+  if (!*job) return QMAT_RESULT_FAILED;
+  const qmat_registry nodes = all_nodes();
+  qmat_status status = qmat_graph_read_file(&(*job)->context, &nodes, path, &(*job)->graph);
+  (*job)->loaded = status == QMAT_OK;
+  return finish(*job, status);
+}
+
+qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size) {
+  *job = new_job();
+  if (!*job) return QMAT_RESULT_FAILED;
+  const qmat_registry nodes = all_nodes();
+  qmat_status status = qmat_graph_read_text(&(*job)->context, &nodes, "graph", text, size, &(*job)->graph);
+  (*job)->loaded = status == QMAT_OK;
+  return finish(*job, status);
+}
+
+void qmat_job_free(qmat_job *job) {
+  if (!job) return;
+  qmat_run_uninit(&job->run);
+  for (size_t i = 0; i < job->save_count; i++) qmat_free(job->saves[i].path);
+  for (size_t i = 0; i < job->given_count; i++) qmat_value_release(job->given[i].value);
+  qmat_free(job->saves);
+  qmat_free(job->wants);
+  qmat_free(job->given);
+  qmat_graph_uninit(&job->graph);
+  qmat_context_uninit(&job->context);
+  qmat_free(job);
+}
+
+/* ---- what to do ---- */
+
+qmat_result qmat_job_set(qmat_job *job, const char *assignment) {
+  if (!job->loaded) return job->problem.result;
+  return finish(job, qmat_graph_assign(&job->context, &job->graph, assignment));
+}
+
+static qmat_status make_mesh(qmat_context *context, const char *name, const double *positions, size_t vertex_count,
+                             const uint32_t *triangles, size_t triangle_count, qmat_mesh **mesh) {
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  qmat_soup soup = {0};
+  *mesh = NULL;
+  qmat_status status = QMAT_OK;
+  if (triangle_count > UINT32_MAX || vertex_count > UINT32_MAX) status = qmat_fail_memory(context, "the mesh");
+  if (status == QMAT_OK) status = qmat_soup_reserve(context, &soup, vertex_count, triangle_count, 3 * triangle_count);
+  if (status == QMAT_OK) status = qmat_soup_add_vertices(context, &soup, positions, vertex_count);
+  for (size_t i = 0; i < triangle_count && status == QMAT_OK; i++)
+    status = qmat_soup_add_facet(context, &soup, triangles + 3 * i, 3, (uint32_t)i, 0);
+  if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, name, &options, mesh, NULL);
+  qmat_soup_uninit(&soup);
+  return status;
+}
+
+static qmat_status make_scene(qmat_context *context, const char *name, qmat_scene **scene) {
+  *scene = qmat_scene_new();
+  if (!*scene) return qmat_fail_memory(context, "the scene");
+  (*scene)->name = qmat_strdup(name);
+  (*scene)->format = qmat_strdup("memory");
+  qmat_status status = (*scene)->name && (*scene)->format ? qmat_value_seal(context, &(*scene)->base)
+                                                          : qmat_fail_memory(context, "the scene");
+  if (status == QMAT_OK) return status;
+  qmat_value_release(&(*scene)->base);
+  *scene = NULL;
+  return status;
+}
+
+// Puts a value in place of what the port would make; the job takes the caller's reference.
+static qmat_status give(qmat_job *job, size_t node, size_t port, qmat_value *value) {
+  for (size_t i = 0; i < job->given_count; i++)
+    if (job->given[i].node == node && job->given[i].port == port) {
+      qmat_value_release(job->given[i].value);
+      job->given[i].value = value;
+      return QMAT_OK;
+    }
+  if (qmat_grow((void **)&job->given, &job->given_capacity, job->given_count + 1, sizeof *job->given) != 0) {
+    qmat_value_release(value);
+    return qmat_fail_memory(&job->context, "values");
+  }
+  job->given[job->given_count++] = (qmat_run_given){node, port, value};
+  return QMAT_OK;
+}
+
+qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
+                               size_t vertex_count, const uint32_t *triangles, size_t triangle_count) {
+  if (!job->loaded) return job->problem.result;
+  size_t node, index;
+  qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, &node, &index);
+  if (status != QMAT_OK) return finish(job, status);
+  const qmat_node *type = job->graph.nodes[node].type;
+  if (type->outputs[index].type != QMAT_MESH)
+    return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' is a %s, not a mesh", port,
+                                 qmat_value_type_name(type->outputs[index].type)));
+  if (!name || !*name) name = "mesh";
+  qmat_mesh *mesh;
+  status = make_mesh(&job->context, name, positions, vertex_count, triangles, triangle_count, &mesh);
+  if (status == QMAT_OK) status = give(job, node, index, &mesh->base);
+  for (size_t i = 0; i < qmat_output_count(type) && status == QMAT_OK; i++) {
+    if (type->outputs[i].type != QMAT_SCENE) continue;
+    qmat_scene *scene;
+    status = make_scene(&job->context, name, &scene);
+    if (status == QMAT_OK) status = give(job, node, i, &scene->base);
+  }
+  return finish(job, status);
+}
+
+qmat_result qmat_job_want(qmat_job *job, const char *port) {
+  if (!job->loaded) return job->problem.result;
+  qmat_run_port want;
+  qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, &want.node, &want.port);
+  if (status == QMAT_OK &&
+      qmat_grow((void **)&job->wants, &job->want_capacity, job->want_count + 1, sizeof *job->wants) != 0)
+    status = qmat_fail_memory(&job->context, "ports");
+  if (status == QMAT_OK) job->wants[job->want_count++] = want;
+  return finish(job, status);
+}
+
+// The only output that is a file.
+static qmat_status only_file(qmat_job *job, size_t *output) {
+  size_t count = 0;
+  for (size_t i = 0; i < job->graph.output_count; i++) {
+    const qmat_graph_output *made = &job->graph.outputs[i];
+    if (job->graph.nodes[made->node].type->outputs[made->port].type != QMAT_FILE) continue;
+    *output = i;
+    count++;
+  }
+  if (count == 1) return QMAT_OK;
+  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "the graph makes %zu files: say which output is to be saved",
+                   count);
+}
+
+qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
+  if (!job->loaded) return job->problem.result;
+  job_save save = {0};
+  int choice;
+  qmat_status status =
+      output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output) : only_file(job, &save.output);
+  if (status == QMAT_OK) status = qmat_graph_output_format(&job->context, &job->graph, save.output, path, &choice);
+  if (status == QMAT_OK) {
+    save.path = qmat_strdup(path);
+    if (!save.path ||
+        qmat_grow((void **)&job->saves, &job->save_capacity, job->save_count + 1, sizeof *job->saves) != 0) {
+      qmat_free(save.path);
+      status = qmat_fail_memory(&job->context, "paths");
+    }
+  }
+  if (status == QMAT_OK) job->saves[job->save_count++] = save;
+  return finish(job, status);
+}
+
+/* ---- running ---- */
+
+static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                             const char *unit) {
+  const qmat_job *job = user;
+  return job->progress(job->progress_user, node_id, node_type, done, total, unit);
+}
+
+qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress, void *user) {
+  if (!job->loaded) return job->problem.result;
+  qmat_context *context = &job->context;
+  qmat_run_uninit(&job->run);
+  job->ran = false;
+  if (threads < 0 || threads > 1024)
+    return finish(job,
+                  qmat_fail(context, QMAT_ERROR_USAGE, "the number of threads is from 0 to 1024, not %d", threads));
+  qmat_run_save *saves = qmat_calloc(job->save_count, sizeof *saves);
+  if (!saves) return finish(job, qmat_fail_memory(context, "paths"));
+  for (size_t i = 0; i < job->save_count; i++) saves[i] = (qmat_run_save){job->saves[i].output, job->saves[i].path};
+  const qmat_run_options options = {
+      .saves = saves,
+      .save_count = job->save_count,
+      .wants = job->wants,
+      .want_count = job->want_count,
+      .given = job->given,
+      .given_count = job->given_count,
+      .only_wanted = job->want_count > 0,
+  };
+  job->progress = progress;
+  job->progress_user = user;
+  context->threads = threads;
+  context->progress = progress ? forward_progress : NULL;
+  context->progress_user = job;
+  qmat_status status = qmat_run_plan(context, &job->graph, &options, &job->run);
+  if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
+  if (status == QMAT_OK) status = qmat_run_write(context, &job->run);
+  context->progress = NULL;
+  qmat_free(saves);
+  job->ran = status == QMAT_OK;
+  if (status != QMAT_OK) qmat_run_uninit(&job->run);
+  return finish(job, status);
+}
+
+/* ---- results ---- */
+
+static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type type, const qmat_value **value) {
+  qmat_context *context = &job->context;
+  if (!job->ran) return qmat_fail(context, QMAT_ERROR_USAGE, "the job has no results: run it first");
+  size_t node, index;
+  qmat_status status = qmat_graph_find_port(context, &job->graph, port, &node, &index);
+  if (status != QMAT_OK) return status;
+  *value = qmat_run_value(&job->run, node, index);
+  if (!*value) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not asked for before the run", port);
+    return qmat_fail_hint(context, "qmat_job_want");
+  }
+  if ((*value)->type != type)
+    return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name((*value)->type),
+                     qmat_value_type_name(type));
+  return QMAT_OK;
+}
+
+qmat_result qmat_job_medial(qmat_job *job, const char *port, qmat_medial_view *view) {
+  *view = (qmat_medial_view){0};
+  if (!job->loaded) return job->problem.result;
+  const qmat_value *value;
+  qmat_status status = find_value(job, port, QMAT_MEDIAL, &value);
+  if (status != QMAT_OK) return finish(job, status);
+  const qmat_medial *medial = (const qmat_medial *)value;
+  *view = (qmat_medial_view){medial->sphere_count, medial->edge_count, medial->triangle_count,
+                             medial->spheres,      medial->edges,      medial->triangles};
+  return QMAT_RESULT_OK;
+}
+
+qmat_result qmat_job_mesh(qmat_job *job, const char *port, qmat_mesh_view *view) {
+  *view = (qmat_mesh_view){0};
+  if (!job->loaded) return job->problem.result;
+  const qmat_value *value;
+  qmat_status status = find_value(job, port, QMAT_MESH, &value);
+  if (status != QMAT_OK) return finish(job, status);
+  const qmat_mesh *mesh = (const qmat_mesh *)value;
+  *view = (qmat_mesh_view){mesh->vertex_count, mesh->triangle_count, mesh->positions, mesh->triangles};
+  return QMAT_RESULT_OK;
+}
+
+qmat_result qmat_job_file(qmat_job *job, const char *port, qmat_file_view *view) {
+  *view = (qmat_file_view){.format = ""};
+  if (!job->loaded) return job->problem.result;
+  const qmat_value *value;
+  qmat_status status = find_value(job, port, QMAT_FILE, &value);
+  if (status != QMAT_OK) return finish(job, status);
+  const qmat_file *file = (const qmat_file *)value;
+  *view = (qmat_file_view){file->format, file->part_count};
+  return QMAT_RESULT_OK;
+}
+
+qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t part, const char **name, const uint8_t **bytes,
+                               size_t *size) {
+  *name = "";
+  *bytes = NULL;
+  *size = 0;
+  if (!job->loaded) return job->problem.result;
+  const qmat_value *value;
+  qmat_status status = find_value(job, port, QMAT_FILE, &value);
+  if (status != QMAT_OK) return finish(job, status);
+  const qmat_file *file = (const qmat_file *)value;
+  if (part >= file->part_count)
+    return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' has %zu parts, so none of number %zu", port,
+                                 file->part_count, part));
+  *name = file->parts[part].name;
+  *bytes = file->parts[part].bytes;
+  *size = file->parts[part].size;
+  return QMAT_RESULT_OK;
+}
+
+static qmat_status dump(qmat_context *context, const json_t *root, char **json) {
+  *json = root ? json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  return *json ? QMAT_OK : qmat_fail_memory(context, "report");
+}
+
+qmat_result qmat_job_report(qmat_job *job, const char *port, char **json) {
+  *json = NULL;
+  if (!job->loaded) return job->problem.result;
+  const qmat_value *value;
+  qmat_status status = find_value(job, port, QMAT_REPORT, &value);
+  if (status == QMAT_OK) status = dump(&job->context, ((const qmat_report *)value)->root, json);
+  return finish(job, status);
+}
+
+qmat_result qmat_job_run_report(qmat_job *job, char **json) {
+  *json = NULL;
+  if (!job->loaded) return job->problem.result;
+  if (!job->ran) return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "the job has no results: run it first"));
+  json_t *report = qmat_run_report(&job->context, &job->run);
+  qmat_status status = dump(&job->context, report, json);
+  json_decref(report);
+  return finish(job, status);
+}
