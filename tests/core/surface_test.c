@@ -266,6 +266,19 @@ static void test_open_cup_agrees_with_the_winding_number(void **state) {
   check_against_brute_force(mesh, 1000);
 }
 
+static void test_sphere_without_an_octant_agrees_with_the_winding_number(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_sphere(1, 24);
+  size_t kept = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    bool octant = true;
+    for (size_t k = 0; k < 9; k++) octant &= mesh->positions[3 * mesh->triangles[3 * t + k / 3] + k % 3] > -1e-9;
+    if (!octant) memmove(mesh->triangles + 3 * kept++, mesh->triangles + 3 * t, 3 * sizeof *mesh->triangles);
+  }
+  mesh->triangle_count = kept;
+  check_against_brute_force(shape_seal(mesh), 2000);
+}
+
 static void test_flipped_triangle_agrees_with_the_winding_number(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_sphere(1, 20);
@@ -361,6 +374,88 @@ static void test_equally_close_triangles_give_the_smallest(void **state) {
   release(surface);
 }
 
+static void test_vertices_of_a_sphere_give_their_first_triangle(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_sphere(1, 30);
+  /* In an order that has nothing to do with where they are. */
+  for (size_t t = mesh->triangle_count; t-- > 1;) {
+    uint32_t kept[3], *a = mesh->triangles + 3 * t, *b = mesh->triangles + 3 * (qmat_hash3(10, t, 0) % (t + 1));
+    memcpy(kept, a, sizeof kept);
+    memmove(a, b, sizeof kept);
+    memcpy(b, kept, sizeof kept);
+  }
+  shape_rotate(mesh);
+  shape_seal(mesh);
+  qmat_surface *surface = surface_of(mesh);
+  for (uint32_t v = 0; v < mesh->vertex_count; v++) {
+    const double *vertex = qmat_surface_positions(surface) + 3 * (size_t)v;
+    uint32_t first = 0, triangle;
+    while (mesh->triangles[first] != v) first++;
+    double outer[3], closest[3];
+    for (int k = 0; k < 3; k++) outer[k] = 1.3 * vertex[k];
+    qmat_surface_distance(surface, outer, INFINITY, closest, &triangle);
+    assert_memory_equal(closest, vertex, sizeof closest);
+    assert_int_equal(triangle, first / 3);
+  }
+  release(surface);
+}
+
+static void test_doubled_triangles_give_the_first_of_each_pair(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_torus(1, 0.3, 20, 10);
+  const size_t count = mesh->triangle_count;
+  for (size_t t = count; t-- > 0;) {
+    const uint32_t *ids = mesh->triangles + 3 * t;
+    shape_triangle(mesh, ids[0], ids[1], ids[2]);
+  }
+  shape_seal(mesh);
+  qmat_surface *surface = surface_of(mesh);
+  const double down[3] = {0, 0, -1};
+  for (size_t i = 0; i < 500; i++) {
+    double p[3];
+    for (int k = 0; k < 3; k++) p[k] = uniform(8, 3 * i + (size_t)k, -0.4, 0.4);
+    uint32_t triangle;
+    qmat_surface_distance(surface, p, INFINITY, NULL, &triangle);
+    assert_true(triangle < count);
+    if (qmat_surface_cast(surface, p, down, 0, NULL, &triangle, NULL)) assert_true(triangle < count);
+  }
+  release(surface);
+}
+
+static void test_both_triangles_of_an_edge_are_equally_far(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 2, 3);
+  shape_rotate(mesh);
+  shape_seal(mesh);
+  qmat_surface *surface = surface_of(mesh);
+  for (uint32_t t = 0; t < 12; t++) {
+    for (int c = 0; c < 3; c++) {
+      const uint32_t a = mesh->triangles[3 * t + (uint32_t)c], b = mesh->triangles[3 * t + (uint32_t)(c + 1) % 3];
+      uint32_t first = 0;
+      for (;; first++) {
+        const uint32_t *ids = mesh->triangles + 3 * (size_t)first;
+        if ((ids[0] == a || ids[1] == a || ids[2] == a) && (ids[0] == b || ids[1] == b || ids[2] == b)) break;
+      }
+      for (uint64_t i = 0; i < 20; i++) {
+        /* Away from the centre, but less so along the edge than across it. */
+        const double share = uniform(9, 20 * t + i, 0.4, 0.6);
+        double p[3];
+        for (int k = 0; k < 3; k++) {
+          const double *positions = qmat_surface_positions(surface);
+          p[k] = 1.05 *
+                 ((1 - share) * positions[3 * (size_t)a + (size_t)k] + share * positions[3 * (size_t)b + (size_t)k]);
+        }
+        uint32_t triangle;
+        qmat_surface_distance(surface, p, INFINITY, NULL, &triangle);
+        /* Not the diagonals of the sides, above which the planes are what is near. */
+        const uint32_t differing = a ^ b;
+        if (differing == 1 || differing == 2 || differing == 4) assert_int_equal(triangle, first);
+      }
+    }
+  }
+  release(surface);
+}
+
 static void test_centre_of_a_box_is_inside_though_rays_meet_edges(void **state) {
   (void)state;
   qmat_surface *surface = surface_of(shape_seal(shape_box(1, 1, 1)));
@@ -413,6 +508,46 @@ static void test_rays_from_the_surface_leave_their_own_triangle(void **state) {
     assert_near(normal[2], direction[2], 1e-15);
   }
   release(surface);
+}
+
+static void test_thread_count_does_not_change_an_answer(void **state) {
+  (void)state;
+  enum { COUNT = 2000 };
+  static const int threads[] = {1, 2, 8};
+  double *answers[3];
+  qmat_mesh *mesh = shape_torus(1, 0.3, 120, 50);
+  shape_rotate(mesh);
+  shape_seal(mesh);
+  for (size_t t = 0; t < 3; t++) {
+    qmat_context context = {.threads = threads[t]};
+    qmat_surface *surface = NULL;
+    assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+    answers[t] = calloc(8 * COUNT, sizeof **answers);
+    uint8_t *inside = calloc(COUNT, 1);
+    double *points = calloc(3 * COUNT, sizeof *points);
+    assert_true(answers[t] != NULL && inside != NULL && points != NULL);
+    for (size_t i = 0; i < 3 * COUNT; i++) points[i] = uniform(6, i, -0.5, 0.5);
+    qmat_surface_inside_many(surface, points, COUNT, inside, threads[t]);
+    for (size_t i = 0; i < COUNT; i++) {
+      double *answer = answers[t] + 8 * i, direction[3];
+      uint32_t near, hit = 0;
+      for (uint64_t k = 0; k < 3; k++) direction[k] = uniform(7, 3 * i + k, -1, 1);
+      const double length = sqrt(dot(direction, direction));
+      for (int k = 0; k < 3; k++) direction[k] /= length;
+      answer[0] = qmat_surface_distance(surface, points + 3 * i, INFINITY, answer + 1, &near);
+      answer[4] = near;
+      qmat_surface_cast(surface, points + 3 * i, direction, 0, answer + 5, &hit, NULL);
+      answer[6] = hit;
+      answer[7] = inside[i];
+    }
+    free(inside);
+    free(points);
+    qmat_surface_free(surface);
+    qmat_context_uninit(&context);
+    if (t > 0) assert_memory_equal(answers[0], answers[t], 8 * COUNT * sizeof **answers);
+  }
+  for (size_t t = 0; t < 3; t++) free(answers[t]);
+  qmat_value_release(&mesh->base);
 }
 
 /* --- frames ------------------------------------------------------------------------------------------------------- */
@@ -516,12 +651,13 @@ static void test_thickness_takes_minimum_at_vertices_and_facet_value_at_samples(
   for (int i = 0; i < 5; i++) shape_vertex(mesh, i, i * i, 0);
   shape_triangle(mesh, 0, 1, 2);
   shape_triangle(mesh, 1, 2, 3);
-  double values[2] = {4, 2}, out[6];
+  shape_triangle(mesh, 2, 3, 0);
+  double values[3] = {4, 2, 3}, out[6];
   uint32_t facets[6] = {0, 0, 0, 1, 0, 0};
-  const qmat_field field = {.count = 2, .values = values};
+  const qmat_field field = {.count = 3, .values = values};
   const qmat_samples samples = {.count = 6, .vertex_count = 5, .facets = facets};
   qmat_thickness_of_samples(mesh, &field, &samples, out);
-  assert_near(out[0], 4, 0);
+  assert_near(out[0], 3, 0);
   assert_near(out[1], 2, 0);
   assert_near(out[2], 2, 0);
   assert_near(out[3], 2, 0);
@@ -540,13 +676,18 @@ int main(void) {
       cmocka_unit_test(test_nested_shell_agrees_with_brute_force),
       cmocka_unit_test(test_overlapping_boxes_agree_with_brute_force),
       cmocka_unit_test(test_open_cup_agrees_with_the_winding_number),
+      cmocka_unit_test(test_sphere_without_an_octant_agrees_with_the_winding_number),
       cmocka_unit_test(test_flipped_triangle_agrees_with_the_winding_number),
       cmocka_unit_test(test_degenerate_triangles_change_nothing),
       cmocka_unit_test(test_points_on_vertices_edges_and_faces_have_distance_zero),
       cmocka_unit_test(test_equally_close_triangles_give_the_smallest),
+      cmocka_unit_test(test_both_triangles_of_an_edge_are_equally_far),
+      cmocka_unit_test(test_vertices_of_a_sphere_give_their_first_triangle),
+      cmocka_unit_test(test_doubled_triangles_give_the_first_of_each_pair),
       cmocka_unit_test(test_centre_of_a_box_is_inside_though_rays_meet_edges),
       cmocka_unit_test(test_far_points_are_outside_at_the_right_distance),
       cmocka_unit_test(test_rays_from_the_surface_leave_their_own_triangle),
+      cmocka_unit_test(test_thread_count_does_not_change_an_answer),
       cmocka_unit_test(test_huge_offsets_keep_precision),
       cmocka_unit_test(test_tiny_models_keep_precision),
       cmocka_unit_test(test_huge_models_keep_precision),

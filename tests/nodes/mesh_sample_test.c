@@ -295,6 +295,33 @@ static void test_limit_on_samples_thins_all_facets_evenly(void **state) {
   qmat_value_release(&mesh->base);
 }
 
+static void test_random_points_are_uniform_on_a_facet(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_seal(shape_torus(1, 0.3, 40, 20));
+  qmat_field *thickness = field_of(1600, NULL, 1);
+  result made = sample(mesh, thickness, "theta=1 n_f=16 lloyd_rounds=0");
+  const size_t first = made.samples->vertex_count, count = made.samples->count - first;
+  assert_true(count > 20000);
+  /* Uniform points have barycentrics of mean 1/3 and mean square 1/6; each lies in a corner's half with chance 1/4. */
+  double mean[3] = {0}, square[3] = {0}, corner[3] = {0};
+  for (size_t i = first; i < made.samples->count; i++) {
+    for (size_t k = 0; k < 3; k++) {
+      const double weight = made.samples->barycentrics[3 * i + k];
+      mean[k] += weight / (double)count;
+      square[k] += weight * weight / (double)count;
+      corner[k] += (weight > 0.5) / (double)count;
+    }
+  }
+  for (int k = 0; k < 3; k++) {
+    assert_near(mean[k], 1.0 / 3, 0.01);
+    assert_near(square[k], 1.0 / 6, 0.01);
+    assert_near(corner[k], 0.25, 0.015);
+  }
+  release(&made);
+  qmat_value_release(&thickness->base);
+  qmat_value_release(&mesh->base);
+}
+
 /* The least distance between two samples of a facet, its corners included. */
 static double least_distance(const qmat_mesh *mesh, const qmat_samples *samples, uint32_t facet) {
   double points[80][3], least = INFINITY;
@@ -532,6 +559,7 @@ int main(void) {
       cmocka_unit_test(test_slivers_count_as_a_thousandth_of_the_median),
       cmocka_unit_test(test_degenerate_facets_get_none_and_are_no_neighbours),
       cmocka_unit_test(test_limit_on_samples_thins_all_facets_evenly),
+      cmocka_unit_test(test_random_points_are_uniform_on_a_facet),
       cmocka_unit_test(test_lloyd_spreads_samples),
       cmocka_unit_test(test_lloyd_comes_to_rest_at_centroids),
       cmocka_unit_test(test_rotation_scale_and_vertex_order_keep_the_counts),
