@@ -49,15 +49,15 @@ double qmat_draco_medial_loss(const qmat_medial *given, const qmat_medial *decod
 typedef struct qmat_draco_skin {
   uint8_t *bytes; /* owned */
   size_t size;
-  uint32_t position_id, normal_id; /* the attributes' unique ids */
+  uint32_t position_id, normal_id;       /* the attributes' unique ids */
   uint32_t vertex_count, triangle_count; /* as decoded: vertices may be split, dropped or reordered */
   float min[3], max[3];                  /* of the decoded positions */
 } qmat_draco_skin;
 
 /* Encodes a triangle mesh for display with edgebreaker: the order of a skin's vertices means nothing to a viewer, and
- * edgebreaker takes about half the bytes of the sequential method. `positions` and `normals` hold 3 * vertex_count
- * finite floats, `triangles` 3 * triangle_count ids below vertex_count; none may be empty. The result is decoded again
- * for its counts and bounds. On failure `skin` is empty. QMAT_ERROR_USAGE, _MEMORY, _DEPENDENCY. */
+ * edgebreaker takes about a quarter of the bytes of the sequential method. `positions` and `normals` hold 3 *
+ * vertex_count finite floats, `triangles` 3 * triangle_count ids below vertex_count; none may be empty. The result is
+ * decoded again for its counts and bounds. On failure `skin` is empty. QMAT_ERROR_USAGE, _MEMORY, _DEPENDENCY. */
 qmat_status qmat_draco_encode_mesh(qmat_context *context, const float *positions, const float *normals,
                                    size_t vertex_count, const uint32_t *triangles, size_t triangle_count,
                                    int position_bits, int normal_bits, qmat_draco_skin *skin);

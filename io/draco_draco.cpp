@@ -38,6 +38,10 @@ namespace {
 constexpr uint64_t kFreeCount = 1u << 16;
 constexpr uint64_t kCountPerByte = 1024;
 
+/* Draco's entropy coder counts symbols in a table of 2^(bits + 1) numbers: 4 GiB for 30 bits. Beyond this many bits,
+ * which are noise mostly, values are stored as they are. */
+constexpr int kMostCodedBits = 20;
+
 /* To be called in a catch block: turns the exception in flight into a status. */
 qmat_status caught(qmat_context *context, const char *what) {
   try {
@@ -134,7 +138,8 @@ qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std
     bool sound = width > 0 && attribute->buffer() != nullptr && attribute->byte_offset() == 0 &&
                  attribute->byte_stride() >= width &&
                  (attribute->is_mapping_identity() || attribute->indices_map_size() >= points);
-    const uint64_t held = sound ? attribute->buffer()->data_size() / static_cast<uint64_t>(attribute->byte_stride()) : 0;
+    const uint64_t held =
+        sound ? attribute->buffer()->data_size() / static_cast<uint64_t>(attribute->byte_stride()) : 0;
     for (uint32_t p = 0; sound && p < points; p++) {
       sound = attribute->mapped_index(draco::PointIndex(p)).value() < held;
     }
@@ -164,23 +169,43 @@ void copy_values(const draco::Mesh &mesh, const draco::PointAttribute &attribute
 bool attribute_values(const draco::Mesh &mesh, const draco::PointAttribute &attribute, double *values) {
   const size_t components = attribute.num_components();
   switch (attribute.data_type()) {
-    case draco::DT_INT8: copy_values<int8_t>(mesh, attribute, components, values); return true;
-    case draco::DT_UINT8: copy_values<uint8_t>(mesh, attribute, components, values); return true;
-    case draco::DT_INT16: copy_values<int16_t>(mesh, attribute, components, values); return true;
-    case draco::DT_UINT16: copy_values<uint16_t>(mesh, attribute, components, values); return true;
-    case draco::DT_INT32: copy_values<int32_t>(mesh, attribute, components, values); return true;
-    case draco::DT_UINT32: copy_values<uint32_t>(mesh, attribute, components, values); return true;
-    case draco::DT_FLOAT32: copy_values<float>(mesh, attribute, components, values); return true;
-    case draco::DT_FLOAT64: copy_values<double>(mesh, attribute, components, values); return true;
-    default: return false;
+    case draco::DT_INT8:
+      copy_values<int8_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_UINT8:
+      copy_values<uint8_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_INT16:
+      copy_values<int16_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_UINT16:
+      copy_values<uint16_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_INT32:
+      copy_values<int32_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_UINT32:
+      copy_values<uint32_t>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_FLOAT32:
+      copy_values<float>(mesh, attribute, components, values);
+      return true;
+    case draco::DT_FLOAT64:
+      copy_values<double>(mesh, attribute, components, values);
+      return true;
+    default:
+      return false;
   }
 }
 
 draco::GeometryAttribute::Type type_of(qmat_draco_meaning meaning) {
   switch (meaning) {
-    case QMAT_DRACO_POSITION: return draco::GeometryAttribute::POSITION;
-    case QMAT_DRACO_NORMAL: return draco::GeometryAttribute::NORMAL;
-    default: return draco::GeometryAttribute::GENERIC;
+    case QMAT_DRACO_POSITION:
+      return draco::GeometryAttribute::POSITION;
+    case QMAT_DRACO_NORMAL:
+      return draco::GeometryAttribute::NORMAL;
+    default:
+      return draco::GeometryAttribute::GENERIC;
   }
 }
 
@@ -210,6 +235,7 @@ qmat_status encode(qmat_context *context, const qmat_draco_attribute *attributes
   encoder.SetSpeedOptions(3, 3);
   for (size_t a = 0; a < attribute_count; a++) {
     encoder.SetAttributeQuantization(static_cast<int32_t>(a), attributes[a].bits);
+    if (attributes[a].bits > kMostCodedBits) encoder.SetUseBuiltInAttributeCompression(false);
   }
   draco::EncoderBuffer buffer;
   const draco::Status result = encoder.EncodeToBuffer(&buffer);

@@ -29,8 +29,8 @@ typedef struct qmat_draco_attribute {
 
 /* Encodes a triangle mesh. `faces` holds 3 * face_count point ids below point_count; neither count may be 0. With
  * `keep_order` (Draco's sequential method) points and faces come back in their order and degenerate faces stay; without
- * (edgebreaker) the result is about half as large, but points are reordered and split, and degenerate faces and points
- * on no face are dropped. `*bytes` (qmat_free it) is NULL on failure. QMAT_ERROR_USAGE for bits out of range,
+ * (edgebreaker) the result is about a quarter as large, but points are reordered and split, and degenerate faces and
+ * points on no face are dropped. `*bytes` (qmat_free it) is NULL on failure. QMAT_ERROR_USAGE for bits out of range,
  * QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY. */
 qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute *attributes, size_t attribute_count,
                               size_t point_count, const uint32_t *faces, size_t face_count, bool keep_order,

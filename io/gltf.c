@@ -42,8 +42,8 @@ static qmat_status add_report(qmat_context *context, const qmat_gltf_counts *cou
   return QMAT_OK;
 }
 
-qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
-                            qmat_soup *soup, json_t *report) {
+qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path, qmat_soup *soup,
+                            json_t *report) {
   qmat_gltf_document document;
   qmat_gltf_bytes *buffers = NULL;
   qmat_gltf_counts counts;

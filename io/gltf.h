@@ -27,7 +27,7 @@ qmat_status qmat_gltf_read(qmat_context *context, const char *path, qmat_soup *s
 
 /* The same for an asset that is in memory; `path` names it in errors, and external files are looked for in its
  * folder. */
-qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
-                            qmat_soup *soup, json_t *report);
+qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path, qmat_soup *soup,
+                            json_t *report);
 
 #endif

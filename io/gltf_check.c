@@ -449,10 +449,13 @@ static qmat_status check_views(checker *check) {
 static int64_t component_size(int64_t component_type) {
   switch (component_type) {
     case BYTE:
-    case UNSIGNED_BYTE: return 1;
+    case UNSIGNED_BYTE:
+      return 1;
     case SHORT:
-    case UNSIGNED_SHORT: return 2;
-    default: return 4;
+    case UNSIGNED_SHORT:
+      return 2;
+    default:
+      return 4;
   }
 }
 
@@ -582,12 +585,24 @@ static qmat_status check_use(const checker *check, int64_t id, const char *what,
   const accessor *of = &check->accessors[id];
   bool fits = of->components == components;
   switch (of->component_type) {
-    case BYTE: fits = fits && (allowed & ALLOW_BYTES) && (allowed & ALLOW_SIGNED); break;
-    case UNSIGNED_BYTE: fits = fits && (allowed & ALLOW_BYTES); break;
-    case SHORT: fits = fits && (allowed & ALLOW_SHORTS) && (allowed & ALLOW_SIGNED); break;
-    case UNSIGNED_SHORT: fits = fits && (allowed & ALLOW_SHORTS); break;
-    case UNSIGNED_INT: fits = fits && (allowed & ALLOW_UINTS); break;
-    default: fits = fits && (allowed & ALLOW_FLOATS); break;
+    case BYTE:
+      fits = fits && (allowed & ALLOW_BYTES) && (allowed & ALLOW_SIGNED);
+      break;
+    case UNSIGNED_BYTE:
+      fits = fits && (allowed & ALLOW_BYTES);
+      break;
+    case SHORT:
+      fits = fits && (allowed & ALLOW_SHORTS) && (allowed & ALLOW_SIGNED);
+      break;
+    case UNSIGNED_SHORT:
+      fits = fits && (allowed & ALLOW_SHORTS);
+      break;
+    case UNSIGNED_INT:
+      fits = fits && (allowed & ALLOW_UINTS);
+      break;
+    default:
+      fits = fits && (allowed & ALLOW_FLOATS);
+      break;
   }
   if (!fits) {
     return fail(check, "accessor", (size_t)id, "its type of %lld components of %lld cannot be %s",
@@ -681,7 +696,8 @@ static qmat_status check_attributes(const checker *check, size_t mesh, size_t in
     if (status == QMAT_OK) status = check_same_count(check, id, position, name);
     if (status != QMAT_OK) return status;
     char partner[16];
-    snprintf(partner, sizeof partner, "%s_%s", joints ? "WEIGHTS" : "JOINTS", is_position ? "" : strrchr(name, '_') + 1);
+    snprintf(partner, sizeof partner, "%s_%s", joints ? "WEIGHTS" : "JOINTS",
+             is_position ? "" : strrchr(name, '_') + 1);
     if (!is_position && !json_object_get(attributes, partner)) {
       return fail(check, "mesh", mesh, "primitive %zu: %.40s without %s", index, name, partner);
     }
@@ -689,8 +705,7 @@ static qmat_status check_attributes(const checker *check, size_t mesh, size_t in
   return QMAT_OK;
 }
 
-static qmat_status check_targets(const checker *check, size_t mesh, size_t index, json_t *primitive,
-                                 int64_t position) {
+static qmat_status check_targets(const checker *check, size_t mesh, size_t index, json_t *primitive, int64_t position) {
   static const char *const keys[] = {"POSITION", NULL};
   json_t *targets;
   qmat_status status = take_array(check, primitive, "targets", "mesh", mesh, &targets);
@@ -948,9 +963,10 @@ static qmat_status write_reduced(const checker *check) {
 
 qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
                                     qmat_gltf_document *document) {
-  static const char *const arrays[][2] = {{"buffers", "buffer"}, {"bufferViews", "bufferView"},
-                                          {"accessors", "accessor"}, {"meshes", "mesh"}, {"nodes", "node"},
-                                          {"skins", "skin"}, {"scenes", "scene"}};
+  static const char *const arrays[][2] = {{"buffers", "buffer"},     {"bufferViews", "bufferView"},
+                                          {"accessors", "accessor"}, {"meshes", "mesh"},
+                                          {"nodes", "node"},         {"skins", "skin"},
+                                          {"scenes", "scene"}};
   *document = (qmat_gltf_document){0};
   checker check = {.context = context, .path = path, .document = document};
   const char *text = NULL;

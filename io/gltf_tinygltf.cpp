@@ -101,10 +101,22 @@ Matrix local_matrix(const qmat_tinygltf::Node &node) {
     y /= length;
     z /= length;
     w /= length;
-    m = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w),     2 * (x * z - y * w),     0,
-         2 * (x * y - z * w),     1 - 2 * (x * x + z * z), 2 * (y * z + x * w),     0,
-         2 * (x * z + y * w),     2 * (y * z - x * w),     1 - 2 * (x * x + y * y), 0,
-         0,                       0,                       0,                       1};
+    m = {1 - 2 * (y * y + z * z),
+         2 * (x * y + z * w),
+         2 * (x * z - y * w),
+         0,
+         2 * (x * y - z * w),
+         1 - 2 * (x * x + z * z),
+         2 * (y * z + x * w),
+         0,
+         2 * (x * z + y * w),
+         2 * (y * z - x * w),
+         1 - 2 * (x * x + y * y),
+         0,
+         0,
+         0,
+         0,
+         1};
   }
   for (size_t k = 0; k < 3; k++) {
     const double scale = node.scale.size() == 3 ? node.scale[k] : 1;
@@ -123,23 +135,34 @@ double load(const uint8_t *from) {
 
 double component_at(const uint8_t *from, int type) {
   switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE: return load<int8_t>(from);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return load<uint8_t>(from);
-    case TINYGLTF_COMPONENT_TYPE_SHORT: return load<int16_t>(from);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return load<uint16_t>(from);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return load<uint32_t>(from);
-    default: return load<float>(from);
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return load<int8_t>(from);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return load<uint8_t>(from);
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return load<int16_t>(from);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return load<uint16_t>(from);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return load<uint32_t>(from);
+    default:
+      return load<float>(from);
   }
 }
 
 /* What 1 is stored as in normalised whole numbers; 0 for types that are not normalised. */
 double normalised_one(int type) {
   switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE: return 127;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return 255;
-    case TINYGLTF_COMPONENT_TYPE_SHORT: return 32767;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return 65535;
-    default: return 0;
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return 127;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return 255;
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return 32767;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return 65535;
+    default:
+      return 0;
   }
 }
 
@@ -147,8 +170,7 @@ class Reader {
  public:
   Reader(qmat_context *context, const qmat_tinygltf::Model &model, const qmat_gltf_bytes *buffers, size_t most,
          qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts)
-      : context_(context), model_(model), buffers_(buffers), most_(most), sink_(sink), user_(user), counts_(counts) {
-  }
+      : context_(context), model_(model), buffers_(buffers), most_(most), sink_(sink), user_(user), counts_(counts) {}
 
   void read_scene() {
     find_globals();
@@ -313,8 +335,8 @@ class Reader {
     if (unique_id == unique_ids.end()) return accessor_values(accessor_id, fractions);
     const int components = qmat_tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type));
     std::vector<double> values(accessor.count * static_cast<size_t>(components));
-    const qmat_status status = qmat_draco_mesh_attribute(context_, draco, static_cast<uint32_t>(unique_id->second),
-                                                         components, values.data());
+    const qmat_status status =
+        qmat_draco_mesh_attribute(context_, draco, static_cast<uint32_t>(unique_id->second), components, values.data());
     if (status != QMAT_OK) fail("accessor", static_cast<size_t>(accessor_id));
     normalise(accessor, fractions, values);
     return values;
@@ -326,12 +348,12 @@ class Reader {
     DracoMesh draco(nullptr, qmat_draco_mesh_free);
     std::map<std::string, int> unique_ids;
     const auto extension = primitive.extensions.find("KHR_draco_mesh_compression");
-    check_room(model_.accessors[static_cast<size_t>(position)].count, 0);
     if (extension != primitive.extensions.end()) {
       draco = open_draco(extension->second.Get("bufferView").GetNumberAsInt());
       const qmat_tinygltf::Value &ids = extension->second.Get("attributes");
       for (const std::string &name : ids.Keys()) unique_ids[name] = ids.Get(name).GetNumberAsInt();
     }
+    if (!draco) check_room(model_.accessors[static_cast<size_t>(position)].count, 0);
     shape->positions = attribute_values("POSITION", position, draco.get(), unique_ids, false);
     const size_t vertices = shape->positions.size() / 3;
     if (draco) {
@@ -390,8 +412,8 @@ class Reader {
         for (size_t k = 4 * (s * vertices + i); k < 4 * (s * vertices + i) + 4; k++) {
           if (shape.weights[k] == 0) continue;
           if (shape.joints[k] >= static_cast<double>(matrices.size())) {
-            qmat_fail(context_, QMAT_ERROR_FORMAT, "vertex %zu of its mesh names joint %.0f of %zu", i,
-                      shape.joints[k], matrices.size());
+            qmat_fail(context_, QMAT_ERROR_FORMAT, "vertex %zu of its mesh names joint %.0f of %zu", i, shape.joints[k],
+                      matrices.size());
             fail("skin", skin_id);
           }
           add_transformed(matrices[static_cast<size_t>(shape.joints[k])], &local[3 * i], shape.weights[k], sum);

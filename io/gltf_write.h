@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_GLTF_WRITE_H
+#define QMAT_IO_GLTF_WRITE_H
+
+#include <stdbool.h>
+
+#include "core/value.h"
+
+typedef enum qmat_certificate { QMAT_CERTIFICATE_UNKNOWN, QMAT_CERTIFICATE_NO, QMAT_CERTIFICATE_YES } qmat_certificate;
+
+/* How to write, and what is known of the medial mesh. */
+typedef struct qmat_gltf_options {
+  bool binary;         /* one .glb; else one .gltf whose data are in it as base64 */
+  bool compress_skin;  /* KHR_draco_mesh_compression, required: smaller, but some engines refuse it */
+  int position_bits;   /* 1 to 30; 0: chosen by `quantisation` */
+  int radius_bits;     /* the same */
+  double quantisation; /* what quantisation may move the solid by, model units; used where bits are 0 */
+  const char *name;    /* of the node and the mesh, UTF-8; NULL or "": none */
+  double epsilon;      /* written as they are, in units of the diagonal; NAN: not known */
+  double error_out;    /* surface to envelope */
+  double error_in;     /* envelope to surface */
+  qmat_certificate certified;
+} qmat_gltf_options;
+
+/* Makes a glTF 2.0 file of a medial mesh: one scene with one node, which carries
+ *  - the skin as an ordinary mesh (POSITION, area-weighted NORMAL, indices, one material), so that every client shows
+ *    something; without a skin (NULL, or no triangles) the node carries no mesh;
+ *  - the medial mesh in its extras, which clients keep better than extensions: flat strings, numbers and booleans.
+ *      qmat_version      the program's version
+ *      qmat_data         base64 of what qmat_draco_encode_medial makes
+ *      qmat_data_format  "draco"
+ *      qmat_vertices, qmat_edges, qmat_triangles     counts of the medial mesh
+ *      qmat_epsilon, qmat_error_out, qmat_error_in   as in the options; missing when not known
+ *      qmat_error_unit   "diagonal"; with them
+ *      qmat_certified    missing when not known
+ *      qmat_quantisation the largest |dc| + |dr| of a sphere of `medial` against the one decoded from qmat_data
+ *      qmat_quantisation_unit  "model"
+ *      qmat_position_bits, qmat_radius_bits
+ *      qmat_frame        "node": spheres are in the node's local space, like the skin
+ * Chosen bits are raised until the measured error is within options->quantisation or single precision ends; with
+ * compress_skin the skin's positions get bits by the same bound.
+ * `*file` is sealed, has one part, and is released by the caller; NULL on failure. QMAT_ERROR_GEOMETRY for an empty
+ * medial mesh or coordinates beyond single precision, QMAT_ERROR_USAGE for bits out of range, QMAT_ERROR_MEMORY,
+ * QMAT_ERROR_DEPENDENCY. One thread; the same bytes for the same input. Cost: linear. */
+qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
+                            const qmat_gltf_options *options, qmat_file **file);
+
+#endif
