@@ -35,11 +35,12 @@ qmat_status qmat_invocation_add_option(qmat_context *context, qmat_invocation *i
 qmat_status qmat_invocation_init(qmat_context *context, const qmat_command *command, const qmat_registry *registry,
                                  qmat_invocation *invocation) {
   *invocation = (qmat_invocation){.command = command, .registry = *registry};
-  for (const qmat_option *option = command->options; option && option->name; option++) {
-    qmat_status status = qmat_invocation_add_option(context, invocation, *option);
-    if (status != QMAT_OK) return status;
-  }
-  return command->add_options ? command->add_options(context, invocation) : QMAT_OK;
+  qmat_status status = command->add_options ? command->add_options(context, invocation) : QMAT_OK;
+  const qmat_option *const tables[] = {command->options, command->common};
+  for (int i = 0; i < 2; i++)
+    for (const qmat_option *option = tables[i]; option && option->name && status == QMAT_OK; option++)
+      status = qmat_invocation_add_option(context, invocation, *option);
+  return status;
 }
 
 void qmat_invocation_uninit(qmat_invocation *invocation) {

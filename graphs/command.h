@@ -41,8 +41,8 @@ typedef struct qmat_invocation {
 
 struct qmat_command {
   const char *name, *arguments, *summary, *doc;
-  const qmat_option *options; /* NULL: none */
-  size_t least, most;         /* arguments that are not options */
+  const qmat_option *options, *common; /* its own, and those that it shares; NULL: none */
+  size_t least, most;                  /* arguments that are not options */
   /* Adds options that depend on a graph; NULL: none. */
   qmat_status (*add_options)(qmat_context *context, qmat_invocation *invocation);
   qmat_status (*run)(qmat_context *context, qmat_invocation *invocation);
@@ -84,15 +84,8 @@ void qmat_print_wrapped(const char *text, int column, int indent);
 
 /* ---- what `run` and `mat` share ---- */
 
-/* The options that both have. */
-#define QMAT_RUN_OPTIONS                                                                                              \
-  {"set", 0, "NAME=VALUE", "Set a parameter: node.parameter=value, or input=value; may be repeated"},                 \
-      {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},               \
-      {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},         \
-      {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"}, \
-      {"report", 0, "FILE", "Write what was done, or the error, as JSON"}, {                                          \
-    "quiet", 'q', NULL, "Print nothing but errors"                                                                    \
-  }
+/* The options that both have, beside their own. */
+extern const qmat_option qmat_common_options[];
 
 /* Makes invocation->graph with `prepare`, sets what --set says, runs it, and prints and writes what came of it. */
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,

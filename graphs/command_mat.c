@@ -21,6 +21,16 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
       qmat_param_describe(type, param, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
     status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
   }
+  for (size_t i = 0; i < graph->output_count && status == QMAT_OK; i++) {
+    const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
+    if (!format) continue;
+    char *doc = invocation->docs[invocation->option_count];
+    size_t used =
+        (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE, "Save the result; may be repeated. The ending chooses the format:");
+    for (int k = 0; format->choices[k] && used < QMAT_OPTION_DOC_SIZE; k++)
+      used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", k ? "," : "", format->choices[k]);
+    return qmat_invocation_add_option(context, invocation, (qmat_option){"output", 'o', "[NAME=]PATH", doc});
+  }
   return status;
 }
 
@@ -52,8 +62,6 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   return qmat_execute(context, invocation, set_inputs);
 }
 
-static const qmat_option options[] = {QMAT_RUN_OPTIONS, {0}};
-
 const qmat_command qmat_command_mat = {
     .name = "mat",
     .arguments = "INPUT -o OUTPUT",
@@ -62,7 +70,7 @@ const qmat_command qmat_command_mat = {
         "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
         "0, which means no bound on the distance. Every other parameter is reached by --set; 'qmat nodes' lists the "
         "nodes and 'qmat node NAME' their parameters.",
-    .options = options,
+    .common = qmat_common_options,
     .least = 1,
     .most = 1,
     .add_options = add_options,

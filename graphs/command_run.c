@@ -10,7 +10,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    QMAT_RUN_OPTIONS,
+    {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
     {"to", 0, "NODE", "Stop at this node: run it and what it needs"},
     {0},
 };
@@ -23,6 +23,7 @@ const qmat_command qmat_command_run = {
         "Runs a graph file. Files are written only when everything has succeeded. Paths in the graph are relative to "
         "the graph file, paths given here to the working folder.",
     .options = options,
+    .common = qmat_common_options,
     .least = 1,
     .most = 1,
     .run = run,

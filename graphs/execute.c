@@ -6,6 +6,15 @@
 #include "graphs/progress.h"
 #include "graphs/run_report.h"
 
+const qmat_option qmat_common_options[] = {
+    {"set", 0, "NAME=VALUE", "Set a parameter: node.parameter=value, or input=value; may be repeated"},
+    {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},
+    {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"},
+    {"report", 0, "FILE", "Write what was done, or the error, as JSON"},
+    {"quiet", 'q', NULL, "Print nothing but errors"},
+    {0},
+};
+
 static qmat_status read_threads(qmat_context *context, const char *text) {
   double number = 0;
   if (!text) return QMAT_OK;

@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "graphs/qmat.h"
+
+enum { RINGS = 12, SECTORS = 24, VERTICES = 2 + (RINGS - 1) * SECTORS, TRIANGLES = 2 * SECTORS * (RINGS - 1) };
+
+// A ball of radius 2 around (1, 0, 0).
+typedef struct ball {
+  double positions[3 * VERTICES];
+  uint32_t triangles[3 * TRIANGLES];
+} ball;
+
+static void make_ball(ball *b) {
+  const double pi = 3.14159265358979323846;
+  size_t at = 0;
+  for (int i = 0; i < VERTICES; i++) {
+    int ring = i == 0 ? 0 : i == VERTICES - 1 ? RINGS : 1 + (i - 1) / SECTORS, sector = i == 0 ? 0 : (i - 1) % SECTORS;
+    double polar = pi * ring / RINGS, turn = 2 * pi * sector / SECTORS;
+    b->positions[3 * i] = 1 + 2 * sin(polar) * cos(turn);
+    b->positions[3 * i + 1] = 2 * sin(polar) * sin(turn);
+    b->positions[3 * i + 2] = 2 * cos(polar);
+  }
+#define ADD(a, b_, c)                                                                                             \
+  (b->triangles[at] = (uint32_t)(a), b->triangles[at + 1] = (uint32_t)(b_), b->triangles[at + 2] = (uint32_t)(c), \
+   at += 3)
+  for (int ring = 0; ring < RINGS; ring++)
+    for (int s = 0; s < SECTORS; s++) {
+      int next = (s + 1) % SECTORS, upper = 1 + (ring - 1) * SECTORS, lower = 1 + ring * SECTORS;
+      if (ring == 0) {
+        ADD(0, lower + s, lower + next);
+      } else if (ring == RINGS - 1) {
+        ADD(upper + s, VERTICES - 1, upper + next);
+      } else {
+        ADD(upper + s, lower + s, lower + next);
+        ADD(upper + s, lower + next, upper + next);
+      }
+    }
+#undef ADD
+  assert_int_equal(at, 3 * TRIANGLES);
+}
+
+static void ok(const qmat_job *job, qmat_result result) {
+  if (result != QMAT_RESULT_OK) fail_msg("%s", qmat_job_error(job)->text);
+}
+
+static qmat_job *job_with_ball(void) {
+  ball b;
+  make_ball(&b);
+  qmat_job *job;
+  ok(job, qmat_job_new(&job));
+  ok(job, qmat_job_give_mesh(job, "model.mesh", "ball", b.positions, VERTICES, b.triangles, TRIANGLES));
+  ok(job, qmat_job_set(job, "epsilon=3%"));
+  return job;
+}
+
+static void test_the_listing_names_the_nodes_of_the_built_in_graph(void **state) {
+  (void)state;
+  static const char *const names[] = {"medial.delaunay", "medial.simplify", "medial.skin", "mesh.sample",
+                                      "mesh.sdf",        "scene.read",      "scene.write"};
+  char *text = qmat_nodes_json();
+  assert_non_null(text);
+  json_t *nodes = json_loads(text, 0, NULL);
+  assert_non_null(nodes);
+  for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+    size_t index;
+    json_t *node;
+    bool found = false;
+    json_array_foreach(nodes, index, node) {
+      if (strcmp(json_string_value(json_object_get(node, "name")), names[i]) != 0) continue;
+      found = true;
+      assert_true(json_array_size(json_object_get(node, "outputs")) > 0);
+    }
+    if (!found) fail_msg("%s is not listed", names[i]);
+  }
+  json_decref(nodes);
+  qmat_text_free(text);
+  assert_string_equal(qmat_version(), QMAT_VERSION);
+}
+
+static void test_a_mesh_in_memory_becomes_spheres_inside_it(void **state) {
+  (void)state;
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_want(job, "simple.medial"));
+  ok(job, qmat_job_want(job, "simple.report"));
+  ok(job, qmat_job_want(job, "model.mesh"));
+  ok(job, qmat_job_run(job, 2, NULL, NULL));
+  qmat_mesh_view mesh;
+  ok(job, qmat_job_mesh(job, "model.mesh", &mesh));
+  assert_int_equal(mesh.vertex_count, VERTICES);
+  assert_int_equal(mesh.triangle_count, TRIANGLES);
+  qmat_medial_view medial;
+  ok(job, qmat_job_medial(job, "simple.medial", &medial));
+  assert_true(medial.sphere_count >= 1 && medial.sphere_count < VERTICES);
+  double tolerance = 0.03 * 4 * sqrt(3), largest = 0;
+  for (size_t i = 0; i < medial.sphere_count; i++) {
+    const double *s = medial.spheres + 4 * i;
+    double reach = sqrt((s[0] - 1) * (s[0] - 1) + s[1] * s[1] + s[2] * s[2]) + s[3];
+    assert_true(reach <= 2 + tolerance);
+    if (s[3] > largest) largest = s[3];
+  }
+  assert_true(largest >= 2 - 2 * tolerance);
+  for (size_t i = 0; i < 2 * medial.edge_count; i++) assert_true(medial.edges[i] < medial.sphere_count);
+  for (size_t i = 0; i < 3 * medial.triangle_count; i++) assert_true(medial.triangles[i] < medial.sphere_count);
+  char *text;
+  ok(job, qmat_job_report(job, "simple.report", &text));
+  json_t *report = json_loads(text, 0, NULL);
+  assert_int_equal(json_integer_value(json_object_get(report, "spheres")), medial.sphere_count);
+  json_decref(report);
+  qmat_text_free(text);
+  // Nothing that was not asked for has run.
+  ok(job, qmat_job_run_report(job, &text));
+  report = json_loads(text, 0, NULL);
+  assert_int_equal(json_array_size(json_object_get(report, "nodes")), 4);
+  json_decref(report);
+  qmat_text_free(text);
+  qmat_job_free(job);
+}
+
+static void test_the_saved_file_is_the_file_in_memory(void **state) {
+  (void)state;
+  char folder[] = "/tmp/qmat-job-XXXXXX", path[64];
+  assert_non_null(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/ball.ma", folder);
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_set(job, "asset.format=ma"));
+  ok(job, qmat_job_save(job, NULL, path));
+  ok(job, qmat_job_want(job, "asset.file"));
+  ok(job, qmat_job_run(job, 0, NULL, NULL));
+  qmat_file_view view;
+  ok(job, qmat_job_file(job, "asset.file", &view));
+  assert_string_equal(view.format, "ma");
+  assert_int_equal(view.part_count, 1);
+  const char *name;
+  const uint8_t *bytes;
+  size_t size;
+  ok(job, qmat_job_file_part(job, "asset.file", 0, &name, &bytes, &size));
+  assert_string_equal(name, "");
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  uint8_t *saved = malloc(size + 1);
+  assert_non_null(saved);
+  assert_int_equal(fread(saved, 1, size + 1, file), size);
+  assert_memory_equal(saved, bytes, size);
+  fclose(file);
+  free(saved);
+  assert_int_equal(qmat_job_file_part(job, "asset.file", 1, &name, &bytes, &size), QMAT_RESULT_USAGE);
+  qmat_job_free(job);
+  unlink(path);
+  rmdir(folder);
+}
+
+static bool refuse(void *user, const char *node, const char *type, uint64_t done, uint64_t total, const char *unit) {
+  (void)type;
+  (void)done;
+  (void)total;
+  (void)unit;
+  return strcmp(node, (const char *)user) != 0;
+}
+
+static void test_the_progress_function_cancels_and_the_job_runs_again(void **state) {
+  (void)state;
+  char folder[] = "/tmp/qmat-job-XXXXXX", path[64], node[] = "simple";
+  assert_non_null(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/ball.ma", folder);
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_save(job, "asset", path));
+  assert_int_equal(qmat_job_run(job, 0, refuse, node), QMAT_RESULT_CANCELLED);
+  assert_string_equal(qmat_job_error(job)->status, "cancelled");
+  assert_string_equal(qmat_job_error(job)->node, "simple");
+  assert_int_equal(access(path, F_OK), -1);
+  ok(job, qmat_job_run(job, 0, NULL, NULL));
+  assert_int_equal(access(path, F_OK), 0);
+  qmat_job_free(job);
+  unlink(path);
+  rmdir(folder);
+}
+
+static void test_mistakes_are_results_with_a_problem(void **state) {
+  (void)state;
+  qmat_job *job;
+  ok(job, qmat_job_new(&job));
+  assert_int_equal(qmat_job_error(job)->result, QMAT_RESULT_OK);
+  assert_int_equal(qmat_job_set(job, "simple.epsilom=1"), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->hint, "'epsilon'"));
+  assert_int_equal(qmat_job_want(job, "simple.medal"), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "'medial'"));
+  assert_int_equal(qmat_job_save(job, "asset", "x.doc"), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->hint, ".glb"));
+  qmat_medial_view medial;
+  assert_int_equal(qmat_job_medial(job, "simple.medial", &medial), QMAT_RESULT_USAGE);
+  // No model is given.
+  assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_string_equal(qmat_job_error(job)->field, "path");
+  assert_int_equal(qmat_job_run(job, -1, NULL, NULL), QMAT_RESULT_USAGE);
+  ok(job, qmat_job_set(job, "model=/nowhere/x.off"));
+  assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_FAILED);
+  assert_string_equal(qmat_job_error(job)->status, "io");
+  static const double positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  static const uint32_t triangles[] = {0, 1, 2, 0, 1, 3};
+  assert_int_equal(qmat_job_give_mesh(job, "model.mesh", NULL, positions, 3, triangles, 2), QMAT_RESULT_FAILED);
+  assert_string_equal(qmat_job_error(job)->element_kind, "facet");
+  assert_int_equal(qmat_job_error(job)->element, 1);
+  assert_int_equal(qmat_job_give_mesh(job, "simple.medial", NULL, positions, 3, triangles, 1), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_give_mesh(job, "model.mesh", NULL, NULL, 0, NULL, 0), QMAT_RESULT_FAILED);
+  qmat_job_free(job);
+  qmat_job_free(NULL);
+  assert_string_equal(qmat_job_error(NULL)->status, "memory");
+}
+
+static void test_a_bad_graph_keeps_its_error(void **state) {
+  (void)state;
+  static const char text[] = "qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n";
+  qmat_job *job;
+  assert_int_equal(qmat_job_new_from_text(&job, text, sizeof text - 1), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_error(job)->line, 3);
+  assert_non_null(strstr(qmat_job_error(job)->hint, "mesh.sdf"));
+  assert_int_equal(qmat_job_set(job, "a.b=1"), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_error(job)->line, 3);
+  qmat_job_free(job);
+  assert_int_equal(qmat_job_new_from_file(&job, "/nowhere.yaml"), QMAT_RESULT_USAGE);
+  assert_string_equal(qmat_job_error(job)->file, "/nowhere.yaml");
+  qmat_job_free(job);
+}
+
+static void test_the_shipped_graph_is_the_built_in_one(void **state) {
+  (void)state;
+  // Tests run in the folder of the source.
+  qmat_job *job;
+  ok(job, qmat_job_new_from_file(&job, "graphs/qmat_plus.yaml"));
+  ball b;
+  make_ball(&b);
+  ok(job, qmat_job_give_mesh(job, "model.mesh", "ball", b.positions, VERTICES, b.triangles, TRIANGLES));
+  ok(job, qmat_job_set(job, "simple.epsilon=0.03"));
+  qmat_job *built_in = job_with_ball(), *jobs[] = {job, built_in};
+  const uint8_t *bytes[2];
+  size_t sizes[2];
+  for (int i = 0; i < 2; i++) {
+    const char *name;
+    ok(jobs[i], qmat_job_want(jobs[i], "asset.file"));
+    ok(jobs[i], qmat_job_run(jobs[i], 1 + i, NULL, NULL));
+    ok(jobs[i], qmat_job_file_part(jobs[i], "asset.file", 0, &name, &bytes[i], &sizes[i]));
+  }
+  assert_int_equal(sizes[0], sizes[1]);
+  assert_memory_equal(bytes[0], bytes[1], sizes[0]);
+  qmat_job_free(job);
+  qmat_job_free(built_in);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_the_listing_names_the_nodes_of_the_built_in_graph),
+      cmocka_unit_test(test_a_mesh_in_memory_becomes_spheres_inside_it),
+      cmocka_unit_test(test_the_saved_file_is_the_file_in_memory),
+      cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
+      cmocka_unit_test(test_mistakes_are_results_with_a_problem),
+      cmocka_unit_test(test_a_bad_graph_keeps_its_error),
+      cmocka_unit_test(test_the_shipped_graph_is_the_built_in_one),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
