@@ -18,7 +18,6 @@ typedef struct {
   int completion;
   int radius;
   double merge;
-  double speck;
 } medial_delaunay_params;
 
 #define NONE UINT32_MAX
@@ -41,7 +40,6 @@ typedef struct {
   size_t sphere_count;
   uint32_t *edges, *triangles;
   size_t edge_count, triangle_count;
-  size_t torn_rings;
 } delaunay;
 
 static void subtract(const double *a, const double *b, double *d) {
@@ -102,6 +100,15 @@ static void incentre(const double *const p[4], double centre[3]) {
     centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
 }
 
+/* Coplanar samples are so only up to rounding, which leaves flat tetrahedra on the surface whose side is a matter of
+ * chance. A point this close to the surface (unit frame) does not count as inside. */
+static const double least_depth = 1e-8;
+
+static bool deep_inside(const qmat_surface *surface, const double *point) {
+  return qmat_surface_inside(surface, point) &&
+         !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
+}
+
 /* Algorithm 1 for one tetrahedron. With completion "all" a tetrahedron belongs to the solid when its incentre does;
  * its medial vertex is the circumcentre where that is inside too. */
 static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sphere[4]) {
@@ -115,9 +122,9 @@ static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sph
   double centre[3];
   incentre(p, centre);
   const bool all = d->params->completion == COMPLETION_ALL;
-  const bool in_solid = (all || thin) && qmat_surface_inside(d->surface, centre);
+  const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
   if (all && !in_solid) return CELL_DROPPED;
-  if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
+  if (circumsphere(p, sphere) && deep_inside(d->surface, sphere)) {
     if (d->params->radius == RADIUS_DISTANCE) {
       const double nearest = qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL);
       if (nearest < sphere[3]) sphere[3] = nearest;
@@ -199,12 +206,9 @@ static int corner_index(const uint32_t *corners, uint32_t id) {
   return 3;
 }
 
-/* Walks the tetrahedra around the Delaunay edge (a, b) from `start`. Returns their number when the ring is closed,
- * `start` is its smallest tetrahedron and every member is kept; else 0, with `*torn` telling a ring that is only
- * partly kept (counted once, at its smallest kept tetrahedron, is left to the caller). */
-static size_t walk_ring(const delaunay *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring, size_t capacity,
-                        bool *torn) {
-  *torn = false;
+/* Walks the tetrahedra around the Delaunay edge (a, b) from `start`. Returns their number when the ring is closed, every
+ * member is kept, and `start` is the smallest, so that each ring is found once; else 0. */
+static size_t walk_ring(const delaunay *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring, size_t capacity) {
   const uint32_t *corners = &d->cells.corners[4 * (size_t)start];
   int across = 0;
   while (corners[across] == a || corners[across] == b) across++;
@@ -212,18 +216,14 @@ static size_t walk_ring(const delaunay *d, uint32_t start, uint32_t a, uint32_t 
   uint32_t leaving = corners[across]; /* the next tetrahedron is across the facet opposite this corner */
   size_t count = 0;
   do {
-    if (cell < start) return 0;
-    if (count == capacity) return 0;
+    if (cell < start || count == capacity) return 0;
     ring[count++] = cell;
     corners = &d->cells.corners[4 * (size_t)cell];
     uint32_t entering = NONE;
     for (int k = 0; k < 4; k++)
       if (corners[k] != a && corners[k] != b && corners[k] != leaving) entering = corners[k];
     const uint32_t next = d->cells.neighbours[4 * (size_t)cell + (size_t)corner_index(corners, leaving)];
-    if (next == QMAT_NO_TETRAHEDRON || !d->kinds[next]) {
-      *torn = true;
-      return 0;
-    }
+    if (next == QMAT_NO_TETRAHEDRON || !d->kinds[next]) return 0;
     cell = next;
     leaving = entering;
   } while (cell != start);
@@ -267,10 +267,8 @@ static qmat_status connect(delaunay *d) {
     for (int e = 0; e < 6; e++) {
       uint32_t ring[RING_CAPACITY];
       const uint32_t *corners = &d->cells.corners[4 * i];
-      bool torn;
-      size_t n = walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring,
-                           RING_CAPACITY, &torn);
-      d->torn_rings += torn;
+      const size_t n = walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring,
+                                 RING_CAPACITY);
       size_t polygon = 0;
       for (size_t k = 0; k < n; k++) {
         const uint32_t sphere = d->sphere_of[ring[k]];
@@ -287,18 +285,6 @@ static qmat_status connect(delaunay *d) {
   return QMAT_OK;
 }
 
-/* Components of the medial mesh, largest first, so that specks can be told from parts. */
-typedef struct {
-  uint32_t root, size;
-  double largest_radius;
-} component;
-
-static int larger_component(const void *left, const void *right) {
-  const component *a = left, *b = right;
-  if (a->size != b->size) return a->size < b->size ? 1 : -1;
-  return a->root < b->root ? -1 : 1;
-}
-
 /* Which connected part of the surface each vertex of the mesh belongs to, as its smallest vertex. */
 static uint32_t *surface_parts(delaunay *d) {
   const qmat_mesh *mesh = d->mesh;
@@ -313,66 +299,82 @@ static uint32_t *surface_parts(delaunay *d) {
   return part;
 }
 
-/* Drops specks: components of surface slivers that are no larger than `speck` and touch only parts of the surface that
- * a larger component answers for. They add no coverage and no topology. */
-static qmat_status drop_specks(delaunay *d, size_t *components, size_t *specks, size_t *speck_spheres) {
+/* A component of the medial mesh, and its place in the order of size, largest first. */
+typedef struct {
+  uint32_t root, size;
+} component;
+
+static int larger_component(const void *left, const void *right) {
+  const component *a = left, *b = right;
+  if (a->size != b->size) return a->size < b->size ? 1 : -1;
+  return a->root < b->root ? -1 : 1;
+}
+
+/* The components, sorted; `index` (per sphere) gets each sphere's component. NULL when memory is short. */
+static component *find_components(delaunay *d, uint32_t *index, size_t *count) {
   qmat_arena *arena = &d->context->arena;
   uint32_t *parent = qmat_arena_alloc(arena, d->sphere_count, sizeof *parent);
   component *parts = qmat_arena_calloc(arena, d->sphere_count, sizeof *parts);
-  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
-  uint8_t *keep = qmat_arena_calloc(arena, d->sphere_count, sizeof *keep);
-  uint32_t *surface_part = surface_parts(d);
-  uint8_t *answered = qmat_arena_calloc(arena, d->mesh->vertex_count, sizeof *answered);
-  if (!parent || !parts || !index || !keep || !surface_part || !answered)
-    return qmat_fail_memory(d->context, "components");
+  uint32_t *order = qmat_arena_alloc(arena, d->sphere_count, sizeof *order);
+  if (!parent || !parts || !order) return NULL;
   for (size_t i = 0; i < d->sphere_count; i++) parent[i] = (uint32_t)i;
   for (size_t e = 0; e < d->edge_count; e++) join(parent, d->edges[2 * e], d->edges[2 * e + 1]);
-  size_t count = 0;
+  *count = 0;
   for (size_t i = 0; i < d->sphere_count; i++) {
     const uint32_t root = find_root(parent, (uint32_t)i);
     if (root == i) {
-      index[i] = (uint32_t)count;
-      parts[count++].root = root;
+      index[i] = (uint32_t)*count;
+      parts[(*count)++].root = root;
     }
     parts[index[root]].size++;
   }
-  for (size_t cell = 0; cell < d->cells.count; cell++) {
-    if (!d->kinds[cell]) continue;
-    component *part = &parts[index[find_root(parent, d->sphere_of[cell])]];
-    if (d->spheres[4 * cell + 3] > part->largest_radius) part->largest_radius = d->spheres[4 * cell + 3];
-  }
-  /* The surface parts that each component touches, by two passes over the cells in order of component size. */
-  qsort(parts, count, sizeof *parts, larger_component);
-  for (size_t i = 0; i < count; i++) index[parts[i].root] = (uint32_t)i;
-  size_t *offsets = qmat_arena_calloc(arena, count + 2, sizeof *offsets);
+  qsort(parts, *count, sizeof *parts, larger_component);
+  for (size_t i = 0; i < *count; i++) order[parts[i].root] = (uint32_t)i;
+  for (size_t i = 0; i < d->sphere_count; i++) index[i] = order[find_root(parent, (uint32_t)i)];
+  return parts;
+}
+
+/* Marks the components that answer for a sample which no larger component answers for. The others are specks: slivers
+ * on the surface, which add no coverage. */
+static qmat_status mark_needed(delaunay *d, const uint32_t *index, size_t count, uint8_t *needed) {
+  qmat_arena *arena = &d->context->arena;
+  size_t *starts = qmat_arena_calloc(arena, count + 2, sizeof *starts);
   uint32_t *members = qmat_arena_alloc(arena, d->cells.count, sizeof *members);
-  if (!offsets || !members) return qmat_fail_memory(d->context, "components");
+  uint8_t *answered = qmat_arena_calloc(arena, d->samples->count, sizeof *answered);
+  if (!starts || !members || !answered) return qmat_fail_memory(d->context, "components");
   for (size_t cell = 0; cell < d->cells.count; cell++)
-    if (d->kinds[cell]) offsets[index[find_root(parent, d->sphere_of[cell])] + 2]++;
-  for (size_t i = 0; i < count; i++) offsets[i + 2] += offsets[i + 1];
+    if (d->kinds[cell]) starts[index[d->sphere_of[cell]] + 2]++;
+  for (size_t i = 0; i < count; i++) starts[i + 2] += starts[i + 1];
   for (size_t cell = 0; cell < d->cells.count; cell++)
-    if (d->kinds[cell]) members[offsets[index[find_root(parent, d->sphere_of[cell])] + 1]++] = (uint32_t)cell;
+    if (d->kinds[cell]) members[starts[index[d->sphere_of[cell]] + 1]++] = (uint32_t)cell;
   for (size_t i = 0; i < count; i++) {
-    bool needed = i == 0 || parts[i].largest_radius > d->params->speck;
-    for (int pass = 0; pass < 2; pass++)
-      for (size_t m = offsets[i]; m < offsets[i + 1]; m++)
-        for (int k = 0; k < 4; k++) {
-          const uint32_t sample = d->cells.corners[4 * (size_t)members[m] + (size_t)k];
-          const uint32_t facet = d->samples->facets[sample];
-          uint8_t *done = &answered[surface_part[d->mesh->triangles[3 * (size_t)facet]]];
-          if (pass == 0 && !*done) needed = true;
-          if (pass == 1 && needed) *done = 1;
-        }
-    keep[i] = needed;
-    *components += needed;
-    *specks += !needed;
-    *speck_spheres += needed ? 0 : parts[i].size;
+    const size_t first = 4 * starts[i], last = 4 * starts[i + 1];
+    needed[i] = 0;
+    for (size_t m = first; m < last && !needed[i]; m++)
+      needed[i] = !answered[d->cells.corners[4 * (size_t)members[m / 4] + m % 4]];
+    for (size_t m = first; m < last && needed[i]; m++)
+      answered[d->cells.corners[4 * (size_t)members[m / 4] + m % 4]] = 1;
   }
+  return QMAT_OK;
+}
+
+static qmat_status drop_specks(delaunay *d, size_t *components, size_t *specks, size_t *speck_spheres) {
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
   uint32_t *renumbered = qmat_arena_alloc(arena, d->sphere_count, sizeof *renumbered);
-  if (!renumbered) return qmat_fail_memory(d->context, "medial vertices");
+  size_t count = 0;
+  component *parts = index ? find_components(d, index, &count) : NULL;
+  uint8_t *needed = qmat_arena_alloc(arena, count, sizeof *needed);
+  if (!renumbered || !parts || !needed) return qmat_fail_memory(d->context, "components");
+  const qmat_status status = mark_needed(d, index, count, needed);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < count; i++) {
+    *components += needed[i];
+    *specks += !needed[i];
+    *speck_spheres += needed[i] ? 0 : parts[i].size;
+  }
   uint32_t next = 0;
-  for (size_t i = 0; i < d->sphere_count; i++)
-    renumbered[i] = keep[index[find_root(parent, (uint32_t)i)]] ? next++ : NONE;
+  for (size_t i = 0; i < d->sphere_count; i++) renumbered[i] = needed[index[i]] ? next++ : NONE;
   for (size_t cell = 0; cell < d->cells.count; cell++) {
     if (!d->kinds[cell]) continue;
     d->sphere_of[cell] = renumbered[d->sphere_of[cell]];
@@ -380,21 +382,163 @@ static qmat_status drop_specks(delaunay *d, size_t *components, size_t *specks, 
   }
   size_t kept = 0;
   for (size_t e = 0; e < d->edge_count; e++) {
-    const uint32_t a = renumbered[d->edges[2 * e]], b = renumbered[d->edges[2 * e + 1]];
-    if (a == NONE) continue;
-    d->edges[2 * kept] = a;
-    d->edges[2 * kept++ + 1] = b;
+    if (renumbered[d->edges[2 * e]] == NONE) continue;
+    for (size_t k = 0; k < 2; k++) d->edges[2 * kept + k] = renumbered[d->edges[2 * e + k]];
+    kept++;
   }
   d->edge_count = kept;
   kept = 0;
   for (size_t t = 0; t < d->triangle_count; t++) {
     if (renumbered[d->triangles[3 * t]] == NONE) continue;
-    for (int k = 0; k < 3; k++) d->triangles[3 * kept + (size_t)k] = renumbered[d->triangles[3 * t + (size_t)k]];
+    for (size_t k = 0; k < 3; k++) d->triangles[3 * kept + k] = renumbered[d->triangles[3 * t + k]];
     kept++;
   }
   d->triangle_count = kept;
   d->sphere_count = next;
   return QMAT_OK;
+}
+
+/* A medial edge that would join two components. */
+typedef struct {
+  double length;
+  uint32_t a, b;
+} medial_link;
+
+static int shorter_link(const void *left, const void *right) {
+  const medial_link *p = left, *q = right;
+  if (p->length != q->length) return p->length < q->length ? -1 : 1;
+  if (p->a != q->a) return p->a < q->a ? -1 : 1;
+  return p->b < q->b ? -1 : p->b > q->b;
+}
+
+typedef struct {
+  uint32_t sample, sphere;
+} contact;
+
+static int by_sample(const void *left, const void *right) {
+  const contact *p = left, *q = right;
+  if (p->sample != q->sample) return p->sample < q->sample ? -1 : 1;
+  return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
+}
+
+/* The spheres of each surface part's samples, as (part, sphere) pairs, sorted; or, with `parts` NULL, the spheres of
+ * the samples for which more than one component answers. */
+static contact *find_contacts(delaunay *d, const uint32_t *index, const uint32_t *parts, size_t *count) {
+  qmat_arena *arena = &d->context->arena;
+  const size_t samples = d->samples->count;
+  uint32_t *component_of = qmat_arena_alloc(arena, samples, sizeof *component_of);
+  uint8_t *shared = qmat_arena_calloc(arena, samples, sizeof *shared);
+  if (!component_of || !shared) return NULL;
+  for (size_t i = 0; i < samples; i++) component_of[i] = NONE;
+  for (size_t i = 0; i < 4 * d->cells.count; i++) {
+    if (!d->kinds[i / 4]) continue;
+    const uint32_t sample = d->cells.corners[i], component = index[d->sphere_of[i / 4]];
+    if (component_of[sample] != NONE && component_of[sample] != component) shared[sample] = 1;
+    component_of[sample] = component;
+  }
+  size_t room = 0;
+  for (size_t i = 0; i < 4 * d->cells.count; i++) room += d->kinds[i / 4] && (parts || shared[d->cells.corners[i]]);
+  contact *contacts = qmat_arena_alloc(arena, room, sizeof *contacts);
+  if (!contacts) return NULL;
+  *count = 0;
+  for (size_t i = 0; i < 4 * d->cells.count; i++) {
+    const uint32_t sample = d->cells.corners[i];
+    if (!d->kinds[i / 4] || !(parts || shared[sample])) continue;
+    const uint32_t part = parts ? parts[d->mesh->triangles[3 * (size_t)d->samples->facets[sample]]] : sample;
+    contacts[(*count)++] = (contact){part, d->sphere_of[i / 4]};
+  }
+  qsort(contacts, *count, sizeof *contacts, by_sample);
+  size_t kept = 0;
+  for (size_t i = 0; i < *count; i++)
+    if (kept == 0 || by_sample(&contacts[kept - 1], &contacts[i]) != 0) contacts[kept++] = contacts[i];
+  *count = kept;
+  return contacts;
+}
+
+static qmat_status add_link(delaunay *d, uint32_t a, uint32_t b) {
+  size_t capacity = 2 * d->edge_count;
+  if (qmat_grow((void **)&d->edges, &capacity, 2 * (d->edge_count + 1), sizeof *d->edges))
+    return qmat_fail_memory(d->context, "medial edges");
+  d->edges[2 * d->edge_count] = a;
+  d->edges[2 * d->edge_count + 1] = b;
+  d->edge_count++;
+  return QMAT_OK;
+}
+
+/* For each surface part whose samples still see several components: the nearest two spheres, until it is one. Rare and
+ * small, since components that share a sample are joined before. */
+static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_t *joined, const double *centres,
+                                     size_t *links) {
+  uint32_t *parts = surface_parts(d);
+  size_t count = 0;
+  contact *contacts = parts ? find_contacts(d, index, parts, &count) : NULL;
+  if (!contacts) return qmat_fail_memory(d->context, "components");
+  for (size_t first = 0, last; first < count; first = last) {
+    for (last = first; last < count && contacts[last].sample == contacts[first].sample;) last++;
+    for (;;) {
+      const uint32_t home = find_root(joined, index[contacts[first].sphere]);
+      medial_link best = {INFINITY, NONE, NONE};
+      for (size_t i = first; i < last; i++) {
+        if (find_root(joined, index[contacts[i].sphere]) == home) continue;
+        for (size_t j = first; j < last; j++) {
+          if (find_root(joined, index[contacts[j].sphere]) != home) continue;
+          const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
+          const double length = distance(&centres[3 * (size_t)a], &centres[3 * (size_t)b]);
+          const medial_link link = {length, a < b ? a : b, a < b ? b : a};
+          if (shorter_link(&link, &best) < 0) best = link;
+        }
+      }
+      if (best.a == NONE) break;
+      const qmat_status status = add_link(d, best.a, best.b);
+      if (status != QMAT_OK) return status;
+      join(joined, index[best.a], index[best.b]);
+      ++*links;
+    }
+  }
+  return QMAT_OK;
+}
+
+/* Joins the components of one solid, which tear apart where it is thinner than its samples are apart: by the shortest
+ * medial edges between spheres that answer for a common sample. Such spheres touch the surface in the same place. */
+static qmat_status link_components(delaunay *d, size_t *components, size_t *links) {
+  if (*components < 2) return QMAT_OK;
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
+  double *centres = qmat_arena_alloc(arena, d->sphere_count, 3 * sizeof *centres);
+  size_t count = 0, contact_count = 0;
+  const component *parts = index && centres ? find_components(d, index, &count) : NULL;
+  uint32_t *joined = qmat_arena_alloc(arena, count, sizeof *joined);
+  const contact *contacts = parts ? find_contacts(d, index, NULL, &contact_count) : NULL;
+  if (!parts || !joined || !contacts) return qmat_fail_memory(d->context, "components");
+  for (size_t i = 0; i < count; i++) joined[i] = (uint32_t)i;
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) memcpy(&centres[3 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 3 * sizeof *centres);
+  medial_link *candidates = NULL;
+  size_t candidate_count = 0, capacity = 0;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < contact_count && status == QMAT_OK; i++)
+    for (size_t j = i + 1; j < contact_count && contacts[j].sample == contacts[i].sample; j++) {
+      const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
+      if (index[a] == index[b]) continue;
+      if (qmat_grow((void **)&candidates, &capacity, candidate_count + 1, sizeof *candidates)) {
+        status = qmat_fail_memory(d->context, "components");
+        break;
+      }
+      candidates[candidate_count++] =
+          (medial_link){distance(&centres[3 * (size_t)a], &centres[3 * (size_t)b]), a, b};
+    }
+  qsort(candidates, candidate_count, sizeof *candidates, shorter_link);
+  for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
+    const uint32_t a = index[candidates[i].a], b = index[candidates[i].b];
+    if (find_root(joined, a) == find_root(joined, b)) continue;
+    join(joined, a, b);
+    ++*links;
+    status = add_link(d, candidates[i].a, candidates[i].b);
+  }
+  qmat_free(candidates);
+  if (status == QMAT_OK) status = link_across_parts(d, index, joined, centres, links);
+  *components -= *links;
+  return status;
 }
 
 static int by_number(const void *left, const void *right) {
@@ -496,7 +640,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_field *thickness = (const qmat_field *)inputs[1];
   qmat_medial *medial = NULL;
   qmat_report *report = NULL;
-  size_t components = 0, specks = 0, speck_spheres = 0, by_kind[3] = {0, 0, 0};
+  size_t components = 0, specks = 0, speck_spheres = 0, links = 0, by_kind[3] = {0, 0, 0};
   qmat_status status = check_inputs(context, d.mesh, thickness, d.samples);
   if (status != QMAT_OK) return status;
   if ((status = qmat_surface_new(context, d.mesh, &d.surface)) != QMAT_OK) return status;
@@ -518,6 +662,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   }
   if ((status = connect(&d)) != QMAT_OK) goto done;
   if ((status = drop_specks(&d, &components, &specks, &speck_spheres)) != QMAT_OK) goto done;
+  if ((status = link_components(&d, &components, &links)) != QMAT_OK) goto done;
   medial = qmat_medial_new();
   report = qmat_report_new();
   if (!medial || !report) {
@@ -536,6 +681,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
       {"edges", medial->edge_count},
       {"triangles", medial->triangle_count},
       {"components", components},
+      {"links", links},
       {"specks_dropped", specks},
       {"speck_spheres_dropped", speck_spheres},
   };
@@ -596,15 +742,6 @@ static const qmat_param params[] = {
      .max = 0.01,
      .flags = QMAT_PARAM_RELATIVE,
      .offset = AT(merge)},
-    {.name = "speck",
-     .unit = "diagonal",
-     .doc = "A disconnected component whose spheres are all this small adds nothing and is dropped",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.002,
-     .min = 0,
-     .max = 1,
-     .flags = QMAT_PARAM_RELATIVE,
-     .offset = AT(speck)},
     {0},
 };
 

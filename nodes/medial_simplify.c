@@ -423,24 +423,39 @@ static qmat_status collapse_edges(simplifier *s) {
   return QMAT_OK;
 }
 
-/* Both errors of the result: F at the control points, exactly, and the protrusion of every primitive, bounded. */
+/* The reported protrusion is at most this share of epsilon above the true one. */
+static const double protrusion_tolerance = 0.02;
+
+/* Both errors of the result: F at the control points, exactly, and an upper bound of the protrusion. The largest h of
+ * spheres and middles comes first, so that most primitives are known to matter no more after one look. */
 static qmat_status measure_errors(simplifier *s, const qmat_medial *unit, double *coverage, double *protrusion) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(s->context, unit, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(s->context);
-  double out = 0, in = 0;
+  double out = 0, least = 0, in = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : out)
   for (size_t i = 0; i < s->control.count; i++)
     out = fmax(out, qmat_envelope_distance(envelope, &s->control.points[3 * i], NULL));
   const size_t primitives = qmat_envelope_primitive_count(envelope);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
+  for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
+    double middle[4] = {0, 0, 0, 0};
+    uint32_t ids[3] = {(uint32_t)i};
+    const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
+    for (int c = 0; c < count; c++)
+      for (int k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + (size_t)k] / count;
+    least = fmax(least, qmat_protrusion_of_sphere(s->surface, middle));
+  }
+  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : 0.01;
+  const double tolerance = protrusion_tolerance * epsilon;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : in)
   for (size_t i = 0; i < primitives; i++) {
     uint32_t ids[3];
     const int count = qmat_envelope_primitive(envelope, i, ids);
     const double *spheres[3];
     for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
-    in = fmax(in, qmat_protrusion_bound(s->surface, spheres, count, 2e-4, NULL));
+    in = fmax(in, qmat_protrusion_bound(s->surface, spheres, count, least + tolerance, tolerance));
   }
   qmat_envelope_free(envelope);
   *coverage = out;

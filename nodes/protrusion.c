@@ -129,27 +129,26 @@ static bool search_piece(search *s, const piece *p, int level) {
   return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
 }
 
-double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double tolerance,
-                             double *found) {
+double qmat_protrusion_of_sphere(const qmat_surface *surface, const double sphere[4]) {
+  return sphere[3] - ask_depth(surface, sphere, NULL, 0);
+}
+
+double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,
+                             double tolerance) {
   piece p = {.count = count};
   search s = {.surface = surface,
-              .accept = -INFINITY,
+              .accept = enough,
               .reject = INFINITY,
-              .smallest = 1e-9,
+              .smallest = 0.01 * tolerance,
               .found = -INFINITY,
-              .bound = -INFINITY,
+              .bound = enough,
               .tolerance = tolerance};
   for (int i = 0; i < count; i++) {
     memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
     p.depths[i] = ask_depth(surface, spheres[i], NULL, 0);
     s.found = maximum(s.found, spheres[i][3] - p.depths[i]);
   }
-  if (count == 1) {
-    if (found) *found = s.found;
-    return s.found;
-  }
-  search_piece(&s, &p, 0);
-  if (found) *found = s.found;
+  if (count > 1) search_piece(&s, &p, 0);
   return maximum(s.bound, s.found);
 }
 

@@ -49,9 +49,12 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
 /* Takes the newest successful test over: call it before the complex changes. */
 void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse);
 
-/* An upper bound of h over a primitive of `count` (1, 2 or 3) spheres (4 doubles each), no farther than `tolerance`
- * above the largest h found there, which goes to `*found` (may be NULL). Branch and bound; thread-safe. */
-double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double tolerance,
-                             double *found);
+/* An upper bound of h over a primitive of `count` (1, 2 or 3) spheres (4 doubles each): the largest h itself to within
+ * `tolerance`, unless it is below `enough`, which is then the answer. Branch and bound; thread-safe. */
+double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,
+                             double tolerance);
+
+/* r - depth for one sphere (4 doubles). Thread-safe. */
+double qmat_protrusion_of_sphere(const qmat_surface *surface, const double sphere[4]);
 
 #endif
