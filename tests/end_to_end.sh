@@ -1,0 +1,263 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The whole program, as a user meets it: end_to_end.sh BUILD_FOLDER [COUNTS_FILE]
+#
+# Every generated model, and every real one in ../shared/data where that folder is, goes through `qmat mat`; a judge that
+# shares no code with the library (tests/judge.c) looks at what comes out. COUNTS_FILE gets "passed failed skipped".
+set -u
+source=$(cd "$(dirname "$0")/.." && pwd) || exit 1
+build=$(cd "$1" && pwd) || exit 1
+counts=${2:-/dev/null}
+data=$source/../shared/data
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+passed=0
+failed=0
+skipped=0
+
+pass() {
+  passed=$((passed + 1))
+  printf 'ok      %s\n' "$*"
+}
+
+fail() {
+  failed=$((failed + 1))
+  printf 'FAILED  %s\n' "$*"
+}
+
+skip() {
+  skipped=$((skipped + 1))
+  printf 'skipped %s\n' "$*"
+}
+
+# holds WHAT COMMAND...: the command succeeds; what it says is shown when it does not.
+holds() {
+  what=$1
+  shift
+  if "$@" >said.txt 2>&1; then
+    pass "$what"
+  else
+    fail "$what"
+    sed 's/^/        /' said.txt | head -n 12
+  fi
+}
+
+qmat() {
+  timeout 300 "$build/qmat" "$@"
+}
+
+# judge NAME FILE.off FILE.ma CHECK...: with the judge's figures in the line.
+judge() {
+  what=$1
+  shift
+  if timeout 300 "$build/qmat_judge" "$@" >figures.txt 2>complaints.txt; then
+    pass "$what: $(awk '{ printf "%s%s %s", NR == 1 ? "" : ", ", $1, $2 }' figures.txt)"
+  else
+    fail "$what: $(awk '{ printf "%s%s %s", NR == 1 ? "" : ", ", $1, $2 }' figures.txt)"
+    sed 's/^/        /' complaints.txt
+  fi
+}
+
+# ---- Generated models ----
+
+holds "the models are made" "$build/qmat_models" all models
+for surface in models/*.off; do
+  name=$(basename "$surface" .off)
+  holds "$name: mat" qmat mat "$surface" -o "$name.ma" -o "$name.glb" --epsilon 1% --report "$name.json"
+  if [ ! -s "$name.ma" ]; then continue; fi
+  # Each solid is one piece; its medial mesh has no loop unless the solid has one.
+  euler=1
+  if [ "$name" = torus ]; then euler=0; fi
+  judge "$name: two-sided error, one part, Euler characteristic" "$surface" "$name.ma" --within 1% --components 1 \
+    --euler $euler
+  holds "$name: a binary glTF file" test "$(head -c 4 "$name.glb")" = glTF
+  holds "$name: the report has both errors" grep -q '"envelope_to_surface"' "$name.json"
+done
+
+# Where the true medial axis is known, it is found: spheres have its places and its radii.
+for name in sphere capsule tapered-capsule torus sheet box; do
+  if [ ! -s "$name.ma" ]; then continue; fi
+  holds "$name: its known medial mesh is made" "$build/qmat_models" "$name" --medial "$name-known.ma"
+  # The sheet is 1 % thick: its spheres are held to a quarter of that.
+  near=1%
+  if [ "$name" = sheet ]; then near=0.25%; fi
+  judge "$name: the true medial axis" "models/$name.off" "$name.ma" --known "$name-known.ma" --near $near --samples 1000
+done
+
+# The same bytes whoever runs it.
+for name in octopus torus l-bracket curved-sheet; do
+  for threads in 1 2 8; do
+    holds "$name: mat with $threads threads" qmat mat "models/$name.off" -o "$name-$threads.ma" -o "$name-$threads.glb" \
+      --epsilon 1% --threads $threads
+    holds "$name: the same .ma with $threads threads" cmp "$name.ma" "$name-$threads.ma"
+    holds "$name: the same .glb with $threads threads" cmp "$name.glb" "$name-$threads.glb"
+  done
+  holds "$name: run of the shipped graph" qmat run "$source/graphs/qmat_plus.yaml" --set "model.path=models/$name.off" \
+    --set simple.epsilon=1% -o "$name-run.ma"
+  holds "$name: the same .ma from run" cmp "$name.ma" "$name-run.ma"
+done
+
+# The unit of the model does not matter, nor does where it is.
+awk 'NR == 2 { vertices = $1 }
+  NR > 2 && NR <= vertices + 2 { printf "%.17g %.17g %.17g\n", 1024 * $1, 1024 * $2, 1024 * $3; next } { print }' \
+  models/l-bracket.off >large.off
+holds "l-bracket, 1024 times as large: mat" qmat mat large.off -o large.ma --epsilon 1%
+judge "l-bracket, 1024 times as large" large.off large.ma --within 1% --components 1 --euler 1
+
+# A looser bound needs fewer spheres, and a number of spheres is kept to.
+spheres() {
+  head -n 1 "$1" | cut -d ' ' -f 1
+}
+holds "octopus: mat at 3 %" qmat mat models/octopus.off -o loose.ma --epsilon 3%
+if [ -s loose.ma ] && [ -s octopus.ma ]; then
+  holds "octopus: 3 % needs fewer spheres than 1 %" test "$(spheres loose.ma)" -lt "$(spheres octopus.ma)"
+fi
+holds "octopus: mat to 150 spheres" qmat mat models/octopus.off -o few.ma --vertices 150
+if [ -s few.ma ]; then holds "octopus: 150 spheres at most" test "$(spheres few.ma)" -le 150; fi
+
+# ---- Input that is no model ----
+
+# refused NAME FILE [OPTION...]: exit code 1, one line on stderr that names the file, and no output.
+refused() {
+  what=$1
+  file=$2
+  shift 2
+  rm -f out.ma out.glb
+  qmat mat "$file" -o out.ma -o out.glb "$@" >said.txt 2>complaints.txt
+  code=$?
+  if [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ] && grep -qF "$(basename "$file")" complaints.txt &&
+    [ ! -e out.ma ] && [ ! -e out.glb ] && [ -z "$(find . -maxdepth 1 -name 'out.*' -o -maxdepth 1 -name '.out*')" ]; then
+    pass "refused: $what: $(cut -c 1-150 complaints.txt)"
+  else
+    fail "refused: $what: exit code $code"
+    sed 's/^/        /' complaints.txt | head -n 5
+    ls -a | grep out | sed 's/^/        left: /'
+  fi
+}
+
+model=models/l-bracket.off
+last=$(($(wc -l <$model) - 1))
+vertices=$(sed -n 2p $model | cut -d ' ' -f 1)
+refused "a file that is not there" nowhere.off
+: >empty.off
+refused "an empty file" empty.off
+head -n 300 $model >cut.off
+refused "a file cut off among its vertices" cut.off
+head -n "$last" $model >cut-facets.off
+refused "a file cut off among its facets" cut-facets.off
+printf 'OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n' >no-facets.off
+refused "no facets" no-facets.off
+sed '10s/.*/nan 0 0/' $model >nan.off
+refused "a coordinate that is not a number" nan.off
+sed '10s/.*/1e999 0 0/' $model >infinite.off
+refused "a coordinate that is not finite" infinite.off
+sed "\$s/.*/3 0 1 $vertices/" $model >range.off
+refused "an index out of range" range.off
+sed '$s/.*/3 0 1 -1/' $model >negative.off
+refused "a negative index" negative.off
+sed '2s/.*/4000000000 5 0/' $model >counts.off
+refused "more vertices promised than the file can hold" counts.off
+sed '2s/.*/99999999999999999999999 5 0/' $model >overflow.off
+refused "a count that overflows" overflow.off
+sed '$s/.*/3 0 0 1/' $model >degenerate.off
+refused "a facet that names a vertex twice" degenerate.off
+sed "\$s/.*/$(sed -n "$((vertices + 5))p" $model)/" $model >duplicate.off
+refused "a facet that is there twice" duplicate.off
+cp $model wrong.stl
+refused "an ending that disagrees with the content" wrong.stl
+cp $model model.xyz
+printf 'not a model\n' >model.xyz
+refused "an ending that nobody knows" model.xyz
+mkdir folder.off
+refused "a folder" folder.off
+head -c 65536 /dev/zero >zeros.glb
+refused "zeros" zeros.glb
+head -c 65536 "$build/qmat" >program.ply
+refused "a program" program.ply
+printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n2 0 0\n3 0 0\n3 0 1 2\n3 0 2 3\n3 1 2 3\n3 0 1 3\n' >flat.off
+refused "all vertices on a line" flat.off
+printf 'OFF\n4 4 0\n5 5 5\n5 5 5\n5 5 5\n5 5 5\n3 0 1 2\n3 0 2 3\n3 1 2 3\n3 0 1 3\n' >point.off
+refused "all vertices in one point" point.off
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n' >range.obj
+refused "an OBJ index out of range" range.obj
+printf 'ply\nformat binary_little_endian 1.0\nelement vertex 900000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\nabc' >counts.ply
+refused "a PLY header that promises more than the file holds" counts.ply
+head -c 80 /dev/zero >counts.stl
+printf '\377\377\377\177' >>counts.stl
+refused "an STL header that promises more than the file holds" counts.stl
+
+# Files of our own, broken: a compressed glTF whose identifiers lead nowhere must not reach the decoder.
+if qmat mat $model -o good.glb --epsilon 2% --set asset.draco=true >said.txt 2>&1; then
+  holds "a compressed glTF file can be read" qmat mat good.glb -o good.ma --epsilon 5%
+  for id in POSITION NORMAL; do
+    LC_ALL=C sed "s/\"$id\":[0-9]/\"$id\":9/g" good.glb >hostile.glb
+    if cmp -s good.glb hostile.glb; then continue; fi
+    refused "a $id that leads nowhere" hostile.glb
+  done
+  LC_ALL=C sed 's/"bufferView":[0-9]/"bufferView":9/g' good.glb >hostile.glb
+  refused "a buffer view that is not there" hostile.glb
+  LC_ALL=C sed 's/"buffer":[0-9]/"buffer":9/g' good.glb >hostile.glb
+  refused "a buffer that is not there" hostile.glb
+  size=$(wc -c <good.glb)
+  head -c $((size / 2)) good.glb >half.glb
+  refused "half a glTF file" half.glb
+else
+  fail "a compressed glTF file is made"
+  sed 's/^/        /' said.txt
+fi
+
+# Told to, defects are left out.
+holds "defects are dropped when told to" qmat mat duplicate.off -o dropped.ma --set model.defects=drop
+
+# misused NAME TEXT ARGUMENT...: exit code 2, and the text on stderr.
+misused() {
+  what=$1
+  text=$2
+  shift 2
+  qmat "$@" >said.txt 2>complaints.txt
+  code=$?
+  if [ $code -eq 2 ] && grep -qF -e "$text" complaints.txt; then
+    pass "misused: $what"
+  else
+    fail "misused: $what: exit code $code"
+    sed 's/^/        /' complaints.txt
+  fi
+}
+misused "an unknown option" "did you mean '--epsilon'?" mat $model -o out.ma --epsilonn 1%
+misused "an unknown command" "did you mean 'mat'?" mta $model -o out.ma
+misused "an unknown parameter" "did you mean 'epsilon'?" mat $model -o out.ma --set simple.epsilom=1%
+
+# ---- Real models ----
+
+if [ -d "$data/surfaces" ]; then
+  for surface in "$data"/surfaces/*; do
+    name=$(basename "$surface")
+    holds "$name: mat" qmat mat "$surface" -o real.ma -o real.glb --epsilon 1%
+    if [ -s real.ma ]; then judge "$name: two-sided error" "$surface" real.ma --within 1% --samples 3000; fi
+    rm -f real.ma real.glb
+  done
+  # Surfaces that are not closed have no inside: a result or one clear line, but no crash.
+  for surface in "$data"/dirty/*; do
+    name=$(basename "$surface")
+    qmat mat "$surface" -o real.ma --epsilon 2% --set model.defects=drop >said.txt 2>complaints.txt
+    code=$?
+    if { [ $code -eq 0 ] && [ -s real.ma ]; } || { [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ]; }; then
+      pass "$name: not closed: exit code $code $(cut -c 1-150 complaints.txt)"
+    else
+      fail "$name: not closed: exit code $code"
+      sed 's/^/        /' complaints.txt | head -n 5
+    fi
+    rm -f real.ma
+  done
+  for asset in "$data"/gltf/*.glb; do
+    name=$(basename "$asset")
+    holds "$name: mat" qmat mat "$asset" -o real.glb --epsilon 2%
+  done
+else
+  skip "real models: there is no folder $data"
+fi
+
+echo "$passed $failed $skipped" >"$counts"
+printf 'end to end: %d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"
+[ "$failed" -eq 0 ]

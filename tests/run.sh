@@ -1,0 +1,98 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Sets up, builds and runs everything: the tests of every floor, optimised and under the address and undefined-behaviour
+# sanitizers, and the whole program on generated and, where they are there, on real models (tests/end_to_end.sh).
+# The last line counts: N passed, N failed, N skipped. Exit code 0 when nothing failed.
+set -u
+cd "$(dirname "$0")/.." || exit 1
+started=$(date +%s)
+passed=0
+failed=0
+skipped=0
+
+step() {
+  printf '\n== %s (%d s)\n' "$1" $(($(date +%s) - started))
+}
+
+finish() {
+  printf '\n%d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"
+  [ "$failed" -eq 0 ]
+  exit
+}
+
+# build PRESET OPTION...: configure and build; what the compiler says is shown when it fails.
+build() {
+  preset=$1
+  shift
+  mkdir -p build
+  if cmake --preset "$preset" "$@" >"build/$preset.log" 2>&1 &&
+    cmake --build --preset "$preset" -j "$(nproc)" >>"build/$preset.log" 2>&1; then
+    passed=$((passed + 1))
+    return 0
+  fi
+  grep -E 'FAILED|error|Error' -A 8 "build/$preset.log" | head -n 80
+  tail -n 5 "build/$preset.log"
+  echo "The build of '$preset' failed; all of it: build/$preset.log"
+  failed=$((failed + 1))
+  return 1
+}
+
+# attribute FILE NAME: a number in the first lines of ctest's report.
+attribute() {
+  sed -n "1,12s/.*[[:space:]]$2=\"\([0-9]*\)\".*/\1/p" "$1" | head -n 1
+}
+
+# Tests that do not end are stopped: a hang is a failure.
+run_ctest() {
+  preset=$1
+  shift
+  report=$PWD/build/$preset/ctest.xml
+  rm -f "$report"
+  ctest --preset "$preset" -j "$(nproc)" --timeout 600 --output-junit "$report" "$@"
+  result=$?
+  if [ ! -s "$report" ] || [ -z "$(attribute "$report" tests)" ]; then
+    echo "ctest wrote no report (exit code $result)"
+    failed=$((failed + 1))
+    return
+  fi
+  all=$(attribute "$report" tests)
+  bad=$(attribute "$report" failures)
+  none=$(($(attribute "$report" skipped) + $(attribute "$report" disabled)))
+  if [ "$result" -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
+  passed=$((passed + all - bad - none))
+  failed=$((failed + bad))
+  skipped=$((skipped + none))
+}
+
+step "Debian packages"
+if ! sh .ci/packages.sh; then
+  failed=1
+  finish
+fi
+
+step "Build, optimised, warnings are errors"
+if build release -DQMAT_WERROR=ON; then
+  step "Tests, optimised"
+  run_ctest release
+  step "The whole program"
+  counts=$(mktemp)
+  sh tests/end_to_end.sh "$PWD/build/release" "$counts"
+  result=$?
+  ok=0 bad=0 none=0
+  read -r ok bad none <"$counts" || bad=1
+  rm -f "$counts"
+  if [ "$result" -ne 0 ] && [ "${bad:-0}" -eq 0 ]; then bad=1; fi
+  passed=$((passed + ${ok:-0}))
+  failed=$((failed + ${bad:-1}))
+  skipped=$((skipped + ${none:-0}))
+fi
+
+step "Build with sanitizers"
+if build asan -DQMAT_WERROR=ON; then
+  step "Tests with sanitizers"
+  # The worked example builds the whole tree once more; once is enough.
+  run_ctest asan -LE builds
+fi
+
+step "Done"
+finish
