@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/medial_build.h"
+#include "io/base64.h"
+#include "io/draco.h"
+#include "io/ma.h"
+#include "nodes/nodes.h"
+#include "tests/shapes.h"
+
+/* The parameters as the node lays them out. */
+static void *make_params(const qmat_node *node, const char *const settings[][2]) {
+  qmat_context context = {0};
+  void *params = calloc(1, node->params_size);
+  assert_non_null(params);
+  qmat_params_default(node, params);
+  for (size_t i = 0; settings && settings[i][0]; i++) {
+    const qmat_param *param = qmat_param_find(node, settings[i][0]);
+    assert_non_null(param);
+    assert_int_equal(qmat_param_parse(&context, node, param, settings[i][1], params), QMAT_OK);
+  }
+  qmat_context_uninit(&context);
+  return params;
+}
+
+/* A cone of two spheres (box of the spheres: 6 by 2 by 2, diagonal sqrt(44)) and a sphere alone inside that box. */
+static qmat_medial *make_medial(void) {
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  const double spheres[12] = {0, 0, 0, 1, 4, 0, 0, 1, 2.1, 0.1, 0.3, 0.5};
+  medial->spheres = qmat_alloc(12, sizeof(double));
+  assert_non_null(medial->spheres);
+  memcpy(medial->spheres, spheres, sizeof spheres);
+  medial->sphere_count = 3;
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, (const uint32_t[]){0, 1}, 1, NULL, 0), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return medial;
+}
+
+static qmat_report *make_report(json_t *root) {
+  qmat_context context = {0};
+  qmat_report *report = qmat_report_new();
+  assert_true(report && root);
+  assert_int_equal(json_object_update(report->root, root), 0);
+  json_decref(root);
+  assert_int_equal(qmat_value_seal(&context, &report->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return report;
+}
+
+typedef struct wiring {
+  const qmat_scene *scene;
+  const qmat_mesh *skin;
+  const qmat_report *report;
+} wiring;
+
+static qmat_file *must_write(const qmat_medial *medial, wiring with, const char *const settings[][2]) {
+  const qmat_node *node = qmat_node_find("scene.write");
+  assert_non_null(node);
+  const qmat_value *inputs[4] = {NULL};
+  inputs[qmat_input_find(node, "medial")] = &medial->base;
+  inputs[qmat_input_find(node, "scene")] = with.scene ? &with.scene->base : NULL;
+  inputs[qmat_input_find(node, "skin")] = with.skin ? &with.skin->base : NULL;
+  inputs[qmat_input_find(node, "report")] = with.report ? &with.report->base : NULL;
+  qmat_value *outputs[1] = {NULL};
+  void *params = make_params(node, settings);
+  qmat_context context = {0};
+  assert_int_equal(qmat_params_check(&context, node, params), QMAT_OK);
+  if (node->run(&context, params, inputs, outputs) != QMAT_OK) fail_msg("%s", context.error.message);
+  assert_int_equal(outputs[0]->type, QMAT_FILE);
+  assert_true(outputs[0]->sealed);
+  free(params);
+  qmat_context_uninit(&context);
+  return (qmat_file *)outputs[0];
+}
+
+/* The JSON of a .glb. */
+static json_t *glb_root(const qmat_file *file) {
+  const uint8_t *bytes = file->parts[0].bytes;
+  assert_string_equal(file->format, "glb");
+  assert_memory_equal(bytes, "glTF", 4);
+  const size_t size = (size_t)bytes[12] | (size_t)bytes[13] << 8 | (size_t)bytes[14] << 16 | (size_t)bytes[15] << 24;
+  json_t *root = json_loadb((const char *)bytes + 20, size, 0, NULL);
+  assert_non_null(root);
+  return root;
+}
+
+static json_t *node_of(json_t *root) {
+  return json_array_get(json_object_get(root, "nodes"), 0);
+}
+
+static json_t *extra(json_t *root, const char *key) {
+  return json_object_get(json_object_get(node_of(root), "extras"), key);
+}
+
+static void test_the_report_goes_into_the_extras_as_it_is(void **state) {
+  (void)state;
+  qmat_medial *medial = make_medial();
+  qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:i}", "epsilon", 0.02, "surface_to_envelope",
+                                              0.011, "envelope_to_surface", 0.013, "certified", 1, "spheres", 3));
+  qmat_file *file = must_write(medial, (wiring){.report = report}, NULL);
+  json_t *root = glb_root(file);
+  assert_near(json_real_value(extra(root, "qmat_epsilon")), 0.02, 0);
+  assert_near(json_real_value(extra(root, "qmat_error_out")), 0.011, 0);
+  assert_near(json_real_value(extra(root, "qmat_error_in")), 0.013, 0);
+  assert_true(json_is_true(extra(root, "qmat_certified")));
+  assert_int_equal(json_integer_value(extra(root, "qmat_vertices")), 3);
+  assert_null(extra(root, "spheres"));
+  json_decref(root);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+
+  report = make_report(json_pack("{s:s, s:f}", "epsilon", "small", "surface_to_envelope", 0.011));
+  file = must_write(medial, (wiring){.report = report}, NULL);
+  root = glb_root(file);
+  assert_null(extra(root, "qmat_epsilon"));
+  assert_null(extra(root, "qmat_error_in"));
+  assert_null(extra(root, "qmat_certified"));
+  assert_near(json_real_value(extra(root, "qmat_error_out")), 0.011, 0);
+  json_decref(root);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  qmat_value_release(&medial->base);
+}
+
+static void test_quantisation_spends_a_twentieth_of_epsilon_at_most(void **state) {
+  (void)state;
+  qmat_medial *medial = make_medial();
+  /* Centres span 4, so b bits are good for sqrt(3) / 2 * 4 / (2^b - 1); radii span 0.5: 0.25 / (2^b - 1). Each gets
+   * half of epsilon * diagonal / 20. For 0.02 * sqrt(44) / 40 = 0.0033: 1044.4 steps, 11 bits, and 75.4 steps, 7 bits.
+   * For 1e-3: 20890 steps, 15 bits, and 1507.6 steps, 11 bits. */
+  static const struct {
+    double epsilon;
+    int position_bits, radius_bits;
+  } cases[] = {{0.02, 11, 7}, {0, 15, 11}};
+  for (size_t i = 0; i < 2; i++) {
+    qmat_report *report = cases[i].epsilon > 0 ? make_report(json_pack("{s:f}", "epsilon", cases[i].epsilon)) : NULL;
+    qmat_file *file = must_write(medial, (wiring){.report = report}, NULL);
+    json_t *root = glb_root(file);
+    assert_int_equal(json_integer_value(extra(root, "qmat_position_bits")), cases[i].position_bits);
+    assert_int_equal(json_integer_value(extra(root, "qmat_radius_bits")), cases[i].radius_bits);
+    const double epsilon = report ? cases[i].epsilon : 1e-3;
+    assert_true(json_real_value(extra(root, "qmat_quantisation")) <= epsilon * sqrt(44) / 20);
+    json_decref(root);
+    qmat_value_release(&file->base);
+    if (report) qmat_value_release(&report->base);
+  }
+  const char *const settings[][2] = {{"position_bits", "9"}, {"radius_bits", "5"}, {NULL, NULL}};
+  qmat_file *file = must_write(medial, (wiring){0}, settings);
+  json_t *root = glb_root(file);
+  assert_int_equal(json_integer_value(extra(root, "qmat_position_bits")), 9);
+  assert_int_equal(json_integer_value(extra(root, "qmat_radius_bits")), 5);
+  json_decref(root);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+}
+
+static void test_scene_and_skin_name_and_show_the_node(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = make_medial();
+  qmat_mesh *box = shape_new();
+  shape_add_box(box, 0, 0, 0, 1, 1, 1, false);
+  shape_seal(box);
+  qmat_scene *scene = qmat_scene_new();
+  assert_non_null(scene);
+  scene->name = qmat_strdup("octopus");
+  scene->format = qmat_strdup("off");
+  assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
+  for (int draco = 0; draco < 2; draco++) {
+    const char *const settings[][2] = {{"draco", draco ? "true" : "false"}, {NULL, NULL}};
+    qmat_file *file = must_write(medial, (wiring){.scene = scene, .skin = box}, settings);
+    json_t *root = glb_root(file);
+    assert_string_equal(json_string_value(json_object_get(node_of(root), "name")), "octopus");
+    assert_int_equal(json_integer_value(json_object_get(node_of(root), "mesh")), 0);
+    assert_true((json_object_get(root, "extensionsRequired") != NULL) == (draco == 1));
+    json_decref(root);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&scene->base);
+  qmat_value_release(&box->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_each_format_is_made(void **state) {
+  (void)state;
+  qmat_medial *medial = make_medial();
+  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"}, {"ma", "3 1 0"}, {"ply", "ply"}};
+  for (size_t i = 0; i < 4; i++) {
+    const char *const settings[][2] = {{"format", formats[i][0]}, {NULL, NULL}};
+    qmat_file *file = must_write(medial, (wiring){0}, settings);
+    assert_string_equal(file->format, formats[i][0]);
+    assert_true(file->parts[0].size > strlen(formats[i][1]));
+    assert_memory_equal(file->parts[0].bytes, formats[i][1], strlen(formats[i][1]));
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&medial->base);
+}
+
+static void test_ma_keeps_every_number(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = make_medial(), *read = NULL;
+  const char *const settings[][2] = {{"format", "ma"}, {NULL, NULL}};
+  qmat_file *file = must_write(medial, (wiring){0}, settings);
+  /* qmat_bytes promises 16 readable bytes after the last. */
+  qmat_bytes bytes = {.size = file->parts[0].size, .data = qmat_calloc(file->parts[0].size + 16, 1)};
+  assert_non_null(bytes.data);
+  memcpy(bytes.data, file->parts[0].bytes, bytes.size);
+  assert_int_equal(qmat_ma_read(&context, &bytes, "written.ma", &read), QMAT_OK);
+  assert_memory_equal(&read->base.digest, &medial->base.digest, sizeof read->base.digest);
+  qmat_bytes_uninit(&bytes);
+  qmat_value_release(&read->base);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_compression_of_formats_that_have_none_is_refused(void **state) {
+  (void)state;
+  const qmat_node *node = qmat_node_find("scene.write");
+  static const char *const fields[][2] = {{"draco", "true"}, {"position_bits", "12"}, {"radius_bits", "12"}};
+  for (size_t i = 0; i < 3; i++) {
+    const char *const settings[][2] = {{"format", i ? "ply" : "ma"}, {fields[i][0], fields[i][1]}, {NULL, NULL}};
+    void *params = make_params(node, settings);
+    qmat_context context = {0};
+    assert_int_equal(qmat_params_check(&context, node, params), QMAT_ERROR_USAGE);
+    assert_string_equal(context.error.field, fields[i][0]);
+    free(params);
+    qmat_context_uninit(&context);
+  }
+}
+
+static void test_a_medial_mesh_without_spheres_is_refused(void **state) {
+  (void)state;
+  const qmat_node *node = qmat_node_find("scene.write");
+  qmat_context context = {0};
+  qmat_medial *none = qmat_medial_new();
+  assert_non_null(none);
+  assert_int_equal(qmat_value_seal(&context, &none->base), QMAT_OK);
+  const qmat_value *inputs[4] = {NULL};
+  inputs[qmat_input_find(node, "medial")] = &none->base;
+  qmat_value *outputs[1] = {NULL};
+  void *params = make_params(node, NULL);
+  assert_int_equal(node->run(&context, params, inputs, outputs), QMAT_ERROR_GEOMETRY);
+  assert_null(outputs[0]);
+  free(params);
+  qmat_value_release(&none->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_the_same_inputs_give_the_same_bytes(void **state) {
+  (void)state;
+  qmat_medial *medial = make_medial();
+  qmat_mesh *box = shape_new();
+  shape_add_box(box, 0, 0, 0, 1, 1, 1, false);
+  shape_seal(box);
+  const char *const settings[][2] = {{"draco", "true"}, {NULL, NULL}};
+  qmat_file *a = must_write(medial, (wiring){.skin = box}, settings);
+  qmat_file *b = must_write(medial, (wiring){.skin = box}, settings);
+  assert_memory_equal(&a->base.digest, &b->base.digest, sizeof a->base.digest);
+  qmat_value_release(&a->base);
+  qmat_value_release(&b->base);
+  qmat_value_release(&box->base);
+  qmat_value_release(&medial->base);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_the_report_goes_into_the_extras_as_it_is),
+      cmocka_unit_test(test_quantisation_spends_a_twentieth_of_epsilon_at_most),
+      cmocka_unit_test(test_scene_and_skin_name_and_show_the_node),
+      cmocka_unit_test(test_each_format_is_made),
+      cmocka_unit_test(test_ma_keeps_every_number),
+      cmocka_unit_test(test_compression_of_formats_that_have_none_is_refused),
+      cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),
+      cmocka_unit_test(test_the_same_inputs_give_the_same_bytes),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
