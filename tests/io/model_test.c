@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/model.h"
+
+#include "tests/io/files.h"
+
+static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+static const char obj[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+static const char ply[] =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face "
+    "1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+static const char stl[] =
+    "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+static const char gltf[] =
+    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+    "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,"
+    "1,0]}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
+    "\"nodes\":[0]}],\"scene\":0}";
+
+static char folder[64];
+
+static int set_up(void **state) {
+  (void)state;
+  make_folder(folder);
+  return 0;
+}
+
+static int tear_down(void **state) {
+  (void)state;
+  return rmdir(folder);
+}
+
+static qmat_status read_as(qmat_context *context, const char *name, const void *content, size_t size,
+                           qmat_scene **scene, qmat_mesh **mesh, qmat_report **report) {
+  char path[128];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  write_file(path, content, size);
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  qmat_status status = qmat_model_read(context, path, &options, scene, mesh, report);
+  unlink(path);
+  return status;
+}
+
+static void assert_reads(const char *name, const char *content, const char *format, const char *scene_name) {
+  qmat_context context = {0};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  if (read_as(&context, name, content, strlen(content), &scene, &mesh, &report) != QMAT_OK) {
+    fail_msg("%s: %s", name, context.error.message);
+  }
+  assert_string_equal(scene->format, format);
+  assert_string_equal(scene->name, scene_name);
+  assert_string_equal(json_string_value(json_object_get(report->root, "format")), format);
+  assert_true(scene->base.sealed && mesh->base.sealed && report->base.sealed);
+  static const double positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  static const uint32_t triangle[] = {0, 1, 2};
+  assert_int_equal(mesh->vertex_count, 3);
+  assert_int_equal(mesh->triangle_count, 1);
+  assert_positions(mesh->positions, positions, 9);
+  assert_memory_equal(mesh->triangles, triangle, sizeof triangle);
+  qmat_value_release(&scene->base);
+  qmat_value_release(&mesh->base);
+  qmat_value_release(&report->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_every_format_gives_the_same_triangle(void **state) {
+  (void)state;
+  assert_reads("a.off", off, "off", "a");
+  assert_reads("a.obj", obj, "obj", "a");
+  assert_reads("a.ply", ply, "ply", "a");
+  assert_reads("a.stl", stl, "stl", "a");
+  assert_reads("a.gltf", gltf, "gltf", "a");
+}
+
+static void test_the_bytes_decide_where_the_ending_says_nothing(void **state) {
+  (void)state;
+  assert_reads("a", off, "off", "a");
+  assert_reads("a.b.mesh", ply, "ply", "a.b");
+  assert_reads(".hidden", stl, "stl", ".hidden");
+  assert_reads("A.OFF", off, "off", "A");
+}
+
+static void test_the_ending_decides_where_the_bytes_say_nothing(void **state) {
+  (void)state;
+  assert_reads("a.off", off + 4, "off", "a");
+  assert_reads("a.obj", "newword 1\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "obj", "a");
+}
+
+static void test_a_name_that_is_not_utf8_becomes_valid_utf8(void **state) {
+  (void)state;
+  assert_reads("k\xC3\xA4se.off", off, "off", "k\xC3\xA4se");
+  assert_reads("k\xE4se \xC3.off", off, "off", "k\xEF\xBF\xBDse \xEF\xBF\xBD");
+  assert_reads("\xED\xA0\x80\xF4\x90\x80\x80.off", off, "off",
+               "\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD");
+}
+
+static void assert_not_read(const char *name, const void *content, size_t size, qmat_status expected,
+                            const char *message, const char *hint) {
+  qmat_context context = {0};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  assert_int_equal(read_as(&context, name, content, size, &scene, &mesh, &report), expected);
+  assert_null(scene);
+  assert_null(mesh);
+  assert_null(report);
+  assert_string_equal(context.error.message, message);
+  assert_string_equal(context.error.hint, hint);
+  char path[128];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  assert_string_equal(context.error.file, path);
+  qmat_context_uninit(&context);
+}
+
+static void test_a_wrong_ending_is_an_error_that_says_what_the_file_holds(void **state) {
+  (void)state;
+  static const char rename_it[] = "rename it or convert it";
+  assert_not_read("bunny.off", ply, strlen(ply), QMAT_ERROR_FORMAT, "the name says OFF, but the file holds PLY",
+                  rename_it);
+  assert_not_read("bunny.ply", off, strlen(off), QMAT_ERROR_FORMAT, "the name says PLY, but the file holds OFF",
+                  rename_it);
+  assert_not_read("bunny.stl", obj, strlen(obj), QMAT_ERROR_FORMAT, "the name says STL, but the file holds OBJ",
+                  rename_it);
+  assert_not_read("bunny.glb", gltf, strlen(gltf), QMAT_ERROR_FORMAT,
+                  "the name says binary glTF, but the file holds glTF", rename_it);
+  assert_not_read("bunny.gltf", "glTF\2\0\0\0", 8, QMAT_ERROR_FORMAT,
+                  "the name says glTF, but the file holds binary glTF", rename_it);
+  assert_not_read("bunny.ma", off, strlen(off), QMAT_ERROR_FORMAT, "the name says MA, but the file holds OFF",
+                  rename_it);
+}
+
+static void test_what_is_not_read_is_refused_by_name(void **state) {
+  (void)state;
+  static const char convert[] = "convert the model to glTF",
+                    known[] = "models are read from .off, .obj, .ply, .stl, .gltf and .glb";
+  assert_not_read("a.usda", "#usda 1.0\n", 10, QMAT_ERROR_FORMAT, "USD is not read yet", convert);
+  assert_not_read("a.usd", "PXR-USDC\0\0", 10, QMAT_ERROR_FORMAT, "USD is not read yet", convert);
+  assert_not_read("a.usd", "?", 1, QMAT_ERROR_FORMAT, "USD is not read yet", convert);
+  uint8_t zip[64] = "PK\3\4";
+  zip[26] = 6;
+  memcpy(zip + 30, "a.usdc", 6);
+  assert_not_read("a.usdz", zip, 64, QMAT_ERROR_FORMAT, "USD is not read yet", convert);
+  assert_not_read("a", zip, 64, QMAT_ERROR_FORMAT, "USD is not read yet", convert);
+  zip[30] = zip[33] = 'x';
+  assert_not_read("a.zip", zip, 64, QMAT_ERROR_FORMAT, "archives are not read", known);
+  assert_not_read("a", zip, 5, QMAT_ERROR_FORMAT, "archives are not read", known);
+  assert_not_read("a.txt", "hello", 5, QMAT_ERROR_FORMAT,
+                  "neither the bytes nor the ending of the file show a format that is read", known);
+  assert_not_read("a.ma", "1 0 0\nv 0 0 0 1\n", 16, QMAT_ERROR_FORMAT, "the file holds a medial mesh, not a surface",
+                  "the node medial.read reads it");
+  assert_not_read("a.off", "", 0, QMAT_ERROR_FORMAT, "the file is empty", "");
+}
+
+static void test_a_failure_after_reading_leaves_no_values(void **state) {
+  (void)state;
+  static const char nan[] = "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n";
+  assert_not_read("a.obj", nan, strlen(nan), QMAT_ERROR_GEOMETRY, "the vertex has a coordinate that is not finite", "");
+  assert_not_read("a.obj", "v 0 0 0\n", 8, QMAT_ERROR_GEOMETRY, "the file holds vertices but no facets", "");
+}
+
+static void test_a_medial_mesh_is_read_only_from_its_own_format(void **state) {
+  (void)state;
+  char path[128];
+  qmat_context context = {0};
+  qmat_medial *medial;
+  snprintf(path, sizeof path, "%s/a.ma", folder);
+  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_ERROR_IO);
+  assert_null(medial);
+  write_file(path, "1 0 0\nv 0 0 0 1\n", 16);
+  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_OK);
+  assert_int_equal(medial->sphere_count, 1);
+  qmat_value_release(&medial->base);
+  write_file(path, off, strlen(off));
+  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_ERROR_FORMAT);
+  assert_null(medial);
+  assert_string_equal(context.error.message, "the file holds OFF, not a medial mesh (MA)");
+  unlink(path);
+  qmat_context_uninit(&context);
+}
+
+static void test_looking_at_any_bytes_is_safe(void **state) {
+  (void)state;
+  for (uint64_t round = 0; round < 3000; round++) {
+    static const char *const starts[] = {"PK\3\4", "PK\5\6", "glTF",         "ply", "OFF",
+                                         "#",      "solid",  "\xEF\xBB\xBF", "{",   ""};
+    uint8_t content[100];
+    const char *start = starts[round % 10];
+    const size_t size = strlen(start) + qmat_hash3(8, round, 0) % 60;
+    for (uint64_t i = 0; i < sizeof content; i++) content[i] = (uint8_t)qmat_hash3(9, round, i);
+    memcpy(content, start, strlen(start));
+    qmat_bytes bytes = memory_file(content, size);
+    assert_true(qmat_format_of_bytes(&bytes) < QMAT_FORMAT_COUNT);
+    free(bytes.data);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_every_format_gives_the_same_triangle),
+      cmocka_unit_test(test_the_bytes_decide_where_the_ending_says_nothing),
+      cmocka_unit_test(test_the_ending_decides_where_the_bytes_say_nothing),
+      cmocka_unit_test(test_a_name_that_is_not_utf8_becomes_valid_utf8),
+      cmocka_unit_test(test_a_wrong_ending_is_an_error_that_says_what_the_file_holds),
+      cmocka_unit_test(test_what_is_not_read_is_refused_by_name),
+      cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),
+      cmocka_unit_test(test_a_medial_mesh_is_read_only_from_its_own_format),
+      cmocka_unit_test(test_looking_at_any_bytes_is_safe),
+  };
+  return cmocka_run_group_tests(tests, set_up, tear_down);
+}
