@@ -13,6 +13,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/node.h"
+
 #define LARGEST_FILE ((uint64_t)4 << 30)
 #define PADDING 16
 
@@ -461,33 +463,16 @@ void qmat_put_integer(qmat_writer *writer, int64_t number) {
 }
 
 void qmat_put_number(qmat_writer *writer, double number) {
-  if (isnan(number)) {
-    qmat_put_text(writer, "nan");
-    return;
-  }
-  if (isinf(number)) {
-    qmat_put_text(writer, number < 0 ? "-inf" : "inf");
-    return;
-  }
+  char text[32];
   if (fabs(number) < 1e15 && number == floor(number) && (number != 0 || !signbit(number))) {
     qmat_put_integer(writer, (int64_t)number);
-    return;
+  } else if (isfinite(number)) {
+    qmat_format_number(number, text, sizeof text);
+    if (text[0] == '\0') writer->failed = true;
+    qmat_put_text(writer, text);
+  } else {
+    qmat_put_text(writer, isnan(number) ? "nan" : number < 0 ? "-inf" : "inf");
   }
-  char text[40];
-  locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-  if (plain == (locale_t)0) {
-    writer->failed = true;
-    return;
-  }
-  locale_t before = uselocale(plain);
-  for (int digits = 15; digits <= 17; digits++) {
-    double back = 0;
-    int length = snprintf(text, sizeof text, "%.*g", digits, number);
-    if (qmat_scan_double(text, text + length, &back) && back == number) break;
-  }
-  uselocale(before);
-  freelocale(plain);
-  qmat_put_text(writer, text);
 }
 
 static void put_unsigned(qmat_writer *writer, uint64_t number, unsigned size) {

@@ -109,7 +109,7 @@ typedef struct qmat_writer {
 
 void qmat_put_bytes(qmat_writer *writer, const void *bytes, size_t size);
 void qmat_put_text(qmat_writer *writer, const char *text);
-/* The shortest of 15, 16 or 17 significant digits that reads back as the same number; "nan", "inf" and "-inf". */
+/* The shortest text that reads back as the same number; "nan", "inf" and "-inf". */
 void qmat_put_number(qmat_writer *writer, double number);
 void qmat_put_integer(qmat_writer *writer, int64_t number);
 /* Little-endian binary. */

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/node.h"
 #include "io/mesh_formats.h"
 
 typedef enum scalar { I8, U8, I16, U16, I32, U32, F32, F64, NO_SCALAR } scalar;
@@ -89,8 +90,8 @@ static qmat_status read_element(ply *p) {
   if (is_word(token, length, "vertex")) e->kind = VERTEX;
   if (is_word(token, length, "face")) e->kind = FACE;
   if (is_word(token, length, "tristrips")) e->kind = STRIPS;
-  for (size_t i = 0; i < p->element_count; i++) {
-    if (e->kind != ELSE && p->elements[i].kind == e->kind) {
+  for (size_t i = 0; e->kind != ELSE && i < p->element_count; i++) {
+    if (p->elements[i].kind == e->kind) {
       return qmat_scan_fail(&p->scanner, "the element '%s' is there twice", e->name);
     }
   }
@@ -132,8 +133,8 @@ static qmat_status read_property(ply *p) {
       (is_word(token, length, "vertex_indices") || is_word(token, length, "vertex_index"))) {
     property.role = CORNERS;
   }
-  for (size_t i = e->first_property; i < p->property_count; i++) {
-    if (property.role != OTHER && p->properties[i].role == property.role) {
+  for (size_t i = e->first_property; property.role != OTHER && i < p->property_count; i++) {
+    if (p->properties[i].role == property.role) {
       return qmat_scan_fail(&p->scanner, "the property '%.*s' is there twice", (int)length, token);
     }
   }
@@ -329,8 +330,9 @@ static qmat_status read_list(ply *p, const element *e, uint64_t index, const pro
     if (status != QMAT_OK) return qmat_fail_element(p->context, e->name, (int64_t)index);
     const bool restart = e->kind == STRIPS && number == -1;
     if (!restart && (!(number >= 0 && number < (double)UINT32_MAX) || number != floor(number))) {
-      char message[80];
-      snprintf(message, sizeof message, "the %s names vertex %.9g", e->kind == STRIPS ? "strip" : "facet", number);
+      char message[80], text[32];
+      qmat_format_number(number, text, sizeof text);
+      snprintf(message, sizeof message, "the %s names vertex %s", e->kind == STRIPS ? "strip" : "facet", text);
       return fail_body(p, e, index, message);
     }
     p->corners[i] = restart ? UINT32_MAX : (uint32_t)number;

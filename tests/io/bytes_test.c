@@ -150,7 +150,8 @@ static void test_numbers_are_read_exactly(void **state) {
     const char *bad = ((const char *[]){"", "-", ".", "e5", "+-1", "x"})[i];
     assert_null(qmat_scan_double(bad, bad + strlen(bad), &number));
   }
-  assert_non_null(qmat_scan_double("nan", "nan" + 3, &number));
+  static const char not_a_number[] = "nan";
+  assert_ptr_equal(qmat_scan_double(not_a_number, not_a_number + 3, &number), not_a_number + 3);
   assert_true(isnan(number));
 }
 
@@ -292,7 +293,7 @@ static void check_written_numbers(void) {
   assert_put(0.1 + 0.2, "0.30000000000000004");
   assert_put(1.0 / 3, "0.3333333333333333");
   assert_put(DBL_MAX, "1.7976931348623157e+308");
-  assert_put(5e-324, "4.94065645841247e-324");
+  assert_put(5e-324, "5e-324");
   assert_put(INFINITY, "inf");
   assert_put(-INFINITY, "-inf");
   assert_put(NAN, "nan");

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/model.h"
 
+#include "io/ma.h"
 #include "tests/io/files.h"
 
 static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
@@ -196,6 +197,77 @@ static void test_looking_at_any_bytes_is_safe(void **state) {
   }
 }
 
+/* The linker sends every aligned_alloc of the program here (tests/io/CMakeLists.txt). */
+void *__real_aligned_alloc(size_t alignment, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+static size_t allocations_left = SIZE_MAX;
+
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+  if (allocations_left == 0) return NULL;
+  if (allocations_left != SIZE_MAX) allocations_left--;
+  return __real_aligned_alloc(alignment, size);
+}
+
+static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing(void **state) {
+  (void)state;
+  static const char pentagon[] = "OFF 5 1 0\n0 0 0\n2 0 0\n2 2 0\n1 1 0\n0 2 0\n5 0 1 2 3 4\n";
+  static const struct {
+    const char *name, *content;
+  } files[] = {{"a.off", pentagon}, {"a.obj", obj}, {"a.ply", ply}, {"a.stl", stl}, {"a.gltf", gltf}};
+  for (size_t i = 0; i < 5; i++) {
+    qmat_status status = QMAT_ERROR_MEMORY;
+    size_t granted = 0;
+    for (; status != QMAT_OK; granted++) {
+      qmat_context context = {0};
+      qmat_scene *scene;
+      qmat_mesh *mesh;
+      qmat_report *report;
+      allocations_left = granted;
+      status = read_as(&context, files[i].name, files[i].content, strlen(files[i].content), &scene, &mesh, &report);
+      allocations_left = SIZE_MAX;
+      assert_int_equal(context.error.status, status);
+      if (status != QMAT_OK) {
+        assert_int_equal(status, QMAT_ERROR_MEMORY);
+        assert_true(!scene && !mesh && !report);
+      } else {
+        qmat_value_release(&scene->base);
+        qmat_value_release(&mesh->base);
+        qmat_value_release(&report->base);
+      }
+      qmat_context_uninit(&context);
+    }
+    assert_true(granted > 10);
+  }
+}
+
+static void test_a_shortage_of_memory_while_a_medial_mesh_is_read_written_or_saved_leaks_nothing(void **state) {
+  (void)state;
+  static const char text[] = "3 0 1\nv 0 0 0 1\nv 1 0 0 1\nv 2 0 0 1.5\nf 0 1 2\n";
+  char path[128];
+  snprintf(path, sizeof path, "%s/a.ma", folder);
+  qmat_status status = QMAT_ERROR_MEMORY;
+  for (size_t granted = 0; status != QMAT_OK; granted++) {
+    write_file(path, text, strlen(text));
+    qmat_context context = {0};
+    qmat_medial *medial;
+    qmat_file *file = NULL;
+    allocations_left = granted;
+    status = qmat_medial_read(&context, path, &medial);
+    if (status == QMAT_OK) status = qmat_ma_write(&context, medial, &file);
+    if (status == QMAT_OK) {
+      status = qmat_file_save(&context, file, path);
+    } else {
+      assert_null(file);
+    }
+    allocations_left = SIZE_MAX;
+    if (status != QMAT_OK) assert_true(status == QMAT_ERROR_MEMORY || strstr(context.error.message, "memory"));
+    if (medial) qmat_value_release(&medial->base);
+    if (file) qmat_value_release(&file->base);
+    qmat_context_uninit(&context);
+  }
+  assert_int_equal(unlink(path), 0); /* and nothing else: the folder is removed at the end */
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_format_gives_the_same_triangle),
@@ -207,6 +279,8 @@ int main(void) {
       cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),
       cmocka_unit_test(test_a_medial_mesh_is_read_only_from_its_own_format),
       cmocka_unit_test(test_looking_at_any_bytes_is_safe),
+      cmocka_unit_test(test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing),
+      cmocka_unit_test(test_a_shortage_of_memory_while_a_medial_mesh_is_read_written_or_saved_leaks_nothing),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);
 }
