@@ -292,8 +292,12 @@ static void closest_on_segment(const double a[3], const double b[3], const doubl
   for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
 }
 
-/* The squared distance to a triangle: to its plane where the foot is inside, else to the edges that face the point. */
-static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle, const double point[3],
+/* A plane is surely farther than a distance when its square is larger by this factor. */
+static const double surely_farther = 1 + 1e-9;
+
+/* The squared distance to a triangle: to its plane where the foot is inside, else to the edges that face the point.
+ * INFINITY where the plane alone is farther than the square `enough`. */
+static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle, const double point[3], double enough,
                                   double closest[3]) {
   const uint32_t *ids = surface->mesh->triangles + 3 * (size_t)triangle;
   const double *corners[3];
@@ -301,6 +305,10 @@ static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle
   double normal[3];
   triangle_normal(surface, triangle, normal);
   const double square = dot(normal, normal);
+  double from_corner[3];
+  subtract(point, corners[0], from_corner);
+  const double height = dot(from_corner, normal);
+  if (height * height > surely_farther * enough * square) return INFINITY;
 
   double nearest = INFINITY;
   bool facing = false;
@@ -324,9 +332,6 @@ static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle
     }
   }
   if (facing) return nearest;
-  double to_point[3];
-  subtract(point, corners[0], to_point);
-  const double height = dot(to_point, normal);
   for (int i = 0; i < 3; i++) closest[i] = point[i] - height / square * normal[i];
   return height / square * height;
 }
@@ -343,7 +348,7 @@ typedef struct nearest_query {
 /* Looks at one triangle; true when it is the nearest so far. */
 static bool try_triangle(nearest_query *query, uint32_t triangle) {
   double closest[3];
-  const double square = closest_on_triangle(query->surface, triangle, query->point, closest);
+  const double square = closest_on_triangle(query->surface, triangle, query->point, query->square, closest);
   if (!(square < query->square || (square == query->square && triangle < query->triangle))) return false;
   query->square = square;
   query->triangle = triangle;
@@ -370,7 +375,7 @@ double qmat_surface_distance(const qmat_surface *surface, const double point[3],
   nearest_query query = {.surface = surface,
                          .point = point,
                          .slack = 4 * (double)FLT_EPSILON * (1 + size),
-                         .square = INFINITY,
+                         .square = surely_farther * limit * limit,
                          .triangle = UINT32_MAX};
   if (size < FAR_AWAY) {
     struct RTCPointQueryContext context;

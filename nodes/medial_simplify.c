@@ -271,7 +271,13 @@ static qmat_status fill_heap(simplifier *s) {
   return QMAT_OK;
 }
 
-/* The exact depth of each medial sphere's centre. */
+/* The exact depth at the centre of a medial sphere. Most are inscribed: a look no farther than their radius finds it. */
+static double depth_of(const qmat_surface *surface, const double *sphere) {
+  double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
+  if (!(depth < INFINITY)) depth = qmat_surface_distance(surface, sphere, INFINITY, NULL, NULL);
+  return qmat_surface_inside(surface, sphere) ? depth : -depth;
+}
+
 static qmat_status measure_depths(simplifier *s, double *depths) {
   const size_t count = s->complex.vertex_count, slice = 1 << 15;
   const int threads = qmat_threads(s->context);
@@ -281,7 +287,7 @@ static qmat_status measure_depths(simplifier *s, double *depths) {
     const size_t last = first + slice < count ? first + slice : count;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t v = first; v < last; v++)
-      depths[v] = -qmat_surface_signed_distance(s->surface, &s->complex.spheres[4 * v]);
+      depths[v] = depth_of(s->surface, &s->complex.spheres[4 * v]);
   }
   return QMAT_OK;
 }
@@ -582,7 +588,7 @@ static qmat_status make_report(simplifier *s, const qmat_medial *unit, qmat_repo
       {"refused_by_coverage", s->refused_by_coverage},
       {"refused_by_protrusion", s->refused_by_protrusion},
       {"refused_by_protection", s->refused_by_protection},
-      {"surface_questions", s->protrusion.questions},
+      {"surface_questions", s->protrusion.lattice.questions},
   };
   int bad = 0;
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)

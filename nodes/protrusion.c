@@ -17,13 +17,6 @@ static double minimum(double a, double b) {
   return a < b ? a : b;
 }
 
-/* The depth at a point, given a point of known depth to spare the question of the side. */
-static double ask_depth(const qmat_surface *surface, const double *point, const double *known, double known_depth) {
-  const double d = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
-  if (known && distance(point, known) < known_depth) return d;
-  return qmat_surface_inside(surface, point) ? d : -d;
-}
-
 /* One piece of a primitive: its corners, each with a lower bound of its depth. */
 typedef struct piece {
   double spheres[3][4], depths[3];
@@ -78,48 +71,62 @@ static void split(const piece *p, piece *low, piece *high) {
 }
 
 /* Branch and bound over one primitive: depth first, at most this deep. */
-enum { DEEPEST = 28 };
+enum { DEEPEST = 40 };
 
 typedef struct search {
   const qmat_surface *surface;
-  double accept;   /* a piece with a bound up to this is done */
-  double reject;   /* an h found above this ends the search */
-  double smallest; /* pieces no larger than this are not split */
-  double found;    /* the largest h found */
-  double bound;    /* the largest bound of a finished piece */
-  double tolerance; /* a piece whose bound is this close above `found` is done too */
-  uint64_t questions;
+  qmat_depth_lattice *lattice; /* NULL: every depth is asked of the surface */
+  double content;              /* a piece with a bound up to this is done */
+  double limit;                /* an h above this ends the search */
+  double smallest;             /* pieces no larger than this are not split for a better bound; larger ones are not worth
+                                  a question to the surface where there is a lattice */
+  double found;                /* the largest h found */
+  double bound;                /* the largest bound of a finished piece */
+  double tolerance;            /* a piece whose bound is this close above `found` is done too */
 } search;
 
+static bool is_done(search *s, double bound, double size, bool last) {
+  if (!(bound <= s->content || bound <= s->found + s->tolerance ||
+        (bound <= s->limit && (last || size <= s->smallest))))
+    return false;
+  s->bound = maximum(s->bound, bound);
+  return true;
+}
+
+static bool search_halves(search *s, const piece *p, const double *centre, double depth, int level);
+
 static bool search_piece(search *s, const piece *p, int level) {
-  double bound = bound_from_corners(p);
-  if (bound <= s->accept || bound <= s->found + s->tolerance) {
-    s->bound = maximum(s->bound, bound);
-    return true;
-  }
-  double centre[4] = {0, 0, 0, 0};
+  double centre[4] = {0, 0, 0, 0}, size = 0;
   for (int i = 0; i < p->count; i++)
     for (int k = 0; k < 4; k++) centre[k] += p->spheres[i][k] / p->count;
-  int nearest = 0;
-  for (int i = 1; i < p->count; i++)
-    if (p->depths[i] - distance(p->spheres[i], centre) > p->depths[nearest] - distance(p->spheres[nearest], centre))
-      nearest = i;
-  const double depth = ask_depth(s->surface, centre, p->spheres[nearest], p->depths[nearest]);
-  s->questions++;
+  for (int i = 0; i < p->count; i++) size = maximum(size, distance(p->spheres[i], centre));
+  double bound = bound_from_corners(p);
+  const bool last = p->count == 1 || level == DEEPEST;
+  if (is_done(s, bound, size, last)) return true;
+  double depth = -INFINITY;
+  if (s->lattice) {
+    double gap;
+    const double near = qmat_depth_lattice_near(s->lattice, centre, &gap);
+    if (centre[3] - near - gap > s->limit) return false;
+    depth = near - gap;
+    bound = minimum(bound, bound_from(p, centre, depth));
+    if (is_done(s, bound, size, last)) return true;
+    if (size > s->smallest && !last) return search_halves(s, p, centre, depth, level);
+  }
+  depth = s->lattice ? qmat_depth_lattice_exact(s->lattice, centre) : -qmat_surface_signed_distance(s->surface, centre);
   const double h = centre[3] - depth;
   s->found = maximum(s->found, h);
-  if (h > s->reject) return false;
+  if (h > s->limit) return false;
   bound = minimum(bound, bound_from(p, centre, depth));
-  if (bound <= s->accept || bound <= s->found + s->tolerance) {
+  if (is_done(s, bound, size, last)) return true;
+  if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
     s->bound = maximum(s->bound, bound);
-    return true;
+    return bound <= s->limit;
   }
-  double size = 0;
-  for (int i = 0; i < p->count; i++) size = maximum(size, distance(p->spheres[i], centre));
-  if (p->count == 1 || level == DEEPEST || size <= s->smallest) {
-    s->bound = maximum(s->bound, bound);
-    return bound <= s->reject;
-  }
+  return search_halves(s, p, centre, depth, level);
+}
+
+static bool search_halves(search *s, const piece *p, const double *centre, double depth, int level) {
   piece low, high;
   split(p, &low, &high);
   for (int i = 0; i < p->count; i++) {
@@ -130,31 +137,38 @@ static bool search_piece(search *s, const piece *p, int level) {
 }
 
 double qmat_protrusion_of_sphere(const qmat_surface *surface, const double sphere[4]) {
-  return sphere[3] - ask_depth(surface, sphere, NULL, 0);
+  return sphere[3] + qmat_surface_signed_distance(surface, sphere);
 }
 
 double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,
                              double tolerance) {
   piece p = {.count = count};
   search s = {.surface = surface,
-              .accept = enough,
-              .reject = INFINITY,
+              .content = enough,
+              .limit = INFINITY,
               .smallest = 0.01 * tolerance,
               .found = -INFINITY,
               .bound = enough,
               .tolerance = tolerance};
   for (int i = 0; i < count; i++) {
     memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
-    p.depths[i] = ask_depth(surface, spheres[i], NULL, 0);
+    p.depths[i] = -qmat_surface_signed_distance(surface, spheres[i]);
     s.found = maximum(s.found, spheres[i][3] - p.depths[i]);
   }
   if (count > 1) search_piece(&s, &p, 0);
   return maximum(s.bound, s.found);
 }
 
+/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.22 of the limit away. */
+static const double lattice_share = 0.25, widest_spacing = 0.005;
+
 qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
                                  const qmat_complex *complex, const double *depths, double limit) {
-  *protrusion = (qmat_protrusion){.surface = surface, .limit = limit};
+  *protrusion = (qmat_protrusion){.limit = limit};
+  const double spacing = limit < INFINITY ? lattice_share * limit : widest_spacing;
+  const qmat_status status = qmat_depth_lattice_init(context, &protrusion->lattice, surface,
+                                                     spacing < widest_spacing ? spacing : widest_spacing);
+  if (status != QMAT_OK) return status;
   protrusion->depths = qmat_alloc(complex->vertex_count, sizeof(double));
   protrusion->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
   protrusion->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
@@ -178,6 +192,7 @@ qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrus
 }
 
 void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
+  qmat_depth_lattice_uninit(&protrusion->lattice);
   qmat_free(protrusion->depths);
   qmat_free(protrusion->edge_bounds);
   qmat_free(protrusion->triangle_bounds);
@@ -189,21 +204,15 @@ void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
 bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
                                  const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  double depth = -INFINITY;
-  int nearest = 0;
-  for (int e = 0; e < 2; e++) {
-    const double from =
-        protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]);
-    if (from > depth) {
-      depth = from;
-      nearest = e;
-    }
-  }
+  double depth = -INFINITY, gap;
+  for (int e = 0; e < 2; e++)
+    depth = maximum(depth, protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
   if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
-    depth = ask_depth(protrusion->surface, sphere, &complex->spheres[4 * (size_t)ends[nearest]],
-                      protrusion->depths[ends[nearest]]);
-    protrusion->questions++;
+    const double near = qmat_depth_lattice_near(&protrusion->lattice, sphere, &gap);
+    depth = maximum(depth, near - gap);
   }
+  if (!(depth > 0 && sphere[3] - depth <= protrusion->limit))
+    depth = qmat_depth_lattice_exact(&protrusion->lattice, sphere);
   protrusion->sphere_depth = depth;
   return depth > 0 && sphere[3] - depth <= protrusion->limit;
 }
@@ -214,10 +223,11 @@ bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_comp
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
     const double half = 0.5 * distance(sphere, other);
     if (half < protrusion->sphere_depth || half < protrusion->depths[collapse->neighbours[n]]) continue;
-    double middle[3];
+    double middle[3], gap;
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
-    protrusion->questions++;
-    if (!qmat_surface_inside(protrusion->surface, middle)) return false;
+    const double near = qmat_depth_lattice_near(&protrusion->lattice, middle, &gap);
+    if (near > gap) continue;
+    if (near < -gap || !qmat_surface_inside(protrusion->lattice.surface, middle)) return false;
   }
   return true;
 }
@@ -226,6 +236,9 @@ bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_comp
 static double carry(double bound, const double *from, const double *sphere) {
   return bound + maximum(0, distance(from, sphere) + sphere[3] - from[3]);
 }
+
+/* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
+static const double content_share = 0.5, smallest_share = 0.3;
 
 qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrusion, const qmat_complex *complex,
                                  const qmat_collapse *collapse, const double sphere[4], bool *kept) {
@@ -236,10 +249,10 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
     return qmat_fail_memory(context, "protrusion bounds");
   const double *old_kept = &complex->spheres[4 * (size_t)collapse->kept];
   const double *old_removed = &complex->spheres[4 * (size_t)collapse->removed];
-  search s = {.surface = protrusion->surface,
-              .accept = protrusion->limit,
-              .reject = protrusion->limit,
-              .smallest = 0.02 * protrusion->limit,
+  search s = {.lattice = &protrusion->lattice,
+              .content = content_share * protrusion->limit,
+              .limit = protrusion->limit,
+              .smallest = smallest_share * protrusion->limit,
               .tolerance = 0};
   piece p;
   memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
@@ -273,7 +286,6 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
     }
     *result = bound;
   }
-  protrusion->questions += s.questions;
   return QMAT_OK;
 }
 

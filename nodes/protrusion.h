@@ -2,17 +2,18 @@
 #ifndef QMAT_NODES_PROTRUSION_H
 #define QMAT_NODES_PROTRUSION_H
 
+#include "core/depth_lattice.h"
 #include "core/medial_complex.h"
-#include "core/surface.h"
 
 /* Holds the distance by which the envelope leaves the solid while a medial mesh is simplified.
  *
  * A sphere with centre c and radius r leaves the solid by at most h = r - depth(c), depth being the distance to the
  * surface, negative outside. depth is 1-Lipschitz, so one look at the surface bounds h around it, and bounds of old
  * primitives carry over to their images: when a corner moves to sphere m, h of a primitive at it grows by at most
- * |c_m - c| + r_m - r. The surface is only asked where such bounds pass the limit. */
+ * |c_m - c| + r_m - r. Only where such bounds pass the limit is a primitive searched piece by piece, first among depths
+ * that are remembered on a lattice, then by asking the surface. */
 typedef struct qmat_protrusion {
-  const qmat_surface *surface;
+  qmat_depth_lattice lattice;
   double limit;
   double *depths;          /* per vertex: a lower bound of its depth */
   double *edge_bounds;     /* per edge: an upper bound of h over it */
@@ -21,7 +22,6 @@ typedef struct qmat_protrusion {
   double sphere_depth;
   double *new_edge_bounds, *new_triangle_bounds;
   size_t new_edge_capacity, new_triangle_capacity;
-  uint64_t questions; /* how often the surface was asked */
 } qmat_protrusion;
 
 /* Starts with what is known of the initial medial mesh: `depths` (per vertex, copied) are lower bounds. Bounds of edges

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/depth_lattice.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/hash.h"
+
+enum { FIRST_CAPACITY = 1 << 14 };
+/* 21 bits a coordinate; the offset keeps every key of the lattice above 0. */
+static const double reach = 2;
+static const int64_t key_offset = 1 << 20;
+
+qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *lattice, const qmat_surface *surface,
+                                    double spacing) {
+  /* No finer than the keys can number. */
+  *lattice = (qmat_depth_lattice){.surface = surface, .spacing = fmax(spacing, 4 * reach / (double)key_offset)};
+  lattice->keys = qmat_calloc(FIRST_CAPACITY, sizeof *lattice->keys);
+  lattice->depths = qmat_alloc(FIRST_CAPACITY, sizeof *lattice->depths);
+  if (!lattice->keys || !lattice->depths) return qmat_fail_memory(context, "depths");
+  lattice->capacity = FIRST_CAPACITY;
+  return QMAT_OK;
+}
+
+void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
+  qmat_free(lattice->keys);
+  qmat_free(lattice->depths);
+  *lattice = (qmat_depth_lattice){0};
+}
+
+static size_t find_slot(const uint64_t *keys, size_t capacity, uint64_t key) {
+  size_t slot = (size_t)qmat_hash_mix(key) & (capacity - 1);
+  while (keys[slot] != 0 && keys[slot] != key) slot = (slot + 1) & (capacity - 1);
+  return slot;
+}
+
+/* Doubles the table; when memory is short it stays as it is and simply forgets nothing more. */
+static bool grow(qmat_depth_lattice *lattice) {
+  const size_t capacity = 2 * lattice->capacity;
+  uint64_t *keys = qmat_calloc(capacity, sizeof *keys);
+  double *depths = qmat_alloc(capacity, sizeof *depths);
+  if (!keys || !depths) {
+    qmat_free(keys);
+    qmat_free(depths);
+    return false;
+  }
+  for (size_t i = 0; i < lattice->capacity; i++) {
+    if (lattice->keys[i] == 0) continue;
+    const size_t slot = find_slot(keys, capacity, lattice->keys[i]);
+    keys[slot] = lattice->keys[i];
+    depths[slot] = lattice->depths[i];
+  }
+  qmat_free(lattice->keys);
+  qmat_free(lattice->depths);
+  lattice->keys = keys;
+  lattice->depths = depths;
+  lattice->capacity = capacity;
+  return true;
+}
+
+double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[3]) {
+  lattice->questions++;
+  return -qmat_surface_signed_distance(lattice->surface, point);
+}
+
+double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3], double *distance) {
+  uint64_t key = 0;
+  double node[3], square = 0;
+  for (int k = 0; k < 3; k++) {
+    if (!(fabs(point[k]) <= reach)) {
+      *distance = 0;
+      return qmat_depth_lattice_exact(lattice, point);
+    }
+    const int64_t step = (int64_t)floor(point[k] / lattice->spacing + 0.5);
+    node[k] = (double)step * lattice->spacing;
+    key = key << 21 | (uint64_t)(step + key_offset);
+    square += (point[k] - node[k]) * (point[k] - node[k]);
+  }
+  *distance = sqrt(square);
+  size_t slot = find_slot(lattice->keys, lattice->capacity, key);
+  if (lattice->keys[slot] == key) return lattice->depths[slot];
+  const double depth = qmat_depth_lattice_exact(lattice, node);
+  if (2 * (lattice->count + 1) > lattice->capacity) {
+    if (!grow(lattice)) return depth;
+    slot = find_slot(lattice->keys, lattice->capacity, key);
+  }
+  lattice->keys[slot] = key;
+  lattice->depths[slot] = depth;
+  lattice->count++;
+  return depth;
+}

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_DEPTH_LATTICE_H
+#define QMAT_CORE_DEPTH_LATTICE_H
+
+#include "core/surface.h"
+
+/* Depths (the distance to the surface, negative outside) remembered at the nodes of a cubic lattice, each asked of the
+ * surface when it is first wanted. Depth is 1-Lipschitz, so a node bounds it everywhere around. What it answers depends
+ * on the place alone, never on what was asked before. One thread at a time. */
+typedef struct qmat_depth_lattice {
+  const qmat_surface *surface;
+  double spacing;
+  size_t count, capacity; /* capacity: a power of two */
+  uint64_t *keys;         /* 0: free */
+  double *depths;
+  uint64_t questions; /* how often the surface was asked */
+} qmat_depth_lattice;
+
+/* Starts empty. `spacing` is in the unit frame, at least 1e-6. QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit,
+ * also after a failure. */
+qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *lattice, const qmat_surface *surface,
+                                    double spacing);
+void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice);
+
+/* The depth at the node nearest to `point` (3 doubles, unit frame), and how far that node is. Points beyond the lattice
+ * (farther than 2 diagonals) are asked of the surface themselves. */
+double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3], double *distance);
+
+/* The exact depth at `point`. */
+double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[3]);
+
+#endif
