@@ -4,8 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-enum { LARGEST_BEST_FAN = 64 };
-static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28; /* about a second */
+enum { LARGEST_BEST_FAN = 64, MOST_LOOKS = 64 };
+/* Bounds the time for polygons that cross themselves; what is left of one is then cut without looking. */
+static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28;
 
 /* Twice the signed area of the corners a b c in the plane. */
 static double area(const double *flat, uint32_t a, uint32_t b, uint32_t c) {
@@ -129,7 +130,10 @@ typedef struct ears {
   size_t count;
   uint32_t *next, *previous, *reflex; /* reflex: a list of the corners that may block an ear */
   uint32_t *state;
-  double *shapes;
+  double
+      *worth; /* of cutting a corner off next: its shape, to 24 bits so that equals are equal, ears above all others */
+  uint32_t *best; /* a knock-out among the corners: best[1] wins, best[i] the better of best[2 i] and best[2 i + 1] */
+  size_t leaves;  /* of the knock-out: a power of two; leaf i is corner i */
   size_t reflex_count;
   uint64_t tests_left;
 } ears;
@@ -140,38 +144,70 @@ static bool is_reflex(const ears *e, uint32_t corner) {
   return !(area(e->flat, e->previous[corner], corner, e->next[corner]) > 0);
 }
 
+static double least(double a, double b, double c) {
+  return fmin(a, fmin(b, c));
+}
+
+static double most(double a, double b, double c) {
+  return fmax(a, fmax(b, c));
+}
+
 static bool is_blocked(ears *e, uint32_t a, uint32_t b, uint32_t c) {
-  size_t kept = 0;
-  bool blocked = false;
-  for (size_t i = 0; i < e->reflex_count; i++) {
-    uint32_t p = e->reflex[i];
-    /* A corner that became convex stays convex: it leaves the list. */
-    if (e->state[p] == CUT_OFF || !is_reflex(e, p)) continue;
-    e->reflex[kept++] = p;
-    uint32_t id = e->ids[p];
-    if (blocked || id == e->ids[a] || id == e->ids[b] || id == e->ids[c]) continue;
-    blocked = area(e->flat, a, b, p) >= 0 && area(e->flat, b, c, p) >= 0 && area(e->flat, c, a, p) >= 0;
+  const double *p = e->flat + 2 * (size_t)a, *q = e->flat + 2 * (size_t)b, *r = e->flat + 2 * (size_t)c;
+  const double left = least(p[0], q[0], r[0]), right = most(p[0], q[0], r[0]);
+  const double bottom = least(p[1], q[1], r[1]), top = most(p[1], q[1], r[1]);
+  for (size_t i = 0; i < e->reflex_count && e->tests_left > 0; e->tests_left--) {
+    const uint32_t corner = e->reflex[i];
+    const double *at = e->flat + 2 * (size_t)corner;
+    if (e->state[corner] == CUT_OFF) {
+      e->reflex[i] = e->reflex[--e->reflex_count];
+      continue;
+    }
+    if (at[0] < left || at[0] > right || at[1] < bottom || at[1] > top) {
+      i++;
+      continue;
+    }
+    if (!is_reflex(e, corner)) { /* it became convex, and stays so */
+      e->reflex[i] = e->reflex[--e->reflex_count];
+      continue;
+    }
+    const uint32_t id = e->ids[corner];
+    if (id != e->ids[a] && id != e->ids[b] && id != e->ids[c] && area(e->flat, a, b, corner) >= 0 &&
+        area(e->flat, b, c, corner) >= 0 && area(e->flat, c, a, corner) >= 0) {
+      return true;
+    }
+    i++;
   }
-  e->tests_left = e->tests_left > e->reflex_count ? e->tests_left - e->reflex_count : 0;
-  e->reflex_count = kept;
-  return blocked;
+  return false;
+}
+
+/* The one of greater worth, of equals the first. */
+static uint32_t winner(const ears *e, uint32_t a, uint32_t b) {
+  return b < e->count && e->worth[b] > e->worth[a] ? b : a;
+}
+
+static void replay(ears *e, uint32_t corner) {
+  for (size_t i = (e->leaves + corner) / 2; i > 0; i /= 2) e->best[i] = winner(e, e->best[2 * i], e->best[2 * i + 1]);
+}
+
+static void set_state(ears *e, uint32_t corner, uint32_t state, double worth) {
+  e->state[corner] = state;
+  e->worth[corner] = worth;
 }
 
 static void look_at(ears *e, uint32_t corner) {
   uint32_t a = e->previous[corner], c = e->next[corner];
-  e->shapes[corner] = shape(e->flat, a, corner, c);
-  bool ear = e->shapes[corner] > 0 && (e->tests_left == 0 || !is_blocked(e, a, corner, c));
-  e->state[corner] = ear ? EAR : NO_EAR;
+  double worth = (double)(float)shape(e->flat, a, corner, c); /* within [-0.3, 0.3] */
+  bool ear = worth > 0 && !is_blocked(e, a, corner, c);
+  set_state(e, corner, ear ? EAR : NO_EAR, ear ? worth + 1 : worth);
 }
 
-/* The ear of best shape, or the corner of best shape when `any`; the first of equals; count when there is none. */
-static uint32_t best_corner(const ears *e, bool any) {
-  uint32_t best = (uint32_t)e->count;
+static void look_at_all(ears *e) {
   for (uint32_t i = 0; i < e->count; i++) {
-    if (e->state[i] != EAR && !(any && e->state[i] == NO_EAR)) continue;
-    if (best == e->count || is_better(e->shapes[i], e->shapes[best])) best = i;
+    if (e->state[i] != CUT_OFF) look_at(e, i);
   }
-  return best;
+  for (size_t i = 0; i < e->leaves; i++) e->best[e->leaves + i] = (uint32_t)i;
+  for (size_t i = e->leaves; i-- > 1;) e->best[i] = winner(e, e->best[2 * i], e->best[2 * i + 1]);
 }
 
 static void clip_ears(ears *e, uint32_t *triangles) {
@@ -184,32 +220,26 @@ static void clip_ears(ears *e, uint32_t *triangles) {
   for (uint32_t i = 0; i < count; i++) {
     if (is_reflex(e, i)) e->reflex[e->reflex_count++] = i;
   }
-  for (uint32_t i = 0; i < count; i++) look_at(e, i);
+  look_at_all(e);
 
+  int looks_left = MOST_LOOKS;
   for (size_t left = e->count; left > 3; left--) {
-    uint32_t tip = best_corner(e, false);
-    if (tip == count) {
-      /* What blocked an ear may be gone by now. */
-      for (uint32_t i = 0; i < count; i++) {
-        if (e->state[i] != CUT_OFF) look_at(e, i);
-      }
-      tip = best_corner(e, false);
-    }
-    if (tip == count) tip = best_corner(e, true); /* it crosses itself */
-    uint32_t a = e->previous[tip], c = e->next[tip];
+    /* What blocked an ear may be gone by now. If there is none still, the polygon crosses itself. */
+    if (e->state[e->best[1]] != EAR && looks_left-- > 0) look_at_all(e);
+    uint32_t tip = e->best[1], a = e->previous[tip], c = e->next[tip];
     set_triangle(triangles, a, tip, c);
     triangles += 3;
-    e->state[tip] = CUT_OFF;
+    set_state(e, tip, CUT_OFF, -INFINITY);
     e->next[a] = c;
     e->previous[c] = a;
     look_at(e, a);
     look_at(e, c);
+    replay(e, tip);
+    replay(e, a);
+    replay(e, c);
   }
-  for (uint32_t i = 0; i < count; i++) {
-    if (e->state[i] == CUT_OFF) continue;
-    set_triangle(triangles, e->previous[i], i, e->next[i]);
-    break;
-  }
+  uint32_t last = e->best[1];
+  set_triangle(triangles, e->previous[last], last, e->next[last]);
 }
 
 bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t count, double *flat, uint32_t *links,
@@ -230,6 +260,8 @@ bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t 
     fan(best_fan(flat, count), count, triangles);
     return true;
   }
+  size_t leaves = 4;
+  while (leaves < count) leaves *= 2;
   ears e = {.flat = flat,
             .ids = ids,
             .count = count,
@@ -237,7 +269,9 @@ bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t 
             .previous = links + count,
             .reflex = links + 2 * count,
             .state = links + 3 * count,
-            .shapes = flat + 2 * count,
+            .worth = flat + 2 * count,
+            .best = links + 4 * count,
+            .leaves = leaves,
             .tests_left = MOST_POINT_TESTS};
   clip_ears(&e, triangles);
   return true;

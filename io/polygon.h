@@ -12,7 +12,7 @@ enum { QMAT_LARGEST_CONCAVE_POLYGON = 10000 };
  * the fan of the best-shaped triangles in a small convex polygon, best ear first otherwise. Works in the plane of the
  * polygon's area vector; polygons that are not planar or cross themselves are cut all the same.
  * `points`: 3 * count coordinates, count >= 3; `ids`: what vertex each corner is, so that corners at one vertex do not
- * block each other; `flat` (3 * count) and `links` (4 * count) are scratch; `triangles`: 3 * (count - 2) corner numbers
+ * block each other; `flat` (3 * count) and `links` (8 * count) are scratch; `triangles`: 3 * (count - 2) corner numbers
  * in 0 .. count - 1. False, with nothing written, for a concave polygon of more than QMAT_LARGEST_CONCAVE_POLYGON
  * corners, since its cost is quadratic. Deterministic; no allocation. */
 bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t count, double *flat, uint32_t *links,

@@ -251,7 +251,7 @@ static qmat_status triangulate(conversion *c) {
     total += count - 2;
   }
   uint32_t *ids = qmat_arena_alloc(&c->arena, most, sizeof *ids);
-  uint32_t *links = qmat_arena_alloc(&c->arena, most, 4 * sizeof *links);
+  uint32_t *links = qmat_arena_alloc(&c->arena, most, 8 * sizeof *links);
   uint32_t *cuts = qmat_arena_alloc(&c->arena, most, 3 * sizeof *cuts);
   double *points = qmat_arena_alloc(&c->arena, most, 3 * sizeof *points);
   double *flat = qmat_arena_alloc(&c->arena, most, 3 * sizeof *flat);

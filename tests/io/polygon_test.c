@@ -15,7 +15,7 @@
 /* The triangles of a polygon whose corners are all different vertices. Free with free. */
 static uint32_t *triangulate_ids(const double *points, const uint32_t *ids, size_t count, bool *done) {
   double *flat = malloc(3 * count * sizeof *flat);
-  uint32_t *links = malloc(4 * count * sizeof *links), *own = malloc(count * sizeof *own);
+  uint32_t *links = malloc(8 * count * sizeof *links), *own = malloc(count * sizeof *own);
   uint32_t *triangles = malloc(3 * (count - 2) * sizeof *triangles);
   assert_true(flat && links && own && triangles);
   for (size_t i = 0; i < count; i++) own[i] = (uint32_t)i;
