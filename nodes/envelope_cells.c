@@ -11,8 +11,8 @@ static const double GRADING = 0.5;
 /* Distances are exact to about 1e-15 of the unit frame. */
 static const double SLACK = 1e-12;
 static const double HALF_DIAGONAL = 0.8660254037844387; /* of a cell of size 1 */
-/* Limits on what is held: cells, and entries of their lists. */
-static const size_t MOST_CELLS = (size_t)1 << 25, MOST_ENTRIES = (size_t)1 << 29;
+/* Limits on what is held: cells (about 400 bytes each once they are contoured), and entries of their lists. */
+static const size_t MOST_CELLS = (size_t)1 << 23, MOST_ENTRIES = (size_t)1 << 29;
 /* Children that one thread takes at a time, and list entries between two looks at the progress function. */
 enum { CHUNK_CHILDREN = 64, MOST_CHUNKS = 512 };
 static const size_t BLOCK_ENTRIES = (size_t)1 << 19;
@@ -274,7 +274,8 @@ static qmat_status too_many(qmat_context *context) {
 /* Hands the whole cells of `from` to the result and the others to `next`. */
 static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t *cell_capacity, size_t *list_capacity,
                             const cell_batch *from, cell_batch *next) {
-  if (cells->count + next->count + from->count > MOST_CELLS ||
+  /* Each cell that is still to be halved will become two at the very least. */
+  if (cells->count + 2 * (next->count + from->count) > MOST_CELLS ||
       cells->list_count + next->list_count + from->list_count > MOST_ENTRIES) {
     return too_many(context);
   }

@@ -3,14 +3,7 @@
 #define QMAT_NODES_ENVELOPE_SURFACE_H
 
 #include "core/envelope.h"
-
-/* A triangle surface as plain arrays (qmat_alloc): corner k of triangle t is triangles[3 * t + k], counter-clockwise
- * as seen from outside. */
-typedef struct qmat_skin_triangles {
-  size_t vertex_count, triangle_count;
-  double *positions; /* 3 * vertex_count */
-  uint32_t *triangles;
-} qmat_skin_triangles;
+#include "nodes/skin_triangles.h"
 
 /* What the grid came to. */
 typedef struct qmat_envelope_grid {
@@ -28,9 +21,9 @@ typedef struct qmat_envelope_grid {
  * `spheres` are those that `envelope` was made of, in a frame of about unit size; cells are `base` wide, and halved up
  * to `detail` times where radii are small. Radii below 0.9 of the finest cell are raised to it, so that every primitive
  * leaves a connected trace; isolated spheres of radius 0 are left out.
- * `surface` gets new arrays that the caller frees (also after a failure they may be freed: NULL). QMAT_ERROR_MEMORY,
- * QMAT_ERROR_GEOMETRY when there is no primitive or the cells are too many, QMAT_CANCELLED. Uses all threads; the same
- * bytes for any number of them. */
+ * `surface` gets new arrays that the caller frees; after a failure they may be NULL or not, and are freed the same way.
+ * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY when there is no primitive or the cells are too many, QMAT_CANCELLED. Uses all
+ * threads; the same bytes for any number of them. */
 qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
                                   size_t sphere_count, double base, int detail, qmat_skin_triangles *surface,
                                   qmat_envelope_grid *grid);

@@ -1,0 +1,422 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/envelope.h"
+#include "core/frame.h"
+#include "core/node.h"
+#include "nodes/envelope_surface.h"
+#include "nodes/skin_surface_cgal.h"
+
+/* What CGAL's skin surface is given at most: it takes about 20 seconds for as many. */
+static const size_t MOST_BALLS = 6000;
+/* In the unit frame: no two balls along a primitive are closer than `spacing` of this radius, and smaller ones than the
+ * second enclose nothing worth a ball. */
+static const double SPACING_RADIUS = 2e-3, LEAST_BALL = 1e-6;
+
+enum { METHOD_ENVELOPE, METHOD_SKIN_SURFACE };
+
+typedef struct medial_skin_params {
+  int method;
+  int64_t resolution, detail, subdivisions;
+  double shrink, spacing;
+} medial_skin_params;
+
+typedef struct skin {
+  qmat_context *context;
+  const medial_skin_params *params;
+  const qmat_medial *medial;
+  qmat_frame frame;
+  double *spheres; /* in the unit frame */
+  qmat_envelope *envelope;
+  qmat_skin_triangles surface;
+  qmat_envelope_grid grid;
+  size_t ball_count;
+} skin;
+
+/* Spheres that are the end of an edge. */
+static bool *joined_spheres(const qmat_medial *medial, qmat_arena *arena) {
+  bool *joined = qmat_arena_calloc(arena, medial->sphere_count, sizeof *joined);
+  for (size_t i = 0; joined && i < 2 * medial->edge_count; i++) joined[medial->edges[i]] = true;
+  return joined;
+}
+
+/* The frame of the envelope itself: of every sphere that takes part in it. */
+static qmat_status find_frame(skin *s) {
+  const qmat_medial *medial = s->medial;
+  if (medial->sphere_count == 0) {
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "The medial mesh has no sphere");
+    return qmat_fail_field(s->context, "medial");
+  }
+  const bool *joined = joined_spheres(medial, &s->context->arena);
+  if (!joined) return qmat_fail_memory(s->context, "medial spheres");
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, largest = 0;
+  for (size_t i = 0; i < medial->sphere_count; i++) {
+    const double *sphere = medial->spheres + 4 * i;
+    largest = fmax(largest, sphere[3]);
+    if (!joined[i] && !(sphere[3] > 0)) continue;
+    for (int k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], sphere[k] - sphere[3]);
+      high[k] = fmax(high[k], sphere[k] + sphere[3]);
+    }
+  }
+  if (!(largest > 0)) {
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "Every medial sphere has radius 0: they enclose nothing");
+    return qmat_fail_field(s->context, "medial");
+  }
+  for (int k = 0; k < 3; k++) s->frame.centre[k] = 0.5 * low[k] + 0.5 * high[k];
+  s->frame.diagonal = hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
+  if (!isfinite(s->frame.diagonal) || !isnormal(s->frame.diagonal)) {
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "The medial mesh is too large or too small to measure");
+    return qmat_fail_field(s->context, "medial");
+  }
+  s->spheres = qmat_arena_alloc(&s->context->arena, 4 * medial->sphere_count, sizeof *s->spheres);
+  if (!s->spheres) return qmat_fail_memory(s->context, "medial spheres");
+  qmat_frame_spheres_to_unit(&s->frame, medial->spheres, medial->sphere_count, s->spheres);
+  return QMAT_OK;
+}
+
+typedef struct ball_list {
+  double *balls; /* 4 each */
+  size_t count, capacity;
+  double spacing;
+  bool short_of_memory;
+} ball_list;
+
+/* More than this before doubles and hidden balls are taken out is hopeless. */
+static bool full(const ball_list *list) {
+  return list->short_of_memory || list->count > 16 * MOST_BALLS;
+}
+
+static void add_ball(ball_list *list, const double ball[4]) {
+  if (!(ball[3] > LEAST_BALL)) return;
+  if (qmat_grow((void **)&list->balls, &list->capacity, 4 * (list->count + 1), sizeof *list->balls)) {
+    list->short_of_memory = true;
+    return;
+  }
+  memcpy(list->balls + 4 * list->count++, ball, 4 * sizeof *ball);
+}
+
+static double squared_length(const double a[4], const double b[4]) {
+  double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return x * x + y * y + z * z;
+}
+
+/* Whether two balls on a primitive are close enough for their union to look like what lies between them. */
+static bool close_enough(const ball_list *list, const double a[4], const double b[4]) {
+  double step = list->spacing * fmax(fmin(a[3], b[3]), SPACING_RADIUS);
+  return squared_length(a, b) <= step * step;
+}
+
+/* The same for both orders of the ends, so that neighbours share their balls. */
+static void middle(const double a[4], const double b[4], double m[4]) {
+  for (int k = 0; k < 4; k++) m[k] = 0.5 * (a[k] + b[k]);
+}
+
+/* Balls between the ends of a cone. */
+static void fill_cone(ball_list *list, const double a[4], const double b[4]) {
+  if (full(list) || close_enough(list, a, b)) return;
+  double m[4];
+  middle(a, b, m);
+  add_ball(list, m);
+  fill_cone(list, a, m);
+  fill_cone(list, m, b);
+}
+
+/* Balls between the corners of a slab: halves the longest side that is too long. */
+static void fill_slab(ball_list *list, const double a[4], const double b[4], const double c[4]) {
+  const double *corners[3] = {a, b, c};
+  int longest = -1;
+  double length2 = 0;
+  for (int i = 0; i < 3 && !full(list); i++) {
+    const double *p = corners[i], *q = corners[(i + 1) % 3];
+    double side2 = squared_length(p, q);
+    if (side2 <= length2 || close_enough(list, p, q)) continue;
+    length2 = side2;
+    longest = i;
+  }
+  if (longest < 0) return;
+  const double *p = corners[longest], *q = corners[(longest + 1) % 3], *r = corners[(longest + 2) % 3];
+  double m[4];
+  middle(p, q, m);
+  add_ball(list, m);
+  fill_slab(list, p, m, r);
+  fill_slab(list, m, q, r);
+}
+
+static int by_place(const void *left, const void *right) {
+  const double *a = left, *b = right;
+  for (int k = 0; k < 4; k++) {
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+/* Takes out doubles, and balls inside others. */
+static qmat_status remove_hidden(skin *s, ball_list *list) {
+  qsort(list->balls, list->count, 4 * sizeof *list->balls, by_place);
+  size_t kept = 0;
+  for (size_t i = 0; i < list->count; i++) {
+    if (i > 0 && by_place(list->balls + 4 * i, list->balls + 4 * (i - 1)) == 0) continue;
+    memmove(list->balls + 4 * kept++, list->balls + 4 * i, 4 * sizeof *list->balls);
+  }
+  list->count = kept;
+  if (list->count > 4 * MOST_BALLS) return QMAT_OK; /* too many anyhow */
+  qmat_envelope *all;
+  qmat_status status = qmat_envelope_new(s->context, list->balls, list->count, NULL, 0, NULL, 0, &all);
+  if (status) return status;
+  kept = 0;
+  for (size_t i = 0; i < list->count && !status; i++) {
+    double *ball = list->balls + 4 * i;
+    if (i % 256 == 0) status = qmat_progress(s->context, i, list->count, "balls");
+    /* No ball reaches deeper at its centre than itself, unless it lies within that other one. */
+    if (qmat_envelope_distance(all, ball, NULL) < -ball[3] * (1 + 1e-12)) continue;
+    memmove(list->balls + 4 * kept++, ball, 4 * sizeof *ball);
+  }
+  list->count = kept;
+  qmat_envelope_free(all);
+  return status;
+}
+
+/* The paper's choice. CGAL's skin knows balls only: the cones and slabs are filled with them. */
+static qmat_status make_skin_surface(skin *s) {
+  ball_list list = {.spacing = s->params->spacing};
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < s->medial->sphere_count && !full(&list); i++) add_ball(&list, s->spheres + 4 * i);
+  for (size_t i = 0; i < qmat_envelope_primitive_count(s->envelope) && !full(&list); i++) {
+    uint32_t ids[3];
+    int count = qmat_envelope_primitive(s->envelope, i, ids);
+    const double *ends[3] = {NULL, NULL, NULL};
+    for (int k = 0; k < count; k++) ends[k] = s->spheres + 4 * (size_t)ids[k];
+    if (count == 2) fill_cone(&list, ends[0], ends[1]);
+    if (count == 3) fill_slab(&list, ends[0], ends[1], ends[2]);
+  }
+  if (list.short_of_memory) status = qmat_fail_memory(s->context, "balls");
+  if (!status && !full(&list)) status = remove_hidden(s, &list);
+  if (!status && list.count > MOST_BALLS) {
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
+              "At spacing %g it takes more than %zu balls, too many for a skin surface", list.spacing, MOST_BALLS);
+    qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
+    status = qmat_fail_field(s->context, "spacing");
+  }
+  if (!status) status = qmat_progress(s->context, 0, list.count, "balls");
+  if (!status) {
+    s->ball_count = list.count;
+    status = qmat_skin_surface(s->context, list.balls, list.count, s->params->shrink, (int)s->params->subdivisions,
+                               &s->surface);
+  }
+  qmat_free(list.balls);
+  return status;
+}
+
+static uint32_t find_root(uint32_t *parents, uint32_t i) {
+  while (parents[i] != i) {
+    parents[i] = parents[parents[i]];
+    i = parents[i];
+  }
+  return i;
+}
+
+static qmat_status count_components(skin *s, size_t *components) {
+  const qmat_skin_triangles *surface = &s->surface;
+  uint32_t *parents = qmat_arena_alloc(&s->context->arena, surface->vertex_count, sizeof *parents);
+  if (!parents) return qmat_fail_memory(s->context, "surface vertices");
+  for (size_t i = 0; i < surface->vertex_count; i++) parents[i] = (uint32_t)i;
+  *components = surface->vertex_count;
+  for (size_t i = 0; i < 3 * surface->triangle_count; i++) {
+    uint32_t a = find_root(parents, surface->triangles[i]);
+    uint32_t b = find_root(parents, surface->triangles[i - i % 3]);
+    if (a == b) continue;
+    parents[a > b ? a : b] = a > b ? b : a;
+    --*components;
+  }
+  return QMAT_OK;
+}
+
+/* The largest |F| at the vertices and at the triangles' centroids: how far the mesh strays from the envelope there. */
+static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
+  const qmat_skin_triangles *surface = &s->surface;
+  const int threads = qmat_threads(s->context);
+  const size_t slice = 1 << 15, total = surface->vertex_count + surface->triangle_count;
+  double vertices = 0, centroids = 0;
+  for (size_t begin = 0; begin < total; begin += slice) {
+    const size_t end = total - begin < slice ? total : begin + slice;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : vertices, centroids)
+    for (size_t i = begin; i < end; i++) {
+      if (i < surface->vertex_count) {
+        vertices = fmax(vertices, fabs(qmat_envelope_distance(s->envelope, surface->positions + 3 * i, NULL)));
+        continue;
+      }
+      const uint32_t *t = surface->triangles + 3 * (i - surface->vertex_count);
+      double centroid[3] = {0, 0, 0};
+      for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < 3; k++) centroid[k] += surface->positions[3 * (size_t)t[c] + (size_t)k] / 3;
+      }
+      centroids = fmax(centroids, fabs(qmat_envelope_distance(s->envelope, centroid, NULL)));
+    }
+    qmat_status status = qmat_progress(s->context, end, total, "measured points");
+    if (status) return status;
+  }
+  *at_vertices = vertices;
+  *at_centroids = centroids;
+  return QMAT_OK;
+}
+
+static qmat_status fill_report(skin *s, qmat_report *report) {
+  const qmat_skin_triangles *surface = &s->surface;
+  size_t components = 0;
+  double at_vertices = 0, at_centroids = 0;
+  qmat_status status = count_components(s, &components);
+  if (!status) status = measure(s, &at_vertices, &at_centroids);
+  if (status) return status;
+  json_int_t vertices = (json_int_t)surface->vertex_count, triangles = (json_int_t)surface->triangle_count;
+  bool envelope = s->params->method == METHOD_ENVELOPE;
+  json_t *root = json_pack("{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f}", "method", envelope ? "envelope" : "skin_surface",
+                           "vertices", vertices, "triangles", triangles, "components", (json_int_t)components,
+                           "euler_characteristic", vertices - triangles / 2, "diagonal", s->frame.diagonal,
+                           "error_at_vertices", at_vertices, "error_at_centroids", at_centroids);
+  json_t *details = envelope
+                        ? json_pack("{s:f, s:f, s:f, s:I, s:I, s:f, s:I}", "cell_size", s->grid.base, "cell_size_model",
+                                    s->grid.base * s->frame.diagonal, "finest_cell_size", s->grid.finest, "cells",
+                                    (json_int_t)s->grid.cell_count, "refined_cells",
+                                    (json_int_t)s->grid.refined_cell_count, "smallest_radius", s->grid.smallest_radius,
+                                    "raised_radii", (json_int_t)s->grid.raised_sphere_count)
+                        : json_pack("{s:I}", "balls", (json_int_t)s->ball_count);
+  if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details)) {
+    status = qmat_fail_memory(s->context, "the report");
+  }
+  json_decref(root);
+  json_decref(details);
+  return status;
+}
+
+static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const medial_skin_params *params = raw_params;
+  skin s = {.context = context, .params = params, .medial = (const qmat_medial *)inputs[0]};
+  qmat_mesh *mesh = qmat_mesh_new();
+  qmat_report *report = qmat_report_new();
+  qmat_status status = mesh && report ? QMAT_OK : qmat_fail_memory(context, "the skin");
+  if (!status) status = find_frame(&s);
+  if (!status) {
+    status = qmat_envelope_new(context, s.spheres, s.medial->sphere_count, s.medial->edges, s.medial->edge_count,
+                               s.medial->triangles, s.medial->triangle_count, &s.envelope);
+  }
+  if (!status) {
+    status = params->method == METHOD_ENVELOPE
+                 ? qmat_envelope_surface(context, s.envelope, s.spheres, s.medial->sphere_count,
+                                         1 / (double)params->resolution, (int)params->detail, &s.surface, &s.grid)
+                 : make_skin_surface(&s);
+  }
+  if (!status) status = fill_report(&s, report);
+  if (!status) {
+    qmat_frame_to_model(&s.frame, s.surface.positions, s.surface.vertex_count, s.surface.positions);
+    mesh->vertex_count = s.surface.vertex_count;
+    mesh->triangle_count = s.surface.triangle_count;
+    mesh->positions = s.surface.positions;
+    mesh->triangles = s.surface.triangles;
+    mesh->closed = mesh->oriented = true;
+    s.surface = (qmat_skin_triangles){0};
+    status = qmat_value_seal(context, &mesh->base);
+  }
+  if (!status) status = qmat_value_seal(context, &report->base);
+  qmat_free(s.surface.positions);
+  qmat_free(s.surface.triangles);
+  qmat_envelope_free(s.envelope);
+  if (status) {
+    if (mesh) qmat_value_release(&mesh->base);
+    if (report) qmat_value_release(&report->base);
+    return status;
+  }
+  outputs[0] = &mesh->base;
+  outputs[1] = &report->base;
+  return QMAT_OK;
+}
+
+static const char *const methods[] = {"envelope", "skin_surface", NULL};
+
+static const qmat_param params[] = {
+    {.name = "method",
+     .unit = "",
+     .doc = "The envelope of spheres, cones and slabs itself, or CGAL's skin surface of balls filled into it",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = METHOD_ENVELOPE,
+     .choices = methods,
+     .offset = offsetof(medial_skin_params, method)},
+    {.name = "resolution",
+     .unit = "cells",
+     .doc = "envelope: the largest cells along the diagonal of the envelope's bounding box",
+     .type = QMAT_PARAM_INT,
+     .default_number = 128,
+     .min = 8,
+     .max = 2048,
+     .offset = offsetof(medial_skin_params, resolution)},
+    {.name = "detail",
+     .unit = "halvings",
+     .doc = "envelope: how many times a cell may be halved where the medial radii are small",
+     .type = QMAT_PARAM_INT,
+     .default_number = 3,
+     .min = 0,
+     .max = 6,
+     .offset = offsetof(medial_skin_params, detail)},
+    {.name = "shrink",
+     .unit = "1",
+     .doc = "skin_surface: towards 1 the union of the balls, towards 0 smoother and fuller between them",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.5,
+     .min = 0.05,
+     .max = 0.95,
+     .offset = offsetof(medial_skin_params, shrink)},
+    {.name = "spacing",
+     .unit = "radius",
+     .doc = "skin_surface: the largest step between balls along cones and slabs, relative to their radius",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.5,
+     .min = 0.02,
+     .max = 10,
+     .offset = offsetof(medial_skin_params, spacing)},
+    {.name = "subdivisions",
+     .unit = "steps",
+     .doc = "skin_surface: how often the mesh is refined, each time to four times as many triangles",
+     .type = QMAT_PARAM_INT,
+     .default_number = 1,
+     .min = 0,
+     .max = 4,
+     .offset = offsetof(medial_skin_params, subdivisions)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "A medial mesh"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "Its surface: closed, oriented, normals outwards"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts, topology, and how far the mesh strays from the envelope"},
+    {0},
+};
+
+const qmat_node qmat_node_medial_skin = {
+    .name = "medial.skin",
+    .version = 1,
+    .summary = "Give a medial mesh a surface",
+    .doc =
+        "The method envelope meshes the enveloping volume of the medial spheres, cones and slabs by dual contouring of "
+        "its exact signed distance. Only cells that the surface passes through are looked at; they are halved where "
+        "the "
+        "medial radii are small, so that thin parts neither vanish nor break, and radii below 0.9 of the finest cell "
+        "are raised to it (the report says how many). The mesh is always a closed 2-manifold. The method skin_surface "
+        "is the paper's choice: CGAL's skin surface, which knows balls only, so cones and slabs are filled with balls "
+        "first; it takes two to four milliseconds a ball. The report gives the largest distance from the envelope at "
+        "vertices and at triangle centroids, as a fraction of the diagonal of the envelope's bounding box.",
+    .citation =
+        "section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
+        "Edelsbrunner 1999, Deformable smooth surface design",
+    .params_size = sizeof(medial_skin_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};
