@@ -181,7 +181,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.5 * epsilon};
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.4 * epsilon};
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   uint32_t *parts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *parts);
   answering a = {.mesh = mesh, .complex = complex};

@@ -32,7 +32,7 @@ typedef struct {
 /* Rims and tips hold on to their place by this share of a slab's weight (section 3.1.2, boundary preservation). */
 static const double boundary_weight = 0.01;
 /* Of the wanted error the control points leave this much to the surface between them. */
-static const double control_share = 0.99;
+static const double control_share = 0.98;
 enum { MOST_CONTROL_POINTS = 600000, REPORT_EVERY = 256 };
 
 /* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */

@@ -9,6 +9,7 @@
 #include "core/node.h"
 #include "core/thickness.h"
 #include "core/triangle.h"
+#include "nodes/sample_spacing.h"
 
 #define MOST_PER_FACET 64
 #define MOST_SITES (MOST_PER_FACET + 3)
@@ -21,6 +22,7 @@
 #define AREA_TOLERANCE 1e-9
 
 typedef struct mesh_sample_params {
+  double spacing;
   double theta;
   int64_t n_f;
   int64_t lloyd_rounds;
@@ -35,7 +37,14 @@ typedef struct smallest_areas {
   uint32_t facet[2];
 } smallest_areas;
 
+/* What the spacing adds to eq. 7. */
+typedef struct spaced_points {
+  uint32_t *on_sides; /* 3 per facet: points that it owns on its sides; NULL without a spacing */
+  uint64_t *in_rows;  /* per facet: points in rows, where these are more than eq. 7 asks for, else 0 */
+} spaced_points;
+
 typedef struct sample_counts {
+  size_t by_spacing;
   size_t by_area, by_thickness, thin, capped, degenerate;
   size_t added, dropped;
   double threshold;
@@ -111,8 +120,8 @@ static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_
 
 /* Fills offsets (triangle_count + 1) with where each facet's added samples begin, before the limit on their sum. */
 static qmat_status count_samples(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
-                                 const qmat_field *thickness, const double *areas, uint64_t *offsets,
-                                 sample_counts *counts) {
+                                 const double *unit_positions, const qmat_field *thickness, const double *areas,
+                                 uint64_t *offsets, spaced_points *spaced, sample_counts *counts) {
   double *scratch = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *scratch);
   smallest_areas *at_vertices = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *at_vertices);
   if (scratch == NULL || at_vertices == NULL) return qmat_fail_memory(context, "the areas around vertices");
@@ -125,12 +134,24 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
   }
   const double floor_area = SMALLEST_NEIGHBOUR * median_area(areas, mesh->triangle_count, scratch);
   counts->threshold = qmat_thickness_threshold(thickness, params->theta);
+  if (params->spacing > 0) {
+    spaced->on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *spaced->on_sides);
+    spaced->in_rows = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *spaced->in_rows);
+    if (spaced->on_sides == NULL || spaced->in_rows == NULL) return qmat_fail_memory(context, "the samples");
+    const qmat_status status =
+        qmat_side_points_count(context, mesh, unit_positions, params->spacing, spaced->on_sides);
+    if (status != QMAT_OK) return status;
+  }
 
   offsets[0] = 0;
   for (size_t i = 0; i < mesh->triangle_count; i++) {
     const bool thin = thickness->values[i] <= counts->threshold;
     counts->thin += thin;
     offsets[i + 1] = offsets[i];
+    for (size_t k = 0; k < 3 && spaced->on_sides != NULL; k++) {
+      offsets[i + 1] += spaced->on_sides[3 * i + k];
+      counts->by_spacing += spaced->on_sides[3 * i + k];
+    }
     if (!(areas[i] > 0)) {
       counts->degenerate++;
       continue;
@@ -141,6 +162,18 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
                                              params->max_per_facet + 1);
     const int64_t wanted = by_area + by_thickness;
     const int64_t count = wanted < params->max_per_facet ? wanted : params->max_per_facet;
+    if (spaced->in_rows != NULL) {
+      const uint32_t *ids = mesh->triangles + 3 * i;
+      const uint64_t rows =
+          qmat_row_points_count(unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
+                                unit_positions + 3 * (size_t)ids[2], params->spacing);
+      if (rows > (uint64_t)count) {
+        spaced->in_rows[i] = rows;
+        counts->by_spacing += rows;
+        offsets[i + 1] += rows;
+        continue;
+      }
+    }
     const int64_t kept_thickness = by_thickness < count ? by_thickness : count;
     counts->capped += wanted > count;
     counts->by_thickness += (size_t)kept_thickness;
@@ -281,7 +314,35 @@ static void spread_samples(const mesh_sample_params *params, const double *a, co
   }
 }
 
+/* Places a facet's samples: those on its sides first, then those inside. */
+static void place_samples(const mesh_sample_params *params, const double *unit_positions, const uint32_t *ids,
+                          uint32_t facet, const spaced_points *spaced, size_t count, double *barycentrics) {
+  const double *a = unit_positions + 3 * (size_t)ids[0], *b = unit_positions + 3 * (size_t)ids[1],
+               *c = unit_positions + 3 * (size_t)ids[2];
+  for (int side = 0; side < 3 && spaced->on_sides != NULL; side++) {
+    const size_t wanted = spaced->on_sides[3 * (size_t)facet + (size_t)side];
+    const size_t placed = wanted < count ? wanted : count;
+    qmat_side_points_fill(side, (uint32_t)placed, barycentrics);
+    barycentrics += 3 * placed;
+    count -= placed;
+  }
+  if (count == 0) return;
+  if (spaced->in_rows != NULL && spaced->in_rows[facet] > 0) {
+    qmat_row_points_fill(a, b, c, params->spacing, qmat_hash3((uint64_t)params->seed, facet, 0), count, barycentrics);
+  } else {
+    spread_samples(params, a, b, c, facet, count, barycentrics);
+  }
+}
+
 /* --- the node --------------------------------------------------------------------------------------------------- */
+
+/* A spacing so small that its samples could not be counted is a mistake; limits on the sum are max_samples' work. */
+static qmat_status check(qmat_context *context, const void *raw_params) {
+  const mesh_sample_params *params = raw_params;
+  if (params->spacing == 0 || params->spacing >= 1e-4) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_USAGE, "spacing must be 0 or at least 0.0001 (diagonal)");
+  return qmat_fail_field(context, "spacing");
+}
 
 static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness) {
   if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
@@ -314,7 +375,8 @@ static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh,
 
 /* Adds offsets[i + 1] - offsets[i] samples to each facet, all behind the vertices. */
 static qmat_status sample_facets(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
-                                 const double *unit_positions, const uint64_t *offsets, qmat_samples *samples) {
+                                 const double *unit_positions, const uint64_t *offsets, const spaced_points *spaced,
+                                 qmat_samples *samples) {
   const size_t slice = 65536;
   const int threads = qmat_threads(context);
   for (size_t begin = 0; begin < mesh->triangle_count; begin += slice) {
@@ -324,8 +386,7 @@ static qmat_status sample_facets(qmat_context *context, const mesh_sample_params
       const size_t first = mesh->vertex_count + (size_t)offsets[i], count = (size_t)(offsets[i + 1] - offsets[i]);
       if (count == 0) continue;
       const uint32_t *ids = mesh->triangles + 3 * i;
-      spread_samples(params, unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
-                     unit_positions + 3 * (size_t)ids[2], (uint32_t)i, count, samples->barycentrics + 3 * first);
+      place_samples(params, unit_positions, ids, (uint32_t)i, spaced, count, samples->barycentrics + 3 * first);
       for (size_t s = first; s < first + count; s++) {
         const double *weights = samples->barycentrics + 3 * s;
         samples->facets[s] = (uint32_t)i;
@@ -345,9 +406,9 @@ static qmat_status sample_facets(qmat_context *context, const mesh_sample_params
 static qmat_status fill_report(qmat_context *context, const qmat_mesh *mesh, const sample_counts *counts,
                                qmat_report *report) {
   json_t *root = json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "samples", (json_int_t)(mesh->vertex_count + counts->added),
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "samples", (json_int_t)(mesh->vertex_count + counts->added),
       "vertices", (json_int_t)mesh->vertex_count, "added", (json_int_t)counts->added, "added_by_area",
-      (json_int_t)counts->by_area, "added_by_thickness", (json_int_t)counts->by_thickness, "thin_facets",
+      (json_int_t)counts->by_area, "added_by_spacing", (json_int_t)counts->by_spacing, "added_by_thickness", (json_int_t)counts->by_thickness, "thin_facets",
       (json_int_t)counts->thin, "degenerate_facets", (json_int_t)counts->degenerate, "capped",
       (json_int_t)counts->capped, "dropped", (json_int_t)counts->dropped, "thickness_threshold", counts->threshold);
   if (root == NULL || json_object_update(report->root, root) != 0) {
@@ -383,6 +444,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   double *unit_positions = qmat_arena_alloc(&context->arena, 3 * mesh->vertex_count, sizeof *unit_positions);
   double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
   uint64_t *offsets = qmat_arena_alloc(&context->arena, mesh->triangle_count + 1, sizeof *offsets);
+  spaced_points spaced = {NULL, NULL};
   sample_counts counts = {0};
   qmat_status status = QMAT_OK;
   if (samples == NULL || report == NULL || unit_positions == NULL || areas == NULL || offsets == NULL) {
@@ -391,7 +453,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   }
   status = check_inputs(context, mesh, thickness);
   if (status == QMAT_OK) status = measure_areas(context, mesh, unit_positions, areas);
-  if (status == QMAT_OK) status = count_samples(context, params, mesh, thickness, areas, offsets, &counts);
+  if (status == QMAT_OK) status = count_samples(context, params, mesh, unit_positions, thickness, areas, offsets, &spaced,
+                                                   &counts);
   if (status != QMAT_OK) goto done;
   const uint64_t most = (uint64_t)params->max_samples;
   limit_samples(offsets, mesh->triangle_count, most > mesh->vertex_count ? most - mesh->vertex_count : 0, &counts);
@@ -406,7 +469,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     goto done;
   }
   status = sample_vertices(context, mesh, samples);
-  if (status == QMAT_OK) status = sample_facets(context, params, mesh, unit_positions, offsets, samples);
+  if (status == QMAT_OK) status = sample_facets(context, params, mesh, unit_positions, offsets, &spaced, samples);
   if (status == QMAT_OK) status = fill_report(context, mesh, &counts, report);
   if (status == QMAT_OK) status = qmat_value_seal(context, &samples->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
@@ -422,6 +485,15 @@ done:
 }
 
 static const qmat_param params[] = {
+    {.name = "spacing",
+     .unit = "diagonal",
+     .doc = "Facets and sides that are larger get samples this far apart, whatever eq. 7 says; 0: none",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.02,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = offsetof(mesh_sample_params, spacing)},
     {.name = "theta",
      .unit = "1",
      .doc = "A facet is thin up to this share of the mean thickness (eq. 8)",
@@ -493,7 +565,9 @@ const qmat_node qmat_node_mesh_sample = {
         "Every vertex is a sample. A facet gets as many more as the smallest facet around it fits into it, less one, "
         "and n_f more where it is thin. Neighbours count as at least a thousandth of the median area; degenerate "
         "facets get none and are nobody's neighbours. A single sample lies at the centroid; several start at random "
-        "and are spread by Lloyd's relaxation on the facet's bounded Voronoi diagram, in which the corners stay. The "
+        "and are spread by Lloyd's relaxation on the facet's bounded Voronoi diagram, in which the corners stay. Sides "
+        "longer than the spacing, and facets that would get fewer samples than it asks for, are filled evenly, since "
+        "eq. 7 compares facets only with each other and says nothing to a mesh that is coarse everywhere. The "
         "report counts samples, vertices and added ones; added_by_area and added_by_thickness (before max_samples); "
         "thin and degenerate facets; facets capped by max_per_facet; and samples dropped by max_samples.",
     .citation = "section 3.2, eq. 7 and 8; Tournois et al. 2010",
@@ -501,5 +575,6 @@ const qmat_node qmat_node_mesh_sample = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .check = check,
     .run = run,
 };
