@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* qmat_picture: draws a surface (.off) and its medial mesh (.ma) as one SVG, in parallel projection. The surface is
- * shaded and, where a medial mesh lies in it, see-through; slabs are triangles, cones lines, spheres circles. */
+ * shaded; the medial mesh shines through it: slabs are triangles, cones lines, spheres circles. */
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
@@ -23,7 +23,7 @@ typedef struct mesh {
 typedef struct shape {
   double depth;
   uint32_t index;
-  char kind; /* 'b' back of the surface, 't' slab, 'e' cone, 's' sphere, 'f' front of the surface */
+  char kind; /* 'f' facet of the surface, 't' slab, 'e' cone, 's' sphere */
 } shape;
 
 typedef struct view {
@@ -154,9 +154,7 @@ static bool normal_of(const mesh *m, const uint32_t *t, double n[3]) {
 
 static int compare_shapes(const void *left, const void *right) {
   const shape *a = left, *b = right;
-  /* the back of the surface lies under the medial mesh, its front over it */
-  const int first = a->kind == 'b' ? 0 : a->kind == 'f' ? 2 : 1, second = b->kind == 'b' ? 0 : b->kind == 'f' ? 2 : 1;
-  if (first != second) return first - second;
+  if ((a->kind == 'f') != (b->kind == 'f')) return a->kind == 'f' ? -1 : 1; /* the surface first */
   if (a->depth != b->depth) return a->depth < b->depth ? -1 : 1;
   if (a->kind != b->kind) return a->kind - b->kind;
   return a->index < b->index ? -1 : a->index > b->index;
@@ -186,18 +184,17 @@ static void paint_triangle(FILE *out, const view *v, const mesh *m, const uint32
 }
 
 static void paint(FILE *out, const view *v, const mesh *surface, const mesh *medial, const shape *s) {
-  static const int stone_dark[3] = {96, 110, 128}, stone_bright[3] = {240, 244, 250};
+  static const int stone_dark[2][3] = {{96, 110, 128}, {150, 164, 182}};
+  static const int stone_bright[2][3] = {{240, 244, 250}, {250, 252, 255}};
   static const int slab_dark[3] = {190, 84, 20}, slab_bright[3] = {255, 190, 96};
   double n[3] = {0, 0, 1};
   int colour[3];
-  if (s->kind == 'b' || s->kind == 'f') {
+  if (s->kind == 'f') {
     const uint32_t *t = surface->triangles + 3 * (size_t)s->index;
+    const int pale = medial->vertex_count > 0;
     if (!normal_of(surface, t, n)) return;
-    if (s->kind == 'b') {
-      for (int k = 0; k < 3; k++) n[k] = -n[k];
-    }
-    shade(v, n, stone_dark, stone_bright, colour);
-    paint_triangle(out, v, surface, t, colour, s->kind == 'b' || medial->vertex_count == 0 ? 1 : 0.2);
+    shade(v, n, stone_dark[pale], stone_bright[pale], colour);
+    paint_triangle(out, v, surface, t, colour, 1);
   } else if (s->kind == 't') {
     const uint32_t *t = medial->triangles + 3 * (size_t)s->index;
     if (!normal_of(medial, t, n)) return;
@@ -205,7 +202,7 @@ static void paint(FILE *out, const view *v, const mesh *surface, const mesh *med
       for (int k = 0; k < 3; k++) n[k] = -n[k];
     }
     shade(v, n, slab_dark, slab_bright, colour);
-    paint_triangle(out, v, medial, t, colour, 0.85);
+    paint_triangle(out, v, medial, t, colour, 0.6);
   } else if (s->kind == 'e') {
     const uint32_t *e = medial->edges + 2 * (size_t)s->index;
     double x[2], y[2];
@@ -229,10 +226,8 @@ static shape *collect(const view *v, const mesh *surface, const mesh *medial, bo
   for (uint32_t i = 0; i < surface->triangle_count; i++) {
     const uint32_t *t = surface->triangles + 3 * (size_t)i;
     double normal[3];
-    if (!normal_of(surface, t, normal)) continue;
-    const bool front = along(normal, v->towards) > 0;
-    if (!front && medial->vertex_count == 0) continue;
-    all[n++] = (shape){depth_of(v, surface, t, 3), i, front ? 'f' : 'b'};
+    if (!normal_of(surface, t, normal) || along(normal, v->towards) <= 0) continue;
+    all[n++] = (shape){depth_of(v, surface, t, 3), i, 'f'};
   }
   for (uint32_t i = 0; i < medial->triangle_count; i++) {
     all[n++] = (shape){depth_of(v, medial, medial->triangles + 3 * (size_t)i, 3), i, 't'};
