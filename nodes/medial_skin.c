@@ -9,8 +9,8 @@
 #include "nodes/envelope_surface.h"
 #include "nodes/skin_surface_cgal.h"
 
-/* What CGAL's skin surface is given at most: it takes about 20 seconds for as many. */
-static const size_t MOST_BALLS = 6000;
+/* What CGAL's skin surface is given at most: it may take 45 seconds for as many. */
+static const size_t MOST_BALLS = 3000;
 /* In the unit frame: no two balls along a primitive are closer than `spacing` of this radius, and smaller ones than the
  * second enclose nothing worth a ball. */
 static const double SPACING_RADIUS = 2e-3, LEAST_BALL = 1e-6;
@@ -372,7 +372,7 @@ static const qmat_param params[] = {
      .unit = "radius",
      .doc = "skin_surface: the largest step between balls along cones and slabs, relative to their radius",
      .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.5,
+     .default_number = 0.75,
      .min = 0.02,
      .max = 10,
      .offset = offsetof(medial_skin_params, spacing)},
@@ -380,7 +380,7 @@ static const qmat_param params[] = {
      .unit = "steps",
      .doc = "skin_surface: how often the mesh is refined, each time to four times as many triangles",
      .type = QMAT_PARAM_INT,
-     .default_number = 1,
+     .default_number = 0,
      .min = 0,
      .max = 4,
      .offset = offsetof(medial_skin_params, subdivisions)},
@@ -409,7 +409,7 @@ const qmat_node qmat_node_medial_skin = {
         "medial radii are small, so that thin parts neither vanish nor break, and radii below 0.9 of the finest cell "
         "are raised to it (the report says how many). The mesh is always a closed 2-manifold. The method skin_surface "
         "is the paper's choice: CGAL's skin surface, which knows balls only, so cones and slabs are filled with balls "
-        "first; it takes two to four milliseconds a ball. The report gives the largest distance from the envelope at "
+        "first; it takes 3 to 15 milliseconds a ball. The report gives the largest distance from the envelope at "
         "vertices and at triangle centroids, as a fraction of the diagonal of the envelope's bounding box.",
     .citation =
         "section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "

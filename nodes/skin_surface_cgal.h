@@ -15,8 +15,8 @@ extern "C" {
  * convex hull. `subdivisions` steps refine the mesh, each to four times as many triangles, new vertices on the skin.
  * `surface` gets new arrays, vertices and triangles sorted by position, that the caller frees; on failure both are
  * NULL. QMAT_ERROR_MEMORY; QMAT_ERROR_DEPENDENCY with CGAL's text; QMAT_ERROR_GEOMETRY when the skin is not closed. One
- * thread. It cannot be cancelled, and takes two to four milliseconds a ball. Sizes are meant to
- * be around 1: points lie on the skin to about 1e-7. */
+ * thread. It cannot be cancelled, and takes 3 to 15 milliseconds a ball (in line they are the slowest). Sizes are meant
+ * to be around 1: points lie on the skin to about 1e-7. */
 qmat_status qmat_skin_surface(qmat_context *context, const double *balls, size_t count, double shrink, int subdivisions,
                               qmat_skin_triangles *surface);
 

@@ -326,7 +326,7 @@ static void test_every_soup_of_primitives_is_a_closed_manifold(void **unused) {
   (void)unused;
   qmat_context context = {0};
   /* Coarse cells: many sheets to a cell, and jumps in cell size. */
-  static const char *const settings[] = {"resolution=8 detail=0",  "resolution=16 detail=2", "resolution=12 detail=5",
+  static const char *const settings[] = {"resolution=8 detail=0",  "resolution=16 detail=2", "resolution=12 detail=4",
                                          "resolution=40 detail=1", "resolution=33 detail=3", "resolution=64 detail=0"};
   for (uint64_t seed = 0; seed < 24; seed++) {
     qmat_medial *medial = soup(seed);
@@ -430,7 +430,7 @@ static void test_size_and_place_do_not_matter(void **unused) {
 
 static void test_the_bytes_do_not_depend_on_threads(void **unused) {
   (void)unused;
-  static const char *const settings[] = {"resolution=60 detail=3", "method=skin_surface spacing=1.5 subdivisions=0"};
+  static const char *const settings[] = {"resolution=40 detail=3", "method=skin_surface spacing=1.5 subdivisions=0"};
   for (int method = 0; method < 2; method++) {
     qmat_digest mesh, report;
     for (int i = 0; i < 4; i++) {
