@@ -116,8 +116,11 @@ static void take_star(const qmat_complex *complex, const double *point, uint32_t
 }
 
 /* A point is content with a sphere that comes this close, as a part of epsilon; else it looks at the primitives around,
- * and when those are farther than the second part it asks the whole envelope. */
-static const double content_with_sphere = 0.1, content_with_star = 0.5;
+ * and when those are farther than the second part it asks the whole medial mesh. */
+static const double content_with_sphere = 0.1, content_with_star = 0.9;
+
+/* About a second of looks at single spheres: more far points than that are worth a search structure. */
+static const size_t most_sphere_looks = 1000000000;
 
 static void store(qmat_control_points *control, size_t i, const witness *w) {
   memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
@@ -135,12 +138,41 @@ static void look_around(const answering *a, const double *point, const uint32_t 
       take_star(a->complex, point, a->spheres[i], best);
 }
 
-/* The nearest primitive of all, for the points that the regions leave far from their spheres. */
+static bool is_far(const qmat_control_points *control, size_t i, double epsilon) {
+  return !(control->distances[i] <= content_with_star * epsilon);
+}
+
+static size_t count_far(const qmat_control_points *control, double epsilon) {
+  size_t far = 0;
+  for (size_t i = 0; i < control->count; i++) far += is_far(control, i, epsilon);
+  return far;
+}
+
+/* For the points that the regions leave far from their spheres: the primitives at the spheres that are nearest of all,
+ * within epsilon. Cheaper than a search structure over a dense medial mesh while the points are few. */
+static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
+                            qmat_control_points *control) {
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1024)
+  for (size_t i = 0; i < control->count; i++) {
+    if (!is_far(control, i, epsilon)) continue;
+    const double *p = &control->points[3 * i];
+    witness best = {.distance = control->distances[i]};
+    memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
+    memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
+    double least = INFINITY;
+    for (size_t v = 0; v < complex->vertex_count; v++)
+      least = fmin(least, qmat_sphere_distance(&complex->spheres[4 * v], p));
+    for (size_t v = 0; v < complex->vertex_count; v++)
+      if (qmat_sphere_distance(&complex->spheres[4 * v], p) <= least + epsilon)
+        take_star(complex, p, (uint32_t)v, &best);
+    store(control, i, &best);
+  }
+}
+
+/* The same for many points: the nearest primitive of all. */
 static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double epsilon,
                                 qmat_control_points *control) {
-  size_t far = 0;
-  for (size_t i = 0; i < control->count; i++) far += !(control->distances[i] <= content_with_star * epsilon);
-  if (far == 0) return QMAT_OK;
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_new(context, complex->spheres, complex->vertex_count, complex->edges,
                                          complex->edge_count, complex->triangles, complex->triangle_count, &envelope);
@@ -148,7 +180,7 @@ static qmat_status ask_envelope(qmat_context *context, const qmat_complex *compl
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
   for (size_t i = 0; i < control->count; i++) {
-    if (control->distances[i] <= content_with_star * epsilon) continue;
+    if (!is_far(control, i, epsilon)) continue;
     const double *p = &control->points[3 * i];
     size_t primitive;
     witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
@@ -224,5 +256,9 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       store(control, i, &best);
     }
   }
-  return ask_envelope(context, complex, epsilon, control);
+  const size_t far = count_far(control, epsilon);
+  if (far == 0) return QMAT_OK;
+  if (far * complex->vertex_count > most_sphere_looks) return ask_envelope(context, complex, epsilon, control);
+  ask_all_spheres(context, complex, epsilon, control);
+  return QMAT_OK;
 }

@@ -47,14 +47,20 @@ static double bound_from_corners(const piece *p) {
   return bound;
 }
 
+/* Halves a piece across its longest side. What is known of the depth at its corners is not carried on: the centres of
+ * the halves say more. */
 static void split(const piece *p, piece *low, piece *high) {
   int a = 0, b = 1;
   if (p->count == 3) {
     double longest = -1;
     for (int i = 0; i < 3; i++) {
-      const double length = distance(p->spheres[i], p->spheres[(i + 1) % 3]);
-      if (length > longest) {
-        longest = length;
+      double square = 0;
+      for (int k = 0; k < 3; k++) {
+        const double d = p->spheres[i][k] - p->spheres[(i + 1) % 3][k];
+        square += d * d;
+      }
+      if (square > longest) {
+        longest = square;
         a = i;
         b = (i + 1) % 3;
       }
@@ -62,12 +68,9 @@ static void split(const piece *p, piece *low, piece *high) {
   }
   double middle[4];
   for (int k = 0; k < 4; k++) middle[k] = 0.5 * (p->spheres[a][k] + p->spheres[b][k]);
-  const double half = 0.5 * distance(p->spheres[a], p->spheres[b]);
-  const double depth = maximum(p->depths[a], p->depths[b]) - half;
   *low = *high = *p;
   memcpy(low->spheres[b], middle, sizeof middle);
   memcpy(high->spheres[a], middle, sizeof middle);
-  low->depths[b] = high->depths[a] = depth;
 }
 
 /* Branch and bound over one primitive: depth first, at most this deep. */
@@ -93,46 +96,40 @@ static bool is_done(search *s, double bound, double size, bool last) {
   return true;
 }
 
-static bool search_halves(search *s, const piece *p, const double *centre, double depth, int level);
-
 static bool search_piece(search *s, const piece *p, int level) {
-  double centre[4] = {0, 0, 0, 0}, size = 0;
+  double centre[4] = {0, 0, 0, 0}, size = 0, farthest = -INFINITY;
+  const double share = 1.0 / p->count;
   for (int i = 0; i < p->count; i++)
-    for (int k = 0; k < 4; k++) centre[k] += p->spheres[i][k] / p->count;
-  for (int i = 0; i < p->count; i++) size = maximum(size, distance(p->spheres[i], centre));
-  double bound = bound_from_corners(p);
+    for (int k = 0; k < 4; k++) centre[k] += share * p->spheres[i][k];
+  for (int i = 0; i < p->count; i++) {
+    const double d = distance(p->spheres[i], centre);
+    size = maximum(size, d);
+    farthest = maximum(farthest, p->spheres[i][3] + d);
+  }
+  /* h over the piece is at most `farthest` less the depth at the centre: convex, so largest at a corner. */
   const bool last = p->count == 1 || level == DEEPEST;
-  if (is_done(s, bound, size, last)) return true;
-  double depth = -INFINITY;
+  bool ask = true;
   if (s->lattice) {
     double gap;
     const double near = qmat_depth_lattice_near(s->lattice, centre, &gap);
     if (centre[3] - near - gap > s->limit) return false;
-    depth = near - gap;
-    bound = minimum(bound, bound_from(p, centre, depth));
-    if (is_done(s, bound, size, last)) return true;
-    if (size > s->smallest && !last) return search_halves(s, p, centre, depth, level);
+    if (is_done(s, farthest - near + gap, size, last)) return true;
+    ask = size <= s->smallest || last;
   }
-  depth = s->lattice ? qmat_depth_lattice_exact(s->lattice, centre) : -qmat_surface_signed_distance(s->surface, centre);
-  const double h = centre[3] - depth;
-  s->found = maximum(s->found, h);
-  if (h > s->limit) return false;
-  bound = minimum(bound, bound_from(p, centre, depth));
-  if (is_done(s, bound, size, last)) return true;
-  if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
-    s->bound = maximum(s->bound, bound);
-    return bound <= s->limit;
+  if (ask) {
+    const double depth =
+        s->lattice ? qmat_depth_lattice_exact(s->lattice, centre) : -qmat_surface_signed_distance(s->surface, centre);
+    const double h = centre[3] - depth;
+    s->found = maximum(s->found, h);
+    if (h > s->limit) return false;
+    if (is_done(s, farthest - depth, size, last)) return true;
+    if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
+      s->bound = maximum(s->bound, farthest - depth);
+      return farthest - depth <= s->limit;
+    }
   }
-  return search_halves(s, p, centre, depth, level);
-}
-
-static bool search_halves(search *s, const piece *p, const double *centre, double depth, int level) {
   piece low, high;
   split(p, &low, &high);
-  for (int i = 0; i < p->count; i++) {
-    low.depths[i] = maximum(low.depths[i], depth - distance(low.spheres[i], centre));
-    high.depths[i] = maximum(high.depths[i], depth - distance(high.spheres[i], centre));
-  }
   return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
 }
 

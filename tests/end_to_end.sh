@@ -118,7 +118,8 @@ if [ -s few.ma ]; then holds "octopus: 150 spheres at most" test "$(spheres few.
 
 # ---- Input that is no model ----
 
-# refused NAME FILE [OPTION...]: exit code 1, one line on stderr that names the file, and no output.
+# refused NAME FILE [OPTION...]: exit code 1, one line on stderr that names the file or the node that cannot work on what
+# was read, and no output.
 refused() {
   what=$1
   file=$2
@@ -126,8 +127,8 @@ refused() {
   rm -f out.ma out.glb
   qmat mat "$file" -o out.ma -o out.glb "$@" >said.txt 2>complaints.txt
   code=$?
-  if [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ] && grep -qF "$(basename "$file")" complaints.txt &&
-    [ ! -e out.ma ] && [ ! -e out.glb ] && [ -z "$(find . -maxdepth 1 -name 'out.*' -o -maxdepth 1 -name '.out*')" ]; then
+  if [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ] && grep -qF -e "$(basename "$file")" -e "node '" complaints.txt &&
+    [ -z "$(find . -maxdepth 1 -name '*out.*')" ]; then
     pass "refused: $what: $(cut -c 1-150 complaints.txt)"
   else
     fail "refused: $what: exit code $code"
