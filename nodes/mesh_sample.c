@@ -188,9 +188,8 @@ static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, 
   const uint64_t wanted = offsets[facet_count];
   if (wanted > room) {
     /* Rounding the running sum, not each count, keeps the share also where every facet wants a single sample. */
-    const double share = (double)room / (double)wanted;
     for (size_t i = 0; i <= facet_count; i++) {
-      const uint64_t scaled = (uint64_t)floor((double)offsets[i] * share);
+      const uint64_t scaled = (uint64_t)floor((double)offsets[i] * (double)room / (double)wanted);
       offsets[i] = scaled < room ? scaled : room;
     }
   }

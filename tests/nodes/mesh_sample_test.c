@@ -19,10 +19,11 @@ typedef struct result {
   qmat_report *report;
 } result;
 
-/* "name=value name=value", or "". */
+/* "name=value name=value", or "". Without a spacing unless the text gives one: most tests are of eq. 7 alone. */
 static void set_params(qmat_context *context, const char *text, void *params) {
   const qmat_node *node = &qmat_node_mesh_sample;
   qmat_params_default(node, params);
+  assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "spacing"), "0", params), QMAT_OK);
   char copy[256];
   assert_true(strlen(text) < sizeof copy);
   memcpy(copy, text, strlen(text) + 1);
@@ -84,8 +85,9 @@ static void check_samples(const qmat_mesh *mesh, const result *made) {
   assert_int_equal(reported(made, "samples"), samples->count);
   assert_int_equal(reported(made, "vertices"), mesh->vertex_count);
   assert_int_equal(reported(made, "added"), samples->count - mesh->vertex_count);
-  assert_int_equal(reported(made, "added_by_area") + reported(made, "added_by_thickness"),
-                   reported(made, "added") + reported(made, "dropped"));
+  assert_int_equal(
+      reported(made, "added_by_area") + reported(made, "added_by_thickness") + reported(made, "added_by_spacing"),
+      reported(made, "added") + reported(made, "dropped"));
   for (size_t i = 0; i < samples->count; i++) {
     const double *weights = samples->barycentrics + 3 * i;
     const uint32_t *ids = mesh->triangles + 3 * (size_t)samples->facets[i];
@@ -490,6 +492,133 @@ static void test_threads_do_not_change_a_byte_and_the_seed_does(void **state) {
   qmat_value_release(&mesh->base);
 }
 
+/* The distance from a point to the nearest sample. */
+static double nearest_sample(const qmat_samples *samples, const double point[3]) {
+  double least = INFINITY;
+  for (size_t i = 0; i < samples->count; i++) {
+    double square = 0;
+    for (size_t k = 0; k < 3; k++)
+      square += (point[k] - samples->positions[3 * i + k]) * (point[k] - samples->positions[3 * i + k]);
+    least = fmin(least, square);
+  }
+  return sqrt(least);
+}
+
+static void test_spacing_fills_a_coarse_box_evenly(void **state) {
+  (void)state;
+  /* A cube with the diagonal 1: sides of 1 / sqrt(3), diagonals of sqrt(2 / 3). */
+  const double side = 1 / sqrt(3.0), spacing = 0.1;
+  qmat_mesh *mesh = shape_seal(shape_box(side, side, side));
+  qmat_field *thickness = field_of(12, NULL, 1);
+  result made = sample(mesh, thickness, "spacing=0.1 theta=0.5");
+  const qmat_samples *samples = made.samples;
+  assert_int_equal(reported(&made, "added_by_spacing"), reported(&made, "added"));
+  /* 12 sides of ceil(5.77) - 1 = 5 points and 6 diagonals of ceil(8.16) - 1 = 8, each once. */
+  size_t on_sides = 0;
+  for (size_t i = 8; i < samples->count; i++) {
+    bool zero = false;
+    for (size_t k = 0; k < 3; k++) zero |= samples->barycentrics[3 * i + k] == 0;
+    on_sides += zero;
+  }
+  assert_int_equal(on_sides, 12 * 5 + 6 * 8);
+  /* No two samples in one place, and none farther than the spacing from any point of the surface. */
+  for (size_t i = 0; i < samples->count; i++)
+    for (size_t j = 0; j < i; j++) {
+      double square = 0;
+      for (size_t k = 0; k < 3; k++)
+        square += pow(samples->positions[3 * i + k] - samples->positions[3 * j + k], 2);
+      assert_true(sqrt(square) > 0.2 * spacing);
+    }
+  for (int i = 0; i <= 40; i++)
+    for (int j = 0; j <= 40; j++)
+      for (int s = 0; s < 6; s++) {
+        double point[3];
+        point[s / 2] = s % 2 ? side : 0;
+        point[(s / 2 + 1) % 3] = side * i / 40;
+        point[(s / 2 + 2) % 3] = side * j / 40;
+        assert_true(nearest_sample(samples, point) < 0.75 * spacing);
+      }
+  release(&made);
+  qmat_value_release(&thickness->base);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_spacing_adds_nothing_to_a_fine_mesh(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_seal(shape_torus(1, 0.3, 60, 30)); /* sides up to 0.16 of a diagonal of 3.7 */
+  qmat_field *thickness = field_of(3600, NULL, 1);
+  result without = sample(mesh, thickness, "theta=0.5"), with = sample(mesh, thickness, "theta=0.5 spacing=0.05");
+  assert_int_equal(reported(&with, "added_by_spacing"), 0);
+  assert_memory_equal(&without.samples->base.digest, &with.samples->base.digest, sizeof(qmat_digest));
+  release(&without);
+  release(&with);
+  qmat_value_release(&thickness->base);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_spacing_never_takes_samples_of_equation_seven_away(void **state) {
+  (void)state;
+  /* A large facet beside small ones gets 64 by its area; the spacing asks for fewer. */
+  static const double areas[3] = {1, 1, 0.02};
+  qmat_mesh *mesh = fan(areas, 3);
+  qmat_field *thickness = field_of(3, NULL, 1);
+  result without = sample(mesh, thickness, "theta=0.5"), with = sample(mesh, thickness, "theta=0.5 spacing=0.2");
+  assert_int_equal(reported(&with, "added_by_area"), reported(&without, "added_by_area"));
+  for (uint32_t i = 0; i < 3; i++) assert_true(count_on(with.samples, i) >= count_on(without.samples, i));
+  release(&without);
+  release(&with);
+  qmat_value_release(&thickness->base);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_spacing_is_a_share_of_the_diagonal(void **state) {
+  (void)state;
+  qmat_field *thickness = field_of(12, NULL, 1);
+  size_t counts[3];
+  for (int variant = 0; variant < 3; variant++) {
+    qmat_mesh *mesh = shape_box(1, 2, 3);
+    if (variant == 1) shape_map(mesh, 1e-6, 1, 2, 3);
+    if (variant == 2) shape_map(mesh, 1e6, 0, 0, 0);
+    shape_seal(mesh);
+    result made = sample(mesh, thickness, "spacing=5% theta=0.5");
+    counts[variant] = made.samples->count;
+    assert_true(counts[variant] > 300);
+    assert_int_equal(counts[variant], counts[0]);
+    release(&made);
+    qmat_value_release(&mesh->base);
+  }
+  qmat_value_release(&thickness->base);
+}
+
+static void test_limit_on_samples_holds_for_spaced_ones_too(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_seal(shape_box(1, 1, 1));
+  qmat_field *thickness = field_of(12, NULL, 1);
+  result all = sample(mesh, thickness, "spacing=0.02 theta=0.5");
+  result made = sample(mesh, thickness, "spacing=0.02 theta=0.5 max_samples=500");
+  assert_int_equal(made.samples->count, 500);
+  assert_int_equal(reported(&made, "dropped"), all.samples->count - 500);
+  for (uint32_t i = 0; i < 12; i++) assert_true(count_on(made.samples, i) >= 25);
+  release(&all);
+  release(&made);
+  qmat_value_release(&thickness->base);
+  qmat_value_release(&mesh->base);
+}
+
+static void test_spacing_below_a_ten_thousandth_is_refused(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  double params[16];
+  set_params(&context, "spacing=0.00009", params);
+  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.field, "spacing");
+  set_params(&context, "spacing=0.0001", params);
+  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_OK);
+  set_params(&context, "spacing=0", params);
+  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_OK);
+  qmat_context_uninit(&context);
+}
+
 static void expect_error(const qmat_mesh *mesh, const qmat_field *thickness, const char *field, int64_t element) {
   qmat_context context = {0};
   result made;
@@ -564,6 +693,12 @@ int main(void) {
       cmocka_unit_test(test_lloyd_comes_to_rest_at_centroids),
       cmocka_unit_test(test_rotation_scale_and_vertex_order_keep_the_counts),
       cmocka_unit_test(test_threads_do_not_change_a_byte_and_the_seed_does),
+      cmocka_unit_test(test_spacing_fills_a_coarse_box_evenly),
+      cmocka_unit_test(test_spacing_adds_nothing_to_a_fine_mesh),
+      cmocka_unit_test(test_spacing_never_takes_samples_of_equation_seven_away),
+      cmocka_unit_test(test_spacing_is_a_share_of_the_diagonal),
+      cmocka_unit_test(test_limit_on_samples_holds_for_spaced_ones_too),
+      cmocka_unit_test(test_spacing_below_a_ten_thousandth_is_refused),
       cmocka_unit_test(test_bad_inputs_are_named),
       cmocka_unit_test(test_progress_function_cancels),
   };
