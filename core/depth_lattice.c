@@ -63,6 +63,23 @@ double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[
   return -qmat_surface_signed_distance(lattice->surface, point);
 }
 
+/* The depth at a node. A neighbour that is known tells how far to look. */
+static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
+  static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};
+  for (int k = 0; k < 3; k++)
+    for (int sign = 0; sign < 2; sign++) {
+      const uint64_t neighbour = sign ? key + steps[k] : key - steps[k];
+      const size_t slot = find_slot(lattice->keys, lattice->capacity, neighbour);
+      if (lattice->keys[slot] != neighbour) continue;
+      const double limit = (fabs(lattice->depths[slot]) + lattice->spacing) * (1 + 1e-9);
+      const double distance = qmat_surface_distance(lattice->surface, node, limit, NULL, NULL);
+      if (!(distance < INFINITY)) continue;
+      lattice->questions++;
+      return qmat_surface_inside(lattice->surface, node) ? distance : -distance;
+    }
+  return qmat_depth_lattice_exact(lattice, node);
+}
+
 double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3], double *distance) {
   uint64_t key = 0;
   double node[3], square = 0;
@@ -79,7 +96,7 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
   *distance = sqrt(square);
   size_t slot = find_slot(lattice->keys, lattice->capacity, key);
   if (lattice->keys[slot] == key) return lattice->depths[slot];
-  const double depth = qmat_depth_lattice_exact(lattice, node);
+  const double depth = ask_node(lattice, key, node);
   if (2 * (lattice->count + 1) > lattice->capacity) {
     if (!grow(lattice)) return depth;
     slot = find_slot(lattice->keys, lattice->capacity, key);

@@ -361,6 +361,57 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
   return node->check != NULL ? node->check(context, params) : QMAT_OK;
 }
 
+static qmat_status check_inputs(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[]) {
+  for (size_t i = 0; i < qmat_input_count(node); ++i) {
+    const qmat_port *port = &node->inputs[i];
+    const qmat_value *value = inputs[i];
+    if (value == NULL && port->optional) continue;
+    if (value != NULL && value->sealed && value->type == port->type) continue;
+    if (value == NULL) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "a %s must be given", qmat_value_type_name(port->type));
+    } else if (value->type != port->type) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "a %s is given, not a %s", qmat_value_type_name(value->type),
+                qmat_value_type_name(port->type));
+    } else {
+      qmat_fail(context, QMAT_ERROR_USAGE, "the %s is not sealed", qmat_value_type_name(port->type));
+    }
+    return qmat_fail_field(context, port->name);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status check_outputs(qmat_context *context, const qmat_node *node, qmat_value *const outputs[]) {
+  for (size_t i = 0; i < qmat_output_count(node); ++i) {
+    if (outputs[i] != NULL && outputs[i]->sealed && outputs[i]->type == node->outputs[i].type) continue;
+    qmat_fail(context, QMAT_ERROR_INTERNAL, "the node did not make its output '%s'", node->outputs[i].name);
+    return qmat_fail_field(context, node->outputs[i].name);
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
+                          const qmat_value *const inputs[], qmat_value *outputs[]) {
+  const char *outer = context->node_type;
+  context->node_type = node->name;
+  qmat_status status = check_inputs(context, node, inputs);
+  if (status == QMAT_OK) {
+    context->error.status = QMAT_OK;
+    status = node->run(context, params, inputs, outputs);
+    if (status == QMAT_OK) {
+      status = check_outputs(context, node, outputs);
+    } else if (context->error.status != status) {
+      qmat_fail(context, status, "the node failed and did not say why");
+    }
+  }
+  for (size_t i = 0; status != QMAT_OK && i < qmat_output_count(node); ++i) {
+    qmat_value_release(outputs[i]);
+    outputs[i] = NULL;
+  }
+  qmat_arena_uninit(&context->arena);
+  context->node_type = outer;
+  return status;
+}
+
 void qmat_param_format(const qmat_param *param, const void *params, char *text, size_t size) {
   if (size == 0) return;
   const void *place = const_slot(param, params);

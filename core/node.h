@@ -84,6 +84,14 @@ void qmat_params_default(const qmat_node *node, void *params);
 qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
                              void *params);
 
+/* Runs a node whose parameters have been checked. `inputs` and `outputs` hold one pointer per port; outputs start out
+ * NULL. What the descriptor promises is looked at on both sides: every input that is not optional is there, and every
+ * input is sealed and of its port's type, else QMAT_ERROR_USAGE names the port and the node does not run; on success
+ * every output is sealed and of its port's type, else QMAT_ERROR_INTERNAL; on failure every output is NULL and an error
+ * is recorded. The caller releases the outputs. Scratch memory of the context is freed. */
+qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
+                          const qmat_value *const inputs[], qmat_value *outputs[]);
+
 /* Required parameters present, every number within its range, and the node's own rules. QMAT_ERROR_USAGE. */
 qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, const void *params);
 

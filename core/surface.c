@@ -34,6 +34,7 @@ struct qmat_surface {
   const qmat_mesh *mesh;
   qmat_frame frame;
   double *positions;
+  float *balls; /* 4 per triangle: a ball around it, to pass over triangles that are too far to matter */
   double low[3], high[3];
   RTCDevice device;
   RTCScene scene;
@@ -340,17 +341,22 @@ typedef struct nearest_query {
   const qmat_surface *surface;
   const double *point;
   double slack; /* by how much single precision may misjudge the distance to a box */
-  double square;
+  double square, reach; /* of the nearest so far: the squared distance and the distance */
   double closest[3];
   uint32_t triangle;
 } nearest_query;
 
 /* Looks at one triangle; true when it is the nearest so far. */
 static bool try_triangle(nearest_query *query, uint32_t triangle) {
-  double closest[3];
+  const float *ball = query->surface->balls + 4 * (size_t)triangle;
+  double closest[3], to_ball[3];
+  for (int i = 0; i < 3; i++) to_ball[i] = query->point[i] - (double)ball[i];
+  const double near = query->reach + (double)ball[3];
+  if (dot(to_ball, to_ball) > surely_farther * near * near) return false;
   const double square = closest_on_triangle(query->surface, triangle, query->point, query->square, closest);
   if (!(square < query->square || (square == query->square && triangle < query->triangle))) return false;
   query->square = square;
+  query->reach = sqrt(square);
   query->triangle = triangle;
   memcpy(query->closest, closest, sizeof closest);
   return true;
@@ -363,7 +369,7 @@ static float search_radius(const nearest_query *query, double distance) {
 static bool see_triangle(struct RTCPointQueryFunctionArguments *args) {
   nearest_query *query = args->userPtr;
   if (!try_triangle(query, args->primID)) return false;
-  const float radius = search_radius(query, sqrt(query->square));
+  const float radius = search_radius(query, query->reach);
   if (!(radius < args->query->radius)) return false;
   args->query->radius = radius;
   return true;
@@ -376,6 +382,7 @@ double qmat_surface_distance(const qmat_surface *surface, const double point[3],
                          .point = point,
                          .slack = 4 * (double)FLT_EPSILON * (1 + size),
                          .square = surely_farther * limit * limit,
+                         .reach = surely_farther * limit,
                          .triangle = UINT32_MAX};
   if (size < FAR_AWAY) {
     struct RTCPointQueryContext context;
@@ -582,6 +589,33 @@ done:
   return status;
 }
 
+/* Around the middle of each triangle's box, rounded up: balls are compared, never measured. */
+static qmat_status build_balls(qmat_context *context, qmat_surface *surface) {
+  const qmat_mesh *mesh = surface->mesh;
+  surface->balls = qmat_alloc(4 * mesh->triangle_count, sizeof *surface->balls);
+  if (surface->balls == NULL) return qmat_fail_memory(context, "the triangles");
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    float *ball = surface->balls + 4 * t;
+    const double *corners[3];
+    for (int i = 0; i < 3; i++) corners[i] = corner_position(surface, (uint32_t)t, i);
+    for (int k = 0; k < 3; k++) {
+      const double low = fmin(fmin(corners[0][k], corners[1][k]), corners[2][k]);
+      const double high = fmax(fmax(corners[0][k], corners[1][k]), corners[2][k]);
+      ball[k] = (float)(0.5 * (low + high));
+    }
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+      double offset[3];
+      for (int k = 0; k < 3; k++) offset[k] = corners[i][k] - (double)ball[k];
+      square = fmax(square, dot(offset, offset));
+    }
+    ball[3] = nextafterf((float)sqrt(square), INFINITY);
+  }
+  return QMAT_OK;
+}
+
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
   *surface = NULL;
   qmat_surface *made = qmat_calloc(1, sizeof *made);
@@ -607,6 +641,7 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
     }
   }
   status = build_scene(context, made);
+  if (status == QMAT_OK) status = build_balls(context, made);
   if (status != QMAT_OK) goto failed;
   if (!(mesh->closed && mesh->oriented)) {
     status = build_winding_tree(context, made);
@@ -624,6 +659,7 @@ void qmat_surface_free(qmat_surface *surface) {
   if (surface->scene != NULL) rtcReleaseScene(surface->scene);
   if (surface->device != NULL) rtcReleaseDevice(surface->device);
   qmat_free(surface->positions);
+  qmat_free(surface->balls);
   qmat_free(surface->nodes);
   qmat_free(surface->order);
   qmat_free(surface);

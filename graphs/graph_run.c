@@ -433,17 +433,6 @@ static void release_slot(qmat_run_slot *slot) {
   slot->value = NULL;
 }
 
-static qmat_status check_made(qmat_context *context, const qmat_node *type, qmat_value *const values[]) {
-  for (size_t port = 0; port < qmat_output_count(type); port++) {
-    const qmat_value *value = values[port];
-    if (!value || !value->sealed || value->type != type->outputs[port].type) {
-      qmat_fail(context, QMAT_ERROR_INTERNAL, "the node did not make its output '%s'", type->outputs[port].name);
-      return qmat_fail_field(context, type->outputs[port].name);
-    }
-  }
-  return QMAT_OK;
-}
-
 static void note_made(qmat_run *run, qmat_run_step *step, const qmat_node *type) {
   for (size_t port = 0; port < qmat_output_count(type); port++) {
     const qmat_value *value = run->slots[step->first_slot + port].value;
@@ -473,24 +462,15 @@ static qmat_status run_step(qmat_context *context, qmat_run *run, size_t index) 
       step->mesh_triangles = ((const qmat_mesh *)inputs[port])->triangle_count;
   }
   double start = now();
-  status = type->run(context, step->params, inputs, outputs);
+  status = qmat_node_run(context, type, step->params, inputs, outputs);
   step->seconds = now() - start;
-  if (status == QMAT_OK)
-    status = check_made(context, type, outputs);
-  else if (context->error.status != status)
-    qmat_fail(context, status, "the node failed and did not say why");
   if (status != QMAT_OK) goto cleanup;
-  for (size_t port = 0; port < output_count; port++) {
-    run->slots[step->first_slot + port].value = outputs[port];
-    outputs[port] = NULL;
-  }
+  for (size_t port = 0; port < output_count; port++) run->slots[step->first_slot + port].value = outputs[port];
   note_made(run, step, type);
   step->done = true;
 cleanup:
-  for (size_t port = 0; outputs && port < output_count; port++) qmat_value_release(outputs[port]);
   qmat_free(inputs);
   qmat_free(outputs);
-  qmat_arena_uninit(&context->arena);
   return status;
 }
 

@@ -124,12 +124,12 @@ static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sph
   const bool all = d->params->completion == COMPLETION_ALL;
   const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
   if (all && !in_solid) return CELL_DROPPED;
-  if (circumsphere(p, sphere) && deep_inside(d->surface, sphere)) {
-    if (d->params->radius == RADIUS_DISTANCE) {
-      const double nearest = qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL);
-      if (nearest < sphere[3]) sphere[3] = nearest;
+  if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
+    const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
+    if (nearest > least_depth) {
+      if (d->params->radius == RADIUS_DISTANCE) sphere[3] = nearest;
+      return CELL_CIRCUMCENTRE;
     }
-    return CELL_CIRCUMCENTRE;
   }
   if (!in_solid) return CELL_DROPPED;
   memcpy(sphere, centre, sizeof centre);
@@ -171,7 +171,8 @@ static void join(uint32_t *parent, uint32_t a, uint32_t b) {
   if (b < a) parent[a] = b;
 }
 
-/* Numbers the medial vertices: one for each set of adjacent kept tetrahedra whose centres coincide. */
+/* Numbers the medial vertices: one for each set of adjacent kept tetrahedra whose centres lie close together. It is the
+ * sets' leading centres that are compared, so that a row of close centres does not become one. */
 static qmat_status number_medial_vertices(delaunay *d) {
   const size_t count = d->cells.count;
   uint32_t *parent = qmat_arena_alloc(&d->context->arena, count, sizeof *parent);
@@ -180,10 +181,11 @@ static qmat_status number_medial_vertices(delaunay *d) {
   for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
   for (size_t i = 0; i < count; i++) {
     if (!d->kinds[i]) continue;
-    for (int k = 0; k < 4; k++) {
-      const uint32_t j = d->cells.neighbours[4 * i + (size_t)k];
+    for (size_t k = 0; k < 4; k++) {
+      const uint32_t j = d->cells.neighbours[4 * i + k];
       if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
-      if (distance(&d->spheres[4 * i], &d->spheres[4 * (size_t)j]) <= d->params->merge) join(parent, (uint32_t)i, j);
+      const uint32_t a = find_root(parent, (uint32_t)i), b = find_root(parent, j);
+      if (distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge) join(parent, a, b);
     }
   }
   uint32_t next = 0;
@@ -735,9 +737,9 @@ static const qmat_param params[] = {
      .offset = AT(radius)},
     {.name = "merge",
      .unit = "diagonal",
-     .doc = "Adjacent medial vertices no farther apart than this become one",
+     .doc = "Adjacent medial vertices no farther apart than this become one; 0: only those that coincide",
      .type = QMAT_PARAM_FLOAT,
-     .default_number = 1e-7,
+     .default_number = 2e-4,
      .min = 0,
      .max = 0.01,
      .flags = QMAT_PARAM_RELATIVE,
