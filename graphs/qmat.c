@@ -320,6 +320,7 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
 
 static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type type, const qmat_value **value) {
   qmat_context *context = &job->context;
+  *value = NULL;
   if (!job->ran) return qmat_fail(context, QMAT_ERROR_USAGE, "the job has no results: run it first");
   size_t node, index;
   qmat_status status = qmat_graph_find_port(context, &job->graph, port, &node, &index);
