@@ -215,14 +215,19 @@ static double cone_value(const sphere *a, const sphere *b, vec p) {
   return at > 0 && at < l ? fmin(best, distance - a->r - growth * at) : best;
 }
 
+/* The gradient of the radius over a slab: in its plane, with the corners' differences along the sides. */
+static vec radius_gradient(const sphere *a, const sphere *b, const sphere *c, vec normal) {
+  const vec u = sub(b->c, a->c), v = sub(c->c, a->c);
+  const double area = dot(normal, normal);
+  return mix(mix((vec){0, 0, 0}, (b->r - a->r) / area, cross(v, normal)), (c->r - a->r) / area, cross(normal, u));
+}
+
 static double slab_value(const sphere *a, const sphere *b, const sphere *c, vec p) {
   const double best = fmin(cone_value(a, b, p), fmin(cone_value(b, c, p), cone_value(a, c, p)));
   const vec u = sub(b->c, a->c), v = sub(c->c, a->c), normal = cross(u, v), q = sub(p, a->c);
   const double area = dot(normal, normal);
   if (!(area > 1e-24 * dot(u, u) * dot(v, v))) return best;
-  /* the gradient g of the radius: g.u and g.v are the differences */
-  const vec g =
-      mix(mix((vec){0, 0, 0}, (b->r - a->r) / area, cross(v, normal)), (c->r - a->r) / area, cross(normal, u));
+  const vec g = radius_gradient(a, b, c, normal);
   const double steep = dot(g, g);
   if (!(steep < 1)) return best;
   const double height = fabs(dot(q, normal)) / sqrt(area), distance = height / sqrt(1 - steep);
@@ -362,26 +367,59 @@ static double surface_to_envelope(const surface *s, const medial *m, size_t samp
   return worst;
 }
 
-/* Points on the spheres of each simplex that no simplex holds lie on the envelope. */
+static vec random_direction(void) {
+  const double z = 2 * random_unit() - 1, turn = 2 * acos(-1) * random_unit(), flat = sqrt(1 - z * z);
+  return (vec){flat * cos(turn), flat * sin(turn), z};
+}
+
+/* A random point where the simplex itself ends: on the plane that touches a slab, the line that touches a cone, or the
+ * ball of a sphere. False where the simplex has no such plane or line. */
+static bool random_boundary_point(const medial *m, const simplex *x, vec *p) {
+  const sphere *s[3];
+  double w[3], r = 0;
+  vec c = {0, 0, 0}, direction = random_direction();
+  for (int k = 0; k < 3; k++) s[k] = m->spheres + x->ids[k < x->count ? k : 0];
+  random_weights(x->count, w);
+  for (int k = 0; k < x->count; k++) {
+    c = mix(c, w[k], s[k]->c);
+    r += w[k] * s[k]->r;
+  }
+  vec lean = {0, 0, 0}; /* along the simplex: minus the gradient of the radius */
+  if (x->count == 2) {
+    const vec d = sub(s[1]->c, s[0]->c);
+    const double l2 = dot(d, d);
+    if (!(l2 > 0)) return false;
+    lean = mix(lean, (s[0]->r - s[1]->r) / l2, d);
+    direction = mix(direction, -dot(direction, d) / l2, d);
+  } else if (x->count == 3) {
+    const vec normal = cross(sub(s[1]->c, s[0]->c), sub(s[2]->c, s[0]->c));
+    if (!(dot(normal, normal) > 0)) return false;
+    lean = mix(lean, -1, radius_gradient(s[0], s[1], s[2], normal));
+    direction = mix((vec){0, 0, 0}, direction.x < 0 ? -1 : 1, normal);
+  }
+  const double across = 1 - dot(lean, lean), size = length(direction);
+  if (!(across >= 0) || !(size > 0)) return false;
+  *p = mix(mix(c, r, lean), r * sqrt(across) / size, direction);
+  return true;
+}
+
+/* Boundary points of a simplex that lie in no other one are points of the envelope. */
 static double envelope_to_surface(const surface *s, const medial *m, double diagonal, size_t samples) {
   double worst = 0;
-  const size_t each = m->simplex_count == 0 ? 0 : samples / m->simplex_count + 1;
+  simplex *all = need(calloc(m->simplex_count + m->sphere_count + 1, sizeof *all));
+  size_t count = 0;
   for (size_t i = 0; i < m->simplex_count; i++) {
-    const simplex *x = m->simplices + i;
-    for (size_t k = 0; k < each; k++) {
-      double w[3];
-      random_weights(x->count, w);
-      vec c = {0, 0, 0};
-      double r = 0;
-      for (int j = 0; j < x->count; j++) {
-        c = mix(c, w[j], m->spheres[x->ids[j]].c);
-        r += w[j] * m->spheres[x->ids[j]].r;
-      }
-      const double z = 2 * random_unit() - 1, turn = 2 * acos(-1) * random_unit(), flat = sqrt(1 - z * z);
-      const vec p = mix(c, r, (vec){flat * cos(turn), flat * sin(turn), z});
-      if (envelope_value(m, p) > -1e-4 * diagonal) worst = fmax(worst, surface_distance(s, p, worst));
+    if (m->simplices[i].count > 1) all[count++] = m->simplices[i];
+  }
+  for (size_t i = 0; i < m->sphere_count; i++) all[count++] = (simplex){.ids = {(uint32_t)i}, .count = 1};
+  for (size_t i = 0; i < count; i++) {
+    for (size_t k = 0; k < samples / count + 1; k++) {
+      vec p;
+      if (!random_boundary_point(m, all + i, &p) || envelope_value(m, p) < -1e-6 * diagonal) continue;
+      worst = fmax(worst, surface_distance(s, p, worst));
     }
   }
+  free(all);
   return worst;
 }
 
