@@ -209,11 +209,11 @@ static qmat_status ask_envelope(qmat_context *context, const qmat_complex *compl
 
 qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                     size_t most, qmat_control_points *control) {
+                                     size_t most, const qmat_extra_points *extra, qmat_control_points *control) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.4 * epsilon};
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.25 * epsilon};
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   uint32_t *parts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *parts);
   answering a = {.mesh = mesh, .complex = complex};
@@ -227,7 +227,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       starts[t] = samples->count + added;
       added += grid_points(&mesh->triangles[3 * t], parts[t]);
     }
-    control->count = samples->count + added;
+    control->count = samples->count + added + extra->count;
   }
   control->spacing /= 1.25;
   control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
@@ -255,6 +255,14 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);
       store(control, i, &best);
     }
+  }
+  const size_t first_extra = control->count - extra->count;
+  if (extra->count) memcpy(&control->points[3 * first_extra], extra->points, 3 * extra->count * sizeof(double));
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+  for (size_t i = 0; i < extra->count; i++) {
+    witness best;
+    look_around(&a, &extra->points[3 * i], &mesh->triangles[3 * (size_t)extra->facets[i]], 3, epsilon, &best);
+    store(control, first_extra + i, &best);
   }
   const size_t far = count_far(control, epsilon);
   if (far == 0) return QMAT_OK;

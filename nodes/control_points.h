@@ -16,12 +16,19 @@ typedef struct qmat_control_points {
   double spacing;      /* of the grid, unit frame */
 } qmat_control_points;
 
+/* Places on facets, in the unit frame, to be control points besides. */
+typedef struct qmat_extra_points {
+  size_t count;
+  const double *points;   /* 3 per point */
+  const uint32_t *facets; /* per point */
+} qmat_extra_points;
+
 /* Makes the control points of a model whose medial mesh `complex` (unit frame) is not yet changed. `medial` gives the
  * responsible regions; without any the envelope is searched. `epsilon` is the error that is to be held (unit frame,
- * > 0, may be INFINITY: samples only). At most `most` points are added; the spacing grows until they are few enough.
+ * > 0, may be INFINITY: samples only). At most `most` points are added in grids; their spacing grows until they are few enough. `extra` comes last.
  * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples). Uses all threads. */
 qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                     size_t most, qmat_control_points *control);
+                                     size_t most, const qmat_extra_points *extra, qmat_control_points *control);
 
 #endif

@@ -11,6 +11,7 @@
 #include "core/surface.h"
 #include "core/thickness.h"
 #include "nodes/control_points.h"
+#include "nodes/cover.h"
 #include "nodes/coverage.h"
 #include "nodes/protrusion.h"
 
@@ -31,8 +32,10 @@ typedef struct {
 
 /* Rims and tips hold on to their place by this share of a slab's weight (section 3.1.2, boundary preservation). */
 static const double boundary_weight = 0.01;
-/* Of the wanted error the control points leave this much to the surface between them. */
-static const double control_share = 0.98;
+/* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
+ * is repeated, at most this often, with control points in the places found. */
+static const double control_share = 0.975;
+enum { MOST_ROUNDS = 4 };
 enum { MOST_CONTROL_POINTS = 600000, REPORT_EVERY = 256 };
 
 /* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
@@ -278,8 +281,8 @@ static double depth_of(const qmat_surface *surface, const double *sphere) {
   return qmat_surface_inside(surface, sphere) ? depth : -depth;
 }
 
-static qmat_status measure_depths(simplifier *s, double *depths) {
-  const size_t count = s->complex.vertex_count, slice = 1 << 15;
+static qmat_status measure_depths(const simplifier *s, const double *spheres, size_t count, double *depths) {
+  const size_t slice = 1 << 15;
   const int threads = qmat_threads(s->context);
   for (size_t first = 0; first < count; first += slice) {
     const qmat_status status = qmat_progress(s->context, 0, 0, "depths");
@@ -287,7 +290,7 @@ static qmat_status measure_depths(simplifier *s, double *depths) {
     const size_t last = first + slice < count ? first + slice : count;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t v = first; v < last; v++)
-      depths[v] = depth_of(s->surface, &s->complex.spheres[4 * v]);
+      depths[v] = depth_of(s->surface, &spheres[4 * v]);
   }
   return QMAT_OK;
 }
@@ -429,44 +432,61 @@ static qmat_status collapse_edges(simplifier *s) {
   return QMAT_OK;
 }
 
-/* The reported protrusion is at most this share of epsilon above the true one. */
-static const double protrusion_tolerance = 0.02;
+/* The reported errors are at most this share of epsilon above the true ones. */
+static const double error_tolerance = 0.01;
 
-/* Both errors of the result: F at the control points, exactly, and an upper bound of the protrusion. The largest h of
- * spheres and middles comes first, so that most primitives are known to matter no more after one look. */
-static qmat_status measure_errors(simplifier *s, const qmat_medial *unit, double *coverage, double *protrusion) {
-  qmat_envelope *envelope;
-  qmat_status status = qmat_envelope_of_medial(s->context, unit, &envelope);
-  if (status != QMAT_OK) return status;
-  const int threads = qmat_threads(s->context);
-  double out = 0, least = 0, in = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : out)
-  for (size_t i = 0; i < s->control.count; i++)
-    out = fmax(out, qmat_envelope_distance(envelope, &s->control.points[3 * i], NULL));
+typedef struct {
+  double coverage, protrusion; /* upper bounds, unit frame */
+  qmat_cover cover;
+} measured_errors;
+
+/* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
+ * one look. */
+static double least_protrusion(const simplifier *s, const qmat_medial *unit, const qmat_envelope *envelope) {
   const size_t primitives = qmat_envelope_primitive_count(envelope);
+  const int threads = qmat_threads(s->context);
+  double least = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
   for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
     double middle[4] = {0, 0, 0, 0};
     uint32_t ids[3] = {(uint32_t)i};
     const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
     for (int c = 0; c < count; c++)
-      for (int k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + (size_t)k] / count;
+      for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
     least = fmax(least, qmat_protrusion_of_sphere(s->surface, middle));
   }
+  return least;
+}
+
+/* Both errors of the result, over the whole surface and every primitive. */
+static qmat_status measure_errors(simplifier *s, const qmat_medial *unit, measured_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(s->context, unit, &envelope);
+  if (status != QMAT_OK) return status;
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : 0.01;
-  const double tolerance = protrusion_tolerance * epsilon;
+  const double tolerance = error_tolerance * epsilon;
+  const int threads = qmat_threads(s->context);
+  double out = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : out)
+  for (size_t i = 0; i < s->control.count; i++)
+    out = fmax(out, qmat_envelope_distance(envelope, &s->control.points[3 * i], NULL));
+  status = qmat_cover_measure(s->context, s->surface, envelope, unit->spheres, out, tolerance,
+                              epsilon - tolerance, &errors->cover);
+  errors->coverage = errors->cover.bound;
+  const double enough = least_protrusion(s, unit, envelope) + tolerance;
+  const size_t primitives = qmat_envelope_primitive_count(envelope);
+  double in = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : in)
   for (size_t i = 0; i < primitives; i++) {
     uint32_t ids[3];
     const int count = qmat_envelope_primitive(envelope, i, ids);
     const double *spheres[3];
     for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
-    in = fmax(in, qmat_protrusion_bound(s->surface, spheres, count, least + tolerance, tolerance));
+    in = fmax(in, qmat_protrusion_bound(s->surface, spheres, count, enough, tolerance));
   }
+  errors->protrusion = in;
   qmat_envelope_free(envelope);
-  *coverage = out;
-  *protrusion = in;
-  return QMAT_OK;
+  return status;
 }
 
 /* The sample's owner: the corner of its witness with the largest weight. */
@@ -533,8 +553,14 @@ static qmat_status extract(simplifier *s, qmat_medial *medial) {
   return status == QMAT_OK ? set_regions(s, ids, medial) : status;
 }
 
-static qmat_status start(simplifier *s, const qmat_mesh *mesh, const qmat_field *thickness,
-                         const qmat_samples *samples, const qmat_medial *medial) {
+/* The initial medial mesh in the unit frame, its depths, and which samples are thin: the same in every round. */
+typedef struct {
+  double *spheres, *depths;
+  uint8_t *thin;
+} initial_state;
+
+static qmat_status prepare(simplifier *s, const qmat_mesh *mesh, const qmat_field *thickness,
+                           const qmat_samples *samples, const qmat_medial *medial, initial_state *state) {
   qmat_context *context = s->context;
   qmat_status status = qmat_surface_new(context, mesh, &s->surface);
   if (status != QMAT_OK) return status;
@@ -546,16 +572,24 @@ static qmat_status start(simplifier *s, const qmat_mesh *mesh, const qmat_field 
   qmat_thickness_of_samples(mesh, thickness, samples, values);
   const double theta = qmat_thickness_threshold(thickness, s->params->theta);
   for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
-  s->thin = thin;
   qmat_frame_spheres_to_unit(qmat_surface_frame(s->surface), medial->spheres, medial->sphere_count, spheres);
-  if ((status = qmat_complex_init(context, &s->complex, medial, spheres)) != QMAT_OK) return status;
-  if ((status = set_quadrics(s)) != QMAT_OK) return status;
-  if ((status = fill_heap(s)) != QMAT_OK) return status;
-  if ((status = measure_depths(s, depths)) != QMAT_OK) return status;
+  *state = (initial_state){spheres, depths, thin};
+  return measure_depths(s, spheres, medial->sphere_count, depths);
+}
+
+/* Sets one round up: everything that collapses change. */
+static qmat_status start(simplifier *s, const initial_state *state, const qmat_samples *samples,
+                         const qmat_medial *medial, const qmat_extra_points *extra) {
+  qmat_context *context = s->context;
+  s->thin = state->thin;
+  qmat_status status = qmat_complex_init(context, &s->complex, medial, state->spheres);
+  if (status == QMAT_OK) status = set_quadrics(s);
+  if (status == QMAT_OK) status = fill_heap(s);
+  if (status != QMAT_OK) return status;
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : INFINITY;
   s->limit = control_share * epsilon;
   if ((status = qmat_control_points_make(context, s->surface, samples, medial, &s->complex, epsilon,
-                                         MOST_CONTROL_POINTS, &s->control)) != QMAT_OK)
+                                         MOST_CONTROL_POINTS, extra, &s->control)) != QMAT_OK)
     return status;
   /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
   double *limits = qmat_arena_alloc(&context->arena, s->control.count, sizeof *limits);
@@ -565,23 +599,21 @@ static qmat_status start(simplifier *s, const qmat_mesh *mesh, const qmat_field 
                               s->control.witnesses, s->control.weights, s->complex.vertex_count);
   if (status != QMAT_OK) return status;
   const bool two_sided = s->params->error == ERROR_TWO_SIDED;
-  return qmat_protrusion_init(context, &s->protrusion, s->surface, &s->complex, depths,
+  return qmat_protrusion_init(context, &s->protrusion, s->surface, &s->complex, state->depths,
                               two_sided ? s->limit : INFINITY);
 }
 
-static qmat_status make_report(simplifier *s, const qmat_medial *unit, qmat_report *report) {
-  double coverage, protrusion;
-  const qmat_status status = measure_errors(s, unit, &coverage, &protrusion);
-  if (status != QMAT_OK) return status;
-  const size_t cones_only = unit->edge_count;
+static qmat_status make_report(simplifier *s, const qmat_medial *unit, const measured_errors *errors, int rounds,
+                               qmat_report *report) {
   const struct {
     const char *name;
     size_t value;
   } counts[] = {
       {"initial_spheres", s->complex.vertex_count},
       {"spheres", unit->sphere_count},
-      {"edges", cones_only},
+      {"edges", unit->edge_count},
       {"triangles", unit->triangle_count},
+      {"rounds", (size_t)rounds},
       {"collapses", s->collapses},
       {"control_points", s->control.count},
       {"refused_by_surface", s->refused_by_surface},
@@ -594,9 +626,56 @@ static qmat_status make_report(simplifier *s, const qmat_medial *unit, qmat_repo
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value));
   bad |= json_object_set_new(report->root, "epsilon", json_real(s->params->epsilon));
-  bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(coverage));
-  bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(protrusion));
+  bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(errors->coverage));
+  bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(errors->protrusion));
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
+}
+
+/* Frees what one round made. */
+static void finish(simplifier *s) {
+  qmat_collapse_uninit(&s->collapse);
+  qmat_coverage_uninit(&s->coverage);
+  qmat_protrusion_uninit(&s->protrusion);
+  qmat_complex_uninit(&s->complex);
+}
+
+/* The places where the surface between the control points is too far from the envelope, added to those known. */
+static qmat_status add_extra_points(simplifier *s, const qmat_cover *cover, qmat_extra_points *extra) {
+  const size_t count = extra->count + cover->count;
+  double *points = qmat_arena_alloc(&s->context->arena, count, 3 * sizeof *points);
+  uint32_t *facets = qmat_arena_alloc(&s->context->arena, count, sizeof *facets);
+  if (!points || !facets) return qmat_fail_memory(s->context, "control points");
+  if (extra->count) {
+    memcpy(points, extra->points, 3 * extra->count * sizeof *points);
+    memcpy(facets, extra->facets, extra->count * sizeof *facets);
+  }
+  memcpy(points + 3 * extra->count, cover->points, 3 * cover->count * sizeof *points);
+  memcpy(facets + extra->count, cover->facets, cover->count * sizeof *facets);
+  *extra = (qmat_extra_points){count, points, facets};
+  return QMAT_OK;
+}
+
+/* Rounds of collapses until the surface between the control points keeps within epsilon as they do. */
+static qmat_status simplify(simplifier *s, const initial_state *state, const qmat_samples *samples,
+                            const qmat_medial *initial, qmat_medial **medial, qmat_report *report) {
+  qmat_extra_points extra = {0};
+  const double epsilon = s->params->epsilon;
+  for (int round = 1;; round++) {
+    measured_errors errors = {.coverage = 0};
+    qmat_medial *unit = *medial = qmat_medial_new();
+    qmat_status status = unit ? start(s, state, samples, initial, &extra)
+                              : qmat_fail_memory(s->context, "the medial mesh");
+    if (status == QMAT_OK) status = collapse_edges(s);
+    if (status == QMAT_OK) status = extract(s, unit);
+    if (status == QMAT_OK) status = measure_errors(s, unit, &errors);
+    if (status != QMAT_OK) return status;
+    const bool repeat = epsilon > 0 && errors.coverage > epsilon && errors.cover.count > 0 && round < MOST_ROUNDS;
+    if (!repeat) return make_report(s, unit, &errors, round, report);
+    if ((status = add_extra_points(s, &errors.cover, &extra)) != QMAT_OK) return status;
+    qmat_value_release(&unit->base);
+    finish(s);
+    *s = (simplifier){.context = s->context, .params = s->params, .surface = s->surface};
+  }
 }
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
@@ -606,13 +685,12 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
   simplifier s = {.context = context, .params = params};
-  qmat_medial *medial = qmat_medial_new();
+  initial_state state = {NULL, NULL, NULL};
+  qmat_medial *medial = NULL;
   qmat_report *report = qmat_report_new();
-  qmat_status status = medial && report ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
-  if (status == QMAT_OK) status = start(&s, mesh, thickness, samples, initial);
-  if (status == QMAT_OK) status = collapse_edges(&s);
-  if (status == QMAT_OK) status = extract(&s, medial);
-  if (status == QMAT_OK) status = make_report(&s, medial, report);
+  qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK) status = prepare(&s, mesh, thickness, samples, initial, &state);
+  if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &medial, report);
   if (status == QMAT_OK) {
     qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), medial->spheres, medial->sphere_count,
                                 medial->spheres);
@@ -626,10 +704,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     qmat_value_release(medial ? &medial->base : NULL);
     qmat_value_release(report ? &report->base : NULL);
   }
-  qmat_collapse_uninit(&s.collapse);
-  qmat_coverage_uninit(&s.coverage);
-  qmat_protrusion_uninit(&s.protrusion);
-  qmat_complex_uninit(&s.complex);
+  finish(&s);
   qmat_surface_free(s.surface);
   return status;
 }

@@ -156,8 +156,8 @@ double qmat_protrusion_bound(const qmat_surface *surface, const double *const sp
   return maximum(s.bound, s.found);
 }
 
-/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.22 of the limit away. */
-static const double lattice_share = 0.25, widest_spacing = 0.005;
+/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away. */
+static const double lattice_share = 0.5, widest_spacing = 0.005;
 
 qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
                                  const qmat_complex *complex, const double *depths, double limit) {
@@ -235,7 +235,7 @@ static double carry(double bound, const double *from, const double *sphere) {
 }
 
 /* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
-static const double content_share = 0.5, smallest_share = 0.3;
+static const double content_share = 0.8, smallest_share = 0.15;
 
 qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrusion, const qmat_complex *complex,
                                  const qmat_collapse *collapse, const double sphere[4], bool *kept) {
