@@ -29,6 +29,15 @@ using Triangulation =
 
 constexpr size_t kPointsPerReport = 4096;
 
+/* Room for the cells of the next point. CGAL notes the new cells around a point in a thread-local map that it leaves
+ * full when memory runs out among them, and the thread's next triangulation would be built with what is in there: so
+ * the shortage has to come before. CGAL makes at most this many cells with that map. */
+void reserve_cells(Triangulation &triangulation) {
+  constexpr size_t kMostCells = Triangulation::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
+  auto &cells = triangulation.tds().cells();
+  if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
+}
+
 qmat_status triangulate(qmat_context *context, const std::vector<Point> &points, Triangulation &triangulation) {
   using PointMap = CGAL::Pointer_property_map<Point>::const_type;
   using SortTraits = CGAL::Spatial_sort_traits_adapter_3<Kernel, PointMap>;
@@ -42,6 +51,7 @@ qmat_status triangulate(qmat_context *context, const std::vector<Point> &points,
       if (status != QMAT_OK) return status;
     }
     const auto id = static_cast<uint32_t>(order[i]);
+    reserve_cells(triangulation);
     const size_t before = triangulation.number_of_vertices();
     const auto vertex = triangulation.insert(points[order[i]], hint);
     const bool is_new = triangulation.number_of_vertices() > before;

@@ -886,7 +886,7 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
   }
   qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, &c.cells);
   if (!status && c.cells.count == 0) {
-    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "The medial mesh encloses no volume");
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
   }
   grid->cell_count = c.cells.count;
   grid->refined_cell_count = c.cells.refined_count;

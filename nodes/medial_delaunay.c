@@ -9,6 +9,7 @@
 #include "core/surface.h"
 #include "core/thickness.h"
 #include "nodes/delaunay_cgal.h"
+#include "nodes/refine_medial.h"
 
 typedef enum { COMPLETION_THIN, COMPLETION_ALL } completion;
 typedef enum { RADIUS_DISTANCE, RADIUS_CIRCUMRADIUS } radius_rule;
@@ -18,6 +19,7 @@ typedef struct {
   int completion;
   int radius;
   double merge;
+  double protrusion;
 } medial_delaunay_params;
 
 #define NONE UINT32_MAX
@@ -402,15 +404,32 @@ static qmat_status drop_specks(delaunay *d, size_t *components, size_t *specks, 
 
 /* A medial edge that would join two components. */
 typedef struct {
+  double protrusion; /* how far its cone leaves the solid, as seen at a few places */
   double length;
   uint32_t a, b;
 } medial_link;
 
-static int shorter_link(const void *left, const void *right) {
+static int better_link(const void *left, const void *right) {
   const medial_link *p = left, *q = right;
+  if (p->protrusion != q->protrusion) return p->protrusion < q->protrusion ? -1 : 1;
   if (p->length != q->length) return p->length < q->length ? -1 : 1;
   if (p->a != q->a) return p->a < q->a ? -1 : 1;
   return p->b < q->b ? -1 : p->b > q->b;
+}
+
+enum { LINK_LOOKS = 7 };
+
+/* `spheres` holds 4 doubles a medial vertex. */
+static medial_link make_link(const delaunay *d, const double *spheres, uint32_t a, uint32_t b) {
+  const double *p = &spheres[4 * (size_t)a], *q = &spheres[4 * (size_t)b];
+  medial_link link = {0, distance(p, q), a < b ? a : b, a < b ? b : a};
+  for (int i = 1; i <= LINK_LOOKS; i++) {
+    const double t = (double)i / (LINK_LOOKS + 1);
+    double s[4];
+    for (int k = 0; k < 4; k++) s[k] = (1 - t) * p[k] + t * q[k];
+    link.protrusion = fmax(link.protrusion, s[3] + qmat_surface_signed_distance(d->surface, s));
+  }
+  return link;
 }
 
 typedef struct {
@@ -469,7 +488,7 @@ static qmat_status add_link(delaunay *d, uint32_t a, uint32_t b) {
 
 /* For each surface part whose samples still see several components: the nearest two spheres, until it is one. Rare and
  * small, since components that share a sample are joined before. */
-static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_t *joined, const double *centres,
+static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_t *joined, const double *spheres,
                                      size_t *links) {
   uint32_t *parts = surface_parts(d);
   size_t count = 0;
@@ -479,15 +498,15 @@ static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_
     for (last = first; last < count && contacts[last].sample == contacts[first].sample;) last++;
     for (;;) {
       const uint32_t home = find_root(joined, index[contacts[first].sphere]);
-      medial_link best = {INFINITY, NONE, NONE};
+      medial_link best = {0, INFINITY, NONE, NONE};
       for (size_t i = first; i < last; i++) {
         if (find_root(joined, index[contacts[i].sphere]) == home) continue;
         for (size_t j = first; j < last; j++) {
           if (find_root(joined, index[contacts[j].sphere]) != home) continue;
           const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
-          const double length = distance(&centres[3 * (size_t)a], &centres[3 * (size_t)b]);
-          const medial_link link = {length, a < b ? a : b, a < b ? b : a};
-          if (shorter_link(&link, &best) < 0) best = link;
+          const double length = distance(&spheres[4 * (size_t)a], &spheres[4 * (size_t)b]);
+          const medial_link link = {0, length, a < b ? a : b, a < b ? b : a};
+          if (better_link(&link, &best) < 0) best = link;
         }
       }
       if (best.a == NONE) break;
@@ -500,21 +519,22 @@ static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_
   return QMAT_OK;
 }
 
-/* Joins the components of one solid, which tear apart where it is thinner than its samples are apart: by the shortest
- * medial edges between spheres that answer for a common sample. Such spheres touch the surface in the same place. */
+/* Joins the components of one solid, which tear apart where it is thinner than its samples are apart: by medial edges
+ * between spheres that answer for a common sample, those first that stay inside. Such spheres touch the surface in the
+ * same place. */
 static qmat_status link_components(delaunay *d, size_t *components, size_t *links) {
   if (*components < 2) return QMAT_OK;
   qmat_arena *arena = &d->context->arena;
   uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
-  double *centres = qmat_arena_alloc(arena, d->sphere_count, 3 * sizeof *centres);
+  double *spheres = qmat_arena_alloc(arena, d->sphere_count, 4 * sizeof *spheres);
   size_t count = 0, contact_count = 0;
-  const component *parts = index && centres ? find_components(d, index, &count) : NULL;
+  const component *parts = index && spheres ? find_components(d, index, &count) : NULL;
   uint32_t *joined = qmat_arena_alloc(arena, count, sizeof *joined);
   const contact *contacts = parts ? find_contacts(d, index, NULL, &contact_count) : NULL;
   if (!parts || !joined || !contacts) return qmat_fail_memory(d->context, "components");
   for (size_t i = 0; i < count; i++) joined[i] = (uint32_t)i;
   for (size_t cell = 0; cell < d->cells.count; cell++)
-    if (d->kinds[cell]) memcpy(&centres[3 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 3 * sizeof *centres);
+    if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
   medial_link *candidates = NULL;
   size_t candidate_count = 0, capacity = 0;
   qmat_status status = QMAT_OK;
@@ -526,10 +546,9 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
         status = qmat_fail_memory(d->context, "components");
         break;
       }
-      candidates[candidate_count++] =
-          (medial_link){distance(&centres[3 * (size_t)a], &centres[3 * (size_t)b]), a, b};
+      candidates[candidate_count++] = make_link(d, spheres, a, b);
     }
-  qsort(candidates, candidate_count, sizeof *candidates, shorter_link);
+  qsort(candidates, candidate_count, sizeof *candidates, better_link);
   for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
     const uint32_t a = index[candidates[i].a], b = index[candidates[i].b];
     if (find_root(joined, a) == find_root(joined, b)) continue;
@@ -538,7 +557,7 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
     status = add_link(d, candidates[i].a, candidates[i].b);
   }
   qmat_free(candidates);
-  if (status == QMAT_OK) status = link_across_parts(d, index, joined, centres, links);
+  if (status == QMAT_OK) status = link_across_parts(d, index, joined, spheres, links);
   *components -= *links;
   return status;
 }
@@ -550,7 +569,7 @@ static int by_number(const void *left, const void *right) {
 
 /* The responsible regions: a medial vertex answers for the corners of its tetrahedra. */
 static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
-  const size_t count = d->sphere_count;
+  const size_t count = medial->sphere_count; /* those added by refinement answer for none */
   uint32_t *offsets = qmat_calloc(count + 1, sizeof *offsets);
   medial->region_offsets = offsets;
   medial->region_offset_count = count + 1;
@@ -582,20 +601,22 @@ static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
   return QMAT_OK;
 }
 
-static qmat_status make_medial(delaunay *d, qmat_medial *medial) {
+static qmat_status make_medial(delaunay *d, qmat_medial *medial, size_t *refined) {
   medial->sphere_count = d->sphere_count;
   medial->spheres = qmat_alloc(d->sphere_count, 4 * sizeof *medial->spheres);
   if (!medial->spheres) return qmat_fail_memory(d->context, "medial spheres");
-  uint32_t next = 0; /* of coincident centres the first tetrahedron's stands for all */
+  uint32_t next = 0; /* of centres that merged, the first tetrahedron's stands for all */
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell] && d->sphere_of[cell] == next)
       memcpy(&medial->spheres[4 * (size_t)next++], &d->spheres[4 * cell], 4 * sizeof *medial->spheres);
-  qmat_frame_spheres_to_model(qmat_surface_frame(d->surface), medial->spheres, d->sphere_count, medial->spheres);
   qmat_status status =
       qmat_medial_set_simplices(d->context, medial, d->edges, d->edge_count, d->triangles, d->triangle_count);
+  if (status == QMAT_OK && d->params->protrusion > 0)
+    status = qmat_refine_medial(d->context, d->surface, medial, d->params->protrusion, refined);
   if (status == QMAT_OK) status = set_regions(d, medial);
-  if (status == QMAT_OK) status = qmat_value_seal(d->context, &medial->base);
-  return status;
+  if (status != QMAT_OK) return status;
+  qmat_frame_spheres_to_model(qmat_surface_frame(d->surface), medial->spheres, medial->sphere_count, medial->spheres);
+  return qmat_value_seal(d->context, &medial->base);
 }
 
 static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
@@ -642,7 +663,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_field *thickness = (const qmat_field *)inputs[1];
   qmat_medial *medial = NULL;
   qmat_report *report = NULL;
-  size_t components = 0, specks = 0, speck_spheres = 0, links = 0, by_kind[3] = {0, 0, 0};
+  size_t components = 0, specks = 0, speck_spheres = 0, links = 0, refined = 0, by_kind[3] = {0, 0, 0};
   qmat_status status = check_inputs(context, d.mesh, thickness, d.samples);
   if (status != QMAT_OK) return status;
   if ((status = qmat_surface_new(context, d.mesh, &d.surface)) != QMAT_OK) return status;
@@ -671,7 +692,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     status = qmat_fail_memory(context, "the medial mesh");
     goto done;
   }
-  if ((status = make_medial(&d, medial)) != QMAT_OK) goto done;
+  if ((status = make_medial(&d, medial, &refined)) != QMAT_OK) goto done;
   const struct {
     const char *name;
     size_t value;
@@ -684,6 +705,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
       {"triangles", medial->triangle_count},
       {"components", components},
       {"links", links},
+      {"spheres_by_refinement", refined},
       {"specks_dropped", specks},
       {"speck_spheres_dropped", speck_spheres},
   };
@@ -744,6 +766,15 @@ static const qmat_param params[] = {
      .max = 0.01,
      .flags = QMAT_PARAM_RELATIVE,
      .offset = AT(merge)},
+    {.name = "protrusion",
+     .unit = "diagonal",
+     .doc = "Medial edges whose cones leave the solid by more than this are halved; 0: never",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.0025,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = AT(protrusion)},
     {0},
 };
 

@@ -7,7 +7,7 @@ typedef struct medial_read_params {
 } medial_read_params;
 
 static const qmat_param params[] = {{.name = "path",
-                                     .doc = "the medial mesh: a .ma file",
+                                     .doc = "The medial mesh: a .ma file",
                                      .unit = "",
                                      .type = QMAT_PARAM_PATH,
                                      .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
@@ -15,7 +15,7 @@ static const qmat_param params[] = {{.name = "path",
                                     {0}};
 
 static const qmat_port outputs[] = {
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "its spheres, edges and triangles, sorted"}, {0}};
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "Its spheres, edges and triangles, sorted"}, {0}};
 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
                        qmat_value *made[]) {

@@ -46,7 +46,7 @@ static bool *joined_spheres(const qmat_medial *medial, qmat_arena *arena) {
 static qmat_status find_frame(skin *s) {
   const qmat_medial *medial = s->medial;
   if (medial->sphere_count == 0) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "The medial mesh has no sphere");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "it has no sphere");
     return qmat_fail_field(s->context, "medial");
   }
   const bool *joined = joined_spheres(medial, &s->context->arena);
@@ -62,13 +62,13 @@ static qmat_status find_frame(skin *s) {
     }
   }
   if (!(largest > 0)) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "Every medial sphere has radius 0: they enclose nothing");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "every sphere has radius 0: they enclose nothing");
     return qmat_fail_field(s->context, "medial");
   }
   for (int k = 0; k < 3; k++) s->frame.centre[k] = 0.5 * low[k] + 0.5 * high[k];
   s->frame.diagonal = hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
   if (!isfinite(s->frame.diagonal) || !isnormal(s->frame.diagonal)) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "The medial mesh is too large or too small to measure");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "it is too large or too small to be measured");
     return qmat_fail_field(s->context, "medial");
   }
   s->spheres = qmat_arena_alloc(&s->context->arena, 4 * medial->sphere_count, sizeof *s->spheres);
@@ -195,8 +195,10 @@ static qmat_status make_skin_surface(skin *s) {
   if (list.short_of_memory) status = qmat_fail_memory(s->context, "balls");
   if (!status && !full(&list)) status = remove_hidden(s, &list);
   if (!status && list.count > MOST_BALLS) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
-              "At spacing %g it takes more than %zu balls, too many for a skin surface", list.spacing, MOST_BALLS);
+    char spacing[32];
+    qmat_format_number(list.spacing, spacing, sizeof spacing);
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "at spacing %s it takes more than %zu balls, too many for a skin surface",
+              spacing, MOST_BALLS);
     qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
     status = qmat_fail_field(s->context, "spacing");
   }
@@ -401,7 +403,7 @@ static const qmat_port outputs[] = {
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
     .version = 1,
-    .summary = "Give a medial mesh a surface",
+    .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the enveloping volume of the medial spheres, cones and slabs by dual contouring of "
         "its exact signed distance. Only cells that the surface passes through are looked at; they are halved where "
@@ -412,7 +414,7 @@ const qmat_node qmat_node_medial_skin = {
         "first; it takes 3 to 15 milliseconds a ball. The report gives the largest distance from the envelope at "
         "vertices and at triangle centroids, as a fraction of the diagonal of the envelope's bounding box.",
     .citation =
-        "section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
+        "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",
     .params_size = sizeof(medial_skin_params),
     .params = params,

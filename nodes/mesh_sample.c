@@ -559,7 +559,7 @@ static const qmat_port outputs[] = {
 const qmat_node qmat_node_mesh_sample = {
     .name = "mesh.sample",
     .version = 1,
-    .summary = "Spread points over a surface, more of them on large and on thin facets",
+    .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
         "Every vertex is a sample. A facet gets as many more as the smallest facet around it fits into it, less one, "
         "and n_f more where it is thin. Neighbours count as at least a thousandth of the median area; degenerate "
@@ -569,7 +569,7 @@ const qmat_node qmat_node_mesh_sample = {
         "eq. 7 compares facets only with each other and says nothing to a mesh that is coarse everywhere. The "
         "report counts samples, vertices and added ones; added_by_area and added_by_thickness (before max_samples); "
         "thin and degenerate facets; facets capped by max_per_facet; and samples dropped by max_samples.",
-    .citation = "section 3.2, eq. 7 and 8; Tournois et al. 2010",
+    .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,
     .inputs = inputs,

@@ -311,7 +311,7 @@ static const qmat_port outputs[] = {
 const qmat_node qmat_node_mesh_sdf = {
     .name = "mesh.sdf",
     .version = 1,
-    .summary = "Measure how thick a solid is at each facet",
+    .summary = "Measures how thick a solid is at each facet",
     .doc =
         "The shape diameter function: from each facet's centroid a fixed pattern of rays goes into the solid within a "
         "cone around the inward normal. Hits on surfaces that face the same way as the facet are ignored. The "
@@ -320,7 +320,7 @@ const qmat_node qmat_node_mesh_sdf = {
         "take the median of the facets at their corners, or the mean of all; degenerate facets take the value of the "
         "nearest facet at their corners.",
     .citation =
-        "section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
+        "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
         "diameter function",
     .params_size = sizeof(mesh_sdf_params),
     .params = params,

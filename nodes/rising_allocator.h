@@ -4,19 +4,24 @@
 
 #include <sys/mman.h>
 
+#include <atomic>
 #include <cstddef>
 #include <limits>
 #include <new>
 
 namespace qmat {
 
+/* Thrown into what allocates after it was asked to stop. */
+struct Stopped {};
+
 /* Memory whose addresses only rise, so that the order of objects by address is the order in which they were made.
  * CGAL's mixed complex sorts simplices by the addresses of their vertices and cells: with any other memory the last
  * digits of its points depend on what the process did before. While an object of this class lives, the thread's
- * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc. */
+ * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc, and Stopped once `stop` is set: CGAL asks nobody
+ * whether to go on, but it allocates all the time. */
 class RisingMemory {
  public:
-  RisingMemory() : outer_(current()) {
+  explicit RisingMemory(const std::atomic<bool> &stop) : stop_(stop), outer_(current()) {
     /* Address space only: pages come when they are touched. */
     for (size_ = kLargest; base_ == nullptr; size_ /= 2) {
       if (size_ < kSmallest) throw std::bad_alloc();
@@ -36,6 +41,7 @@ class RisingMemory {
 
   void *take(std::size_t bytes) {
     constexpr std::size_t alignment = 64;
+    if (stop_) throw Stopped();
     if (bytes > size_ - used_) throw std::bad_alloc();
     void *memory = base_ + used_;
     used_ += (bytes + alignment - 1) / alignment * alignment;
@@ -54,6 +60,7 @@ class RisingMemory {
 
  private:
   static constexpr std::size_t kLargest = std::size_t{1} << 36, kSmallest = std::size_t{1} << 26;
+  const std::atomic<bool> &stop_;
   RisingMemory *outer_;
   char *base_ = nullptr;
   std::size_t size_ = 0, used_ = 0;

@@ -11,13 +11,13 @@ static const char *const defects_choices[] = {"refuse", "drop", NULL};
 
 static const qmat_param params[] = {
     {.name = "path",
-     .doc = "the model: .off, .obj, .ply, .stl, .gltf or .glb",
+     .doc = "The model: .off, .obj, .ply, .stl, .gltf or .glb",
      .unit = "",
      .type = QMAT_PARAM_PATH,
      .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
      .offset = offsetof(scene_read_params, path)},
     {.name = "defects",
-     .doc = "what becomes of facets that name a vertex twice or repeat another facet's vertices",
+     .doc = "What becomes of facets that name a vertex twice or repeat another facet's vertices",
      .unit = "",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_DEFECTS_REFUSE,
@@ -28,9 +28,9 @@ static const qmat_param params[] = {
 enum { SCENE, MESH, REPORT };
 
 static const qmat_port outputs[] = {
-    [SCENE] = {.name = "scene", .type = QMAT_SCENE, .doc = "the model's name and format"},
-    [MESH] = {.name = "mesh", .type = QMAT_MESH, .doc = "its surface as triangles"},
-    [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "what was read and what was done to it"},
+    [SCENE] = {.name = "scene", .type = QMAT_SCENE, .doc = "The model's name and format"},
+    [MESH] = {.name = "mesh", .type = QMAT_MESH, .doc = "Its surface as triangles"},
+    [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "What was read and what was done to it"},
     {0}};
 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],

@@ -145,7 +145,7 @@ static const qmat_port outputs[] = {
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
     .version = 1,
-    .summary = "Make a file of a medial mesh and its skin",
+    .summary = "Makes a file of a medial mesh and its skin",
     .doc =
         "glb and gltf hold the skin as an ordinary mesh, so that every client shows something, and the medial mesh as "
         "a "

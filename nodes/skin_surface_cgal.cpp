@@ -14,9 +14,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <exception>
+#include <mutex>
 #include <new>
 #include <numeric>
+#include <system_error>
+#include <thread>
 #include <unordered_map>
 #include <vector>
 
@@ -92,13 +98,10 @@ qmat_status copy_out(qmat_context *context, const Soup &soup, qmat_skin_triangle
   return QMAT_OK;
 }
 
-}  // namespace
-
-qmat_status qmat_skin_surface(qmat_context *context, const double *balls, size_t count, double shrink, int subdivisions,
-                              qmat_skin_triangles *surface) {
-  *surface = {};
+qmat_status make_skin(qmat_context *context, const std::atomic<bool> &stop, const double *balls, size_t count,
+                      double shrink, int subdivisions, qmat_skin_triangles *surface) {
   try {
-    const qmat::RisingMemory memory;
+    const qmat::RisingMemory memory(stop);
     std::vector<Skin::Weighted_point> weighted;
     weighted.reserve(count + 6);
     for (size_t i = 0; i < count; i++) {
@@ -126,9 +129,58 @@ qmat_status qmat_skin_surface(qmat_context *context, const double *balls, size_t
     return copy_out(context, soup, surface);
   } catch (const std::bad_alloc &) {
     return qmat_fail_memory(context, "the skin surface");
+  } catch (const qmat::Stopped &) {
+    return QMAT_CANCELLED;
   } catch (const std::exception &failure) {
     return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "CGAL: %s", failure.what());
   } catch (...) {
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "the skin surface failed in an unknown way");
   }
+}
+
+}  // namespace
+
+/* CGAL works in a thread of its own, while this one asks whether to go on. What CGAL keeps in thread-local variables,
+ * which it does not put in order when an exception passes through, goes with the thread. */
+qmat_status qmat_skin_surface(qmat_context *context, const double *balls, size_t count, double shrink, int subdivisions,
+                              qmat_skin_triangles *surface) {
+  *surface = {};
+  qmat_context inner = {};
+  inner.node_id = context->node_id;
+  inner.node_type = context->node_type;
+  std::atomic<bool> stop{false};
+  bool done = false;
+  qmat_status made = QMAT_OK, status = QMAT_OK;
+  std::mutex mutex;
+  std::condition_variable ended;
+  try {
+    std::thread worker([&] {
+      const qmat_status result = make_skin(&inner, stop, balls, count, shrink, subdivisions, surface);
+      const std::lock_guard<std::mutex> lock(mutex);
+      made = result;
+      done = true;
+      ended.notify_one();
+    });
+    std::unique_lock<std::mutex> lock(mutex);
+    while (!done) {
+      if (!ended.wait_for(lock, std::chrono::milliseconds(50), [&] { return done; }) && status == QMAT_OK) {
+        lock.unlock();
+        status = qmat_progress(context, 0, count, "balls");
+        if (status != QMAT_OK) stop = true;
+        lock.lock();
+      }
+    }
+    lock.unlock();
+    worker.join();
+  } catch (const std::system_error &) {
+    return qmat_fail_memory(context, "a thread for the skin surface");
+  } catch (const std::bad_alloc &) {
+    return qmat_fail_memory(context, "a thread for the skin surface");
+  }
+  if (status == QMAT_OK && made != QMAT_OK) context->error = inner.error;
+  if (status == QMAT_OK) return made;
+  qmat_free(surface->positions);
+  qmat_free(surface->triangles);
+  *surface = {};
+  return status;
 }
