@@ -50,12 +50,12 @@ static void test_plane_measures_how_far_a_sphere_is_from_touching_it_from_inside
   const double n[3] = {0, 0, 1}, m[4] = {0, 0, 0, 1};
   qmat_quadric_add_plane(&quadric, n, m, 1);
   assert_error(&quadric, 0, 0, 0, 1, 0);
-  assert_error(&quadric, 7, -3, 0, 1, 0);          /* along the plane */
-  assert_error(&quadric, 0, 0, -0.5, 1.5, 0);      /* a larger sphere inside that touches z = 1 */
-  assert_error(&quadric, 0, 0, -0.25, 1, 0.0625);  /* moved by d: d^2, to either side */
+  assert_error(&quadric, 7, -3, 0, 1, 0);         /* along the plane */
+  assert_error(&quadric, 0, 0, -0.5, 1.5, 0);     /* a larger sphere inside that touches z = 1 */
+  assert_error(&quadric, 0, 0, -0.25, 1, 0.0625); /* moved by d: d^2, to either side */
   assert_error(&quadric, 0, 0, 0.25, 1, 0.0625);
-  assert_error(&quadric, 0, 0, 0, 0.75, 0.0625);   /* the radius counts like a move */
-  assert_error(&quadric, 0, 0, 2, 1, 4);           /* touching from outside is 2 r away */
+  assert_error(&quadric, 0, 0, 0, 0.75, 0.0625); /* the radius counts like a move */
+  assert_error(&quadric, 0, 0, 2, 1, 4);         /* touching from outside is 2 r away */
 }
 
 static void test_weights_and_sums_are_linear(void **state) {
@@ -149,7 +149,7 @@ static void test_degenerate_slab_is_refused_and_adds_nothing(void **state) {
   assert_no_slab(a, a, b);
   assert_no_slab(a, b, a);
   assert_no_slab(a, a, a);
-  assert_no_slab((const double[4]){0, 0, 0, 9}, b, wide);  /* one holds the others */
+  assert_no_slab((const double[4]){0, 0, 0, 9}, b, wide);                             /* one holds the others */
   assert_no_slab((const double[4]){0, 0, 0, 5}, (const double[4]){4, 0, 0, 1}, wide); /* touching inside: slope 1 */
   assert_no_slab((const double[4]){0, 0, 0, 1}, (const double[4]){4, 0, 0, 1}, (const double[4]){2, 0.5, 0, 0.1});
 }

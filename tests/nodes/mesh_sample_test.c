@@ -525,8 +525,7 @@ static void test_spacing_fills_a_coarse_box_evenly(void **state) {
   for (size_t i = 0; i < samples->count; i++)
     for (size_t j = 0; j < i; j++) {
       double square = 0;
-      for (size_t k = 0; k < 3; k++)
-        square += pow(samples->positions[3 * i + k] - samples->positions[3 * j + k], 2);
+      for (size_t k = 0; k < 3; k++) square += pow(samples->positions[3 * i + k] - samples->positions[3 * j + k], 2);
       assert_true(sqrt(square) > 0.2 * spacing);
     }
   for (int i = 0; i <= 40; i++)
