@@ -1,0 +1,594 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/surface.h"
+#include "tests/nodes/pipeline.h"
+
+/* The tetrahedra's own spheres: nothing that is near is merged, nothing is refined. */
+#define PLAIN "merge=0 protrusion=0"
+
+static double distance(const double *a, const double *b) {
+  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+static qmat_field *constant_thickness(const qmat_mesh *mesh, double value) {
+  qmat_context context = {0};
+  qmat_field *field = qmat_field_new();
+  assert_non_null(field);
+  field->count = mesh->triangle_count;
+  field->domain = QMAT_PER_FACET;
+  field->unit = qmat_strdup("model unit");
+  field->values = qmat_alloc(field->count, sizeof *field->values);
+  for (size_t i = 0; i < field->count; i++) field->values[i] = value;
+  assert_int_equal(qmat_value_seal(&context, &field->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return field;
+}
+
+/* The mesh's vertices and nothing else, for cases by hand. Takes the mesh over. */
+static void sample_vertices(pipeline *p, qmat_mesh *mesh) {
+  qmat_context context = {0};
+  *p = (pipeline){.mesh = mesh->base.sealed ? mesh : shape_seal(mesh)};
+  p->thickness = constant_thickness(mesh, 1);
+  qmat_samples *samples = p->samples = qmat_samples_new();
+  assert_non_null(samples);
+  samples->count = samples->vertex_count = mesh->vertex_count;
+  samples->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *samples->positions);
+  samples->barycentrics = qmat_calloc(3 * mesh->vertex_count, sizeof *samples->barycentrics);
+  samples->facets = qmat_calloc(mesh->vertex_count, sizeof *samples->facets);
+  memcpy(samples->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *samples->positions);
+  for (size_t i = 3 * mesh->triangle_count; i-- > 0;) {
+    const size_t v = mesh->triangles[i];
+    samples->facets[v] = (uint32_t)(i / 3);
+    for (size_t k = 0; k < 3; k++) samples->barycentrics[3 * v + k] = k == i % 3;
+  }
+  for (size_t v = 0; v < mesh->vertex_count; v++)
+    if (samples->barycentrics[3 * v] + samples->barycentrics[3 * v + 1] + samples->barycentrics[3 * v + 2] == 0)
+      samples->barycentrics[3 * v] = 1; /* on no triangle */
+  assert_int_equal(qmat_value_seal(&context, &samples->base), QMAT_OK);
+  qmat_context_uninit(&context);
+}
+
+static void assert_sphere(const qmat_medial *medial, size_t i, double x, double y, double z, double r) {
+  const double *s = &medial->spheres[4 * i];
+  assert_true(i < medial->sphere_count);
+  assert_near(s[0], x, 1e-12);
+  assert_near(s[1], y, 1e-12);
+  assert_near(s[2], z, 1e-12);
+  assert_near(s[3], r, 1e-12);
+}
+
+static void assert_counts(const qmat_medial *medial, size_t spheres, size_t edges, size_t triangles) {
+  assert_int_equal(medial->sphere_count, spheres);
+  assert_int_equal(medial->edge_count, edges);
+  assert_int_equal(medial->triangle_count, triangles);
+}
+
+static void assert_region(const qmat_medial *medial, size_t sphere, const uint32_t *samples, size_t count) {
+  const uint32_t first = medial->region_offsets[sphere];
+  assert_int_equal(medial->region_offsets[sphere + 1] - first, count);
+  assert_memory_equal(&medial->region_samples[first], samples, count * sizeof *samples);
+}
+
+/* --- by hand ------------------------------------------------------------------------------------------------------ */
+
+static void test_regular_tetrahedron(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  shape_vertex(mesh, 1, 1, 1);
+  shape_vertex(mesh, 1, -1, -1);
+  shape_vertex(mesh, -1, 1, -1);
+  shape_vertex(mesh, -1, -1, 1);
+  shape_triangle(mesh, 0, 1, 2);
+  shape_triangle(mesh, 0, 3, 1);
+  shape_triangle(mesh, 0, 2, 3);
+  shape_triangle(mesh, 1, 3, 2);
+  pipeline p;
+  sample_vertices(&p, mesh);
+  pipeline_delaunay(&p, 0, "");
+  assert_counts(p.medial, 1, 0, 0);
+  assert_sphere(p.medial, 0, 0, 0, 0, 1 / sqrt(3));
+  assert_region(p.medial, 0, (uint32_t[]){0, 1, 2, 3}, 4);
+  assert_int_equal(pipeline_count(p.report, "tetrahedra"), 1);
+  assert_int_equal(pipeline_count(p.report, "circumcentres"), 1);
+  assert_int_equal(pipeline_count(p.report, "incentres"), 0);
+  assert_int_equal(pipeline_count(p.report, "components"), 1);
+  pipeline_delaunay(&p, 0, "radius=circumradius");
+  assert_counts(p.medial, 1, 0, 0);
+  assert_sphere(p.medial, 0, 0, 0, 0, sqrt(3));
+  pipeline_free(&p);
+}
+
+static void test_coincident_centres_of_a_cube_become_one(void **state) {
+  (void)state;
+  for (int variant = 0; variant < 4; variant++) {
+    qmat_mesh *mesh = shape_box(2, 2, 2);
+    shape_map(mesh, 1, -1, -1, -1);
+    if (variant % 2) pipeline_shuffle(mesh);
+    if (variant / 2) shape_rotate(mesh);
+    pipeline p;
+    sample_vertices(&p, mesh);
+    pipeline_delaunay(&p, 0, "merge=1e-9");
+    assert_counts(p.medial, 1, 0, 0);
+    assert_sphere(p.medial, 0, 0, 0, 0, 1);
+    assert_region(p.medial, 0, (uint32_t[]){0, 1, 2, 3, 4, 5, 6, 7}, 8);
+    assert_true(pipeline_count(p.report, "circumcentres") >= 5);
+    pipeline_delaunay(&p, 0, "radius=circumradius");
+    assert_sphere(p.medial, 0, 0, 0, 0, sqrt(3));
+    pipeline_free(&p);
+  }
+}
+
+/* Three points on a circle of radius 1, and poles at the height h above and below its centre. */
+static qmat_mesh *two_pyramids(double h) {
+  qmat_mesh *mesh = shape_new();
+  shape_vertex(mesh, 1, 0, 0);
+  shape_vertex(mesh, -0.5, sqrt(0.75), 0);
+  shape_vertex(mesh, -0.5, -sqrt(0.75), 0);
+  shape_vertex(mesh, 0, 0, h);
+  shape_vertex(mesh, 0, 0, -h);
+  for (uint32_t i = 0; i < 3; i++) {
+    shape_triangle(mesh, i, (i + 1) % 3, 3);
+    shape_triangle(mesh, (i + 1) % 3, i, 4);
+  }
+  return mesh;
+}
+
+static void test_facet_between_two_tetrahedra_gives_an_edge(void **state) {
+  (void)state;
+  /* Circumcentres at (4 - 1) / 4 up and down, 5/4 from the corners, 0.625 / sqrt(4.25) from the sides. */
+  pipeline p;
+  sample_vertices(&p, two_pyramids(2));
+  pipeline_delaunay(&p, 0, "protrusion=0");
+  const double radius = 0.625 / sqrt(4.25);
+  const int up = p.medial->spheres[2] > 0 ? 0 : 1;
+  assert_counts(p.medial, 2, 1, 0);
+  assert_sphere(p.medial, (size_t)up, 0, 0, 0.75, radius);
+  assert_sphere(p.medial, (size_t)!up, 0, 0, -0.75, radius);
+  assert_region(p.medial, (size_t)up, (uint32_t[]){0, 1, 2, 3}, 4);
+  assert_region(p.medial, (size_t)!up, (uint32_t[]){0, 1, 2, 4}, 4);
+  pipeline_delaunay(&p, 0, "protrusion=0 radius=circumradius");
+  assert_sphere(p.medial, (size_t)up, 0, 0, 0.75, 1.25);
+  assert_sphere(p.medial, (size_t)!up, 0, 0, -0.75, 1.25);
+  pipeline_free(&p);
+}
+
+static void test_ring_around_an_edge_gives_a_slab(void **state) {
+  (void)state;
+  /* Flat: three tetrahedra around the edge between the poles, circumcentres outside, so that the incentres count. */
+  pipeline p;
+  sample_vertices(&p, two_pyramids(0.5));
+  static const char *const settings[] = {"", "completion=thin theta=1"};
+  for (int i = 0; i < 2; i++) {
+    pipeline_delaunay(&p, 0, settings[i]);
+    assert_counts(p.medial, 3, 3, 1);
+    assert_int_equal(pipeline_count(p.report, "circumcentres"), 0);
+    assert_int_equal(pipeline_count(p.report, "incentres"), 3);
+    qmat_context context = {0};
+    qmat_surface *surface;
+    assert_int_equal(qmat_surface_new(&context, p.mesh, &surface), QMAT_OK);
+    for (size_t s = 0; s < 3; s++) {
+      double sphere[4];
+      qmat_frame_spheres_to_unit(qmat_surface_frame(surface), &p.medial->spheres[4 * s], 1, sphere);
+      assert_near(p.medial->spheres[4 * s + 2], 0, 1e-12);
+      assert_near(sphere[3], -qmat_surface_signed_distance(surface, sphere), 1e-12);
+    }
+    qmat_surface_free(surface);
+    qmat_context_uninit(&context);
+  }
+  /* None is thin: nothing is left. */
+  qmat_context context = {0};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base};
+  assert_int_equal(pipeline_run(&context, "medial.delaunay", "completion=thin theta=0.5", inputs, outputs),
+                   QMAT_ERROR_GEOMETRY);
+  qmat_context_uninit(&context);
+  pipeline_free(&p);
+}
+
+/* --- models whose medial axis is known ---------------------------------------------------------------------------- */
+
+static void test_sphere_gives_its_centre(void **state) {
+  (void)state;
+  pipeline p;
+  sample_vertices(&p, pipeline_model("sphere", 16));
+  pipeline_delaunay(&p, 0, PLAIN " radius=circumradius");
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    assert_near(distance(&p.medial->spheres[4 * i], (const double[3]){0, 0, 0}), 0, 1e-6);
+    assert_near(p.medial->spheres[4 * i + 3], 1, 1e-6);
+  }
+  pipeline_delaunay(&p, 0, "");
+  assert_counts(p.medial, 1, 0, 0); /* all of them merge */
+  assert_near(distance(p.medial->spheres, (const double[3]){0, 0, 0}), 0, 1e-6);
+  assert_int_equal(p.medial->region_sample_count, p.mesh->vertex_count);
+  pipeline_free(&p);
+}
+
+static void test_capsule_gives_its_axis(void **state) {
+  (void)state;
+  /* Vertices alone lie on the ideal surface: empty spheres are as deep as the axis, but for those of slivers. */
+  pipeline p;
+  sample_vertices(&p, pipeline_model("capsule", 24));
+  pipeline_delaunay(&p, 0, PLAIN " radius=circumradius completion=thin theta=0");
+  assert_true(p.medial->sphere_count > 100);
+  size_t near = 0;
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    const double *s = &p.medial->spheres[4 * i];
+    const double end[3] = {fmin(fmax(s[0], 0), 3), 0, 0};
+    near += distance(s, end) < 0.05 && fabs(s[3] - 1) < 0.05;
+  }
+  assert_true((double)near > 0.75 * (double)p.medial->sphere_count);
+  assert_int_equal(pipeline_components(p.medial), 1);
+  pipeline_free(&p);
+}
+
+static void test_thin_sheet_gives_one_piece_near_its_middle(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("sheet", 24), "spacing=5%", "");
+  qmat_model model;
+  assert_int_equal(qmat_model_make("sheet", 24, &model), QMAT_OK);
+  const double half = model.spheres[3];
+  assert_true(half < 0.011 * pipeline_diagonal(p.mesh));
+  qmat_model_uninit(&model);
+  assert_int_equal(pipeline_components(p.medial), 1);
+  assert_int_equal(pipeline_count(p.report, "components"), 1);
+  assert_int_equal(pipeline_euler(p.medial), 1);
+  size_t middle = 0;
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    const double *s = &p.medial->spheres[4 * i];
+    assert_true(fabs(s[2]) + s[3] <= half * (1 + 1e-9));
+    middle += fabs(s[2]) <= 0.5 * half;
+  }
+  assert_true((double)middle > 0.6 * (double)p.medial->sphere_count);
+  /* Without completion, where samples are farther apart than the sheet is thick, hardly anything of it is found. */
+  const size_t all = p.medial->sphere_count;
+  pipeline_delaunay(&p, 0, "completion=thin theta=0");
+  assert_true(p.medial->sphere_count < all);
+  assert_int_equal(pipeline_count(p.report, "incentres"), 0);
+  pipeline_free(&p);
+}
+
+static void test_torus_keeps_its_loop(void **state) {
+  (void)state;
+  static const char *const samplings[] = {"spacing=0", "spacing=5%"};
+  for (int i = 0; i < 4; i++) {
+    pipeline p;
+    pipeline_make(&p, pipeline_model("torus", 12), samplings[i / 2], i % 2 ? PLAIN : "");
+    assert_int_equal(pipeline_euler(p.medial), 0);
+    assert_int_equal(pipeline_components(p.medial), 1);
+    assert_int_equal(pipeline_count(p.report, "components"), 1);
+    pipeline_free(&p);
+  }
+}
+
+static void test_two_solids_give_two_pieces(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 1, 1.1, 1.2, false);
+  shape_add_box(mesh, 1.5, 0, 0, 2.5, 1.1, 1.2, false);
+  pipeline p;
+  pipeline_make(&p, mesh, "spacing=5%", "");
+  assert_int_equal(pipeline_components(p.medial), 2);
+  assert_int_equal(pipeline_count(p.report, "components"), 2);
+  assert_int_equal(pipeline_count(p.report, "links"), 0);
+  assert_int_equal(pipeline_euler(p.medial), 2);
+  size_t left = 0, right = 0;
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    left += p.medial->spheres[4 * i] < 1;
+    right += p.medial->spheres[4 * i] > 1.5;
+  }
+  assert_true(left > 0 && right > 0);
+  assert_int_equal(left + right, p.medial->sphere_count); /* nothing between them */
+  pipeline_free(&p);
+}
+
+static void test_cavity_is_left_out(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 3, 3.1, 3.2, false);
+  shape_add_box(mesh, 1, 1, 1, 2, 2.1, 2.2, true);
+  pipeline p;
+  pipeline_make(&p, mesh, "spacing=5%", "");
+  assert_int_equal(pipeline_components(p.medial), 1);
+  assert_int_equal(pipeline_euler(p.medial), 2); /* a sphere around the cavity */
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    const double *s = &p.medial->spheres[4 * i];
+    assert_false(s[0] > 1 && s[0] < 2 && s[1] > 1 && s[1] < 2.1 && s[2] > 1 && s[2] < 2.2);
+  }
+  pipeline_free(&p);
+}
+
+/* --- rules -------------------------------------------------------------------------------------------------------- */
+
+static void test_circumradius_touches_its_samples_and_holds_none(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("l-bracket", 8), "spacing=8%", PLAIN " radius=circumradius completion=thin theta=0");
+  const double tolerance = 1e-6 * pipeline_diagonal(p.mesh);
+  size_t tight = 0;
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    const double *s = &p.medial->spheres[4 * i];
+    assert_true(p.medial->region_offsets[i + 1] >= p.medial->region_offsets[i] + 4);
+    for (uint32_t r = p.medial->region_offsets[i]; r < p.medial->region_offsets[i + 1]; r++)
+      assert_near(distance(s, &p.samples->positions[3 * (size_t)p.medial->region_samples[r]]), s[3], tolerance);
+    for (size_t k = 0; k < p.samples->count; k++)
+      assert_true(distance(s, &p.samples->positions[3 * k]) >= s[3] - tolerance);
+    tight++;
+  }
+  assert_true(tight > 500);
+  pipeline_free(&p);
+}
+
+static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("torus", 10), "spacing=0", PLAIN);
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, p.mesh, &surface), QMAT_OK);
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    double s[4];
+    qmat_frame_spheres_to_unit(qmat_surface_frame(surface), &p.medial->spheres[4 * i], 1, s);
+    const double depth = -qmat_surface_signed_distance(surface, s);
+    assert_true(s[3] > 0 && s[3] <= depth + 1e-9);
+  }
+  qmat_medial *by_distance = p.medial;
+  qmat_value_retain(&by_distance->base);
+  pipeline_delaunay(&p, 0, PLAIN " radius=circumradius");
+  assert_int_equal(p.medial->sphere_count, by_distance->sphere_count);
+  assert_int_equal(p.medial->edge_count, by_distance->edge_count);
+  assert_int_equal(p.medial->triangle_count, by_distance->triangle_count);
+  size_t larger = 0;
+  for (size_t i = 0; i < p.medial->sphere_count; i++) {
+    assert_near(distance(&p.medial->spheres[4 * i], &by_distance->spheres[4 * i]), 0, 0);
+    assert_true(p.medial->spheres[4 * i + 3] >= by_distance->spheres[4 * i + 3] - 1e-9);
+    larger += p.medial->spheres[4 * i + 3] > by_distance->spheres[4 * i + 3] * (1 + 1e-6);
+  }
+  assert_true(larger > 0);
+  qmat_value_release(&by_distance->base);
+  qmat_surface_free(surface);
+  qmat_context_uninit(&context);
+  pipeline_free(&p);
+}
+
+static void test_completion_adds_incentres_and_keeps_the_rest(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("octopus", 6), "spacing=0", "completion=all");
+  const int64_t circumcentres = pipeline_count(p.report, "circumcentres");
+  const int64_t incentres = pipeline_count(p.report, "incentres");
+  assert_true(incentres > 0);
+  int64_t before = -1;
+  static const char *const thetas[] = {"completion=thin theta=0", "completion=thin theta=0.5",
+                                       "completion=thin theta=1", "completion=thin theta=10"};
+  for (int i = 0; i < 4; i++) {
+    pipeline_delaunay(&p, 0, thetas[i]);
+    assert_true(pipeline_count(p.report, "circumcentres") >= circumcentres); /* also of tetrahedra outside */
+    assert_true(pipeline_count(p.report, "incentres") >= before);
+    assert_true(pipeline_count(p.report, "incentres") <= incentres);
+    before = pipeline_count(p.report, "incentres");
+    if (i == 0) assert_int_equal(before, 0);
+  }
+  assert_true(before > incentres / 2);
+  pipeline_free(&p);
+}
+
+static void test_samples_all_have_a_sphere(void **state) {
+  (void)state;
+  static const char *const names[] = {"capsule", "sheet", "torus", "octopus", "box"};
+  for (int i = 0; i < 5; i++) {
+    pipeline p;
+    pipeline_make(&p, pipeline_model(names[i], 8), "spacing=6%", "");
+    uint8_t *answered = calloc(p.samples->count, 1);
+    assert_non_null(answered);
+    assert_int_equal(p.medial->region_offset_count, p.medial->sphere_count + 1);
+    for (size_t k = 0; k < p.medial->region_sample_count; k++) answered[p.medial->region_samples[k]] = 1;
+    size_t missing = 0;
+    for (size_t k = 0; k < p.samples->count; k++) missing += !answered[k];
+    assert_true(missing * 100 <= p.samples->count); /* slivers on the surface may be all that a sample has */
+    free(answered);
+    pipeline_free(&p);
+  }
+}
+
+/* --- invariance --------------------------------------------------------------------------------------------------- */
+
+static void assert_share(int64_t actual, int64_t expected, double share) {
+  assert_near((double)actual, (double)expected, share * (double)expected);
+}
+
+static void test_moving_scaling_and_shuffling_change_little(void **state) {
+  (void)state;
+  static const char *const names[] = {"torus", "octopus"};
+  static const char *const counts[] = {"tetrahedra", "circumcentres", "incentres", "spheres", "edges", "triangles"};
+  for (int n = 0; n < 2; n++) {
+    pipeline plain;
+    pipeline_make(&plain, pipeline_model(names[n], 8), "spacing=0 n_f=0", "");
+    for (int variant = 0; variant < 5; variant++) {
+      qmat_mesh *mesh = pipeline_model(names[n], 8);
+      if (variant == 0) shape_rotate(mesh);
+      if (variant == 1) shape_map(mesh, 1e-6, 0, 0, 0);
+      if (variant == 2) shape_map(mesh, 1e6, 0, 0, 0);
+      if (variant == 3) shape_map(mesh, 1, 100, -200, 300);
+      if (variant == 4) pipeline_shuffle(mesh);
+      pipeline p;
+      pipeline_make(&p, mesh, "spacing=0 n_f=0", "");
+      /* Added samples start at random per facet; a rotation of the model moves its bounding box and tolerances. */
+      const double share = variant == 1 || variant == 2 ? 0.001 : 0.05;
+      for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
+        assert_share(pipeline_count(p.report, counts[c]), pipeline_count(plain.report, counts[c]),
+                     c == 2 ? 4 * share : share);
+      assert_int_equal(pipeline_components(p.medial), pipeline_components(plain.medial));
+      pipeline_free(&p);
+    }
+    pipeline_free(&plain);
+  }
+}
+
+static int by_coordinates(const void *left, const void *right) {
+  const double *a = left, *b = right;
+  for (int k = 0; k < 4; k++)
+    if (fabs(a[k] - b[k]) > 1e-7) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
+static void test_order_of_samples_does_not_move_the_spheres(void **state) {
+  (void)state;
+  /* Vertices alone, no two of whose choices tie: the same spheres come in another order. */
+  pipeline p, q;
+  qmat_mesh *mesh = pipeline_model("tapered-capsule", 10);
+  pipeline_shuffle(mesh);
+  sample_vertices(&p, pipeline_model("tapered-capsule", 10));
+  sample_vertices(&q, mesh);
+  pipeline_delaunay(&p, 0, PLAIN);
+  pipeline_delaunay(&q, 0, PLAIN);
+  assert_counts(q.medial, p.medial->sphere_count, p.medial->edge_count, p.medial->triangle_count);
+  const size_t count = p.medial->sphere_count;
+  double *a = calloc(count, 4 * sizeof *a), *b = calloc(count, 4 * sizeof *b);
+  assert_true(a && b);
+  memcpy(a, p.medial->spheres, 4 * count * sizeof *a);
+  memcpy(b, q.medial->spheres, 4 * count * sizeof *b);
+  qsort(a, count, 4 * sizeof *a, by_coordinates);
+  qsort(b, count, 4 * sizeof *b, by_coordinates);
+  for (size_t i = 0; i < 4 * count; i++) assert_near(b[i], a[i], 1e-6);
+  free(a);
+  free(b);
+  pipeline_free(&p);
+  pipeline_free(&q);
+}
+
+static void test_threads_do_not_change_a_byte(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_sample(&p, pipeline_model("octopus", 8), "spacing=0");
+  static const int threads[] = {1, 2, 8};
+  qmat_digest medial = {{0}}, report = {{0}};
+  for (int i = 0; i < 3; i++) {
+    pipeline_delaunay(&p, threads[i], "");
+    if (i == 0) {
+      medial = p.medial->base.digest;
+      report = p.report->base.digest;
+    }
+    assert_memory_equal(&p.medial->base.digest, &medial, sizeof medial);
+    assert_memory_equal(&p.report->base.digest, &report, sizeof report);
+  }
+  pipeline_free(&p);
+}
+
+/* --- errors ------------------------------------------------------------------------------------------------------- */
+
+static void expect_error(const pipeline *p, qmat_status status, const char *field) {
+  qmat_context context = {0};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  const qmat_value *inputs[] = {&p->mesh->base, &p->thickness->base, &p->samples->base};
+  assert_int_equal(pipeline_run(&context, "medial.delaunay", "", inputs, outputs), status);
+  if (field != NULL) assert_string_equal(context.error.field, field);
+  qmat_context_uninit(&context);
+}
+
+static void test_flat_samples_are_refused(void **state) {
+  (void)state;
+  pipeline p;
+  qmat_mesh *mesh = shape_new(); /* a square seen from both sides */
+  for (int i = 0; i < 4; i++) shape_vertex(mesh, i % 2, i / 2, 0);
+  shape_quad(mesh, 0, 1, 3, 2);
+  shape_quad(mesh, 0, 2, 3, 1);
+  sample_vertices(&p, mesh);
+  expect_error(&p, QMAT_ERROR_GEOMETRY, NULL);
+  pipeline_free(&p);
+  mesh = shape_new();
+  shape_vertex(mesh, 0, 0, 0);
+  shape_vertex(mesh, 1, 0, 0);
+  shape_vertex(mesh, 0, 1, 0);
+  shape_triangle(mesh, 0, 1, 2);
+  sample_vertices(&p, mesh); /* a single triangle */
+  expect_error(&p, QMAT_ERROR_GEOMETRY, NULL);
+  pipeline_free(&p);
+}
+
+static void test_meshes_without_an_inside_are_refused(void **state) {
+  (void)state;
+  pipeline p;
+  sample_vertices(&p, shape_new()); /* nothing at all */
+  expect_error(&p, QMAT_ERROR_GEOMETRY, NULL);
+  pipeline_free(&p);
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 1, 2, 3, true); /* inside out */
+  sample_vertices(&p, mesh);
+  expect_error(&p, QMAT_ERROR_GEOMETRY, NULL);
+  pipeline_free(&p);
+  mesh = shape_new(); /* vertices in one place: no size */
+  for (int i = 0; i < 3; i++) shape_vertex(mesh, 1, 1, 1);
+  shape_triangle(mesh, 0, 1, 2);
+  sample_vertices(&p, mesh);
+  expect_error(&p, QMAT_ERROR_GEOMETRY, NULL);
+  pipeline_free(&p);
+}
+
+static void test_inputs_that_do_not_fit_are_named(void **state) {
+  (void)state;
+  pipeline box, other;
+  sample_vertices(&box, shape_box(1, 1, 1));
+  sample_vertices(&other, two_pyramids(1)); /* 5 vertices, 6 facets */
+  pipeline mixed = box;
+  mixed.samples = other.samples;
+  expect_error(&mixed, QMAT_ERROR_GEOMETRY, "samples");
+  mixed = box;
+  mixed.thickness = other.thickness;
+  expect_error(&mixed, QMAT_ERROR_GEOMETRY, "thickness");
+  pipeline_free(&box);
+  pipeline_free(&other);
+}
+
+static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                   const char *unit) {
+  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return false;
+}
+
+static void test_progress_function_cancels(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_sample(&p, pipeline_model("torus", 8), "spacing=0");
+  qmat_context context = {.progress = refuse};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base};
+  assert_int_equal(pipeline_run(&context, "medial.delaunay", "", inputs, outputs), QMAT_CANCELLED);
+  qmat_context_uninit(&context);
+  pipeline_free(&p);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_regular_tetrahedron),
+      cmocka_unit_test(test_coincident_centres_of_a_cube_become_one),
+      cmocka_unit_test(test_facet_between_two_tetrahedra_gives_an_edge),
+      cmocka_unit_test(test_ring_around_an_edge_gives_a_slab),
+      cmocka_unit_test(test_sphere_gives_its_centre),
+      cmocka_unit_test(test_capsule_gives_its_axis),
+      cmocka_unit_test(test_thin_sheet_gives_one_piece_near_its_middle),
+      cmocka_unit_test(test_torus_keeps_its_loop),
+      cmocka_unit_test(test_two_solids_give_two_pieces),
+      cmocka_unit_test(test_cavity_is_left_out),
+      cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
+      cmocka_unit_test(test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller),
+      cmocka_unit_test(test_completion_adds_incentres_and_keeps_the_rest),
+      cmocka_unit_test(test_samples_all_have_a_sphere),
+      cmocka_unit_test(test_moving_scaling_and_shuffling_change_little),
+      cmocka_unit_test(test_order_of_samples_does_not_move_the_spheres),
+      cmocka_unit_test(test_threads_do_not_change_a_byte),
+      cmocka_unit_test(test_flat_samples_are_refused),
+      cmocka_unit_test(test_meshes_without_an_inside_are_refused),
+      cmocka_unit_test(test_inputs_that_do_not_fit_are_named),
+      cmocka_unit_test(test_progress_function_cancels),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
