@@ -619,28 +619,6 @@ static qmat_status make_medial(delaunay *d, qmat_medial *medial, size_t *refined
   return qmat_value_seal(d->context, &medial->base);
 }
 
-static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
-                                const qmat_samples *samples) {
-  if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the thickness has %zu values, the mesh %zu facets", thickness->count,
-              mesh->triangle_count);
-    return qmat_fail_field(context, "thickness");
-  }
-  if (samples->vertex_count != mesh->vertex_count) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the samples were taken of a mesh with %zu vertices, not %zu",
-              samples->vertex_count, mesh->vertex_count);
-    return qmat_fail_field(context, "samples");
-  }
-  for (size_t i = 0; i < samples->count; i++)
-    if (samples->facets[i] >= mesh->triangle_count) {
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "the sample lies on facet %u of a mesh with %zu", samples->facets[i],
-                mesh->triangle_count);
-      qmat_fail_field(context, "samples");
-      return qmat_fail_element(context, "sample", (int64_t)i);
-    }
-  return QMAT_OK;
-}
-
 static qmat_status mark_thin_samples(delaunay *d, const qmat_field *thickness) {
   qmat_arena *arena = &d->context->arena;
   const size_t count = d->samples->count;
@@ -664,7 +642,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   qmat_medial *medial = NULL;
   qmat_report *report = NULL;
   size_t components = 0, specks = 0, speck_spheres = 0, links = 0, refined = 0, by_kind[3] = {0, 0, 0};
-  qmat_status status = check_inputs(context, d.mesh, thickness, d.samples);
+  qmat_status status = qmat_thickness_check(context, d.mesh, thickness, d.samples);
   if (status != QMAT_OK) return status;
   if ((status = qmat_surface_new(context, d.mesh, &d.surface)) != QMAT_OK) return status;
   double *points = qmat_arena_alloc(&context->arena, d.samples->count, 3 * sizeof *points);

@@ -562,7 +562,12 @@ typedef struct {
 static qmat_status prepare(simplifier *s, const qmat_mesh *mesh, const qmat_field *thickness,
                            const qmat_samples *samples, const qmat_medial *medial, initial_state *state) {
   qmat_context *context = s->context;
-  qmat_status status = qmat_surface_new(context, mesh, &s->surface);
+  qmat_status status = qmat_thickness_check(context, mesh, thickness, samples);
+  if (status == QMAT_OK && medial->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
+    status = qmat_fail_field(context, "medial");
+  }
+  if (status == QMAT_OK) status = qmat_surface_new(context, mesh, &s->surface);
   if (status != QMAT_OK) return status;
   double *spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof *spheres);
   double *depths = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *depths);

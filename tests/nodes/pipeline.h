@@ -35,16 +35,8 @@ static inline qmat_status pipeline_run(qmat_context *context, const char *name, 
     if (qmat_param_parse(context, node, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
   }
   if (qmat_params_check(context, node, params) != QMAT_OK) fail_msg("%s", context->error.message);
-  for (size_t i = 0; i < qmat_output_count(node); i++) outputs[i] = NULL;
-  const qmat_status status = node->run(context, params, inputs, outputs);
-  for (size_t i = 0; i < qmat_output_count(node); i++) {
-    assert_int_equal(outputs[i] != NULL, status == QMAT_OK);
-    if (outputs[i] != NULL) assert_true(outputs[i]->sealed);
-  }
-  if (status != QMAT_OK) {
-    assert_int_equal(context->error.status, status);
-    assert_string_not_equal(context->error.message, "");
-  }
+  const qmat_status status = qmat_node_run(context, node, params, inputs, outputs);
+  if (status != QMAT_OK) assert_string_not_equal(context->error.message, "");
   return status;
 }
 
