@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/envelope.h"
 #include "core/medial_build.h"
 #include "core/medial_complex.h"
 #include "core/node.h"
@@ -11,8 +10,9 @@
 #include "core/surface.h"
 #include "core/thickness.h"
 #include "nodes/control_points.h"
-#include "nodes/cover.h"
 #include "nodes/coverage.h"
+#include "nodes/edge_heap.h"
+#include "nodes/medial_errors.h"
 #include "nodes/protrusion.h"
 
 typedef enum { ERROR_TWO_SIDED, ERROR_ONE_SIDED } error_kind;
@@ -43,21 +43,13 @@ static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
 }
 
-/* A heap of edges, cheapest first: by cost, then by error (eq. 6 gives every spike cost 0), then by ids. */
-typedef struct {
-  const qmat_complex *complex;
-  double *costs, *errors; /* per edge */
-  uint32_t *heap, *places; /* places: per edge, QMAT_NONE when it is not in the heap */
-  size_t count;
-} edge_heap;
-
 typedef struct {
   qmat_context *context;
   const medial_simplify_params *params;
   qmat_surface *surface;
   qmat_complex complex;
   qmat_quadric *quadrics; /* per vertex */
-  edge_heap heap;
+  qmat_edge_heap heap;
   qmat_control_points control;
   qmat_coverage coverage;
   qmat_protrusion protrusion;
@@ -79,58 +71,6 @@ static double stability_ratio(const double *a, const double *b) {
   const double length = distance(a, b);
   const double hyperbolic = length - fabs(a[3] - b[3]);
   return length > 0 && hyperbolic > 0 ? hyperbolic / length : 0;
-}
-
-static bool comes_first(const edge_heap *h, uint32_t a, uint32_t b) {
-  if (h->costs[a] != h->costs[b]) return h->costs[a] < h->costs[b];
-  if (h->errors[a] != h->errors[b]) return h->errors[a] < h->errors[b];
-  const uint32_t *p = &h->complex->edges[2 * (size_t)a], *q = &h->complex->edges[2 * (size_t)b];
-  const uint32_t low_p = p[0] < p[1] ? p[0] : p[1], low_q = q[0] < q[1] ? q[0] : q[1];
-  if (low_p != low_q) return low_p < low_q;
-  return (p[0] < p[1] ? p[1] : p[0]) < (q[0] < q[1] ? q[1] : q[0]);
-}
-
-static void put(edge_heap *h, size_t place, uint32_t edge) {
-  h->heap[place] = edge;
-  h->places[edge] = (uint32_t)place;
-}
-
-static void sift_up(edge_heap *h, size_t place) {
-  const uint32_t edge = h->heap[place];
-  for (; place > 0 && comes_first(h, edge, h->heap[(place - 1) / 2]); place = (place - 1) / 2)
-    put(h, place, h->heap[(place - 1) / 2]);
-  put(h, place, edge);
-}
-
-static void sift_down(edge_heap *h, size_t place) {
-  const uint32_t edge = h->heap[place];
-  for (;;) {
-    size_t child = 2 * place + 1;
-    if (child >= h->count) break;
-    if (child + 1 < h->count && comes_first(h, h->heap[child + 1], h->heap[child])) child++;
-    if (!comes_first(h, h->heap[child], edge)) break;
-    put(h, place, h->heap[child]);
-    place = child;
-  }
-  put(h, place, edge);
-}
-
-static void heap_remove(edge_heap *h, uint32_t edge) {
-  const uint32_t place = h->places[edge];
-  if (place == QMAT_NONE) return;
-  h->places[edge] = QMAT_NONE;
-  const uint32_t last = h->heap[--h->count];
-  if (last == edge) return;
-  put(h, place, last);
-  sift_up(h, place);
-  sift_down(h, h->places[last]);
-}
-
-/* Puts an edge in, or in its new place. */
-static void heap_update(edge_heap *h, uint32_t edge) {
-  if (h->places[edge] == QMAT_NONE) put(h, h->count++, edge);
-  sift_up(h, h->places[edge]);
-  sift_down(h, h->places[edge]);
 }
 
 /* The candidates for the merged sphere of an edge, best first: the sphere of least error where there is one, both ends
@@ -251,26 +191,18 @@ static qmat_status set_quadrics(simplifier *s) {
 }
 
 static qmat_status fill_heap(simplifier *s) {
-  qmat_arena *arena = &s->context->arena;
   const size_t count = s->complex.edge_count;
-  edge_heap *h = &s->heap;
-  h->complex = &s->complex;
-  h->costs = qmat_arena_alloc(arena, count, sizeof *h->costs);
-  h->errors = qmat_arena_alloc(arena, count, sizeof *h->errors);
-  h->heap = qmat_arena_alloc(arena, count, sizeof *h->heap);
-  h->places = qmat_arena_alloc(arena, count, sizeof *h->places);
-  s->failed_points = qmat_arena_alloc(arena, count, sizeof *s->failed_points);
-  if (!h->costs || !h->errors || !h->heap || !h->places || !s->failed_points)
-    return qmat_fail_memory(s->context, "the heap of edges");
+  s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
+  if (!s->failed_points) return qmat_fail_memory(s->context, "the heap of edges");
+  const qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
+  if (status != QMAT_OK) return status;
   const int threads = qmat_threads(s->context);
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (size_t e = 0; e < count; e++) {
     set_cost(s, (uint32_t)e);
-    put(h, e, (uint32_t)e);
     s->failed_points[e] = QMAT_NONE;
   }
-  h->count = count;
-  for (size_t i = count / 2; i-- > 0;) sift_down(h, i);
+  qmat_edge_heap_fill(&s->heap);
   return QMAT_OK;
 }
 
@@ -389,19 +321,19 @@ static qmat_status try_collapse(simplifier *s, uint32_t edge, outcome *result) {
 static void update_neighbourhood(simplifier *s) {
   const qmat_collapse *c = &s->collapse;
   qmat_quadric_add(&s->quadrics[c->kept], &s->quadrics[c->removed]);
-  heap_remove(&s->heap, c->edge);
+  qmat_edge_heap_remove(&s->heap, c->edge);
   for (size_t n = 0; n < c->neighbour_count; n++)
-    if (c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE) heap_remove(&s->heap, c->removed_edges[n]);
+    if (c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE) qmat_edge_heap_remove(&s->heap, c->removed_edges[n]);
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(&s->complex, c->kept, &count);
   for (size_t i = 0; i < count; i++) {
     set_cost(s, at[i]);
-    heap_update(&s->heap, at[i]);
+    qmat_edge_heap_update(&s->heap, at[i]);
   }
   for (size_t n = 0; n < c->neighbour_count; n++) {
     at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
     for (size_t i = 0; i < count; i++)
-      if (s->heap.places[at[i]] == QMAT_NONE) heap_update(&s->heap, at[i]);
+      if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
   }
 }
 
@@ -416,9 +348,9 @@ static qmat_status collapse_edges(simplifier *s) {
       if (status != QMAT_OK) return status;
     }
     s->protecting = p->protect == PROTECT_ALWAYS || (p->protect == PROTECT_LATE && live <= late_stage(initial));
-    const uint32_t edge = s->heap.heap[0];
+    const uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (p->cost > 0 && s->heap.costs[edge] > p->cost) break;
-    heap_remove(&s->heap, edge);
+    qmat_edge_heap_remove(&s->heap, edge);
     outcome result;
     const qmat_status status = try_collapse(s, edge, &result);
     if (status != QMAT_OK) return status;
@@ -435,58 +367,14 @@ static qmat_status collapse_edges(simplifier *s) {
 /* The reported errors are at most this share of epsilon above the true ones. */
 static const double error_tolerance = 0.01;
 
-typedef struct {
-  double coverage, protrusion; /* upper bounds, unit frame */
-  qmat_cover cover;
-} measured_errors;
+/* What an unbounded run (epsilon 0) measures its errors against. */
+static const double default_epsilon = 0.01;
 
-/* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
- * one look. */
-static double least_protrusion(const simplifier *s, const qmat_medial *unit, const qmat_envelope *envelope) {
-  const size_t primitives = qmat_envelope_primitive_count(envelope);
-  const int threads = qmat_threads(s->context);
-  double least = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
-  for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
-    double middle[4] = {0, 0, 0, 0};
-    uint32_t ids[3] = {(uint32_t)i};
-    const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
-    for (int c = 0; c < count; c++)
-      for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
-    least = fmax(least, qmat_protrusion_of_sphere(s->surface, middle));
-  }
-  return least;
-}
-
-/* Both errors of the result, over the whole surface and every primitive. */
-static qmat_status measure_errors(simplifier *s, const qmat_medial *unit, measured_errors *errors) {
-  qmat_envelope *envelope;
-  qmat_status status = qmat_envelope_of_medial(s->context, unit, &envelope);
-  if (status != QMAT_OK) return status;
-  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : 0.01;
+static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
+  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
-  const int threads = qmat_threads(s->context);
-  double out = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : out)
-  for (size_t i = 0; i < s->control.count; i++)
-    out = fmax(out, qmat_envelope_distance(envelope, &s->control.points[3 * i], NULL));
-  status = qmat_cover_measure(s->context, s->surface, envelope, unit->spheres, out, tolerance,
-                              epsilon - tolerance, &errors->cover);
-  errors->coverage = errors->cover.bound;
-  const double enough = least_protrusion(s, unit, envelope) + tolerance;
-  const size_t primitives = qmat_envelope_primitive_count(envelope);
-  double in = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : in)
-  for (size_t i = 0; i < primitives; i++) {
-    uint32_t ids[3];
-    const int count = qmat_envelope_primitive(envelope, i, ids);
-    const double *spheres[3];
-    for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
-    in = fmax(in, qmat_protrusion_bound(s->surface, spheres, count, enough, tolerance));
-  }
-  errors->protrusion = in;
-  qmat_envelope_free(envelope);
-  return status;
+  return qmat_medial_errors_measure(s->context, s->surface, unit, s->control.points, s->control.count, tolerance,
+                                    epsilon - tolerance, errors);
 }
 
 /* The sample's owner: the corner of its witness with the largest weight. */
@@ -608,7 +496,7 @@ static qmat_status start(simplifier *s, const initial_state *state, const qmat_s
                               two_sided ? s->limit : INFINITY);
 }
 
-static qmat_status make_report(simplifier *s, const qmat_medial *unit, const measured_errors *errors, int rounds,
+static qmat_status make_report(simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors, int rounds,
                                qmat_report *report) {
   const struct {
     const char *name;
@@ -631,8 +519,8 @@ static qmat_status make_report(simplifier *s, const qmat_medial *unit, const mea
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value));
   bad |= json_object_set_new(report->root, "epsilon", json_real(s->params->epsilon));
-  bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(errors->coverage));
-  bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(errors->protrusion));
+  bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(errors->surface_to_envelope));
+  bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(errors->envelope_to_surface));
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
@@ -666,15 +554,15 @@ static qmat_status simplify(simplifier *s, const initial_state *state, const qma
   qmat_extra_points extra = {0};
   const double epsilon = s->params->epsilon;
   for (int round = 1;; round++) {
-    measured_errors errors = {.coverage = 0};
+    qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_medial *unit = *medial = qmat_medial_new();
     qmat_status status = unit ? start(s, state, samples, initial, &extra)
                               : qmat_fail_memory(s->context, "the medial mesh");
     if (status == QMAT_OK) status = collapse_edges(s);
     if (status == QMAT_OK) status = extract(s, unit);
-    if (status == QMAT_OK) status = measure_errors(s, unit, &errors);
+    if (status == QMAT_OK) status = measure(s, unit, &errors);
     if (status != QMAT_OK) return status;
-    const bool repeat = epsilon > 0 && errors.coverage > epsilon && errors.cover.count > 0 && round < MOST_ROUNDS;
+    const bool repeat = epsilon > 0 && errors.surface_to_envelope > epsilon && errors.cover.count > 0 && round < MOST_ROUNDS;
     if (!repeat) return make_report(s, unit, &errors, round, report);
     if ((status = add_extra_points(s, &errors.cover, &extra)) != QMAT_OK) return status;
     qmat_value_release(&unit->base);

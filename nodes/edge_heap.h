@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_EDGE_HEAP_H
+#define QMAT_NODES_EDGE_HEAP_H
+
+#include "core/medial_complex.h"
+
+/* The edges of a medial complex in a heap, cheapest first: by cost, then by error (eq. 6 gives every spike cost 0), then
+ * by the ids of their ends, so that the order is one and the same in every run. The arrays live in the context's arena
+ * that made them. */
+typedef struct qmat_edge_heap {
+  const qmat_complex *complex;
+  double *costs, *errors; /* per edge; set them before an edge is put in, and update it when they change */
+  uint32_t *edges;        /* the heap */
+  uint32_t *places;       /* per edge: its place in the heap, QMAT_NONE when it is not in it */
+  size_t count;
+} qmat_edge_heap;
+
+/* Makes room for the complex's edges; the heap is empty. QMAT_ERROR_MEMORY. */
+qmat_status qmat_edge_heap_init(qmat_context *context, qmat_edge_heap *heap, const qmat_complex *complex);
+
+/* Puts all edges in; their costs and errors are set. Cost: linear. */
+void qmat_edge_heap_fill(qmat_edge_heap *heap);
+
+/* The cheapest edge; the heap is not empty. */
+static inline uint32_t qmat_edge_heap_first(const qmat_edge_heap *heap) {
+  return heap->edges[0];
+}
+
+/* Takes an edge out; one that is not in it is left alone. Cost: logarithmic, as that of an update. */
+void qmat_edge_heap_remove(qmat_edge_heap *heap, uint32_t edge);
+
+/* Puts an edge in, or in its new place. */
+void qmat_edge_heap_update(qmat_edge_heap *heap, uint32_t edge);
+
+#endif

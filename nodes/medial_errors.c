@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/medial_errors.h"
+
+#include <math.h>
+
+#include "nodes/protrusion.h"
+
+/* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
+ * one look. */
+static double least_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+                               int threads) {
+  const size_t primitives = qmat_envelope_primitive_count(envelope);
+  double least = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
+  for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
+    double middle[4] = {0, 0, 0, 0};
+    uint32_t ids[3] = {(uint32_t)i};
+    const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
+    for (int c = 0; c < count; c++)
+      for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
+    least = fmax(least, qmat_protrusion_of_sphere(surface, middle));
+  }
+  return least;
+}
+
+static double largest_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+                                 double tolerance, int threads) {
+  const double enough = least_protrusion(surface, unit, envelope, threads) + tolerance;
+  const size_t primitives = qmat_envelope_primitive_count(envelope);
+  double largest = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
+  for (size_t i = 0; i < primitives; i++) {
+    uint32_t ids[3];
+    const int count = qmat_envelope_primitive(envelope, i, ids);
+    const double *spheres[3];
+    for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
+    largest = fmax(largest, qmat_protrusion_bound(surface, spheres, count, enough, tolerance));
+  }
+  return largest;
+}
+
+qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                       const double *points, size_t point_count, double tolerance, double threshold,
+                                       qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(context);
+  double farthest = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
+  for (size_t i = 0; i < point_count; i++)
+    farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
+  status = qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
+  errors->surface_to_envelope = errors->cover.bound;
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "primitives measured");
+  if (status == QMAT_OK)
+    errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, threads);
+  qmat_envelope_free(envelope);
+  return status;
+}

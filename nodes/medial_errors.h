@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_MEDIAL_ERRORS_H
+#define QMAT_NODES_MEDIAL_ERRORS_H
+
+#include "nodes/cover.h"
+
+/* How far a solid and the envelope of a medial mesh are apart, in the unit frame. Both are upper bounds. */
+typedef struct qmat_medial_errors {
+  double surface_to_envelope; /* of F over the surface (eq. 9) */
+  double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
+  qmat_cover cover;           /* where the surface is farther than the threshold */
+} qmat_medial_errors;
+
+/* Measures both by branch and bound, each to within `tolerance` (> 0) of the truth. `unit` is a medial mesh in the unit
+ * frame, sealed or not; at the `point_count` points (3 doubles each, on the surface) a first look is taken; `threshold`
+ * as in qmat_cover_measure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. */
+qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                       const double *points, size_t point_count, double tolerance, double threshold,
+                                       qmat_medial_errors *errors);
+
+#endif
