@@ -24,8 +24,8 @@ static double least_protrusion(const qmat_surface *surface, const qmat_medial *u
 }
 
 static double largest_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
-                                 double tolerance, int threads) {
-  const double enough = least_protrusion(surface, unit, envelope, threads) + tolerance;
+                                 double tolerance, double enough, int threads) {
+  enough = fmax(enough, least_protrusion(surface, unit, envelope, threads) + tolerance);
   const size_t primitives = qmat_envelope_primitive_count(envelope);
   double largest = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
@@ -40,13 +40,13 @@ static double largest_protrusion(const qmat_surface *surface, const qmat_medial 
 }
 
 qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                       const double *points, size_t point_count, double tolerance, double threshold,
-                                       qmat_medial_errors *errors) {
+                                       const double *points, size_t point_count, double tolerance, double enough,
+                                       double threshold, qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
-  double farthest = 0;
+  double farthest = enough;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
   for (size_t i = 0; i < point_count; i++)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
@@ -54,7 +54,7 @@ qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface
   errors->surface_to_envelope = errors->cover.bound;
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "primitives measured");
   if (status == QMAT_OK)
-    errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, threads);
+    errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, threads);
   qmat_envelope_free(envelope);
   return status;
 }

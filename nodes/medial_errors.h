@@ -11,11 +11,13 @@ typedef struct qmat_medial_errors {
   qmat_cover cover;           /* where the surface is farther than the threshold */
 } qmat_medial_errors;
 
-/* Measures both by branch and bound, each to within `tolerance` (> 0) of the truth. `unit` is a medial mesh in the unit
+/* Measures both by branch and bound, each to within `tolerance` (> 0) of the truth where that is above `enough`; below,
+ * `enough` is the answer: a plateau of small errors would take looks without number to tell from its highest place.
+ * `unit` is a medial mesh in the unit
  * frame, sealed or not; at the `point_count` points (3 doubles each, on the surface) a first look is taken; `threshold`
  * as in qmat_cover_measure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. */
 qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                       const double *points, size_t point_count, double tolerance, double threshold,
-                                       qmat_medial_errors *errors);
+                                       const double *points, size_t point_count, double tolerance, double enough,
+                                       double threshold, qmat_medial_errors *errors);
 
 #endif

@@ -364,8 +364,8 @@ static qmat_status collapse_edges(simplifier *s) {
   return QMAT_OK;
 }
 
-/* The reported errors are at most this share of epsilon above the true ones. */
-static const double error_tolerance = 0.01;
+/* The reported errors are at most this share of epsilon above the true ones, but never below the second share. */
+static const double error_tolerance = 0.01, least_reported = 0.5;
 
 /* What an unbounded run (epsilon 0) measures its errors against. */
 static const double default_epsilon = 0.01;
@@ -374,7 +374,7 @@ static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_e
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
   return qmat_medial_errors_measure(s->context, s->surface, unit, s->control.points, s->control.count, tolerance,
-                                    epsilon - tolerance, errors);
+                                    least_reported * epsilon, epsilon - tolerance, errors);
 }
 
 /* The sample's owner: the corner of its witness with the largest weight. */
@@ -548,6 +548,12 @@ static qmat_status add_extra_points(simplifier *s, const qmat_cover *cover, qmat
   return QMAT_OK;
 }
 
+static double farthest_at_first(const qmat_control_points *control) {
+  double farthest = -INFINITY;
+  for (size_t i = 0; i < control->count; i++) farthest = fmax(farthest, control->distances[i]);
+  return farthest;
+}
+
 /* Rounds of collapses until the surface between the control points keeps within epsilon as they do. */
 static qmat_status simplify(simplifier *s, const initial_state *state, const qmat_samples *samples,
                             const qmat_medial *initial, qmat_medial **medial, qmat_report *report) {
@@ -562,7 +568,9 @@ static qmat_status simplify(simplifier *s, const initial_state *state, const qma
     if (status == QMAT_OK) status = extract(s, unit);
     if (status == QMAT_OK) status = measure(s, unit, &errors);
     if (status != QMAT_OK) return status;
-    const bool repeat = epsilon > 0 && errors.surface_to_envelope > epsilon && errors.cover.count > 0 && round < MOST_ROUNDS;
+    /* What the initial medial mesh itself leaves too far away, no round brings closer. */
+    const bool repeat = epsilon > 0 && errors.surface_to_envelope > epsilon && errors.cover.count > 0 &&
+                        farthest_at_first(&s->control) <= epsilon && round < MOST_ROUNDS;
     if (!repeat) return make_report(s, unit, &errors, round, report);
     if ((status = add_extra_points(s, &errors.cover, &extra)) != QMAT_OK) return status;
     qmat_value_release(&unit->base);
