@@ -373,7 +373,7 @@ static const double default_epsilon = 0.01;
 static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
-  return qmat_medial_errors_measure(s->context, s->surface, unit, s->control.points, s->control.count, tolerance,
+  return qmat_medial_errors_measure(s->context, s->surface, unit, s->control.points, s->control.surface_count, tolerance,
                                     least_reported * epsilon, epsilon - tolerance, errors);
 }
 
@@ -481,17 +481,17 @@ static qmat_status start(simplifier *s, const initial_state *state, const qmat_s
   if (status != QMAT_OK) return status;
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : INFINITY;
   s->limit = control_share * epsilon;
-  if ((status = qmat_control_points_make(context, s->surface, samples, medial, &s->complex, epsilon,
-                                         MOST_CONTROL_POINTS, extra, &s->control)) != QMAT_OK)
-    return status;
+  const bool two_sided = s->params->error == ERROR_TWO_SIDED;
+  status = qmat_control_points_make(context, s->surface, samples, medial, &s->complex, epsilon, MOST_CONTROL_POINTS,
+                                    extra, two_sided && epsilon < INFINITY, &s->control);
+  if (status != QMAT_OK) return status;
   /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
   double *limits = qmat_arena_alloc(&context->arena, s->control.count, sizeof *limits);
   if (!limits) return qmat_fail_memory(context, "control points");
-  for (size_t i = 0; i < s->control.count; i++) limits[i] = fmax(s->limit, s->control.distances[i]);
+  for (size_t i = 0; i < s->control.count; i++) limits[i] = fmax(s->limit - s->control.radii[i], s->control.distances[i]);
   status = qmat_coverage_init(context, &s->coverage, s->control.count, s->control.points, limits,
                               s->control.witnesses, s->control.weights, s->complex.vertex_count);
   if (status != QMAT_OK) return status;
-  const bool two_sided = s->params->error == ERROR_TWO_SIDED;
   return qmat_protrusion_init(context, &s->protrusion, s->surface, &s->complex, state->depths,
                               two_sided ? s->limit : INFINITY);
 }
@@ -703,7 +703,10 @@ const qmat_node qmat_node_medial_simplify = {
     .doc = "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
            "the edge. A collapse is done when its sphere and the midpoints of its edges lie inside the model and both "
            "errors stay below epsilon: from the surface to the envelope at the samples and a grid of control points, and "
-           "from the envelope of spheres, cones and slabs to the surface.",
+           "from the envelope of spheres, cones and slabs to the surface. Spheres of the initial medial mesh, shrunk by "
+           "epsilon, have to stay inside too, so that the envelope has no hollow. The largest distance from the surface "
+           "between the control points is bounded afterwards, and the collapses are repeated with points in the places "
+           "found where it is above epsilon.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(medial_simplify_params),
     .params = params,
