@@ -393,6 +393,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
                           const qmat_value *const inputs[], qmat_value *outputs[]) {
   const char *outer = context->node_type;
   context->node_type = node->name;
+  for (size_t i = 0; i < qmat_output_count(node); ++i) outputs[i] = NULL;
   qmat_status status = check_inputs(context, node, inputs);
   if (status == QMAT_OK) {
     context->error.status = QMAT_OK;
