@@ -139,8 +139,9 @@ static void look_around(const answering *a, const double *point, const uint32_t 
       take_star(a->complex, point, a->spheres[i], best);
 }
 
+/* Also without a bound every point needs some witness. */
 static bool is_far(const qmat_control_points *control, size_t i, double epsilon) {
-  return !(control->distances[i] <= content_with_star * epsilon);
+  return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= content_with_star * epsilon);
 }
 
 static size_t count_far(const qmat_control_points *control, double epsilon) {
@@ -154,6 +155,7 @@ static size_t count_far(const qmat_control_points *control, double epsilon) {
 static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
                             qmat_control_points *control) {
   const int threads = qmat_threads(context);
+  const double reach = epsilon < INFINITY ? epsilon : 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1024)
   for (size_t i = 0; i < control->count; i++) {
     if (!is_far(control, i, epsilon)) continue;
@@ -165,7 +167,7 @@ static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, 
     for (size_t v = 0; v < complex->vertex_count; v++)
       least = fmin(least, qmat_sphere_distance(&complex->spheres[4 * v], p));
     for (size_t v = 0; v < complex->vertex_count; v++)
-      if (qmat_sphere_distance(&complex->spheres[4 * v], p) <= least + epsilon)
+      if (qmat_sphere_distance(&complex->spheres[4 * v], p) <= least + reach)
         take_star(complex, p, (uint32_t)v, &best);
     store(control, i, &best);
   }
