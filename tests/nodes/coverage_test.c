@@ -169,10 +169,11 @@ static void make_model(model *m, qmat_mesh *mesh, double epsilon, bool with_regi
   qmat_free(spheres);
   const qmat_extra_points none = {.count = 0};
   assert_int_equal(qmat_control_points_make(&m->context, m->surface, m->p.samples, medial, &m->complex, epsilon, 3000,
-                                            &none, &m->control),
+                                            &none, true, &m->control),
                    QMAT_OK);
   m->limits = qmat_alloc(m->control.count, sizeof *m->limits);
-  for (size_t i = 0; i < m->control.count; i++) m->limits[i] = fmax(epsilon, m->control.distances[i]);
+  for (size_t i = 0; i < m->control.count; i++)
+    m->limits[i] = fmax(epsilon - m->control.radii[i], m->control.distances[i]);
   assert_int_equal(qmat_coverage_init(&m->context, &m->coverage, m->control.count, m->control.points, m->limits,
                                       m->control.witnesses, m->control.weights, m->complex.vertex_count),
                    QMAT_OK);
