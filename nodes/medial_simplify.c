@@ -409,6 +409,10 @@ static const double error_tolerance = 0.01, least_reported = 0.5;
 /* What an unbounded run (epsilon 0) measures its errors against. */
 static const double default_epsilon = 0.01;
 
+/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
+ * digits. */
+static const double farthest_sphere = 1e6;
+
 static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
@@ -505,6 +509,12 @@ static qmat_status prepare(simplifier *s, const qmat_mesh *mesh, const qmat_fiel
   const double theta = qmat_thickness_threshold(thickness, s->params->theta);
   for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
   qmat_frame_spheres_to_unit(qmat_surface_frame(s->surface), medial->spheres, medial->sphere_count, spheres);
+  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
+    if (fabs(spheres[i]) <= farthest_sphere) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
+    qmat_fail_field(context, "medial");
+    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
+  }
   *state = (initial_state){spheres, depths, thin};
   return measure_depths(s, spheres, medial->sphere_count, depths);
 }
@@ -742,7 +752,7 @@ static const qmat_param params[] = {
      .max = 10,
      .offset = AT(theta)},
     {.name = "k",
-     .unit = "",
+     .unit = "1",
      .doc = "The constant of the collapse cost (eq. 6)",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 1e-5,
