@@ -166,9 +166,12 @@ static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, 
     double least = INFINITY;
     for (size_t v = 0; v < complex->vertex_count; v++)
       least = fmin(least, qmat_sphere_distance(&complex->spheres[4 * v], p));
-    for (size_t v = 0; v < complex->vertex_count; v++)
-      if (qmat_sphere_distance(&complex->spheres[4 * v], p) <= least + reach)
-        take_star(complex, p, (uint32_t)v, &best);
+    for (size_t v = 0; v < complex->vertex_count; v++) {
+      const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
+      if (!(f <= least + reach)) continue;
+      if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+      take_star(complex, p, (uint32_t)v, &best);
+    }
     store(control, i, &best);
   }
 }
