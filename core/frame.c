@@ -5,7 +5,8 @@
 
 qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qmat_frame *frame) {
   if (mesh->triangle_count == 0) {
-    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the mesh has no triangles");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no triangles");
+    return qmat_fail_field(context, "mesh");
   }
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
@@ -29,10 +30,12 @@ qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qma
   }
   frame->diagonal = largest * sqrt(sum);
   if (!isfinite(frame->diagonal)) {
-    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the mesh's bounding box is too large to be measured");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its bounding box is too large to be measured");
+    return qmat_fail_field(context, "mesh");
   }
   if (!(frame->diagonal > 0)) {
-    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "all triangles of the mesh lie in one point");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "all its triangles lie in one point");
+    return qmat_fail_field(context, "mesh");
   }
   return QMAT_OK;
 }

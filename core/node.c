@@ -395,6 +395,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
   context->node_type = node->name;
   for (size_t i = 0; i < qmat_output_count(node); ++i) outputs[i] = NULL;
   qmat_status status = check_inputs(context, node, inputs);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "");
   if (status == QMAT_OK) {
     context->error.status = QMAT_OK;
     status = node->run(context, params, inputs, outputs);

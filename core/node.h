@@ -88,7 +88,8 @@ qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const
  * NULL. What the descriptor promises is looked at on both sides: every input that is not optional is there, and every
  * input is sealed and of its port's type, else QMAT_ERROR_USAGE names the port and the node does not run; on success
  * every output is sealed and of its port's type, else QMAT_ERROR_INTERNAL; on failure every output is NULL and an error
- * is recorded. The caller releases the outputs. Scratch memory of the context is freed. */
+ * is recorded. Asks the progress function once, with 0 of 0, before it starts. The caller releases the outputs. Scratch
+ * memory of the context is freed. */
 qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
                           const qmat_value *const inputs[], qmat_value *outputs[]);
 

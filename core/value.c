@@ -465,12 +465,37 @@ static qmat_status check_u32_count(qmat_context *context, size_t count, const ch
   return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu %s are more than 32-bit indices can name", count, what);
 }
 
-/* Jansson's own check of UTF-8, since these texts end up in JSON. */
+size_t qmat_utf8_length(const char *text) {
+  const unsigned char *bytes = (const unsigned char *)text, first = bytes[0];
+  const size_t length = first < 0x80                    ? 1
+                        : first >= 0xC2 && first < 0xE0 ? 2
+                        : first >= 0xE0 && first < 0xF0 ? 3
+                        : first >= 0xF0 && first < 0xF5 ? 4
+                                                        : 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((bytes[i] & 0xC0) != 0x80) return 0;
+  }
+  /* Longer than need be, surrogates, beyond U+10FFFF. */
+  if ((first == 0xE0 && bytes[1] < 0xA0) || (first == 0xED && bytes[1] > 0x9F) || (first == 0xF0 && bytes[1] < 0x90) ||
+      (first == 0xF4 && bytes[1] > 0x8F)) {
+    return 0;
+  }
+  return length;
+}
+
+bool qmat_is_utf8(const char *text) {
+  while (*text != '\0') {
+    const size_t length = qmat_utf8_length(text);
+    if (length == 0) return false;
+    text += length;
+  }
+  return true;
+}
+
+/* These texts end up in JSON. */
 static qmat_status check_utf8(qmat_context *context, const char *text, const char *what) {
-  json_t *string = json_string(text);
-  if (string == NULL) return qmat_fail(context, QMAT_ERROR_FORMAT, "the %s is not valid UTF-8", what);
-  json_decref(string);
-  return QMAT_OK;
+  if (qmat_is_utf8(text)) return QMAT_OK;
+  return qmat_fail(context, QMAT_ERROR_FORMAT, "the %s is not valid UTF-8", what);
 }
 
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {

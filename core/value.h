@@ -118,6 +118,12 @@ qmat_file *qmat_file_new(void);
 /* A copy of `text` that a value can own (qmat_free frees it); NULL when memory is short. */
 char *qmat_strdup(const char *text);
 
+/* The bytes of the UTF-8 character that `text` starts with: 1 to 4, also 1 for the zero at its end; 0 when it starts
+ * with none. */
+size_t qmat_utf8_length(const char *text);
+/* Whether all of `text` is UTF-8. */
+bool qmat_is_utf8(const char *text);
+
 /* Checks the value (every index in range, every number finite, counts consistent), computes its digest and makes it
  * read-only. QMAT_ERROR_GEOMETRY names the first bad element. Cost: linear in the content. */
 qmat_status qmat_value_seal(qmat_context *context, qmat_value *value);

@@ -511,8 +511,7 @@ qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_ru
     context->node_id = node->id;
     context->node_type = node->type->name;
     if (observer && observer->started) observer->started(observer->user, run, i);
-    status = qmat_progress(context, 0, 0, "");
-    if (status == QMAT_OK) status = run_step(context, run, i);
+    status = run_step(context, run, i);
     if (status != QMAT_OK) break;
     take_name(run, &run->steps[i], &named);
     finish_step(run, &run->steps[i]);

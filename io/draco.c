@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/medial_build.h"
+#include "core/node.h"
 #include "io/draco_draco.h"
 
 /* ---- how many bits ---- */
@@ -115,7 +116,9 @@ qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *m
     radii[i] = (float)sphere[3];
     for (size_t k = 0; k < 4; k++) {
       if (isfinite((float)sphere[k])) continue;
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "%g does not fit into single precision", sphere[k]);
+      char number[32];
+      qmat_format_number(sphere[k], number, sizeof number);
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s does not fit into single precision", number);
       status = qmat_fail_element(context, "sphere", (int64_t)i);
       goto done;
     }

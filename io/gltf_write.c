@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/node.h"
 #include "io/base64.h"
 #include "io/bytes.h"
 #include "io/draco.h"
@@ -118,7 +119,9 @@ static qmat_status single_positions(qmat_context *context, const qmat_mesh *skin
   for (size_t i = 0; i < 3 * skin->vertex_count; i++) {
     positions[i] = (float)skin->positions[i];
     if (isfinite(positions[i])) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%g does not fit into single precision", skin->positions[i]);
+    char number[32];
+    qmat_format_number(skin->positions[i], number, sizeof number);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s does not fit into single precision", number);
     qmat_fail_element(context, "vertex", (int64_t)(i / 3));
     return qmat_fail_field(context, "skin");
   }
@@ -348,10 +351,8 @@ static char *data_uri(const qmat_writer *data) {
 /* The whole document; NULL when memory is short. */
 static json_t *make_root(const qmat_medial *medial, const medial_text *text, const skin_data *skin,
                          const qmat_gltf_options *options) {
-  const char *name = options->name && options->name[0] ? options->name : NULL;
-  json_t *probe = json_string(name); /* a file's name need not be UTF-8, JSON must */
-  if (!probe) name = NULL;
-  json_decref(probe);
+  /* A file's name need not be UTF-8, JSON must. */
+  const char *name = options->name && options->name[0] && qmat_is_utf8(options->name) ? options->name : NULL;
   char *uri = skin && !options->binary ? data_uri(&skin->buffer) : NULL;
   json_t *node = json_object();
   json_t *root = json_pack("{s:{s:s, s:s}, s:i, s:[{s:[i]}]}", "asset", "version", "2.0", "generator",

@@ -123,24 +123,6 @@ qmat_status qmat_format_choose(qmat_context *context, const char *path, const qm
   return QMAT_OK;
 }
 
-/* The length of the valid UTF-8 sequence at `text` (a zero ends it), or 0. */
-static size_t utf8_length(const unsigned char *text) {
-  const unsigned char c = text[0];
-  const size_t length = c < 0x80                ? 1
-                        : c >= 0xC2 && c < 0xE0 ? 2
-                        : c >= 0xE0 && c < 0xF0 ? 3
-                        : c >= 0xF0 && c < 0xF5 ? 4
-                                                : 0;
-  for (size_t i = 1; i < length; i++) {
-    if ((text[i] & 0xC0) != 0x80) return 0;
-  }
-  if ((c == 0xE0 && text[1] < 0xA0) || (c == 0xED && text[1] > 0x9F) || (c == 0xF0 && text[1] < 0x90) ||
-      (c == 0xF4 && text[1] > 0x8F)) {
-    return 0;
-  }
-  return length;
-}
-
 char *qmat_model_name(const char *path) {
   const char *base = base_name(path), *end = ending_of(base);
   if (base == end) return qmat_strdup("model");
@@ -148,7 +130,7 @@ char *qmat_model_name(const char *path) {
   if (!name) return NULL;
   size_t size = 0;
   while (base < end) {
-    size_t length = utf8_length((const unsigned char *)base);
+    size_t length = qmat_utf8_length(base);
     memcpy(name + size, length > 0 ? base : "\xEF\xBF\xBD", length > 0 ? length : 3);
     size += length > 0 ? length : 3;
     base += length > 0 ? length : 1;

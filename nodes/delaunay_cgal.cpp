@@ -119,8 +119,10 @@ qmat_status qmat_delaunay_tetrahedra(qmat_context *context, const double *points
     Triangulation triangulation;
     const qmat_status status = triangulate(context, sites, triangulation);
     if (status != QMAT_OK) return status;
-    if (triangulation.dimension() < 3)
-      return qmat_fail(context, QMAT_ERROR_GEOMETRY, "all %zu samples lie in one plane: there is no solid", count);
+    if (triangulation.dimension() < 3) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "all %zu samples lie in one plane: there is no solid", count);
+      return qmat_fail_field(context, "samples");
+    }
     return collect(context, triangulation, tetrahedra);
   } catch (const std::bad_alloc &) {
     return qmat_fail_memory(context, "the Delaunay triangulation");

@@ -197,8 +197,8 @@ static qmat_status make_skin_surface(skin *s) {
   if (!status && list.count > MOST_BALLS) {
     char spacing[32];
     qmat_format_number(list.spacing, spacing, sizeof spacing);
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "at spacing %s it takes more than %zu balls, too many for a skin surface",
-              spacing, MOST_BALLS);
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
+              "at spacing %s it takes more than %zu balls, too many for a skin surface", spacing, MOST_BALLS);
     qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
     status = qmat_fail_field(s->context, "spacing");
   }

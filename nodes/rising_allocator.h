@@ -17,8 +17,8 @@ struct Stopped {};
 /* Memory whose addresses only rise, so that the order of objects by address is the order in which they were made.
  * CGAL's mixed complex sorts simplices by the addresses of their vertices and cells: with any other memory the last
  * digits of its points depend on what the process did before. While an object of this class lives, the thread's
- * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc, and Stopped once `stop` is set: CGAL asks nobody
- * whether to go on, but it allocates all the time. */
+ * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc, and Stopped once
+ * `stop` is set: CGAL asks nobody whether to go on, but it allocates all the time. */
 class RisingMemory {
  public:
   explicit RisingMemory(const std::atomic<bool> &stop) : stop_(stop), outer_(current()) {

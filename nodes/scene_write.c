@@ -21,15 +21,6 @@ typedef struct scene_write_params {
 
 enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
 
-static qmat_status check(qmat_context *context, const void *data) {
-  const scene_write_params *params = data;
-  if (params->format == FORMAT_GLB || params->format == FORMAT_GLTF) return QMAT_OK;
-  const char *field = params->draco ? "draco" : params->position_bits ? "position_bits" : "radius_bits";
-  if (!params->draco && !params->position_bits && !params->radius_bits) return QMAT_OK;
-  qmat_fail(context, QMAT_ERROR_USAGE, "only the formats glb and gltf are compressed");
-  return qmat_fail_field(context, field);
-}
-
 /* The diagonal of the box around all spheres: the model's own, up to the error of the medial mesh. */
 static double diagonal_of(const qmat_medial *medial) {
   double square = 0;
@@ -81,6 +72,10 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   const qmat_medial *medial = (const qmat_medial *)inputs[IN_MEDIAL];
   qmat_file *file = NULL;
   qmat_status status;
+  if (medial->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    return qmat_fail_field(context, "medial");
+  }
   switch ((file_format)params->format) {
     case FORMAT_MA:
       status = qmat_ma_write(context, medial, &file);
@@ -148,20 +143,18 @@ const qmat_node qmat_node_scene_write = {
     .summary = "Makes a file of a medial mesh and its skin",
     .doc =
         "glb and gltf hold the skin as an ordinary mesh, so that every client shows something, and the medial mesh as "
-        "a "
-        "Draco blob in base64, in the extras of the same node, where clients keep it (qmat_data; triangles first, then "
+        "a Draco blob in base64, in the extras of the same node, where clients keep it (qmat_data; triangles first, "
+        "then "
         "edges on no triangle as (i, j, j), then lone spheres as (i, i, i); the order of spheres is kept). Without "
-        "bits "
-        "given, quantisation moves the solid by at most 5 % of the report's epsilon, or of 0.1 % of the diagonal "
+        "bits given, quantisation moves the solid by at most 5 % of the report's epsilon, or of 0.1 % of the diagonal "
         "without a report; the measured move is in the extras as qmat_quantisation, in model units. The report's "
         "epsilon, surface_to_envelope, envelope_to_surface and certified go into the extras as they are: "
         "qmat_epsilon, qmat_error_out and qmat_error_in are fractions of the diagonal, before quantisation. ma and ply "
-        "hold the medial mesh alone, unquantised.",
+        "hold the medial mesh alone, unquantised: draco and the bits do not apply to them.",
     .citation = "",
     .params_size = sizeof(scene_write_params),
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
-    .check = check,
     .run = run,
 };

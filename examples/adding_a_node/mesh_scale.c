@@ -63,7 +63,7 @@ static const qmat_port outputs[] = {
 const qmat_node qmat_node_mesh_scale = {
     .name = "mesh.scale",
     .version = 1,
-    .summary = "Multiply the lengths of a mesh",
+    .summary = "Multiplies the lengths of a mesh",
     .doc =
         "For models whose unit is not the one that the result is wanted in. Vertices and triangles keep their order.",
     .citation = "",

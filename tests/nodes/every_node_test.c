@@ -40,9 +40,9 @@ static double now(void) {
  * The linker sends the allocations of the program's own objects here (CMakeLists.txt), those of header-only C++
  * libraries included; jansson is given its allocator. */
 
-static atomic_size_t asked;                      /* allocations so far */
-static size_t first_refused = SIZE_MAX;          /* refused from this one on... */
-static size_t refused_count = SIZE_MAX;          /* ...so many of them */
+static atomic_size_t asked;             /* allocations so far */
+static size_t first_refused = SIZE_MAX; /* refused from this one on... */
+static size_t refused_count = SIZE_MAX; /* ...so many of them */
 
 static bool refused(void) {
   const size_t number = atomic_fetch_add_explicit(&asked, 1, memory_order_relaxed);
@@ -153,14 +153,26 @@ static void use_world(subject *run, world from) {
     run->inputs[i] = made.values[from][run->node->inputs[i].type];
 }
 
-/* Default parameters, and the solid's values at every input. Required texts are filled: paths of files that are read
- * with the first known file that the node can work on. */
+/* Lengths five times their default, as far as they go: work grows with their inverse square, and every node is run
+ * hundreds of times here. */
+static void make_coarse(const qmat_node *node, void *params) {
+  for (size_t row = 0; row < qmat_param_count(node); row++) {
+    const qmat_param *param = &node->params[row];
+    if (!(param->flags & QMAT_PARAM_RELATIVE)) continue;
+    const double length = fmin(5 * param->default_number, param->max);
+    memcpy((char *)params + param->offset, &length, sizeof length);
+  }
+}
+
+/* Coarse parameters, else the defaults, and the solid's values at every input. Required texts are filled: paths of
+ * files that are read with the first known file that the node can work on. */
 static subject subject_of(const qmat_node *node) {
   subject run = {.node = node, .params = qmat_calloc(1, node->params_size)};
   assert_non_null(run.params);
   assert_in_range(qmat_input_count(node), 0, MOST_PORTS);
   assert_in_range(qmat_output_count(node), 1, MOST_PORTS);
   qmat_params_default(node, run.params);
+  make_coarse(node, run.params);
   use_world(&run, WORLD_SOLID);
   qmat_context context = {0};
   for (size_t row = 0; row < qmat_param_count(node); row++) {
@@ -200,34 +212,38 @@ static qmat_value *make(const char *name, const char *port, world in, const char
   return value;
 }
 
-static void make_model_file(const char *model, int resolution, const char *path) {
-  qmat_model shape;
-  assert_int_equal(qmat_model_make(model, resolution, &shape), QMAT_OK);
+static void save_model(const qmat_model *model, const char *path) {
   FILE *file = fopen(path, "w");
   assert_non_null(file);
-  fprintf(file, "OFF\n%zu %zu 0\n", shape.vertex_count, shape.triangle_count);
-  for (size_t i = 0; i < shape.vertex_count; i++) {
-    const double *p = shape.positions + 3 * i;
+  fprintf(file, "OFF\n%zu %zu 0\n", model->vertex_count, model->triangle_count);
+  for (size_t i = 0; i < model->vertex_count; i++) {
+    const double *p = model->positions + 3 * i;
     fprintf(file, "%.17g %.17g %.17g\n", p[0], p[1], p[2]);
   }
-  for (size_t i = 0; i < shape.triangle_count; i++) {
-    const uint32_t *t = shape.triangles + 3 * i;
+  for (size_t i = 0; i < model->triangle_count; i++) {
+    const uint32_t *t = model->triangles + 3 * i;
     fprintf(file, "3 %u %u %u\n", t[0], t[1], t[2]);
   }
   assert_int_equal(fclose(file), 0);
-  qmat_model_uninit(&shape);
 }
 
-static void make_solid(world to, const char *model, int resolution) {
+static void make_solid(world to, const qmat_model *model) {
   qmat_value **values = made.values[to];
-  make_model_file(model, resolution, made.files[0]);
+  save_model(model, made.files[0]);
   values[QMAT_SCENE] = make("scene.read", "scene", to, "path", made.files[0]);
   values[QMAT_MESH] = make("scene.read", "mesh", to, "path", made.files[0]);
   values[QMAT_FIELD] = make("mesh.sdf", "thickness", to, NULL, NULL);
-  values[QMAT_SAMPLES] = make("mesh.sample", "samples", to, "spacing", "4%");
+  values[QMAT_SAMPLES] = make("mesh.sample", "samples", to, "spacing", "0");
   values[QMAT_MEDIAL] = make("medial.delaunay", "medial", to, NULL, NULL);
-  values[QMAT_REPORT] = make("medial.simplify", "report", to, NULL, NULL);
+  values[QMAT_REPORT] = make("medial.simplify", "report", to, "epsilon", "3%");
+  qmat_value *simple = make("medial.simplify", "medial", to, "epsilon", "3%");
+  qmat_value_release(values[QMAT_MEDIAL]);
+  values[QMAT_MEDIAL] = simple;
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
+  print_message("%s: %zu facets, %zu samples, %zu medial spheres\n", world_names[to],
+                ((const qmat_mesh *)values[QMAT_MESH])->triangle_count,
+                ((const qmat_samples *)values[QMAT_SAMPLES])->count,
+                ((const qmat_medial *)values[QMAT_MEDIAL])->sphere_count);
 }
 
 /* A family from a few numbers: a field of `thickness` per facet, the vertices as samples, and a medial mesh of one
@@ -296,8 +312,14 @@ static int make_fixture(void **state) {
   assert_non_null(mkdtemp(made.folder));
   snprintf(made.files[0], sizeof made.files[0], "%s/model.off", made.folder);
   snprintf(made.files[1], sizeof made.files[1], "%s/medial.ma", made.folder);
-  make_solid(WORLD_OTHER, "l-bracket", 8);
-  make_solid(WORLD_SOLID, "tapered-capsule", 10);
+  // Slender, since work grows with the surface measured in squared diagonals. The second comes last: its file stays.
+  qmat_model model;
+  assert_int_equal(qmat_model_make_box(2, 0.3, 0.2, 6, &model), QMAT_OK);
+  make_solid(WORLD_OTHER, &model);
+  qmat_model_uninit(&model);
+  assert_int_equal(qmat_model_make_sheet(2, 0.25, 0.15, 1, 4, &model), QMAT_OK);
+  make_solid(WORLD_SOLID, &model);
+  qmat_model_uninit(&model);
   const qmat_file_part *text = ((const qmat_file *)made.values[WORLD_SOLID][QMAT_FILE])->parts;
   FILE *file = fopen(made.files[1], "wb");
   assert_non_null(file);
@@ -411,8 +433,7 @@ static void check_flags(const qmat_node *node, const qmat_param *param) {
     fail_msg("%s: only texts without a default are required, not '%s'", node->name, param->name);
   if (is_text && !(param->flags & QMAT_PARAM_REQUIRED) && !param->default_text)
     fail_msg("%s: '%s' has no default and is not required", node->name, param->name);
-  if ((param->flags & QMAT_PARAM_RELATIVE) &&
-      (param->type != QMAT_PARAM_FLOAT || strcmp(param->unit, "diagonal") != 0))
+  if ((param->flags & QMAT_PARAM_RELATIVE) && (param->type != QMAT_PARAM_FLOAT || strcmp(param->unit, "diagonal") != 0))
     fail_msg("%s: '%s' is relative, so it is a number of diagonals", node->name, param->name);
   if ((param->flags & QMAT_PARAM_OUTPUT_FORMAT) && param->type != QMAT_PARAM_ENUM)
     fail_msg("%s: a format is an enum, unlike '%s'", node->name, param->name);
@@ -590,6 +611,11 @@ static void test_defaults_pass_the_check_and_run(void **state) {
   (void)state;
   for (size_t i = 0; i < qmat_node_count; i++) {
     subject run = subject_of(qmat_nodes[i]);
+    for (size_t row = 0; row < qmat_param_count(run.node); row++) {
+      const qmat_param *param = &run.node->params[row];
+      if (param->flags & QMAT_PARAM_RELATIVE)
+        memcpy((char *)run.params + param->offset, &param->default_number, sizeof param->default_number);
+    }
     qmat_context context = {0};
     if (qmat_params_check(&context, run.node, run.params) != QMAT_OK || execute(&context, &run) != QMAT_OK)
       fail_msg("%s: %s", run.node->name, context.error.message);
@@ -617,7 +643,13 @@ static void test_optional_inputs_may_be_left_out(void **state) {
   }
 }
 
-/* Sets one parameter, everything else being the default: the node runs, or refuses it by name. */
+static bool is_named(const qmat_node *node, const qmat_error *error) {
+  if (error->element >= 0 && error->element_kind[0]) return true;
+  if (qmat_param_find(node, error->field)) return true;
+  return qmat_input_find(node, error->field) != SIZE_MAX;
+}
+
+/* Sets one parameter, and leaves the others alone: the node runs, or refuses it by name. */
 static void try_param(const qmat_node *node, const qmat_param *param, const char *text) {
   subject run = subject_of(node);
   qmat_context context = {.threads = 2};
@@ -630,8 +662,10 @@ static void try_param(const qmat_node *node, const qmat_param *param, const char
   const double start = now();
   if (status == QMAT_OK && !execute_patiently(&context, &run, &status))
     print_message("%s: %s=%s was stopped after %.1f s\n", node->name, param->name, text, now() - start);
+  // With a choice another parameter may be what does not fit: the spacing of an algorithm that is not the default.
   const qmat_error *error = &context.error;
-  const bool names_it = strcmp(error->field, param->name) == 0 || error->file[0];
+  const bool names_it =
+      param->type == QMAT_PARAM_ENUM ? is_named(node, error) : strcmp(error->field, param->name) == 0 || error->file[0];
   const bool is_refusal = status == QMAT_ERROR_USAGE || status == QMAT_ERROR_GEOMETRY || status == QMAT_ERROR_IO ||
                           status == QMAT_ERROR_FORMAT || status == QMAT_ERROR_MEMORY;
   if (status != QMAT_OK && status != QMAT_CANCELLED && !(is_refusal && names_it))
@@ -721,27 +755,28 @@ static void compare_threads(subject *run, const char *what) {
   }
 }
 
-static void test_any_number_of_threads_and_any_run_gives_the_same_bytes(void **state) {
-  (void)state;
-  for (size_t i = 0; i < qmat_node_count; i++) {
-    const qmat_node *node = qmat_nodes[i];
-    subject run = subject_of(node);
-    compare_threads(&run, "");
-    subject_uninit(&run);
-    // Another choice may be another algorithm.
-    for (size_t row = 0; row < qmat_param_count(node); row++) {
-      const qmat_param *param = &node->params[row];
-      for (int choice = 0; param->type == QMAT_PARAM_ENUM && param->choices[choice]; choice++) {
-        if (choice == (int)param->default_number) continue;
-        run = subject_of(node);
-        memcpy((char *)run.params + param->offset, &choice, sizeof choice);
-        char text[64];
-        snprintf(text, sizeof text, " with %s=%s", param->name, param->choices[choice]);
-        compare_threads(&run, text);
-        subject_uninit(&run);
-      }
+/* Calls `visit` with the node's defaults, and with every other choice of each enum: it may be another algorithm. */
+static void for_each_choice(const qmat_node *node, void (*visit)(subject *run, const char *what)) {
+  subject run = subject_of(node);
+  visit(&run, "");
+  subject_uninit(&run);
+  for (size_t row = 0; row < qmat_param_count(node); row++) {
+    const qmat_param *param = &node->params[row];
+    for (int choice = 0; param->type == QMAT_PARAM_ENUM && param->choices[choice]; choice++) {
+      if (choice == (int)param->default_number) continue;
+      run = subject_of(node);
+      memcpy((char *)run.params + param->offset, &choice, sizeof choice);
+      char what[64];
+      snprintf(what, sizeof what, " with %s=%s", param->name, param->choices[choice]);
+      visit(&run, what);
+      subject_uninit(&run);
     }
   }
+}
+
+static void test_any_number_of_threads_and_any_run_gives_the_same_bytes(void **state) {
+  (void)state;
+  for (size_t i = 0; i < qmat_node_count; i++) for_each_choice(qmat_nodes[i], compare_threads);
 }
 
 /* The digest of what the value holds now, not of what it held when it was sealed. */
@@ -835,12 +870,6 @@ static void test_missing_unsealed_and_wrong_inputs_are_refused_by_name(void **st
   }
 }
 
-static bool is_named(const qmat_node *node, const qmat_error *error) {
-  if (error->element >= 0 && error->element_kind[0]) return true;
-  if (qmat_param_find(node, error->field)) return true;
-  return qmat_input_find(node, error->field) != SIZE_MAX;
-}
-
 /* A result, or an error that names a port, a parameter or an element. */
 static qmat_status check_result_or_clear_error(subject *run, const char *what) {
   qmat_context context = {.threads = 2};
@@ -884,7 +913,8 @@ static void test_an_empty_mesh_and_an_empty_medial_mesh_are_refused(void **state
       const qmat_port *input = &run.node->inputs[port];
       if (input->optional || (input->type != QMAT_MESH && input->type != QMAT_MEDIAL)) continue;
       use_world(&run, WORLD_EMPTY);
-      if (check_result_or_clear_error(&run, "nothing") == QMAT_OK) fail_msg("%s makes something of nothing", run.node->name);
+      if (check_result_or_clear_error(&run, "nothing") == QMAT_OK)
+        fail_msg("%s makes something of nothing", run.node->name);
       use_world(&run, WORLD_SOLID);
       run.inputs[port] = made.values[WORLD_EMPTY][input->type];
       if (check_result_or_clear_error(&run, "nothing") == QMAT_OK)
@@ -988,43 +1018,45 @@ static void test_a_cancelled_run_has_no_outputs(void **state) {
   }
 }
 
-static void test_a_shortage_of_memory_anywhere_is_an_error_or_makes_no_difference(void **state) {
-  (void)state;
-  for (size_t i = 0; i < qmat_node_count; i++) {
-    subject run = subject_of(qmat_nodes[i]);
-    qmat_context context = {.threads = 1};
+static void try_shortages(subject *run, const char *what) {
+  qmat_context context = {.threads = 1};
+  shortage(SIZE_MAX, 0);
+  const qmat_status usual = qmat_node_run(&context, run->node, run->params, run->inputs, run->outputs);
+  const size_t needed = atomic_load(&asked);
+  if (usual != QMAT_OK) fail_msg("%s%s: %s", run->node->name, what, context.error.message);
+  const digests whole = digests_of(run);
+  release_outputs(run);
+  qmat_context_uninit(&context);
+  assert_true(needed > 0);
+  // Memory that stays short from some point on, and a single allocation that fails.
+  for (size_t k = 0; k < 2 * MOST_SHORTAGES && k / 2 < needed; k++) {
+    context = (qmat_context){.threads = 1};
+    const size_t first = spread(k / 2, needed, MOST_SHORTAGES);
+    shortage(first, k % 2 ? 1 : SIZE_MAX);
+    const qmat_status status = qmat_node_run(&context, run->node, run->params, run->inputs, run->outputs);
     shortage(SIZE_MAX, 0);
-    assert_int_equal(execute(&context, &run), QMAT_OK);
-    const size_t needed = atomic_load(&asked);
-    const digests whole = digests_of(&run);
-    qmat_context_uninit(&context);
-    assert_true(needed > 0);
-    // Memory that stays short from some point on, and a single allocation that fails.
-    for (size_t k = 0; k < 2 * MOST_SHORTAGES; k++) {
-      const size_t index = k / 2;
-      if (index >= needed) break;
-      context = (qmat_context){.threads = 1};
-      shortage(spread(index, needed, MOST_SHORTAGES), k % 2 ? 1 : SIZE_MAX);
-      const qmat_status status = qmat_node_run(&context, run.node, run.params, run.inputs, run.outputs);
-      const size_t first = first_refused;
-      shortage(SIZE_MAX, 0);
-      if (status == QMAT_OK) {
-        check_outputs(&run);
-        check_same(&run, &whole, "after a shortage of memory");
-      } else if (status != QMAT_ERROR_MEMORY || context.error.status != status) {
-        fail_msg("%s: allocation %zu of %zu: %s: %s", run.node->name, first, needed, qmat_status_name(status),
-                 context.error.message);
-      } else {
-        check_no_outputs(&run);
-      }
-      release_outputs(&run);
-      qmat_context_uninit(&context);
+    if (status == QMAT_OK) {
+      check_outputs(run);
+      check_same(run, &whole, "after a shortage of memory");
+    } else if (status != QMAT_ERROR_MEMORY || context.error.status != status) {
+      fail_msg("%s%s: allocation %zu of %zu: %s: %s", run->node->name, what, first, needed, qmat_status_name(status),
+               context.error.message);
+    } else {
+      check_no_outputs(run);
     }
-    subject_uninit(&run);
+    release_outputs(run);
+    qmat_context_uninit(&context);
   }
 }
 
-int main(void) {
+static void test_a_shortage_of_memory_anywhere_is_an_error_or_makes_no_difference(void **state) {
+  (void)state;
+  for (size_t i = 0; i < qmat_node_count; i++) for_each_choice(qmat_nodes[i], try_shortages);
+}
+
+/* every_node_test [PATTERN]: only the tests whose names match. */
+int main(int argc, char **argv) {
+  if (argc > 1) cmocka_set_test_filter(argv[1]);
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_names_are_group_dot_operator_sorted_and_unique),
       cmocka_unit_test(test_every_text_is_there_and_reads_alike),
