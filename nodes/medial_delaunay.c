@@ -548,7 +548,7 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
       }
       candidates[candidate_count++] = make_link(d, spheres, a, b);
     }
-  qsort(candidates, candidate_count, sizeof *candidates, better_link);
+  if (candidate_count) qsort(candidates, candidate_count, sizeof *candidates, better_link);
   for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
     const uint32_t a = index[candidates[i].a], b = index[candidates[i].b];
     if (find_root(joined, a) == find_root(joined, b)) continue;
