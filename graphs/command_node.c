@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/node_json.h"
 
@@ -75,11 +76,11 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     return QMAT_OK;
   }
   json_t *node = qmat_node_json(type);
-  char *text = node ? json_dumps(node, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  char *text = node ? qmat_json_text(node, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   json_decref(node);
   if (!text) return qmat_fail_memory(context, "listing");
   puts(text);
-  free(text);
+  qmat_free(text);
   return QMAT_OK;
 }
 

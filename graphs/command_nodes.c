@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/node_json.h"
 
@@ -15,11 +16,11 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const qmat_registry *registry = &invocation->registry;
   if (qmat_invocation_value(invocation, "json")) {
     json_t *nodes = qmat_registry_json(registry);
-    char *text = nodes ? json_dumps(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+    char *text = nodes ? qmat_json_text(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
     json_decref(nodes);
     if (!text) return qmat_fail_memory(context, "listing");
     puts(text);
-    free(text);
+    qmat_free(text);
     return QMAT_OK;
   }
   for (size_t i = 0; i < registry->count; i++) {

@@ -9,6 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "core/json_text.h"
 #include "io/bytes.h"
 
 static double now(void) {
@@ -567,7 +568,7 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
   // Inside a group the first main part has no name, which stands for the path given to the saver.
   const char *main_name = group->count == 0 ? "" : file->path + folder_length(file->path);
   if (value->type == QMAT_REPORT) {
-    *text = json_dumps(((const qmat_report *)value)->root, JSON_INDENT(2) | JSON_SORT_KEYS);
+    *text = qmat_json_text(((const qmat_report *)value)->root, JSON_INDENT(2) | JSON_SORT_KEYS, NULL);
     if (!*text) return qmat_fail_memory(context, "report");
     size_t size = strlen(*text);
     (*text)[size] = '\n';  // takes the place of the terminating zero
@@ -620,7 +621,7 @@ qmat_status qmat_run_write(qmat_context *context, qmat_run *run) {
       if (same_folder(run->files[before].path, run->files[i].path)) written = true;
     if (!written) status = write_group(context, run, i, texts);
   }
-  for (size_t i = 0; i < run->file_count; i++) free(texts[i]);
+  for (size_t i = 0; i < run->file_count; i++) qmat_free(texts[i]);
   qmat_free(texts);
   return status;
 }

@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "core/json_text.h"
 #include "graphs/run_report.h"
 
 // The one variable of the program that can change: a signal has no other way to tell.
@@ -69,10 +70,10 @@ static void print_event(const qmat_progress_view *view, const char *event, json_
   json_object_set_new(line, "step", json_integer((json_int_t)view->step + 1));
   json_object_set_new(line, "steps", json_integer((json_int_t)view->step_count));
   if (more) json_object_update(line, more);
-  char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+  char *text = qmat_json_text(line, JSON_COMPACT | JSON_REAL_PRECISION(9), NULL);
   // In one piece, so that lines stay whole when others write to the same terminal.
   if (text) fprintf(stderr, "%s\n", text);
-  free(text);
+  qmat_free(text);
   json_decref(line);
   json_decref(more);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "graphs/built_in.h"
 #include "graphs/graph_run.h"
 #include "graphs/node_json.h"
@@ -42,13 +43,13 @@ const char *qmat_version(void) {
 char *qmat_nodes_json(void) {
   const qmat_registry registry = {qmat_nodes, qmat_node_count};
   json_t *nodes = qmat_registry_json(&registry);
-  char *text = nodes ? json_dumps(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  char *text = nodes ? qmat_json_text(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   json_decref(nodes);
   return text;
 }
 
 void qmat_text_free(char *text) {
-  free(text);
+  qmat_free(text);
 }
 
 // Ends a call: keeps the error for qmat_job_error.
@@ -390,7 +391,7 @@ qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t part, con
 }
 
 static qmat_status dump(qmat_context *context, const json_t *root, char **json) {
-  *json = root ? json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  *json = root ? qmat_json_text(root, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   return *json ? QMAT_OK : qmat_fail_memory(context, "report");
 }
 

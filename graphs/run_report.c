@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "graphs/node_json.h"
 #include "io/bytes.h"
 
@@ -149,14 +150,14 @@ json_t *qmat_error_report(const qmat_error *error) {
 }
 
 qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path) {
-  char *text = json ? json_dumps(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15)) : NULL;
+  char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   if (!text) return qmat_fail_memory(context, "report");
   size_t length = strlen(text);
   text[length] = '\n';  // takes the place of the terminating zero
   qmat_file_part part = {.name = (char *)"", .size = length + 1, .bytes = (uint8_t *)text};
   const qmat_file file = {.base = {.type = QMAT_FILE}, .part_count = 1, .parts = &part};
   qmat_status status = qmat_file_save(context, &file, path);
-  free(text);
+  qmat_free(text);
   return status;
 }
 

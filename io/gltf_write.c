@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "core/node.h"
 #include "io/base64.h"
 #include "io/bytes.h"
@@ -374,7 +375,7 @@ static json_t *make_root(const qmat_medial *medial, const medial_text *text, con
 static qmat_status put_file(qmat_context *context, const json_t *root, const skin_data *skin, bool binary,
                             qmat_writer *out) {
   size_t flags = JSON_REAL_PRECISION(17) | (binary ? JSON_COMPACT : JSON_INDENT(2));
-  char *json = json_dumps(root, flags);
+  char *json = qmat_json_text(root, flags, NULL);
   if (!json) return qmat_fail_memory(context, "a glTF file");
   if (!binary) {
     qmat_put_text(out, json);
@@ -383,7 +384,7 @@ static qmat_status put_file(qmat_context *context, const json_t *root, const ski
     size_t json_size = (strlen(json) + 3) / 4 * 4;
     uint64_t total = 12 + 8 + json_size + (skin ? 8 + skin->buffer.size : 0);
     if (total > UINT32_MAX) {
-      free(json);
+      qmat_free(json);
       return qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes is beyond the format's 4 GiB",
                        (unsigned long long)total);
     }
@@ -400,7 +401,7 @@ static qmat_status put_file(qmat_context *context, const json_t *root, const ski
       qmat_put_bytes(out, skin->buffer.bytes, skin->buffer.size);
     }
   }
-  free(json);
+  qmat_free(json);
   return QMAT_OK;
 }
 

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/json_text.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "core/arena.h"
+
+typedef struct growing_text {
+  char *bytes;
+  size_t size, capacity;
+  bool failed;
+} growing_text;
+
+static int append(const char *bytes, size_t size, void *data) {
+  growing_text *text = data;
+  if (!text->failed && qmat_grow((void **)&text->bytes, &text->capacity, text->size + size + 1, 1) != 0)
+    text->failed = true;
+  if (text->failed) return -1;
+  memcpy(text->bytes + text->size, bytes, size);
+  text->size += size;
+  text->bytes[text->size] = '\0';
+  return 0;
+}
+
+char *qmat_json_text(const json_t *json, size_t flags, size_t *size) {
+  growing_text text = {NULL, 0, 0, false};
+  if (json_dump_callback(json, append, &text, flags) != 0 || text.failed) {
+    qmat_free(text.bytes);
+    return NULL;
+  }
+  if (size != NULL) *size = text.size;
+  return text.bytes;
+}

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_JSON_TEXT_H
+#define QMAT_CORE_JSON_TEXT_H
+
+#include <stddef.h>
+
+#include <jansson.h>
+
+/* The text of `json`, ended by a zero, with jansson's flags. `size` may be NULL; it gets the length without the zero.
+ * NULL when memory is short; json_dumps of jansson 2.14 may lose keys then and say nothing. Free with qmat_free. */
+char *qmat_json_text(const json_t *json, size_t flags, size_t *size);
+
+#endif
