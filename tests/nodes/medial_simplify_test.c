@@ -178,8 +178,8 @@ static errors measure(const pipeline *p, const qmat_medial *medial) {
   assert_int_equal(qmat_envelope_new(&context, spheres, medial->sphere_count, medial->edges, medial->edge_count,
                                      medial->triangles, medial->triangle_count, &envelope),
                    QMAT_OK);
-  const errors e = {sample_surface(p->mesh, qmat_surface_positions(surface), envelope, 20000),
-                    sample_envelope(surface, spheres, envelope, 20000)};
+  const errors e = {sample_surface(p->mesh, qmat_surface_positions(surface), envelope, 10000),
+                    sample_envelope(surface, spheres, envelope, 10000)};
   free(spheres);
   qmat_envelope_free(envelope);
   qmat_surface_free(surface);
@@ -397,6 +397,30 @@ static void test_stopping_at_epsilon_leaves_no_fewer_spheres_than_skipping(void 
     release(&skip);
   }
   assert_true(more);
+}
+
+static void test_topology_is_free_guarded_or_preserved(void **state) {
+  (void)state;
+  static const model_name names[] = {TORUS, BOX, OCTOPUS};
+  for (size_t m = 0; m < COUNT(names); m++) {
+    const pipeline *p = model(names[m]);
+    const long solid = names[m] == TORUS ? 0 : 1;
+    result any = simplify(p, "epsilon=6% topology=free"), guarded = simplify(p, "epsilon=6%");
+    result kept = simplify(p, "epsilon=6% topology=preserve");
+    assert_int_equal(pipeline_count(any.report, "refused_by_topology"), 0);
+    assert_int_equal(pipeline_euler(guarded.medial), solid);
+    assert_int_equal(pipeline_count(guarded.report, "euler_characteristic_of_solid"), solid);
+    assert_int_equal(pipeline_euler(kept.medial), pipeline_euler(p->medial));
+    assert_true(pipeline_count(kept.report, "refused_by_topology") > 0);
+    assert_true(kept.medial->sphere_count >= guarded.medial->sphere_count);
+    result *const all[] = {&any, &guarded, &kept};
+    for (int i = 0; i < 3; i++) {
+      assert_int_equal(pipeline_components(all[i]->medial), 1); /* no collapse can tear it */
+      assert_int_equal(pipeline_count(all[i]->report, "euler_characteristic"), pipeline_euler(all[i]->medial));
+      check_errors(p, all[i], 0.06, true);
+      release(all[i]);
+    }
+  }
 }
 
 /* How far spheres reach from the octopus's head. */
@@ -661,6 +685,7 @@ int main(void) {
       cmocka_unit_test(test_cost_stops_before_dear_collapses),
       cmocka_unit_test(test_one_sided_holds_the_surface_alone),
       cmocka_unit_test(test_stopping_at_epsilon_leaves_no_fewer_spheres_than_skipping),
+      cmocka_unit_test(test_topology_is_free_guarded_or_preserved),
       cmocka_unit_test(test_protection_keeps_tubular_edges),
       cmocka_unit_test(test_protection_of_nothing_thin_changes_nothing),
       cmocka_unit_test(test_medial_mesh_without_regions_works),
