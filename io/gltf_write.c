@@ -323,8 +323,9 @@ static bool add_skin(json_t *root, json_t *node, const skin_data *data, const ch
   }
   json_t *material = json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}}", "name", "skin", "pbrMetallicRoughness",
                                "baseColorFactor", 0.75, 0.72, 0.65, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.6);
-  json_t *buffer = json_pack("{s:I, s:s*}", "byteLength", (json_int_t)data->buffer.size, "uri", uri);
+  json_t *buffer = json_pack("{s:I}", "byteLength", (json_int_t)data->buffer.size);
   bool done = set(node, "mesh", json_integer(0));
+  if (buffer && uri) done = set(buffer, "uri", json_string(uri)) && done;
   done = set(root, "meshes", json_pack("[o]", mesh)) && done;
   done = set(root, "materials", json_pack("[o]", material)) && done;
   done = set(root, "accessors", make_accessors(data)) && done;
