@@ -43,7 +43,7 @@ static void sample_vertices(pipeline *p, qmat_mesh *mesh) {
   samples->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *samples->positions);
   samples->barycentrics = qmat_calloc(3 * mesh->vertex_count, sizeof *samples->barycentrics);
   samples->facets = qmat_calloc(mesh->vertex_count, sizeof *samples->facets);
-  memcpy(samples->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *samples->positions);
+  for (size_t i = 0; i < 3 * mesh->vertex_count; i++) samples->positions[i] = mesh->positions[i];
   for (size_t i = 3 * mesh->triangle_count; i-- > 0;) {
     const size_t v = mesh->triangles[i];
     samples->facets[v] = (uint32_t)(i / 3);
