@@ -48,7 +48,7 @@ run_ctest() {
   shift
   report=$PWD/build/$preset/ctest.xml
   rm -f "$report"
-  ctest --preset "$preset" -j "$(nproc)" --timeout 600 --output-junit "$report" "$@"
+  ctest --preset "$preset" -j "$(nproc)" --timeout 1200 --output-junit "$report" "$@"
   result=$?
   if [ ! -s "$report" ] || [ -z "$(attribute "$report" tests)" ]; then
     echo "ctest wrote no report (exit code $result)"
@@ -90,8 +90,8 @@ fi
 step "Build with sanitizers"
 if build asan -DQMAT_WERROR=ON; then
   step "Tests with sanitizers"
-  # The worked example builds the whole tree once more; once is enough.
-  run_ctest asan -LE builds
+  # The worked example builds the whole tree once more; once is enough. So it is with the long tests.
+  run_ctest asan -LE "builds|long"
 fi
 
 step "Done"
