@@ -25,8 +25,9 @@
  * function, which is then what was tested; after the request it has LATENCY seconds left to return. */
 static const double PATIENCE = 1, LATENCY = 20;
 
-/* So many of the points at which a run may be stopped, or run out of memory, are tried. */
-enum { MOST_STOPS = 24, MOST_SHORTAGES = 48 };
+/* So many of the points at which a run may be stopped, or run out of memory, are tried; fewer when the run is one of
+ * many (with each choice of a parameter). */
+enum { MOST_STOPS = 24, MOST_SHORTAGES = 32, FEWER_SHORTAGES = 6 };
 
 enum { MOST_PORTS = 16 };
 
@@ -1029,9 +1030,10 @@ static void try_shortages(subject *run, const char *what) {
   qmat_context_uninit(&context);
   assert_true(needed > 0);
   // Memory that stays short from some point on, and a single allocation that fails.
-  for (size_t k = 0; k < 2 * MOST_SHORTAGES && k / 2 < needed; k++) {
+  const size_t most = *what ? FEWER_SHORTAGES : MOST_SHORTAGES;
+  for (size_t k = 0; k < 2 * most && k / 2 < needed; k++) {
     context = (qmat_context){.threads = 1};
-    const size_t first = spread(k / 2, needed, MOST_SHORTAGES);
+    const size_t first = spread(k / 2, needed, most);
     shortage(first, k % 2 ? 1 : SIZE_MAX);
     const qmat_status status = qmat_node_run(&context, run->node, run->params, run->inputs, run->outputs);
     shortage(SIZE_MAX, 0);
