@@ -89,6 +89,12 @@ void *__wrap__Znwm(size_t size) {
   return __real__Znwm(size);
 }
 
+/* CGAL's containers lose a block when memory runs out between the block and the list of blocks. */
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void) {
+  return "leak:CGAL::Compact_container";
+}
+
 /* ---- values for ports ---- */
 
 /* Families of values that belong together, one of each type. */
