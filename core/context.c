@@ -19,6 +19,10 @@ int qmat_threads(const qmat_context *context) {
   return processors > 0 ? processors : 1;
 }
 
+void qmat_note_file_read(const qmat_context *context, const char *path, const uint8_t *bytes, size_t size) {
+  if (context->file_read != NULL) context->file_read(context->file_read_user, path, bytes, size);
+}
+
 /* Copies what fits, without cutting a UTF-8 sequence; NULL becomes "". */
 static void copy_text(char *to, size_t size, const char *from) {
   if (from == NULL) from = "";

@@ -32,12 +32,19 @@ typedef struct qmat_error {
 typedef bool qmat_progress_fn(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
                               const char *unit);
 
+/* Hears of every file that is read in whole: its `size` bytes, or NULL for one that could not be read. Called from the
+ * thread that runs the node. Results are cached by what was read, so a reader that does not go through
+ * qmat_bytes_read_file calls it too. */
+typedef void qmat_file_read_fn(void *user, const char *path, const uint8_t *bytes, size_t size);
+
 /* One run's surroundings. A zeroed context is valid: no progress, all processors. One thread at a time uses it;
  * nodes that work in parallel give each OpenMP thread its own slice and report from the calling thread. */
 typedef struct qmat_context {
   qmat_error error;
   qmat_progress_fn *progress;
   void *progress_user;
+  qmat_file_read_fn *file_read; /* NULL: nobody listens */
+  void *file_read_user;
   int threads;                     /* 0: as many as there are processors */
   qmat_arena arena;                /* scratch; emptied after each node */
   const char *node_id, *node_type; /* of the running node; NULL outside */
@@ -49,6 +56,9 @@ void qmat_context_uninit(qmat_context *context);
 
 /* The number of OpenMP threads to use: context->threads or the number of processors, at least 1. */
 int qmat_threads(const qmat_context *context);
+
+/* Tells the context's file_read of a file; see qmat_file_read_fn. */
+void qmat_note_file_read(const qmat_context *context, const char *path, const uint8_t *bytes, size_t size);
 
 /* Records an error (status, message, and the running node's names) and returns `status`. The newest wins;
  * what was recorded before is cleared, so add field, element, file and hint after it. */

@@ -2,6 +2,7 @@
 #ifndef QMAT_CORE_DIGEST_H
 #define QMAT_CORE_DIGEST_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,6 +25,17 @@ void qmat_hasher_add(qmat_hasher *hasher, const void *bytes, size_t size);
 /* Gives the digest and frees the hasher; NULL `digest` only frees. Safe after a failed init: QMAT_ERROR_DEPENDENCY and
  * a digest of zeros when the hasher never started or OpenSSL failed on the way. */
 qmat_status qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest);
+
+/* The digest of `size` bytes; statuses as above. */
+qmat_status qmat_digest_of(const void *bytes, size_t size, qmat_digest *digest);
+
+/* The digest of the bytes of a regular file, read in pieces. QMAT_ERROR_IO when it cannot be read. Cost: one pass. */
+qmat_status qmat_digest_of_file(const char *path, qmat_digest *digest);
+
+/* The digest that exactly 64 lower-case hexadecimal digits stand for; false leaves `*digest` alone. */
+bool qmat_digest_parse(const char *text, qmat_digest *digest);
+
+bool qmat_digest_equal(const qmat_digest *a, const qmat_digest *b);
 
 /* Writes the 64 lower-case hexadecimal digits and a terminating zero. */
 void qmat_digest_hex(const qmat_digest *digest, char text[65]);

@@ -47,6 +47,14 @@ typedef struct qmat_port {
   const char *doc;
 } qmat_port;
 
+/* A library beneath whose version may change the bytes that a node makes. */
+typedef struct qmat_library {
+  const char *name; /* "Embree" */
+  /* Writes its version and, where that changes results, the instruction set that it uses. `text` holds `size` bytes;
+   * always terminated. */
+  void (*describe)(char *text, size_t size);
+} qmat_library;
+
 typedef struct qmat_node {
   const char *name;     /* "medial.simplify" */
   uint32_t version;     /* raised whenever the same input may give other bytes */
@@ -54,9 +62,10 @@ typedef struct qmat_node {
   const char *doc;      /* a few sentences */
   const char *citation; /* paper section and equations, or "" */
   size_t params_size;
-  const qmat_param *params; /* ended by a row without a name; NULL: none */
-  const qmat_port *inputs;  /* ended by a row without a name; NULL: none */
-  const qmat_port *outputs; /* ended by a row without a name */
+  const qmat_param *params;             /* ended by a row without a name; NULL: none */
+  const qmat_port *inputs;              /* ended by a row without a name; NULL: none */
+  const qmat_port *outputs;             /* ended by a row without a name */
+  const qmat_library *const *libraries; /* those that may change its results, ended by NULL; NULL: none */
   /* Rules between parameters; NULL: none. Fails with qmat_fail + qmat_fail_field. */
   qmat_status (*check)(qmat_context *context, const void *params);
   /* Makes every output, sealed, one reference each (the caller releases them). On failure no output is set.

@@ -37,7 +37,11 @@ qmat_status qmat_bytes_read_file(qmat_context *context, const char *path, qmat_b
   bytes->data = NULL;
   /* Without O_NONBLOCK, opening a pipe waits for its writer. */
   int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (file < 0) return fail_file(context, path, "cannot open the file", errno);
+  if (file < 0) {
+    status = fail_file(context, path, "cannot open the file", errno);
+    qmat_note_file_read(context, path, NULL, 0);
+    return status;
+  }
 
   struct stat about;
   if (fstat(file, &about) != 0) {
@@ -89,6 +93,7 @@ qmat_status qmat_bytes_read_file(qmat_context *context, const char *path, qmat_b
 done:
   close(file);
   if (status != QMAT_OK) qmat_bytes_uninit(bytes);
+  qmat_note_file_read(context, path, bytes->data, bytes->size);
   return status;
 }
 

@@ -9,6 +9,7 @@
 #include "core/surface.h"
 #include "core/thickness.h"
 #include "nodes/delaunay_cgal.h"
+#include "nodes/libraries.h"
 #include "nodes/refine_medial.h"
 
 typedef enum { COMPLETION_THIN, COMPLETION_ALL } completion;
@@ -769,6 +770,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
+static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_embree, NULL};
+
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
     .version = 1,
@@ -781,5 +784,6 @@ const qmat_node qmat_node_medial_delaunay = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

@@ -13,6 +13,7 @@
 #include "nodes/control_points.h"
 #include "nodes/coverage.h"
 #include "nodes/edge_heap.h"
+#include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
 #include "nodes/protrusion.h"
 
@@ -776,6 +777,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
+static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
+
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
     .version = 1,
@@ -792,5 +795,6 @@ const qmat_node qmat_node_medial_simplify = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

@@ -7,6 +7,7 @@
 #include "core/frame.h"
 #include "core/node.h"
 #include "nodes/envelope_surface.h"
+#include "nodes/libraries.h"
 #include "nodes/skin_surface_cgal.h"
 
 /* What CGAL's skin surface is given at most: it may take 45 seconds for as many. */
@@ -400,6 +401,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
+static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
+
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
     .version = 1,
@@ -420,5 +423,6 @@ const qmat_node qmat_node_medial_skin = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

@@ -6,6 +6,7 @@
 #include "core/node.h"
 #include "core/surface.h"
 #include "core/triangle.h"
+#include "nodes/libraries.h"
 
 #define MOST_RAYS 1024
 /* Rays start at the facet; its own plane is met at a distance of rounding. In the unit frame. */
@@ -308,6 +309,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
+static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
+
 const qmat_node qmat_node_mesh_sdf = {
     .name = "mesh.sdf",
     .version = 1,
@@ -326,5 +329,6 @@ const qmat_node qmat_node_mesh_sdf = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

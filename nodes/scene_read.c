@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/node.h"
 #include "io/model.h"
+#include "nodes/libraries.h"
 
 typedef struct scene_read_params {
   const char *path;
@@ -49,6 +50,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   return QMAT_OK;
 }
 
+static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_library_tinygltf, NULL};
+
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
     .version = 1,
@@ -62,5 +65,6 @@ const qmat_node qmat_node_scene_read = {
     .params_size = sizeof(scene_read_params),
     .params = params,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

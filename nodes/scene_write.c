@@ -6,6 +6,7 @@
 #include "io/gltf_write.h"
 #include "io/ma.h"
 #include "io/mesh_formats.h"
+#include "nodes/libraries.h"
 
 /* Quantisation spends this part of epsilon at most; without a report epsilon is taken for this part of the diagonal. */
 #define PART_OF_EPSILON 0.05
@@ -137,6 +138,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
+static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
+
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
     .version = 1,
@@ -156,5 +159,6 @@ const qmat_node qmat_node_scene_write = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .libraries = libraries,
     .run = run,
 };

@@ -3,7 +3,9 @@
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -80,6 +82,42 @@ static void test_a_hasher_that_never_started_fails_with_zeros(void **state) {
   assert_digest(&digest, "0000000000000000000000000000000000000000000000000000000000000000");
 }
 
+static void test_bytes_and_a_file_of_them_have_one_digest(void **state) {
+  (void)state;
+  char path[] = "/tmp/qmat-digest-XXXXXX";
+  const int file = mkstemp(path);
+  assert_true(file >= 0);
+  static char bytes[200003]; /* more than one piece */
+  for (size_t i = 0; i < sizeof bytes; ++i) bytes[i] = (char)(i * i % 251);
+  assert_int_equal(write(file, bytes, sizeof bytes), sizeof bytes);
+  close(file);
+  qmat_digest of_bytes, of_file;
+  assert_int_equal(qmat_digest_of(bytes, sizeof bytes, &of_bytes), QMAT_OK);
+  assert_int_equal(qmat_digest_of_file(path, &of_file), QMAT_OK);
+  assert_true(qmat_digest_equal(&of_bytes, &of_file));
+  unlink(path);
+  assert_int_equal(qmat_digest_of_file(path, &of_file), QMAT_ERROR_IO);
+  assert_int_equal(qmat_digest_of_file("/tmp", &of_file), QMAT_ERROR_IO);
+}
+
+static void test_only_64_lower_case_digits_are_a_digest(void **state) {
+  (void)state;
+  qmat_digest digest, parsed;
+  char hex[65];
+  assert_int_equal(qmat_digest_of("abc", 3, &digest), QMAT_OK);
+  qmat_digest_hex(&digest, hex);
+  assert_true(qmat_digest_parse(hex, &parsed));
+  assert_true(qmat_digest_equal(&digest, &parsed));
+  parsed.bytes[31] ^= 1;
+  assert_false(qmat_digest_equal(&digest, &parsed));
+  hex[0] = 'B';
+  assert_false(qmat_digest_parse(hex, &parsed));
+  hex[0] = 'g';
+  assert_false(qmat_digest_parse(hex, &parsed));
+  assert_false(qmat_digest_parse(hex + 1, &parsed));
+  assert_false(qmat_digest_parse("", &parsed));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_published_messages_give_their_digests),
@@ -87,6 +125,8 @@ int main(void) {
       cmocka_unit_test(test_no_bytes_may_come_from_null),
       cmocka_unit_test(test_finishing_without_a_digest_only_frees),
       cmocka_unit_test(test_a_hasher_that_never_started_fails_with_zeros),
+      cmocka_unit_test(test_bytes_and_a_file_of_them_have_one_digest),
+      cmocka_unit_test(test_only_64_lower_case_digits_are_a_digest),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
