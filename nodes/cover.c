@@ -78,7 +78,7 @@ qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surfac
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
   const size_t count = mesh->triangle_count, slice = 1 << 14;
-  *cover = (qmat_cover){.bound = known};
+  *cover = (qmat_cover){.found = known, .bound = known};
   cover->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *cover->points);
   cover->facets = qmat_arena_alloc(&context->arena, count, sizeof *cover->facets);
   double *worst = qmat_arena_alloc(&context->arena, count, sizeof *worst);
@@ -107,6 +107,7 @@ qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surfac
     }
   }
   for (size_t t = 0; t < count; t++) {
+    cover->found = fmax(cover->found, worst[t]);
     if (!(worst[t] > threshold)) continue;
     memmove(&cover->points[3 * cover->count], &cover->points[3 * t], 3 * sizeof *cover->points);
     cover->facets[cover->count++] = (uint32_t)t;

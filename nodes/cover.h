@@ -7,6 +7,7 @@
 
 /* The farthest place of a surface from an envelope. */
 typedef struct qmat_cover {
+  double found; /* the largest F found, at a point that was looked at or `known` */
   double bound; /* no point of the surface has a larger F; unit frame */
   size_t count; /* facets on which an F above the threshold was found */
   double *points;   /* 3 per such facet: the worst place found on it; in the context's arena */

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_BOUNDARY_DISTANCE_H
+#define QMAT_NODES_BOUNDARY_DISTANCE_H
+
+#include "core/envelope.h"
+#include "core/surface.h"
+
+/* What a largest distance lies between, both included; unit frame. */
+typedef struct qmat_bounds {
+  double lo, hi;
+} qmat_bounds;
+
+/* How far the boundary of an envelope lies from a surface. */
+typedef struct qmat_boundary_distance {
+  qmat_bounds either_side; /* of the distance from a point of the boundary to the surface */
+  qmat_bounds outside;     /* the same over the points that lie out of the solid; 0 where there is none */
+  double largest, mean;    /* over the sampled points, to either side; 0 without one */
+  size_t sample_count;     /* of the samples that lie on the boundary */
+  size_t looks;            /* pieces of the boundary that were looked at */
+} qmat_boundary_distance;
+
+/* Measures the boundary of the union of the spheres, cones and slabs of `unit` (a sealed medial mesh's arrays in the
+ * unit frame, of which `envelope` was made) against the surface, inside and outside of it alike.
+ *
+ * First `sample_count` points are spread evenly over the spheres, the mantles of the cones and the tangent planes of
+ * the slabs, and those on the boundary asked. Then branch and bound over pieces of these same: the distance to the
+ * surface is 1-Lipschitz, so it is at most `reach` above that at a piece's middle. A piece that lies deeper than
+ * QMAT_BOUNDARY_SKIN within the envelope is no part of the boundary: within a neighbour whose support is larger
+ * along all of its normals, or within a primitive that holds its middle deeper than its reach. Pieces are taken level
+ * by level, and all of a level are compared with the one `lo` of the levels before, so that the answer does not depend
+ * on threads.
+ *
+ * hi - lo is at most `tolerance` (a share of `epsilon` or of lo, the larger), and less where that decides whether hi is
+ * at most `epsilon`; `outside` is not told from a quarter of epsilon below that. Where two primitives meet so
+ * that the boundary between them is undecided down to the smallest pieces, or the work is beyond all measure, hi is
+ * higher, and still no point of the boundary is farther. `epsilon` > 0 and `tolerance` > 0; their product is taken for
+ * 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
+                                           const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
+                                           double tolerance, size_t sample_count, qmat_boundary_distance *result);
+
+/* Points that lie this deep in the envelope, in diagonals, count as its boundary too, for hi: what a file in single
+ * precision or a judge with samples cannot tell from it. */
+#define QMAT_BOUNDARY_SKIN 1e-4
+
+/* What a search for the largest of some distances has to get below, with `lo` known to be attained: `tolerance` (as
+ * above) over it, or less to get below epsilon where lo is. */
+double qmat_bound_target(double lo, double epsilon, double tolerance);
+
+#endif

@@ -1,0 +1,378 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.evaluate: how far a medial mesh and a surface are apart, as bounds that are proved, and whether the one has
+ * the topology of the other. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/hash.h"
+#include "core/medial_distance.h"
+#include "core/node.h"
+#include "nodes/boundary_distance.h"
+#include "nodes/cover.h"
+#include "nodes/topology.h"
+
+typedef struct medial_evaluate_params {
+  double epsilon;   /* 0: nothing is to be certified */
+  double tolerance; /* share of epsilon */
+  int64_t samples;
+} medial_evaluate_params;
+
+/* What the tolerance is a share of where epsilon is 0. */
+static const double default_epsilon = 0.01;
+
+/* A centre this close to the surface is not outside. */
+static const double beside_surface = 1e-5;
+
+/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
+ * digits. */
+static const double farthest_sphere = 1e6;
+
+/* Searches of the surface, each from what the one before has found. */
+enum { MOST_SEARCHES = 4 };
+
+typedef struct evaluation {
+  qmat_context *context;
+  const medial_evaluate_params *params;
+  double epsilon; /* of the bounds: never 0 */
+  qmat_surface *surface;
+  qmat_envelope *envelope;
+  qmat_medial unit; /* the medial mesh in the unit frame; the spheres are in the arena */
+  qmat_bounds surface_to_envelope;
+  double largest_gap, mean_gap; /* of max(0, F) over the samples of the surface */
+  double deepest, mean_offset;  /* of -F and |F| */
+  qmat_boundary_distance boundary;
+  qmat_topology topology, solid_topology;
+  size_t spheres_outside, degenerate_cones, degenerate_slabs, duplicate_spheres;
+} evaluation;
+
+static qmat_status prepare(evaluation *e, const qmat_mesh *mesh, const qmat_medial *medial) {
+  qmat_context *context = e->context;
+  if (medial->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
+    return qmat_fail_field(context, "medial");
+  }
+  qmat_status status = qmat_surface_new(context, mesh, &e->surface);
+  if (status != QMAT_OK) return status;
+  e->unit = *medial;
+  e->unit.spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof(double));
+  if (!e->unit.spheres) return qmat_fail_memory(context, "the medial mesh");
+  qmat_frame_spheres_to_unit(qmat_surface_frame(e->surface), medial->spheres, medial->sphere_count, e->unit.spheres);
+  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
+    if (fabs(e->unit.spheres[i]) <= farthest_sphere) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
+    qmat_fail_field(context, "medial");
+    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
+  }
+  return qmat_envelope_of_medial(context, &e->unit, &e->envelope);
+}
+
+/* ---- surface to envelope ---- */
+
+enum { SAMPLES_AT_ONCE = 512 };
+
+typedef struct sample_sum {
+  double gap, offset, largest, deepest;
+} sample_sum;
+
+static double facet_area(const double *a, const double *b, const double *c) {
+  double square = 0;
+  for (int k = 0; k < 3; k++) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const double n = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
+    square += n * n;
+  }
+  return 0.5 * sqrt(square);
+}
+
+/* Sample i lies where the running sum of areas passes (i + 1/2) / samples of the whole, anywhere in that facet. */
+static void surface_point(const evaluation *e, const double *areas, size_t i, double point[3]) {
+  const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
+  const double *positions = qmat_surface_positions(e->surface);
+  const double wanted = areas[mesh->triangle_count - 1] * (((double)i + 0.5) / (double)e->params->samples);
+  size_t low = 0, high = mesh->triangle_count - 1;
+  while (low < high) {
+    const size_t middle = low + (high - low) / 2;
+    if (areas[middle] > wanted)
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  const uint32_t *row = &mesh->triangles[3 * low];
+  const double root = sqrt(qmat_hash_unit(qmat_hash3(0, i, 0))), y = qmat_hash_unit(qmat_hash3(0, i, 1));
+  for (size_t k = 0; k < 3; k++)
+    point[k] = (1 - root) * positions[3 * (size_t)row[0] + k] + root * (1 - y) * positions[3 * (size_t)row[1] + k] +
+               root * y * positions[3 * (size_t)row[2] + k];
+}
+
+static qmat_status sample_surface(evaluation *e) {
+  qmat_context *context = e->context;
+  const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
+  const double *positions = qmat_surface_positions(e->surface);
+  const size_t samples = (size_t)e->params->samples, rows = (samples + SAMPLES_AT_ONCE - 1) / SAMPLES_AT_ONCE;
+  const size_t slice = 256;
+  double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas), area = 0;
+  sample_sum *sums = qmat_arena_alloc(&context->arena, slice, sizeof *sums), all = {0, 0, 0, 0};
+  if (!areas || !sums) return qmat_fail_memory(context, "samples of the surface");
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const uint32_t *row = &mesh->triangles[3 * t];
+    areas[t] = area +=
+        facet_area(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]], &positions[3 * (size_t)row[2]]);
+  }
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < rows; first += slice) {
+    const qmat_status status = qmat_progress(context, first, rows, "samples of the surface");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < rows ? first + slice : rows;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+    for (size_t row = first; row < last; row++) {
+      sample_sum sum = {0, 0, 0, 0};
+      for (size_t i = row * SAMPLES_AT_ONCE; i < samples && i < (row + 1) * SAMPLES_AT_ONCE; i++) {
+        double point[3];
+        surface_point(e, areas, i, point);
+        const double f = qmat_envelope_distance(e->envelope, point, NULL);
+        sum.gap += fmax(f, 0);
+        sum.offset += fabs(f);
+        sum.largest = fmax(sum.largest, f);
+        sum.deepest = fmax(sum.deepest, -f);
+      }
+      sums[row - first] = sum;
+    }
+    for (size_t row = first; row < last; row++) {
+      const sample_sum *sum = &sums[row - first];
+      all.gap += sum->gap;
+      all.offset += sum->offset;
+      all.largest = fmax(all.largest, sum->largest);
+      all.deepest = fmax(all.deepest, sum->deepest);
+    }
+  }
+  e->largest_gap = all.largest;
+  e->mean_gap = all.gap / (double)samples;
+  e->deepest = all.deepest;
+  e->mean_offset = all.offset / (double)samples;
+  return QMAT_OK;
+}
+
+/* Bounds max(0, F) over the surface; again from a larger F where that asks for less tolerance. */
+static qmat_status bound_surface_to_envelope(evaluation *e) {
+  double known = e->largest_gap;
+  qmat_status status = QMAT_OK;
+  for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
+    const double tolerance = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    qmat_cover cover;
+    status =
+        qmat_cover_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance, INFINITY, &cover);
+    e->surface_to_envelope = (qmat_bounds){cover.found, fmax(cover.bound, cover.found)};
+    known = cover.found;
+    if (cover.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
+  }
+  return status;
+}
+
+/* ---- what is odd about the medial mesh ---- */
+
+static qmat_status count_spheres_outside(evaluation *e) {
+  const size_t count = e->unit.sphere_count;
+  double *centres = qmat_arena_alloc(&e->context->arena, count, 3 * sizeof *centres);
+  uint8_t *inside = qmat_arena_alloc(&e->context->arena, count, sizeof *inside);
+  if (!centres || !inside) return qmat_fail_memory(e->context, "medial spheres");
+  for (size_t i = 0; i < count; i++) memcpy(&centres[3 * i], &e->unit.spheres[4 * i], 3 * sizeof *centres);
+  qmat_surface_inside_many(e->surface, centres, count, inside, qmat_threads(e->context));
+  for (size_t i = 0; i < count; i++)
+    if (!inside[i] && !isfinite(qmat_surface_distance(e->surface, &centres[3 * i], beside_surface, NULL, NULL)))
+      e->spheres_outside++;
+  return QMAT_OK;
+}
+
+static int compare_spheres(const void *left, const void *right) {
+  const double *a = left, *b = right;
+  for (int k = 0; k < 4; k++)
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
+static qmat_status count_degenerate(evaluation *e) {
+  const qmat_medial *m = &e->unit;
+  double *sorted = qmat_arena_alloc(&e->context->arena, m->sphere_count, 4 * sizeof *sorted);
+  if (!sorted) return qmat_fail_memory(e->context, "medial spheres");
+  memcpy(sorted, m->spheres, 4 * m->sphere_count * sizeof *sorted);
+  qsort(sorted, m->sphere_count, 4 * sizeof *sorted, compare_spheres);
+  for (size_t i = 1; i < m->sphere_count; i++)
+    e->duplicate_spheres += compare_spheres(&sorted[4 * i - 4], &sorted[4 * i]) == 0;
+  for (size_t i = 0; i < m->edge_count; i++) {
+    qmat_cone cone;
+    const uint32_t *ends = &m->edges[2 * i];
+    qmat_cone_prepare(&cone, &m->spheres[4 * (size_t)ends[0]], &m->spheres[4 * (size_t)ends[1]]);
+    e->degenerate_cones += cone.only != 0;
+  }
+  for (size_t i = 0; i < m->triangle_count; i++) {
+    qmat_slab slab;
+    const uint32_t *ids = &m->triangles[3 * i];
+    qmat_slab_prepare(&slab, &m->spheres[4 * (size_t)ids[0]], &m->spheres[4 * (size_t)ids[1]],
+                      &m->spheres[4 * (size_t)ids[2]]);
+    e->degenerate_slabs += !slab.solid;
+  }
+  return QMAT_OK;
+}
+
+/* ---- the report ---- */
+
+static int set_count(json_t *root, const char *key, int64_t count) {
+  return json_object_set_new(root, key, json_integer((json_int_t)count));
+}
+
+static int set_topology(json_t *root, const qmat_topology *t, bool partly, const char *const keys[4]) {
+  int bad = 0;
+  if (t->known || partly) {
+    bad |= set_count(root, keys[0], t->euler);
+    bad |= set_count(root, keys[1], (int64_t)t->components);
+  }
+  if (t->known) {
+    bad |= set_count(root, keys[2], (int64_t)t->loops);
+    bad |= set_count(root, keys[3], (int64_t)t->voids);
+  }
+  return bad;
+}
+
+static qmat_status make_report(const evaluation *e, qmat_report *report) {
+  static const char *const of_medial[] = {"euler_characteristic", "components", "loops", "voids"};
+  static const char *const of_solid[] = {"euler_characteristic_of_solid", "components_of_solid", "loops_of_solid",
+                                         "voids_of_solid"};
+  const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
+  const qmat_boundary_distance *b = &e->boundary;
+  const struct {
+    const char *key;
+    double value;
+  } lengths[] = {
+      {"epsilon", e->params->epsilon},
+      {"surface_to_envelope", e->surface_to_envelope.hi},
+      {"surface_to_envelope_at_least", e->surface_to_envelope.lo},
+      {"surface_to_envelope_sampled", e->largest_gap},
+      {"surface_to_envelope_mean", e->mean_gap},
+      {"surface_buried_sampled", e->deepest},
+      {"surface_offset_mean", e->mean_offset},
+      {"envelope_to_surface", b->either_side.hi},
+      {"envelope_to_surface_at_least", b->either_side.lo},
+      {"envelope_to_surface_sampled", b->largest},
+      {"envelope_to_surface_mean", b->mean},
+      {"envelope_out_of_solid", b->outside.hi},
+      {"envelope_out_of_solid_at_least", b->outside.lo},
+  };
+  const struct {
+    const char *key;
+    size_t value;
+  } counts[] = {
+      {"spheres", e->unit.sphere_count},           {"edges", e->unit.edge_count},
+      {"triangles", e->unit.triangle_count},       {"spheres_outside", e->spheres_outside},
+      {"degenerate_cones", e->degenerate_cones},   {"degenerate_slabs", e->degenerate_slabs},
+      {"duplicate_spheres", e->duplicate_spheres}, {"samples_of_surface", (size_t)e->params->samples},
+      {"samples_of_envelope", b->sample_count},    {"pieces_of_envelope", b->looks},
+  };
+  const bool solid = mesh->closed && mesh->oriented;
+  const bool within = e->surface_to_envelope.hi <= e->params->epsilon && b->either_side.hi <= e->params->epsilon;
+  int bad = json_object_set_new(report->root, "certified", json_boolean(solid && within));
+  bad |= json_object_set_new(report->root, "estimate", json_boolean(!solid));
+  for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
+    bad |= json_object_set_new(report->root, lengths[i].key, json_real(lengths[i].value));
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+    bad |= set_count(report->root, counts[i].key, (int64_t)counts[i].value);
+  bad |= set_topology(report->root, &e->topology, true, of_medial);
+  bad |= set_topology(report->root, &e->solid_topology, false, of_solid);
+  return bad ? qmat_fail_memory(e->context, "the report") : qmat_value_seal(e->context, &report->base);
+}
+
+static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const medial_evaluate_params *params = data;
+  evaluation e = {
+      .context = context, .params = params, .epsilon = params->epsilon > 0 ? params->epsilon : default_epsilon};
+  qmat_report *report = qmat_report_new();
+  qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK) status = prepare(&e, (const qmat_mesh *)inputs[0], (const qmat_medial *)inputs[1]);
+  if (status == QMAT_OK) status = sample_surface(&e);
+  if (status == QMAT_OK) status = bound_surface_to_envelope(&e);
+  if (status == QMAT_OK)
+    status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance,
+                                            (size_t)params->samples, &e.boundary);
+  if (status == QMAT_OK) status = qmat_topology_of_medial(context, &e.unit, &e.topology);
+  if (status == QMAT_OK) status = qmat_topology_of_solid(context, e.surface, &e.solid_topology);
+  if (status == QMAT_OK) status = count_spheres_outside(&e);
+  if (status == QMAT_OK) status = count_degenerate(&e);
+  if (status == QMAT_OK) status = make_report(&e, report);
+  if (status == QMAT_OK)
+    outputs[0] = &report->base;
+  else
+    qmat_value_release(report ? &report->base : NULL);
+  qmat_envelope_free(e.envelope);
+  qmat_surface_free(e.surface);
+  return status;
+}
+
+static const qmat_param params[] = {
+    {.name = "epsilon",
+     .unit = "diagonal",
+     .doc = "The distance that is certified where both errors are at most that; 0: none",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.01,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = offsetof(medial_evaluate_params, epsilon)},
+    {.name = "tolerance",
+     .unit = "epsilon",
+     .doc = "How far the bounds of an error may be apart, as a share of epsilon or of the error if that is larger",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.05,
+     .min = 0.001,
+     .max = 1,
+     .offset = offsetof(medial_evaluate_params, tolerance)},
+    {.name = "samples",
+     .unit = "points",
+     .doc = "Points on the surface, and as many on the primitives, for the sampled figures and the means",
+     .type = QMAT_PARAM_INT,
+     .default_number = 20000,
+     .min = 1,
+     .max = 1e9,
+     .offset = offsetof(medial_evaluate_params, samples)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh that describes it"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "report", .type = QMAT_REPORT, .doc = "Errors with their bounds, certified or not, and topology"},
+    {0},
+};
+
+const qmat_node qmat_node_medial_evaluate = {
+    .name = "medial.evaluate",
+    .version = 1,
+    .summary = "Proves how far a medial mesh and a surface are apart",
+    .doc =
+        "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
+        "distance "
+        "from any point of the surface to the solid that spheres, cones and slabs sweep (eq. 9 over all of the "
+        "surface); "
+        "envelope_to_surface one of the distance from any point of that solid's boundary to the surface, on either "
+        "side "
+        "of it; envelope_out_of_solid of the same over what lies outside of the model, to a quarter of epsilon at "
+        "best. "
+        "Names with _at_least are lower bounds, found at a point. The bounds come from branch and bound and hold "
+        "between samples; the figures that are sampled or means do not. The first and the second together bound the "
+        "two-sided distance between the surface and the envelope's boundary but for surface that lies deep within the "
+        "envelope, in a gap that it fills: surface_buried_sampled shows how deep. certified says that the surface is "
+        "closed and oriented and that both are at most epsilon; of other surfaces all is an estimate. Loops and voids "
+        "are "
+        "Betti numbers over Z/2 of the medial mesh and of the solid; they are missing where the surface has no inside "
+        "or an edge of more than two triangles.",
+    .citation = "Section 3.1.1 and eq. 9",
+    .params_size = sizeof(medial_evaluate_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};
