@@ -13,8 +13,8 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   const qmat_graph *graph = &invocation->graph;
   for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
     const qmat_graph_input *input = &graph->inputs[i];
-    const qmat_node *type = graph->nodes[input->node].type;
-    const qmat_param *param = &type->params[input->param];
+    const qmat_node *type = graph->nodes[input->params[0].node].type;
+    const qmat_param *param = &type->params[input->params[0].param];
     char *doc = invocation->docs[invocation->option_count];
     int length = snprintf(doc, QMAT_OPTION_DOC_SIZE, "%s: ", param->doc);
     if (length > 0 && length < QMAT_OPTION_DOC_SIZE)
@@ -34,22 +34,16 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   return status;
 }
 
-static qmat_status set_input(qmat_context *context, qmat_graph *graph, const char *name, const char *value) {
-  size_t node, param;
-  qmat_status status = qmat_graph_find_param(context, graph, name, &node, &param);
-  return status == QMAT_OK ? qmat_graph_set(context, graph, node, param, value) : status;
-}
-
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
   qmat_graph *graph = &invocation->graph;
-  qmat_status status = set_input(context, graph, graph->inputs[0].name, invocation->arguments[0]);
+  qmat_status status = qmat_graph_set_named(context, graph, graph->inputs[0].name, invocation->arguments[0]);
   // Whoever asks for a number of spheres wants that number, whatever the distance.
   if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
       !qmat_invocation_value(invocation, "epsilon"))
-    status = set_input(context, graph, "epsilon", "0");
+    status = qmat_graph_set_named(context, graph, "epsilon", "0");
   for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
     const char *value = qmat_invocation_value(invocation, graph->inputs[i].name);
-    if (value) status = set_input(context, graph, graph->inputs[i].name, value);
+    if (value) status = qmat_graph_set_named(context, graph, graph->inputs[i].name, value);
   }
   return status;
 }

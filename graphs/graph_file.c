@@ -146,16 +146,22 @@ static qmat_status find_node_param(qmat_context *context, const qmat_graph *grap
   return suggest(context, rest, "parameters", &names);
 }
 
-qmat_status qmat_graph_find_param(qmat_context *context, const qmat_graph *graph, const char *name, size_t *node,
-                                  size_t *param) {
-  if (strchr(name, '.')) return find_node_param(context, graph, name, node, param);
-  for (size_t i = 0; i < graph->input_count; i++)
+/* The parameters that "node.param" or the name of an input stands for: `*params` is the input's own array, or `single`.
+ */
+static qmat_status find_params(qmat_context *context, const qmat_graph *graph, const char *name,
+                               qmat_graph_param *single, const qmat_graph_param **params, size_t *count) {
+  const bool dotted = strchr(name, '.') != NULL;
+  for (size_t i = 0; i < graph->input_count && !dotted; i++)
     if (strcmp(graph->inputs[i].name, name) == 0) {
-      *node = graph->inputs[i].node;
-      *param = graph->inputs[i].param;
+      *params = graph->inputs[i].params;
+      *count = graph->inputs[i].param_count;
       return QMAT_OK;
     }
-  if (find_node(graph, name) != SIZE_MAX) return find_node_param(context, graph, name, node, param);
+  if (dotted || find_node(graph, name) != SIZE_MAX) {
+    *params = single;
+    *count = 1;
+    return find_node_param(context, graph, name, &single->node, &single->param);
+  }
   qmat_fail(context, QMAT_ERROR_USAGE, "the graph has no input '%s'", qmat_show(name).text);
   name_list names = {0};
   for (size_t i = 0; i < graph->input_count; i++) add_name(&names, graph->inputs[i].name);
@@ -277,6 +283,32 @@ qmat_status qmat_graph_set(qmat_context *context, qmat_graph *graph, size_t node
   return set_param(context, graph, node, param, text, "");
 }
 
+/* Whether the parameter may be set to `text`; it is not. */
+static qmat_status try_param(qmat_context *context, const qmat_graph *graph, qmat_graph_param at, const char *text) {
+  const qmat_graph_node *node = &graph->nodes[at.node];
+  const char *outer_id = context->node_id, *outer_type = context->node_type;
+  void *params = qmat_calloc(1, node->type->params_size);
+  if (!params) return qmat_fail_memory(context, "graph");
+  context->node_id = node->id;
+  context->node_type = node->type->name;
+  const qmat_status status = qmat_param_parse(context, node->type, &node->type->params[at.param], text, params);
+  context->node_id = outer_id;
+  context->node_type = outer_type;
+  qmat_free(params);
+  return status;
+}
+
+qmat_status qmat_graph_set_named(qmat_context *context, qmat_graph *graph, const char *name, const char *text) {
+  qmat_graph_param single;
+  const qmat_graph_param *params = NULL;
+  size_t count = 0;
+  qmat_status status = find_params(context, graph, name, &single, &params, &count);
+  for (size_t i = 1; i < count && status == QMAT_OK; i++) status = try_param(context, graph, params[i], text);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = qmat_graph_set(context, graph, params[i].node, params[i].param, text);
+  return status;
+}
+
 qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const char *assignment) {
   const char *equals = strchr(assignment, '=');
   if (!equals) {
@@ -288,10 +320,7 @@ qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const ch
   if (length >= sizeof name) length = sizeof name - 1;
   memcpy(name, assignment, length);
   name[length] = 0;
-  size_t node, param;
-  qmat_status status = qmat_graph_find_param(context, graph, name, &node, &param);
-  if (status != QMAT_OK) return status;
-  return qmat_graph_set(context, graph, node, param, equals + 1);
+  return qmat_graph_set_named(context, graph, name, equals + 1);
 }
 
 // Moves the newest error to where the file sets the parameter that it names, if it does.
@@ -327,7 +356,8 @@ qmat_status qmat_graph_check_node(qmat_context *context, const qmat_graph *graph
 
 static bool is_graph_input(const qmat_graph *graph, size_t node, size_t param) {
   for (size_t i = 0; i < graph->input_count; i++)
-    if (graph->inputs[i].node == node && graph->inputs[i].param == param) return true;
+    for (size_t k = 0; k < graph->inputs[i].param_count; k++)
+      if (graph->inputs[i].params[k].node == node && graph->inputs[i].params[k].param == param) return true;
   return false;
 }
 
@@ -591,6 +621,33 @@ static qmat_status read_nodes(graph_reader *reader) {
   return QMAT_OK;
 }
 
+/* One parameter, "node.parameter", or one each of several nodes, { node: parameter }. */
+static qmat_status read_input(graph_reader *reader, const qmat_tree_entry *entry, qmat_graph_input *input) {
+  const qmat_tree *value = entry->value;
+  const qmat_tree_entry *member = value->is_mapping ? value->entries : NULL;
+  qmat_status status = expect_name(reader, entry, "an input");
+  if (status == QMAT_OK && !member) status = expect_text(reader, value, entry->key);
+  if (status != QMAT_OK) return status;
+  snprintf(input->name, sizeof input->name, "%s", entry->key);
+  input->params = qmat_calloc(member ? entry_count(value) : 1, sizeof *input->params);
+  if (!input->params) return qmat_fail_memory(reader->context, "graph");
+  do {
+    char joined[2 * QMAT_GRAPH_NAME_SIZE];
+    if (member) {
+      status = expect_text(reader, member->value, member->key);
+      if (status != QMAT_OK) return status;
+      snprintf(joined, sizeof joined, "%s.%s", member->key, member->value->text);
+    }
+    qmat_graph_param *param = &input->params[input->param_count];
+    status =
+        find_node_param(reader->context, reader->graph, member ? joined : value->text, &param->node, &param->param);
+    if (status != QMAT_OK) return at_mark(reader, member ? member->mark : value->mark);
+    input->param_count++;
+    if (member) member = member->next;
+  } while (member);
+  return QMAT_OK;
+}
+
 static qmat_status read_inputs(graph_reader *reader) {
   qmat_graph *graph = reader->graph;
   const qmat_tree *inputs = find_key(reader->root, "inputs");
@@ -600,14 +657,8 @@ static qmat_status read_inputs(graph_reader *reader) {
   graph->inputs = qmat_calloc(entry_count(inputs), sizeof *graph->inputs);
   if (!graph->inputs) return qmat_fail_memory(reader->context, "graph");
   for (const qmat_tree_entry *entry = inputs->entries; entry; entry = entry->next) {
-    qmat_graph_input input = {0};
-    status = expect_name(reader, entry, "an input");
-    if (status == QMAT_OK) status = expect_text(reader, entry->value, entry->key);
+    status = read_input(reader, entry, &graph->inputs[graph->input_count++]);
     if (status != QMAT_OK) return status;
-    status = find_node_param(reader->context, graph, entry->value->text, &input.node, &input.param);
-    if (status != QMAT_OK) return at_mark(reader, entry->value->mark);
-    snprintf(input.name, sizeof input.name, "%s", entry->key);
-    graph->inputs[graph->input_count++] = input;
   }
   return QMAT_OK;
 }
@@ -869,6 +920,7 @@ void qmat_graph_uninit(qmat_graph *graph) {
     qmat_free(node->params);
   }
   for (size_t i = 0; i < graph->output_count; i++) qmat_free(graph->outputs[i].path);
+  for (size_t i = 0; i < graph->input_count; i++) qmat_free(graph->inputs[i].params);
   qmat_free(graph->nodes);
   qmat_free(graph->inputs);
   qmat_free(graph->outputs);

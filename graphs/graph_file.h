@@ -8,7 +8,9 @@
 /* A graph file, read and checked:
  *
  *     qmat: 1                                   the version of this language
- *     inputs:  { model: model.path }            other names for parameters
+ *     inputs:                                   other names for parameters
+ *       model: model.path
+ *       rays: { field: rays, other: rays }      for one parameter each of several nodes
  *     nodes:
  *       model:  { type: scene.read, params: { path: octopus.off } }
  *       field:  { type: mesh.sdf, in: { mesh: model.mesh } }
@@ -43,10 +45,15 @@ typedef struct qmat_graph_node {
   qmat_graph_link *links; /* per input port */
 } qmat_graph_node;
 
-/* Another name for a parameter. */
+typedef struct qmat_graph_param {
+  size_t node, param;
+} qmat_graph_param;
+
+/* Another name for a parameter, or for several that are set to the same. */
 typedef struct qmat_graph_input {
   char name[QMAT_GRAPH_NAME_SIZE];
-  size_t node, param;
+  size_t param_count;
+  qmat_graph_param *params; /* at least one, in the file's order */
 } qmat_graph_input;
 
 typedef struct qmat_graph_output {
@@ -85,9 +92,9 @@ void qmat_graph_uninit(qmat_graph *graph);
  * to the working folder. QMAT_ERROR_USAGE leaves the old value. */
 qmat_status qmat_graph_set(qmat_context *context, qmat_graph *graph, size_t node, size_t param, const char *text);
 
-/* The parameter that "node.param" or the name of an input stands for. QMAT_ERROR_USAGE suggests the nearest name. */
-qmat_status qmat_graph_find_param(qmat_context *context, const qmat_graph *graph, const char *name, size_t *node,
-                                  size_t *param);
+/* Sets every parameter that "node.param" or the name of an input stands for. QMAT_ERROR_USAGE leaves all of them as they
+ * were, and suggests the nearest name. */
+qmat_status qmat_graph_set_named(qmat_context *context, qmat_graph *graph, const char *name, const char *text);
 
 /* Sets what "node.param=value" or "input=value" says. */
 qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const char *assignment);

@@ -45,7 +45,8 @@ static void check_good_graph(const qmat_graph *graph) {
   assert_true(two->value == 0.01 && two->repeat == 1);
   assert_int_equal(graph->input_count, 1);
   assert_string_equal(graph->inputs[0].name, "start");
-  assert_int_equal(graph->inputs[0].node, 1);
+  assert_int_equal(graph->inputs[0].param_count, 1);
+  assert_int_equal(graph->inputs[0].params[0].node, 1);
   assert_int_equal(graph->output_count, 2);
   assert_string_equal(graph->outputs[1].name, "text");
   assert_int_equal(graph->outputs[1].node, 3);
@@ -190,6 +191,11 @@ static const mistake mistakes[] = {
     {"qmat: 1\ninputs: { n: a.valu }\nnodes: { a: { type: test.number } }\n", 2, 14, "no parameter 'valu'", "'value'"},
     {"qmat: 1\ninputs: { n: b.value }\nnodes: { a: { type: test.number } }\n", 2, 14, "no node 'b'", "nodes: a"},
     {"qmat: 1\ninputs: { n: a }\nnodes: { a: { type: test.number } }\n", 2, 14, "node.parameter", "'a.value'"},
+    {"qmat: 1\ninputs: { n: { a: valu } }\nnodes: { a: { type: test.number } }\n", 2, 16, "no parameter 'valu'",
+     "'value'"},
+    {"qmat: 1\ninputs: { n: { b: value } }\nnodes: { a: { type: test.number } }\n", 2, 16, "no node 'b'", "nodes: a"},
+    {"qmat: 1\ninputs: { n: { a: { b: c } } }\nnodes: { a: { type: test.number } }\n", 2, 19, "single value", NULL},
+    {"qmat: 1\ninputs: { n: {} }\nnodes: { a: { type: test.number } }\n", 2, 14, "single value", NULL},
     {"qmat: 1\ninputs: 3\nnodes: { a: { type: test.number } }\n", 2, 9, "mapping belongs", "node.parameter"},
     {"qmat: 1\ninputs: { 'n n': a.value }\nnodes: { a: { type: test.number } }\n", 2, 11, "cannot name an input", NULL},
     {HEAD "  a: { type: test.number }\noutputs: { x: a.numbr }\n", 4, 15, "no output 'numbr'", "'number'"},
@@ -330,6 +336,26 @@ static void test_assignments_set_by_node_and_by_input_and_suggest(void **state) 
   qmat_context_uninit(&context);
 }
 
+static void test_an_input_of_several_parameters_sets_all_or_none(void **state) {
+  (void)state;
+  static const char text[] =
+      "qmat: 1\ninputs: { both: { a: value, b: repeat } }\n"
+      "nodes: { a: { type: test.number }, b: { type: test.number } }\n"
+      "outputs: { first: a.number, second: b.number }\n";
+  qmat_context context = {0};
+  qmat_graph graph;
+  test_ok(&context, test_read(&context, text, &graph));
+  assert_int_equal(graph.inputs[0].param_count, 2);
+  const number_params *a = graph.nodes[0].params, *b = graph.nodes[1].params;
+  test_ok(&context, qmat_graph_assign(&context, &graph, "both=3"));
+  assert_true(a->value == 3 && b->repeat == 3);
+  check_assignment(&graph, "both=2.5", "whole", ""); /* the first of them would take it */
+  check_assignment(&graph, "both=x", "number", "");
+  assert_true(a->value == 3 && b->repeat == 3);
+  qmat_graph_uninit(&graph);
+  qmat_context_uninit(&context);
+}
+
 static void test_required_parameters_may_wait_when_they_are_inputs(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -408,6 +434,7 @@ int main(void) {
       cmocka_unit_test(test_oversized_graphs_are_refused),
       cmocka_unit_test(test_files_that_cannot_be_read_are_bad_graphs),
       cmocka_unit_test(test_assignments_set_by_node_and_by_input_and_suggest),
+      cmocka_unit_test(test_an_input_of_several_parameters_sets_all_or_none),
       cmocka_unit_test(test_required_parameters_may_wait_when_they_are_inputs),
       cmocka_unit_test(test_rules_between_parameters_point_at_the_parameter),
       cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),
