@@ -185,9 +185,9 @@ static size_t corner_of(const uint32_t *triangle, uint32_t vertex) {
   return k;
 }
 
-qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *c) {
-  const uint32_t kept = complex->edges[2 * (size_t)edge], removed = complex->edges[2 * (size_t)edge + 1];
-  c->edge = edge;
+/* What the union of the stars of `kept` and `removed` will be; QMAT_NONE for `removed`: the star of `kept` alone. */
+static qmat_status look_at_stars(qmat_context *context, qmat_complex *complex, uint32_t kept, uint32_t removed,
+                                 qmat_collapse *c) {
   c->kept = kept;
   c->removed = removed;
   c->neighbour_count = c->triangle_count = c->vanishing_count = 0;
@@ -196,9 +196,9 @@ qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, u
     memset(complex->mark_of_edge, 0, complex->edge_count * sizeof(uint32_t));
     complex->stamp = 1;
   }
-  size_t kept_count, removed_count;
+  size_t kept_count, removed_count = 0;
   const uint32_t *at_kept = qmat_complex_edges_at(complex, kept, &kept_count);
-  const uint32_t *at_removed = qmat_complex_edges_at(complex, removed, &removed_count);
+  const uint32_t *at_removed = removed == QMAT_NONE ? NULL : qmat_complex_edges_at(complex, removed, &removed_count);
   if (reserve_neighbours(c, kept_count + removed_count)) return qmat_fail_memory(context, "a collapse");
   for (size_t i = 0; i < kept_count; i++) {
     const uint32_t w = qmat_complex_other_end(complex, at_kept[i], kept);
@@ -221,7 +221,7 @@ qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, u
     c->removed_edges[c->neighbour_count++] = at_removed[i];
   }
   at_kept = qmat_complex_triangles_at(complex, kept, &kept_count);
-  at_removed = qmat_complex_triangles_at(complex, removed, &removed_count);
+  if (removed != QMAT_NONE) at_removed = qmat_complex_triangles_at(complex, removed, &removed_count);
   if (reserve_triangles(c, kept_count + removed_count) ||
       qmat_grow((void **)&c->vanishing, &c->vanishing_capacity, kept_count, sizeof(uint32_t)))
     return qmat_fail_memory(context, "a collapse");
@@ -257,6 +257,18 @@ qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, u
   return QMAT_OK;
 }
 
+qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *collapse) {
+  collapse->edge = edge;
+  return look_at_stars(context, complex, complex->edges[2 * (size_t)edge], complex->edges[2 * (size_t)edge + 1],
+                       collapse);
+}
+
+qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *complex, uint32_t vertex,
+                                      qmat_collapse *collapse) {
+  collapse->edge = QMAT_NONE;
+  return look_at_stars(context, complex, vertex, QMAT_NONE, collapse);
+}
+
 /* Takes a triangle out of everything but the rows of `kept` and `removed`, which are rebuilt as a whole. */
 static void kill_triangle(qmat_complex *complex, uint32_t t, uint32_t kept, uint32_t removed) {
   for (size_t k = 0; k < 3; k++) {
@@ -271,6 +283,10 @@ static void kill_triangle(qmat_complex *complex, uint32_t t, uint32_t kept, uint
 qmat_status qmat_complex_collapse(qmat_context *context, qmat_complex *complex, const qmat_collapse *c,
                                   const double sphere[4]) {
   const uint32_t kept = c->kept, removed = c->removed;
+  if (removed == QMAT_NONE) {
+    memcpy(&complex->spheres[4 * (size_t)kept], sphere, 4 * sizeof *sphere);
+    return QMAT_OK;
+  }
   qmat_status status = rows_reserve(context, &complex->vertex_edges, kept, c->neighbour_count);
   if (status == QMAT_OK) status = rows_reserve(context, &complex->vertex_triangles, kept, c->triangle_count);
   if (status != QMAT_OK) return status;

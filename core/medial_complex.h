@@ -33,7 +33,8 @@ typedef struct qmat_complex {
   uint32_t stamp;
 } qmat_complex;
 
-/* What the star of the merged vertex will be after edge (u, v) collapses: vertex `kept` stays, `removed` goes. */
+/* What the star of the merged vertex will be after edge (u, v) collapses: vertex `kept` stays, `removed` goes. Of a vertex
+ * that only moves it is the star as it is: `edge` and `removed` are QMAT_NONE. */
 typedef struct qmat_collapse {
   uint32_t edge, kept, removed;
   size_t neighbour_count, neighbour_capacity;
@@ -58,6 +59,10 @@ void qmat_complex_uninit(qmat_complex *complex);
  * and are reused; zero it before the first use and free it with qmat_collapse_uninit. Cost: linear in both stars. */
 qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *collapse);
 void qmat_collapse_uninit(qmat_collapse *collapse);
+
+/* The same for moving a vertex, which changes no simplex: its star. */
+qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *complex, uint32_t vertex,
+                                      qmat_collapse *collapse);
 
 /* Does what the newest preview says, with the merged sphere (4 doubles). Afterwards the edges at `kept` that were also
  * at `removed` are one: the one at `kept` lives on. */

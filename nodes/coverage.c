@@ -77,9 +77,8 @@ static double witness_distance(const qmat_coverage *coverage, const qmat_complex
   return qmat_sphere_distance(s, &coverage->points[3 * point]);
 }
 
-/* Prepares the slabs and loose cones of the merged vertex. */
-static qmat_status prepare_star(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
-                                const qmat_collapse *collapse, const double sphere[4]) {
+qmat_status qmat_coverage_prepare(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                  const qmat_collapse *collapse, const double sphere[4]) {
   if (qmat_grow((void **)&coverage->slabs, &coverage->slab_capacity, collapse->triangle_count,
                 sizeof *coverage->slabs) ||
       qmat_grow((void **)&coverage->cones, &coverage->cone_capacity, collapse->neighbour_count,
@@ -179,7 +178,7 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
   const double limit = coverage->limits[point];
   if (witness_distance(coverage, complex, collapse, sphere, point) <= limit) return QMAT_OK;
   if (!coverage->prepared) {
-    const qmat_status status = prepare_star(context, coverage, complex, collapse, sphere);
+    const qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, sphere);
     if (status != QMAT_OK) return status;
   }
   if (qmat_grow((void **)&coverage->found, &coverage->found_capacity, coverage->found_count + 1,
@@ -196,6 +195,19 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
   coverage->failed_point = point;
   *kept = false;
   return QMAT_OK;
+}
+
+double qmat_coverage_star_foot(const qmat_coverage *coverage, const qmat_complex *complex,
+                               const qmat_collapse *collapse, const double sphere[4], const double point[3],
+                               double foot[4], double *share) {
+  new_witness witness;
+  const double distance = search_star(coverage, collapse, sphere, point, &witness);
+  *share = witness.weights[0];
+  for (int i = 0; i < 4; i++) foot[i] = witness.weights[0] * sphere[i];
+  for (size_t k = 1; k < 3 && witness.vertices[k] != QMAT_NONE; k++)
+    for (size_t i = 0; i < 4; i++)
+      foot[i] += witness.weights[k] * complex->spheres[4 * (size_t)witness.vertices[k] + i];
+  return distance;
 }
 
 static bool touches(const qmat_coverage *coverage, const qmat_collapse *collapse, uint32_t point) {
@@ -219,7 +231,7 @@ qmat_status qmat_coverage_test(qmat_context *context, qmat_coverage *coverage, c
   if (first != QMAT_NONE && touches(coverage, collapse, first))
     status = test_point(context, coverage, complex, collapse, sphere, first, kept);
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  for (int e = 0; e < 2; e++)
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
     for (uint32_t slot = coverage->heads[ends[e]]; slot != QMAT_NONE && status == QMAT_OK && *kept;
          slot = coverage->next[slot])
       status = test_point(context, coverage, complex, collapse, sphere, slot / 3, kept);
@@ -242,8 +254,8 @@ static void drop_corner(qmat_coverage *coverage, uint32_t slot, uint32_t vertex)
   coverage->weights[last] = 0;
 }
 
-void qmat_coverage_commit(qmat_coverage *coverage, const qmat_collapse *collapse) {
-  const uint32_t kept = collapse->kept, removed = collapse->removed;
+/* The witnesses of `removed` become those of `kept`. */
+static void merge_lists(qmat_coverage *coverage, uint32_t kept, uint32_t removed) {
   uint32_t tail = QMAT_NONE;
   for (uint32_t slot = coverage->heads[removed]; slot != QMAT_NONE;) {
     const uint32_t next = coverage->next[slot], first = slot - slot % 3;
@@ -264,6 +276,10 @@ void qmat_coverage_commit(qmat_coverage *coverage, const qmat_collapse *collapse
     coverage->heads[kept] = coverage->heads[removed];
   }
   coverage->heads[removed] = QMAT_NONE;
+}
+
+void qmat_coverage_commit(qmat_coverage *coverage, const qmat_collapse *collapse) {
+  if (collapse->removed != QMAT_NONE) merge_lists(coverage, collapse->kept, collapse->removed);
   for (size_t i = 0; i < coverage->found_count; i++) {
     const new_witness *w = &coverage->found[i];
     for (size_t k = 0; k < 3; k++) {

@@ -47,6 +47,17 @@ void qmat_coverage_uninit(qmat_coverage *coverage);
 qmat_status qmat_coverage_test(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double sphere[4], uint32_t first, bool *kept);
 
+/* Prepares the primitives of the star of the merged vertex for qmat_coverage_star_foot. Tests prepare their own.
+ * QMAT_ERROR_MEMORY. */
+qmat_status qmat_coverage_prepare(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                  const qmat_collapse *collapse, const double sphere[4]);
+
+/* The signed distance from a point to the primitives prepared last, which belong to `sphere`; `foot` (4 doubles) is the
+ * medial sphere that attains it, `*share` the weight of `sphere` in it. */
+double qmat_coverage_star_foot(const qmat_coverage *coverage, const qmat_complex *complex,
+                               const qmat_collapse *collapse, const double sphere[4], const double point[3],
+                               double foot[4], double *share);
+
 /* Takes the collapse of the newest successful test over (or, without limits, of any): call it before the complex
  * changes. */
 void qmat_coverage_commit(qmat_coverage *coverage, const qmat_collapse *collapse);

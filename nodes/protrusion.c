@@ -202,7 +202,7 @@ bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex
                                  const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   double depth = -INFINITY, gap;
-  for (int e = 0; e < 2; e++)
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
     depth = maximum(depth, protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
   if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
     const double near = qmat_depth_lattice_near(&protrusion->lattice, sphere, &gap);
@@ -245,7 +245,8 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
                 collapse->triangle_count, sizeof(double)))
     return qmat_fail_memory(context, "protrusion bounds");
   const double *old_kept = &complex->spheres[4 * (size_t)collapse->kept];
-  const double *old_removed = &complex->spheres[4 * (size_t)collapse->removed];
+  const double *old_removed =
+      collapse->removed == QMAT_NONE ? NULL : &complex->spheres[4 * (size_t)collapse->removed];
   search s = {.lattice = &protrusion->lattice,
               .content = content_share * protrusion->limit,
               .limit = protrusion->limit,

@@ -1,0 +1,425 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplification.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/medial_build.h"
+#include "core/vector.h"
+#include "nodes/collapse_candidates.h"
+
+enum { REPORT_EVERY = 256 };
+
+/* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
+static size_t late_stage(size_t initial) {
+  return initial / 50 > 100 ? initial / 50 : 100;
+}
+
+/* Eq. 6, with the error of the best candidate. */
+static void set_cost(qmat_simplification *s, uint32_t edge) {
+  qmat_candidates c;
+  qmat_candidates_find(&s->complex, s->quadrics, edge, &c);
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  const double gamma =
+      qmat_stability_ratio(&s->complex.spheres[4 * (size_t)ends[0]], &s->complex.spheres[4 * (size_t)ends[1]]);
+  s->heap.errors[edge] = c.errors[0];
+  s->heap.costs[edge] = (c.errors[0] + s->rules.k) * gamma * gamma;
+  s->stale[edge] = 0;
+}
+
+static qmat_status fill_heap(qmat_simplification *s) {
+  const size_t count = s->complex.edge_count;
+  s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
+  s->stale = qmat_arena_alloc(&s->context->arena, count, sizeof *s->stale);
+  if (!s->failed_points || !s->stale) return qmat_fail_memory(s->context, "the heap of edges");
+  const qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(s->context);
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (size_t e = 0; e < count; e++) {
+    set_cost(s, (uint32_t)e);
+    s->failed_points[e] = QMAT_NONE;
+  }
+  qmat_edge_heap_fill(&s->heap);
+  return QMAT_OK;
+}
+
+qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_points *control, const double *depths) {
+  qmat_context *context = s->context;
+  const qmat_complex *c = &s->complex;
+  s->control = control;
+  s->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
+  s->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *s->quadrics);
+  /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
+  double *limits = qmat_arena_alloc(&context->arena, control->count, sizeof *limits);
+  if (!s->quadrics || !limits) return qmat_fail_memory(context, "the simplification");
+  for (size_t i = 0; i < control->count; i++)
+    limits[i] = fmax(s->rules.limit - control->radii[i], control->distances[i]);
+  qmat_medial_quadrics_add(c, s->quadrics);
+  qmat_status status = fill_heap(s);
+  if (status == QMAT_OK)
+    status = qmat_coverage_init(context, &s->coverage, control->count, control->points, limits, control->witnesses,
+                                control->weights, c->vertex_count);
+  if (status != QMAT_OK) return status;
+  return qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths,
+                              s->rules.error == QMAT_ERROR_TWO_SIDED ? s->rules.limit : INFINITY);
+}
+
+void qmat_simplification_uninit(qmat_simplification *s) {
+  qmat_collapse_uninit(&s->collapse);
+  qmat_sphere_fit_uninit(&s->fit);
+  qmat_coverage_uninit(&s->coverage);
+  qmat_protrusion_uninit(&s->protrusion);
+  qmat_complex_uninit(&s->complex);
+}
+
+/* A loose edge all of whose responsible region is thin: a tubular feature (section 3.4). */
+static bool is_tubular(const qmat_simplification *s, uint32_t edge) {
+  if (s->complex.edge_triangles[edge]) return false;
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  bool any = false;
+  for (int k = 0; k < 2; k++)
+    for (uint32_t slot = qmat_coverage_first(&s->coverage, ends[k]); slot != QMAT_NONE; slot = s->coverage.next[slot]) {
+      if (slot / 3 >= s->control->sample_count) continue;
+      if (!s->rules.thin[slot / 3]) return false;
+      any = true;
+    }
+  return any;
+}
+
+static bool is_protected(const qmat_simplification *s, uint32_t vertex) {
+  size_t count;
+  const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count; i++)
+    if (is_tubular(s, at[i])) return true;
+  return false;
+}
+
+/* Leaves of the candidates what protection allows: a protected end keeps its sphere. */
+static bool apply_protection(const qmat_simplification *s, uint32_t edge, qmat_candidates *c, bool *bound) {
+  if (is_tubular(s, edge)) return false;
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  const bool first = is_protected(s, ends[0]), second = is_protected(s, ends[1]);
+  if (first && second) return false;
+  *bound = first || second;
+  if (!*bound) return true;
+  const qmat_quadric quadric = qmat_merged_quadric(&s->complex, s->quadrics, edge);
+  c->count = 0;
+  qmat_candidates_add(c, &quadric, &s->complex.spheres[4 * (size_t)ends[second]]);
+  return true;
+}
+
+/* How the newest preview would change the Euler characteristic, and whether it satisfies the link condition (Attali et
+ * al. 2011), which keeps the homotopy type: neighbours that both ends share span a slab with the edge, and the ends
+ * span no slab with a common edge. */
+static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
+  int64_t shared_neighbours = 0, shared_edges = 0;
+  for (size_t n = 0; n < c->neighbour_count; n++)
+    shared_neighbours += c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
+  for (size_t t = 0; t < c->triangle_count; t++)
+    shared_edges += c->kept_triangles[t] != QMAT_NONE && c->removed_triangles[t] != QMAT_NONE;
+  const int64_t vanishing = (int64_t)c->vanishing_count;
+  *link_condition = shared_neighbours == vanishing && shared_edges == 0;
+  return shared_neighbours - vanishing - shared_edges;
+}
+
+/* A guarded medial mesh's Euler characteristic may be off by one for every so many spheres: tears and voids of the
+ * dense initial one come in pairs, which could never close one by one, and the fewer spheres are left the less is
+ * forgiven. */
+enum { SPHERES_PER_FAULT = 128 };
+
+static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
+  bool link_condition;
+  *change = euler_change(&s->collapse, &link_condition);
+  if (s->rules.topology == QMAT_TOPOLOGY_PRESERVE) return link_condition;
+  if (s->rules.topology == QMAT_TOPOLOGY_FREE || !s->rules.has_target) return true;
+  const int64_t before = llabs(s->euler - s->rules.target_euler);
+  const int64_t after = llabs(s->euler + *change - s->rules.target_euler);
+  return after <= before || after <= (int64_t)s->complex.live_vertices / SPHERES_PER_FAULT;
+}
+
+typedef enum { DONE, REFUSED, EXCEEDED } outcome;
+
+static bool holds_protrusion(const qmat_simplification *s) {
+  return s->rules.limit < INFINITY && s->rules.error == QMAT_ERROR_TWO_SIDED;
+}
+
+/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. */
+static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uint32_t first, outcome *result) {
+  bool kept;
+  *result = REFUSED;
+  s->coverage.found_count = 0;
+  if (!qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) ||
+      !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere)) {
+    s->refused_by_surface++;
+    return QMAT_OK;
+  }
+  *result = EXCEEDED;
+  if (s->rules.limit < INFINITY) {
+    const qmat_status status =
+        qmat_coverage_test(s->context, &s->coverage, &s->complex, &s->collapse, sphere, first, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->refused_by_coverage++;
+      return QMAT_OK;
+    }
+  }
+  if (holds_protrusion(s)) {
+    const qmat_status status =
+        qmat_protrusion_test(s->context, &s->protrusion, &s->complex, &s->collapse, sphere, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->refused_by_protrusion++;
+      return QMAT_OK;
+    }
+  }
+  *result = DONE;
+  return QMAT_OK;
+}
+
+/* Does what the newest preview and the newest test allow. */
+static qmat_status commit(qmat_simplification *s, const double *sphere) {
+  if (holds_protrusion(s))
+    qmat_protrusion_commit(&s->protrusion, &s->collapse);
+  else
+    s->protrusion.depths[s->collapse.kept] = s->protrusion.sphere_depth;
+  qmat_coverage_commit(&s->coverage, &s->collapse);
+  return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
+}
+
+/* The candidate of least error at the surface, fitted to it. */
+static qmat_status fit_candidate(qmat_simplification *s, const qmat_candidates *c, double *sphere, double *error) {
+  qmat_status status =
+      qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
+  double least = INFINITY;
+  for (int i = 0; i < c->count && status == QMAT_OK; i++) {
+    status = qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], error);
+    if (status != QMAT_OK || !(*error < least)) continue;
+    least = *error;
+    memcpy(sphere, c->spheres[i], 4 * sizeof *sphere);
+  }
+  if (status != QMAT_OK) return status;
+  return qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->rules.limit, sphere,
+                             error);
+}
+
+/* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
+static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *result) {
+  qmat_candidates c;
+  qmat_candidates_find(&s->complex, s->quadrics, edge, &c);
+  *result = REFUSED;
+  bool bound = false;
+  if (s->protecting && !apply_protection(s, edge, &c, &bound)) {
+    s->refused_by_protection++;
+    return QMAT_OK;
+  }
+  qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+  if (status != QMAT_OK) return status;
+  int64_t change;
+  if (!keeps_topology(s, &change)) {
+    s->refused_by_topology++;
+    return QMAT_OK;
+  }
+  bool exceeded = false;
+  const double *sphere = NULL;
+  for (int i = 0; i < c.count && status == QMAT_OK && *result != DONE; i++) {
+    sphere = c.spheres[i];
+    const size_t refused = s->refused_by_coverage;
+    status = test_sphere(s, sphere, s->failed_points[edge], result);
+    if (s->refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
+    exceeded |= *result == EXCEEDED;
+  }
+  double fitted[4], error;
+  if (status == QMAT_OK && *result != DONE && s->fitting && !bound) {
+    status = fit_candidate(s, &c, fitted, &error);
+    if (status == QMAT_OK && error <= 1.1 * s->rules.limit) status = test_sphere(s, fitted, QMAT_NONE, result);
+    sphere = fitted;
+  }
+  if (status == QMAT_OK && *result == DONE) {
+    s->euler += change;
+    return commit(s, sphere);
+  }
+  if (exceeded) *result = EXCEEDED;
+  return status;
+}
+
+/* New costs around the merged vertex, and another chance for the refused edges of its neighbours. */
+static void update_neighbourhood(qmat_simplification *s) {
+  const qmat_collapse *c = &s->collapse;
+  if (c->removed != QMAT_NONE) {
+    qmat_quadric_add(&s->quadrics[c->kept], &s->quadrics[c->removed]);
+    qmat_edge_heap_remove(&s->heap, c->edge);
+  }
+  for (size_t n = 0; n < c->neighbour_count; n++)
+    if (c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE)
+      qmat_edge_heap_remove(&s->heap, c->removed_edges[n]);
+  size_t count;
+  const uint32_t *at = qmat_complex_edges_at(&s->complex, c->kept, &count);
+  for (size_t i = 0; i < count; i++) {
+    s->stale[at[i]] = 1;
+    if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
+  }
+  for (size_t n = 0; n < c->neighbour_count; n++) {
+    at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
+    for (size_t i = 0; i < count; i++)
+      if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
+  }
+}
+
+static bool may_go_on(const qmat_simplification *s) {
+  const size_t live = s->complex.live_vertices;
+  return live > 1 && !(s->rules.vertices > 0 && live <= s->rules.vertices);
+}
+
+static qmat_status report_progress(const qmat_simplification *s) {
+  const size_t initial = s->complex.vertex_count;
+  return qmat_progress(s->context, initial - s->complex.live_vertices, initial, "collapses");
+}
+
+/* Collapses until the heap is empty; `*ended` when the rules want no more. */
+static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
+  const size_t initial = s->complex.vertex_count;
+  for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
+    qmat_status status = attempts % REPORT_EVERY == 0 ? report_progress(s) : QMAT_OK;
+    if (status != QMAT_OK) return status;
+    const uint32_t edge = qmat_edge_heap_first(&s->heap);
+    if (s->stale[edge]) {
+      set_cost(s, edge);
+      qmat_edge_heap_update(&s->heap, edge);
+      continue;
+    }
+    *ended = !may_go_on(s) || (s->rules.most_cost > 0 && s->heap.costs[edge] > s->rules.most_cost);
+    if (*ended) return QMAT_OK;
+    s->protecting = s->rules.protect == QMAT_PROTECT_ALWAYS ||
+                    (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= late_stage(initial));
+    qmat_edge_heap_remove(&s->heap, edge);
+    outcome result;
+    status = try_collapse(s, edge, &result);
+    if (status != QMAT_OK) return status;
+    if (result == DONE) {
+      s->collapses++;
+      update_neighbourhood(s);
+    } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
+      *ended = true;
+    }
+  }
+  return QMAT_OK;
+}
+
+/* A move has to gain at least this share of the error. */
+static const double least_gain = 0.02;
+
+/* Fits every sphere to the surface where that lowers its largest error. */
+static qmat_status refit(qmat_simplification *s, size_t *moved) {
+  *moved = 0;
+  for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
+    if (!s->complex.vertex_alive[v] || (s->protecting && is_protected(s, v))) continue;
+    qmat_status status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
+    if (status == QMAT_OK)
+      status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
+    double sphere[4], before, after;
+    memcpy(sphere, &s->complex.spheres[4 * (size_t)v], sizeof sphere);
+    if (status == QMAT_OK)
+      status = qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, sphere, &before);
+    if (status == QMAT_OK)
+      status =
+          qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, INFINITY, sphere, &after);
+    if (status != QMAT_OK) return status;
+    if (!(after <= (1 - least_gain) * before)) continue;
+    outcome result;
+    status = test_sphere(s, sphere, QMAT_NONE, &result);
+    if (status == QMAT_OK && result == DONE) {
+      status = commit(s, sphere);
+      update_neighbourhood(s);
+      ++*moved;
+    }
+    if (status == QMAT_OK) status = report_progress(s);
+    if (status != QMAT_OK) return status;
+  }
+  s->moves += *moved;
+  return QMAT_OK;
+}
+
+static void queue_all(qmat_simplification *s) {
+  for (uint32_t e = 0; e < s->complex.edge_count; e++)
+    if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
+}
+
+qmat_status qmat_simplification_run(qmat_simplification *s) {
+  bool ended = false;
+  qmat_status status = collapse_edges(s, &ended);
+  if (status != QMAT_OK || ended || !(s->rules.limit < INFINITY)) return status;
+  for (int i = 0; i < s->rules.refits && !ended; i++) {
+    const size_t collapses = s->collapses;
+    size_t moved;
+    s->fitting = true;
+    if (i == 0) queue_all(s);
+    status = collapse_edges(s, &ended);
+    if (status != QMAT_OK || ended || (i > 0 && s->collapses == collapses)) return status;
+    if ((status = refit(s, &moved)) != QMAT_OK) return status;
+  }
+  return status;
+}
+
+/* The sample's owner: the corner of its witness with the largest weight. */
+static uint32_t owner_of(const qmat_coverage *coverage, size_t point) {
+  uint32_t best = 0;
+  for (uint32_t k = 1; k < 3; k++)
+    if (coverage->witnesses[3 * point + k] != QMAT_NONE &&
+        coverage->weights[3 * point + k] > coverage->weights[3 * point + best])
+      best = k;
+  return coverage->witnesses[3 * point + best];
+}
+
+static qmat_status set_regions(const qmat_simplification *s, const uint32_t *ids, qmat_medial *medial) {
+  const size_t count = medial->sphere_count, samples = s->control->sample_count;
+  medial->region_offsets = qmat_calloc(count + 2, sizeof(uint32_t));
+  medial->region_samples = qmat_alloc(samples, sizeof(uint32_t));
+  if (!medial->region_offsets || !medial->region_samples) return qmat_fail_memory(s->context, "responsible regions");
+  uint32_t *offsets = medial->region_offsets;
+  for (size_t i = 0; i < samples; i++) {
+    const uint32_t owner = owner_of(&s->coverage, i);
+    if (owner != QMAT_NONE) offsets[ids[owner] + 2]++;
+  }
+  for (size_t v = 0; v < count; v++) offsets[v + 2] += offsets[v + 1];
+  for (size_t i = 0; i < samples; i++) {
+    const uint32_t owner = owner_of(&s->coverage, i);
+    if (owner != QMAT_NONE) medial->region_samples[offsets[ids[owner] + 1]++] = (uint32_t)i;
+  }
+  medial->region_offset_count = count + 1;
+  medial->region_sample_count = offsets[count];
+  return QMAT_OK;
+}
+
+qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_medial *medial) {
+  const qmat_complex *c = &s->complex;
+  qmat_arena *arena = &s->context->arena;
+  uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
+  uint32_t *edges = qmat_arena_alloc(arena, c->live_edges, 2 * sizeof *edges);
+  uint32_t *triangles = qmat_arena_alloc(arena, c->live_triangles, 3 * sizeof *triangles);
+  medial->sphere_count = c->live_vertices;
+  medial->spheres = qmat_alloc(c->live_vertices, 4 * sizeof(double));
+  if (!ids || !edges || !triangles || !medial->spheres) return qmat_fail_memory(s->context, "the medial mesh");
+  uint32_t next = 0;
+  for (size_t v = 0; v < c->vertex_count; v++) {
+    ids[v] = QMAT_NONE;
+    if (!c->vertex_alive[v]) continue;
+    memcpy(&medial->spheres[4 * (size_t)next], &c->spheres[4 * v], 4 * sizeof(double));
+    ids[v] = next++;
+  }
+  size_t edge_count = 0, triangle_count = 0;
+  for (size_t e = 0; e < c->edge_count; e++)
+    if (c->edge_alive[e]) {
+      for (size_t k = 0; k < 2; k++) edges[2 * edge_count + k] = ids[c->edges[2 * e + k]];
+      edge_count++;
+    }
+  for (size_t t = 0; t < c->triangle_count; t++)
+    if (c->triangle_alive[t]) {
+      for (size_t k = 0; k < 3; k++) triangles[3 * triangle_count + k] = ids[c->triangles[3 * t + k]];
+      triangle_count++;
+    }
+  const qmat_status status =
+      qmat_medial_set_simplices(s->context, medial, edges, edge_count, triangles, triangle_count);
+  return status == QMAT_OK ? set_regions(s, ids, medial) : status;
+}

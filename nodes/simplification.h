@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFICATION_H
+#define QMAT_NODES_SIMPLIFICATION_H
+
+#include "core/surface.h"
+#include "nodes/control_points.h"
+#include "nodes/coverage.h"
+#include "nodes/edge_heap.h"
+#include "nodes/medial_quadrics.h"
+#include "nodes/protrusion.h"
+#include "nodes/sphere_fit.h"
+
+typedef enum { QMAT_ERROR_TWO_SIDED, QMAT_ERROR_ONE_SIDED } qmat_error_kind;
+typedef enum { QMAT_EXCEED_SKIP, QMAT_EXCEED_STOP } qmat_exceed_rule;
+typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_protection;
+typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
+
+/* What collapses are allowed, and when they end. */
+typedef struct qmat_simplification_rules {
+  double limit;     /* what both errors are held to at the control points, unit frame; INFINITY: nothing is held */
+  size_t vertices;  /* collapses end when so few are left; 0: never */
+  double most_cost; /* or when the cheapest costs more; 0: never */
+  double k;         /* of eq. 6 */
+  qmat_error_kind error;
+  qmat_exceed_rule on_exceed;
+  qmat_topology_policy topology;
+  qmat_protection protect;
+  int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
+  const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
+  bool has_target;     /* whether the solid's Euler characteristic is known */
+  int64_t target_euler;
+} qmat_simplification_rules;
+
+/* A medial mesh while its edges collapse: the cheapest first by slab quadratic error and stability ratio (eq. 6), each
+ * to the best candidate that lies inside the model and keeps both errors (sections 3.1.2, 3.3 and 3.4). */
+typedef struct qmat_simplification {
+  qmat_context *context;
+  qmat_simplification_rules rules;
+  qmat_surface *surface;
+  qmat_complex complex;
+  qmat_quadric *quadrics; /* per vertex */
+  qmat_edge_heap heap;
+  const qmat_control_points *control;
+  qmat_coverage coverage;
+  qmat_protrusion protrusion;
+  qmat_collapse collapse;
+  qmat_sphere_fit fit;
+  uint32_t *failed_points; /* per edge: the control point that refused it, or QMAT_NONE */
+  uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
+  bool protecting, fitting;
+  int64_t euler; /* of the medial mesh */
+  size_t collapses, moves, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
+      refused_by_topology;
+} qmat_simplification;
+
+/* Sets the quadrics, the heap, the coverage and the protrusion of a complex up. The caller has made `complex` (unit
+ * frame) and given context, rules and surface; `control` stays the caller's, its distances may be lowered limits of
+ * points that the initial medial mesh leaves farther away. `depths`: per vertex. All in the context's arena but what
+ * qmat_simplification_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+qmat_status qmat_simplification_init(qmat_simplification *simplification, const qmat_control_points *control,
+                                     const double *depths);
+void qmat_simplification_uninit(qmat_simplification *simplification);
+
+/* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
+qmat_status qmat_simplification_run(qmat_simplification *simplification);
+
+/* What is left, renumbered in the order of the initial medial mesh, still in the unit frame, with the samples that each
+ * sphere answers for. `medial` is new and unsealed. QMAT_ERROR_MEMORY. */
+qmat_status qmat_simplification_extract(const qmat_simplification *simplification, qmat_medial *medial);
+
+#endif
