@@ -650,6 +650,8 @@ bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
     bool medial = false;
     for (size_t port = 0; port < qmat_output_count(type); port++)
       if (type->outputs[port].type == QMAT_MEDIAL) medial = true;
+    for (size_t port = 0; port < qmat_input_count(type); port++)
+      if (type->inputs[port].type == QMAT_MEDIAL) medial = true;
     if (!step->done || !medial || !step->report) continue;
     double spheres;
     *summary = (qmat_run_summary){.step = i, .triangles = step->mesh_triangles};
@@ -658,6 +660,9 @@ bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
         take_number(step->report, "surface_to_envelope", &summary->surface_to_envelope) &&
         take_number(step->report, "envelope_to_surface", &summary->envelope_to_surface)) {
       summary->spheres = (uint64_t)spheres;
+      summary->evaluated = json_is_boolean(json_object_get(step->report, "certified"));
+      summary->certified = json_is_true(json_object_get(step->report, "certified"));
+      summary->estimate = json_is_true(json_object_get(step->report, "estimate"));
       return true;
     }
   }

@@ -128,10 +128,13 @@ typedef struct qmat_run_summary {
   uint64_t spheres;
   size_t triangles; /* of the mesh that they describe; 0: not known */
   double epsilon, surface_to_envelope, envelope_to_surface;
+  bool evaluated; /* by a node that tells whether the errors are certified; the second is then of the boundary */
+  bool certified, estimate;
 } qmat_run_summary;
 
-/* The summary of the last step that made a medial mesh and a report with the numbers "spheres", "epsilon",
- * "surface_to_envelope" and "envelope_to_surface"; false when there is none. */
+/* The summary of the last step that made or read a medial mesh and made a report with the numbers "spheres", "epsilon",
+ * "surface_to_envelope" and "envelope_to_surface"; false when there is none. A report with "certified" makes it
+ * evaluated. */
 bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary);
 
 #endif

@@ -111,6 +111,7 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
     json_object_set_new(brief, "epsilon", json_real(summary.epsilon));
     json_object_set_new(brief, "surface_to_envelope", json_real(summary.surface_to_envelope));
     json_object_set_new(brief, "envelope_to_surface", json_real(summary.envelope_to_surface));
+    if (summary.evaluated) json_object_set_new(brief, "certified", json_boolean(summary.certified));
     json_object_set_new(brief, "text", text_json(text));
   }
   bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
@@ -214,10 +215,19 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
   if (summary->triangles > 0)
     snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
   bool one = summary->spheres == 1;
+  const char *between =
+      summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
+  const char *end = summary->evaluated ? " from the surface" : "", *proof = "";
+  if (summary->certified)
+    proof = " (certified)";
+  else if (summary->estimate)
+    proof = " (an estimate: the surface is not closed)";
+  else if (summary->evaluated && summary->epsilon > 0)
+    proof = " (not certified)";
   snprintf(text, size,
            "%s: %s sphere%s describe%s %s; no surface point is farther than %s of the diagonal from the envelope, and "
-           "the envelope leaves the solid by at most %s.",
-           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out, in);
+           "%s %s%s%s.",
+           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out, between, in, end, proof);
 }
 
 // "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted.

@@ -129,7 +129,7 @@ static const qmat_port inputs[] = {
     {.name = "scene", .type = QMAT_SCENE, .optional = true, .doc = "Where the model came from: names the node"},
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh"},
     {.name = "skin", .type = QMAT_MESH, .optional = true, .doc = "The surface that viewers show (glb and gltf)"},
-    {.name = "report", .type = QMAT_REPORT, .optional = true, .doc = "From medial.simplify: epsilon and the errors"},
+    {.name = "report", .type = QMAT_REPORT, .optional = true, .doc = "From medial.evaluate or medial.simplify: epsilon and the errors"},
     {0},
 };
 
