@@ -8,9 +8,11 @@
 #include "core/node.h"
 #include "core/surface.h"
 #include "core/thickness.h"
+#include "core/triangle.h"
 #include "nodes/delaunay_cgal.h"
 #include "nodes/libraries.h"
 #include "nodes/refine_medial.h"
+#include "nodes/sample_thinning.h"
 
 typedef enum { COMPLETION_THIN, COMPLETION_ALL } completion;
 typedef enum { RADIUS_DISTANCE, RADIUS_CIRCUMRADIUS } radius_rule;
@@ -21,6 +23,7 @@ typedef struct {
   int radius;
   double merge;
   double protrusion;
+  double detail;
 } medial_delaunay_params;
 
 #define NONE UINT32_MAX
@@ -36,7 +39,9 @@ typedef struct {
   qmat_surface *surface;
   const double *points; /* samples in the unit frame */
   const uint8_t *thin;  /* per sample */
-  qmat_tetrahedra cells;
+  const uint32_t *stand_ins; /* per sample: the one that is triangulated in its place, itself when it is one */
+  size_t site_count;         /* samples that are triangulated */
+  qmat_tetrahedra cells;     /* with samples as corners */
   uint8_t *kinds;    /* per cell */
   double *spheres;   /* 4 per cell, unit frame */
   uint32_t *sphere_of; /* per cell: its medial vertex, or NONE */
@@ -568,7 +573,42 @@ static int by_number(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* The responsible regions: a medial vertex answers for the corners of its tetrahedra. */
+enum { SHORT_ROW = 32 };
+
+/* Sorts a row of ids. Most are of a handful: by insertion, without qsort's calls. */
+static void sort_numbers(uint32_t *row, size_t length) {
+  if (length > SHORT_ROW) {
+    qsort(row, length, sizeof *row, by_number);
+    return;
+  }
+  for (size_t i = 1; i < length; i++) {
+    const uint32_t moved = row[i];
+    size_t j = i;
+    for (; j > 0 && row[j - 1] > moved; j--) row[j] = row[j - 1];
+    row[j] = moved;
+  }
+}
+
+/* The samples that each triangulated one stands for, itself among them, in rising order: those of sample i are
+ * items[starts[i] .. starts[i + 1]). */
+typedef struct {
+  size_t *starts;
+  uint32_t *items;
+} stood_for;
+
+static qmat_status find_stood_for(const delaunay *d, stood_for *s) {
+  const size_t count = d->samples->count;
+  s->starts = qmat_arena_calloc(&d->context->arena, count + 2, sizeof *s->starts);
+  s->items = qmat_arena_alloc(&d->context->arena, count, sizeof *s->items);
+  if (!s->starts || !s->items) return qmat_fail_memory(d->context, "regions");
+  for (size_t i = 0; i < count; i++) s->starts[d->stand_ins[i] + 2]++;
+  for (size_t i = 0; i < count; i++) s->starts[i + 2] += s->starts[i + 1];
+  for (size_t i = 0; i < count; i++) s->items[s->starts[d->stand_ins[i] + 1]++] = (uint32_t)i;
+  return QMAT_OK;
+}
+
+/* The responsible regions: a medial vertex answers for the corners of its tetrahedra, and for the samples that these
+ * stand for. */
 static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
   const size_t count = medial->sphere_count; /* those added by refinement answer for none */
   uint32_t *offsets = qmat_calloc(count + 1, sizeof *offsets);
@@ -578,8 +618,10 @@ static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
   for (size_t cell = 0; cell < d->cells.count; cell++) kept += d->kinds[cell] != CELL_DROPPED;
   uint32_t *all = qmat_arena_alloc(&d->context->arena, 4 * kept, sizeof *all);
   size_t *starts = qmat_arena_calloc(&d->context->arena, count + 2, sizeof *starts);
-  medial->region_samples = qmat_alloc(4 * kept, sizeof *medial->region_samples);
-  if (!offsets || !all || !starts || !medial->region_samples) return qmat_fail_memory(d->context, "regions");
+  stood_for stood_for;
+  if (!offsets || !all || !starts) return qmat_fail_memory(d->context, "regions");
+  qmat_status status = find_stood_for(d, &stood_for);
+  if (status != QMAT_OK) return status;
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) starts[d->sphere_of[cell] + 2] += 4;
   for (size_t i = 0; i < count; i++) starts[i + 2] += starts[i + 1];
@@ -589,13 +631,27 @@ static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
     memcpy(&all[*end], &d->cells.corners[4 * cell], 4 * sizeof *all);
     *end += 4;
   }
-  uint32_t next = 0;
+  size_t room = 0;
   for (size_t i = 0; i < count; i++) {
     uint32_t *row = &all[starts[i]];
     const size_t length = starts[i + 1] - starts[i];
-    qsort(row, length, sizeof *row, by_number);
+    sort_numbers(row, length);
     for (size_t k = 0; k < length; k++)
-      if (k == 0 || row[k] != row[k - 1]) medial->region_samples[next++] = row[k];
+      if (k == 0 || row[k] != row[k - 1]) room += stood_for.starts[row[k] + 1] - stood_for.starts[row[k]];
+  }
+  if (room >= UINT32_MAX) return qmat_fail(d->context, QMAT_ERROR_MEMORY, "%zu samples in regions are too many", room);
+  medial->region_samples = qmat_alloc(room, sizeof *medial->region_samples);
+  if (!medial->region_samples) return qmat_fail_memory(d->context, "regions");
+  uint32_t next = 0;
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *row = &all[starts[i]];
+    const size_t length = starts[i + 1] - starts[i], first = next;
+    for (size_t k = 0; k < length; k++) {
+      if (k > 0 && row[k] == row[k - 1]) continue;
+      for (size_t m = stood_for.starts[row[k]]; m < stood_for.starts[row[k] + 1]; m++)
+        medial->region_samples[next++] = stood_for.items[m];
+    }
+    sort_numbers(&medial->region_samples[first], next - first);
     offsets[i + 1] = next;
   }
   medial->region_sample_count = next;
@@ -620,17 +676,73 @@ static qmat_status make_medial(delaunay *d, qmat_medial *medial, size_t *refined
   return qmat_value_seal(d->context, &medial->base);
 }
 
-static qmat_status mark_thin_samples(delaunay *d, const qmat_field *thickness) {
+static void mark_thin_samples(delaunay *d, const qmat_field *thickness, const double *values, uint8_t *thin) {
+  const double theta = qmat_thickness_threshold(thickness, d->params->theta);
+  for (size_t i = 0; i < d->samples->count; i++) thin[i] = values[i] <= theta;
+  d->thin = thin;
+}
+
+/* The unit normals of samples: 3 doubles each, zero where there is none. */
+static void find_normals(const delaunay *d, double *normals) {
+  const double *positions = qmat_surface_positions(d->surface);
+  const qmat_samples *samples = d->samples;
+  memset(normals, 0, 3 * samples->count * sizeof *normals);
+  for (size_t t = 0; t < d->mesh->triangle_count; t++) {
+    const uint32_t *ids = &d->mesh->triangles[3 * t];
+    double normal[3];
+    const double area = qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                                           &positions[3 * (size_t)ids[2]], normal);
+    for (size_t corner = 0; corner < 3; corner++)
+      for (size_t k = 0; k < 3; k++) normals[3 * (size_t)ids[corner] + k] += area * normal[k];
+  }
+  for (size_t i = 0; i < samples->vertex_count; i++) {
+    double *normal = &normals[3 * i];
+    const double length = sqrt(dot(normal, normal));
+    for (size_t k = 0; k < 3; k++) normal[k] = length > 0 ? normal[k] / length : 0;
+  }
+  for (size_t i = samples->vertex_count; i < samples->count; i++) {
+    const uint32_t *ids = &d->mesh->triangles[3 * (size_t)samples->facets[i]];
+    (void)qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                             &positions[3 * (size_t)ids[2]], &normals[3 * i]);
+  }
+}
+
+/* A sample stands for others up to this share of the thickness away, and up to this share of the diagonal. */
+static const double thinning_share = 0.25, thinning_reach = 0.01;
+
+static qmat_status find_stand_ins(delaunay *d, const double *thickness, uint32_t *stand_ins) {
   qmat_arena *arena = &d->context->arena;
   const size_t count = d->samples->count;
-  double *values = qmat_arena_alloc(arena, count, sizeof *values);
-  uint8_t *thin = qmat_arena_alloc(arena, count, sizeof *thin);
-  if (!values || !thin) return qmat_fail_memory(d->context, "samples");
-  qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
-  const double theta = qmat_thickness_threshold(thickness, d->params->theta);
-  for (size_t i = 0; i < count; i++) thin[i] = values[i] <= theta;
-  d->thin = thin;
-  return QMAT_OK;
+  const double detail = d->params->detail, diagonal = qmat_surface_frame(d->surface)->diagonal;
+  d->stand_ins = stand_ins;
+  if (detail == 0) {
+    for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+    return QMAT_OK;
+  }
+  double *normals = qmat_arena_alloc(arena, count, 3 * sizeof *normals);
+  double *radii = qmat_arena_alloc(arena, count, sizeof *radii);
+  if (!normals || !radii) return qmat_fail_memory(d->context, "samples");
+  find_normals(d, normals);
+  for (size_t i = 0; i < count; i++)
+    radii[i] = fmin(fmax(thinning_share * (thickness[i] / diagonal), detail), thinning_reach);
+  return qmat_samples_thin(d->context, d->points, normals, radii, count, thinning_reach, detail, stand_ins);
+}
+
+/* The Delaunay tetrahedra of the samples that stand for themselves. */
+static qmat_status triangulate(delaunay *d) {
+  qmat_arena *arena = &d->context->arena;
+  const size_t count = d->samples->count;
+  uint32_t *sites = qmat_arena_alloc(arena, count, sizeof *sites);
+  double *points = qmat_arena_alloc(arena, count, 3 * sizeof *points);
+  if (!sites || !points) return qmat_fail_memory(d->context, "samples");
+  for (size_t i = 0; i < count; i++) {
+    if (d->stand_ins[i] != i) continue;
+    memcpy(&points[3 * d->site_count], &d->points[3 * i], 3 * sizeof *points);
+    sites[d->site_count++] = (uint32_t)i;
+  }
+  const qmat_status status = qmat_delaunay_tetrahedra(d->context, points, d->site_count, &d->cells);
+  for (size_t i = 0; status == QMAT_OK && i < 4 * d->cells.count; i++) d->cells.corners[i] = sites[d->cells.corners[i]];
+  return status;
 }
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
@@ -647,14 +759,19 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   if (status != QMAT_OK) return status;
   if ((status = qmat_surface_new(context, d.mesh, &d.surface)) != QMAT_OK) return status;
   double *points = qmat_arena_alloc(&context->arena, d.samples->count, 3 * sizeof *points);
-  if (!points) {
+  double *values = qmat_arena_alloc(&context->arena, d.samples->count, sizeof *values);
+  uint8_t *thin = qmat_arena_alloc(&context->arena, d.samples->count, sizeof *thin);
+  uint32_t *stand_ins = qmat_arena_alloc(&context->arena, d.samples->count, sizeof *stand_ins);
+  if (!points || !values || !thin || !stand_ins) {
     status = qmat_fail_memory(context, "samples");
     goto done;
   }
   qmat_frame_to_unit(qmat_surface_frame(d.surface), d.samples->positions, d.samples->count, points);
   d.points = points;
-  if ((status = mark_thin_samples(&d, thickness)) != QMAT_OK) goto done;
-  if ((status = qmat_delaunay_tetrahedra(context, points, d.samples->count, &d.cells)) != QMAT_OK) goto done;
+  qmat_thickness_of_samples(d.mesh, thickness, d.samples, values);
+  mark_thin_samples(&d, thickness, values, thin);
+  if ((status = find_stand_ins(&d, values, stand_ins)) != QMAT_OK) goto done;
+  if ((status = triangulate(&d)) != QMAT_OK) goto done;
   if ((status = select_medial_vertices(&d)) != QMAT_OK) goto done;
   for (size_t i = 0; i < d.cells.count; i++) by_kind[d.kinds[i]]++;
   if ((status = number_medial_vertices(&d)) != QMAT_OK) goto done;
@@ -676,6 +793,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     const char *name;
     size_t value;
   } counts[] = {
+      {"samples", d.samples->count},
+      {"samples_triangulated", d.site_count},
       {"tetrahedra", d.cells.count},
       {"circumcentres", by_kind[CELL_CIRCUMCENTRE]},
       {"incentres", by_kind[CELL_INCENTRE]},
@@ -754,6 +873,16 @@ static const qmat_param params[] = {
      .max = 1,
      .flags = QMAT_PARAM_RELATIVE,
      .offset = AT(protrusion)},
+    {.name = "detail",
+     .unit = "diagonal",
+     .doc = "A sample is not triangulated where one nearby stands for it: on the same side of the solid, and neither "
+            "farther than this from the other's tangent plane; 0: all are triangulated",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 5e-4,
+     .min = 0,
+     .max = 0.01,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = AT(detail)},
     {0},
 };
 
@@ -774,7 +903,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 1,
+    .version = 2,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc = "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
            "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "

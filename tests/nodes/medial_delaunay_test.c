@@ -12,7 +12,7 @@
 #include "tests/nodes/pipeline.h"
 
 /* The tetrahedra's own spheres: nothing that is near is merged, nothing is refined. */
-#define PLAIN "merge=0 protrusion=0"
+#define PLAIN "merge=0 protrusion=0 detail=0"
 
 static double distance(const double *a, const double *b) {
   return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
@@ -327,6 +327,37 @@ static void test_circumradius_touches_its_samples_and_holds_none(void **state) {
   pipeline_free(&p);
 }
 
+static void test_flat_parts_are_thinned_and_every_sample_is_answered_for(void **state) {
+  (void)state;
+  size_t triangulated[2];
+  for (int resolution = 0; resolution < 2; resolution++) {
+    pipeline p;
+    pipeline_make(&p, pipeline_model("l-bracket", 20 << resolution), "spacing=0", "merge=0 detail=0.2%");
+    triangulated[resolution] = (size_t)pipeline_count(p.report, "samples_triangulated");
+    assert_int_equal(pipeline_count(p.report, "samples"), p.samples->count);
+    assert_int_equal(pipeline_components(p.medial), 1);
+    uint8_t *answered = qmat_calloc(p.samples->count, 1);
+    assert_non_null(answered);
+    for (size_t i = 0; i < p.medial->sphere_count; i++)
+      for (uint32_t r = p.medial->region_offsets[i]; r < p.medial->region_offsets[i + 1]; r++) {
+        const uint32_t sample = p.medial->region_samples[r];
+        assert_true(sample < p.samples->count);
+        if (r > p.medial->region_offsets[i]) assert_true(sample > p.medial->region_samples[r - 1]);
+        answered[sample] = 1;
+      }
+    for (size_t i = 0; i < p.samples->count; i++) assert_int_equal(answered[i], 1);
+    qmat_free(answered);
+    if (resolution == 1) assert_true(3 * triangulated[1] < 2 * p.samples->count);
+    if (resolution == 0) {
+      pipeline_delaunay(&p, 0, "merge=0 detail=0");
+      assert_int_equal(pipeline_count(p.report, "samples_triangulated"), p.samples->count);
+    }
+    pipeline_free(&p);
+  }
+  /* Four times the vertices, but hardly more that matter. */
+  assert_true(triangulated[1] < 2 * triangulated[0]);
+}
+
 static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(void **state) {
   (void)state;
   pipeline p;
@@ -579,6 +610,7 @@ int main(void) {
       cmocka_unit_test(test_two_solids_give_two_pieces),
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
+      cmocka_unit_test(test_flat_parts_are_thinned_and_every_sample_is_answered_for),
       cmocka_unit_test(test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller),
       cmocka_unit_test(test_completion_adds_incentres_and_keeps_the_rest),
       cmocka_unit_test(test_samples_all_have_a_sphere),
