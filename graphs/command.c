@@ -5,8 +5,8 @@
 #include <string.h>
 
 const qmat_command *const qmat_commands[] = {
-    &qmat_command_mat,   &qmat_command_run,  &qmat_command_check,   &qmat_command_dot,
-    &qmat_command_nodes, &qmat_command_node, &qmat_command_version, &qmat_command_help,
+    &qmat_command_mat, &qmat_command_run,   &qmat_command_why,  &qmat_command_cache,   &qmat_command_check,
+    &qmat_command_dot, &qmat_command_nodes, &qmat_command_node, &qmat_command_version, &qmat_command_help,
 };
 const size_t qmat_command_count = sizeof qmat_commands / sizeof *qmat_commands;
 
@@ -36,8 +36,8 @@ qmat_status qmat_invocation_init(qmat_context *context, const qmat_command *comm
                                  qmat_invocation *invocation) {
   *invocation = (qmat_invocation){.command = command, .registry = *registry};
   qmat_status status = command->add_options ? command->add_options(context, invocation) : QMAT_OK;
-  const qmat_option *const tables[] = {command->options, command->common};
-  for (int i = 0; i < 2; i++)
+  const qmat_option *const tables[] = {command->options, command->common, command->caching};
+  for (int i = 0; i < 3; i++)
     for (const qmat_option *option = tables[i]; option && option->name && status == QMAT_OK; option++)
       status = qmat_invocation_add_option(context, invocation, *option);
   return status;
@@ -101,7 +101,7 @@ static qmat_status take_option(qmat_context *context, qmat_invocation *invocatio
   }
   if (value && !option->value)
     return qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' takes no value", option->name);
-  if (!value && option->value) {
+  if (!value && option->value && strncmp(option->value, "[=", 2) != 0) {
     if (*at + 1 >= count)
       return qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' needs a value: %s", option->name, option->value);
     value = words[++*at];
@@ -197,8 +197,9 @@ void qmat_command_print_help(const qmat_invocation *invocation) {
     const qmat_option *option = &invocation->options[i];
     char left[96], letter[8] = "";
     if (option->letter) snprintf(letter, sizeof letter, "-%c, ", option->letter);
-    snprintf(left, sizeof left, "%s--%s%s%s", letter, option->name, option->value ? " " : "",
-             option->value ? option->value : "");
+    const char *value = option->value ? option->value : "";
+    snprintf(left, sizeof left, "%s--%s%s%s", letter, option->name, *value && strncmp(value, "[=", 2) != 0 ? " " : "",
+             value);
     print_row(left, option->doc);
   }
   print_row("-h, --help", "Print this help");

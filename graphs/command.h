@@ -2,17 +2,18 @@
 #ifndef QMAT_GRAPHS_COMMAND_H
 #define QMAT_GRAPHS_COMMAND_H
 
-#include "graphs/graph_file.h"
+#include "graphs/graph_run.h"
 
 /* The commands of the command line. Each is one constant descriptor at the foot of its file; parsing, mistakes and help
  * come from its table of options. */
 
 /* One option. A table of them ends with a row without a name. */
 typedef struct qmat_option {
-  const char *name;  /* without the dashes */
-  char letter;       /* the short form; 0: none */
-  const char *value; /* what help calls its value ("PATH"); NULL: it takes none */
-  const char *doc;   /* one sentence, no full stop */
+  const char *name; /* without the dashes */
+  char letter;      /* the short form; 0: none */
+  const char
+      *value;      /* what help calls its value ("PATH"), or "[=NODE]" where it may be left out; NULL: it takes none */
+  const char *doc; /* one sentence, no full stop */
 } qmat_option;
 
 /* An option that was given. */
@@ -41,15 +42,15 @@ typedef struct qmat_invocation {
 
 struct qmat_command {
   const char *name, *arguments, *summary, *doc;
-  const qmat_option *options, *common; /* its own, and those that it shares; NULL: none */
-  size_t least, most;                  /* arguments that are not options */
+  const qmat_option *options, *common, *caching; /* its own, and those that it shares; NULL: none */
+  size_t least, most;                            /* arguments that are not options */
   /* Adds options that depend on a graph; NULL: none. */
   qmat_status (*add_options)(qmat_context *context, qmat_invocation *invocation);
   qmat_status (*run)(qmat_context *context, qmat_invocation *invocation);
 };
 
-extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_check, qmat_command_dot, qmat_command_nodes,
-    qmat_command_node, qmat_command_version, qmat_command_help;
+extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_why, qmat_command_cache, qmat_command_check,
+    qmat_command_dot, qmat_command_nodes, qmat_command_node, qmat_command_version, qmat_command_help;
 
 /* All commands, in the order in which help lists them. */
 extern const qmat_command *const qmat_commands[];
@@ -81,6 +82,33 @@ void qmat_commands_print(void);
 /* Prints `text` wrapped at 80 columns, with `indent` blanks before every line but the first, which starts at column
  * `column`. */
 void qmat_print_wrapped(const char *text, int column, int indent);
+
+/* ---- what commands that know of the cache share ---- */
+
+extern const qmat_option qmat_cache_option_rows[];
+
+/* Opens the cache that the options and the environment ask for; `*open` is false when they ask for none. Free `*cache`
+ * with qmat_cache_close in any case. QMAT_ERROR_USAGE: a size that is none, a path that is no folder. */
+qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invocation, qmat_cache *cache, bool *open);
+
+/* A run that was planned from the command line. */
+typedef struct qmat_planned_run {
+  qmat_cache cache;
+  bool cached; /* there is a cache */
+  qmat_run run;
+  qmat_run_save *saves;
+  size_t *forced;
+} qmat_planned_run;
+
+/* Makes invocation->graph with `prepare`, sets what --set says, opens the cache and plans the run that the options ask
+ * for. Free `*planned` with qmat_planned_run_uninit in any case. */
+qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
+                                 qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                                 qmat_planned_run *planned);
+void qmat_planned_run_uninit(qmat_planned_run *planned);
+
+/* A `prepare`: reads the graph file that the first argument names. */
+qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation);
 
 /* ---- what `run` and `mat` share ---- */
 

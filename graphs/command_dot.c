@@ -47,8 +47,24 @@ static void print_ports(const qmat_port *ports, size_t count, const char *prefix
   printf("</tr>");
 }
 
-static void print_node(const qmat_graph *graph, size_t index) {
+// What a run would do: of several runs of a node, in several formats, the one that is least done.
+static const qmat_run_step *step_of(const qmat_run *run, size_t node) {
+  const qmat_run_step *found = NULL;
+  for (size_t i = 0; i < run->step_count; i++)
+    if (run->steps[i].node == node && (!found || found->state == QMAT_STEP_HIT)) found = &run->steps[i];
+  return found;
+}
+
+// Told by words and a number of the frame's lines too, not by colour alone.
+static const char *state_style(const qmat_run_step *step) {
+  if (!step) return "";
+  if (step->state == QMAT_STEP_HIT) return ", fillcolor=\"#d5eedd\"";
+  return step->state == QMAT_STEP_RUN ? ", fillcolor=\"#fbdcc4\", peripheries=2" : ", fillcolor=\"#fdf3c8\"";
+}
+
+static void print_node(const qmat_graph *graph, const qmat_run *run, size_t index) {
   const qmat_graph_node *node = &graph->nodes[index];
+  const qmat_run_step *step = run ? step_of(run, index) : NULL;
   size_t inputs = qmat_input_count(node->type), outputs = qmat_output_count(node->type);
   printf("  n%zu [label=<<table border=\"0\" cellborder=\"0\" cellspacing=\"0\" cellpadding=\"3\">", index);
   if (inputs > 0) {
@@ -56,8 +72,8 @@ static void print_node(const qmat_graph *graph, size_t index) {
     print_ports(node->type->inputs, inputs, "i");
     printf("</table></td></tr>");
   }
-  printf("<tr><td><b>%s</b><br/><font point-size=\"10\" color=\"#555555\">%s</font></td></tr>", node->id,
-         node->type->name);
+  printf("<tr><td><b>%s</b><br/><font point-size=\"10\" color=\"#555555\">%s%s%s</font></td></tr>", node->id,
+         node->type->name, step ? ": " : "", step ? qmat_step_state_name(step->state) : "");
   for (size_t row = 0; row < qmat_param_count(node->type); row++) {
     if (!node->texts[row]) continue;
     printf("<tr><td><font point-size=\"9\">%s = ", node->type->params[row].name);
@@ -69,20 +85,16 @@ static void print_node(const qmat_graph *graph, size_t index) {
     print_ports(node->type->outputs, outputs, "o");
     printf("</table></td></tr>");
   }
-  printf("</table>>];\n");
+  printf("</table>>%s];\n", state_style(step));
 }
 
-static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  qmat_status status =
-      qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
-  if (status != QMAT_OK) return status;
-  const qmat_graph *graph = &invocation->graph;
+static void print_graph(const qmat_graph *graph, const qmat_run *run) {
   printf("digraph qmat {\n  rankdir=TB;\n  fontname=\"sans-serif\";\n");
   printf(
       "  node [shape=box, style=\"rounded,filled\", color=\"#999999\", fillcolor=\"#f2f2f2\", "
       "fontname=\"sans-serif\", fontsize=12];\n");
   printf("  edge [fontname=\"sans-serif\", fontsize=9, arrowsize=0.7, penwidth=1.4];\n");
-  for (size_t i = 0; i < graph->node_count; i++) print_node(graph, i);
+  for (size_t i = 0; i < graph->node_count; i++) print_node(graph, run, i);
   for (size_t i = 0; i < graph->node_count; i++) {
     const qmat_graph_node *node = &graph->nodes[i];
     for (size_t port = 0; port < qmat_input_count(node->type); port++) {
@@ -101,8 +113,30 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
            type_colour(type), type_colour(type), qmat_value_type_name(type));
   }
   printf("}\n");
-  return QMAT_OK;
 }
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  if (!qmat_invocation_value(invocation, "status")) {
+    qmat_status status = qmat_read_graph_argument(context, invocation);
+    if (status == QMAT_OK) print_graph(&invocation->graph, NULL);
+    return status;
+  }
+  qmat_planned_run planned;
+  qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, &planned);
+  if (status == QMAT_OK) {
+    qmat_run_foresee(&planned.run);
+    print_graph(&invocation->graph, &planned.run);
+  }
+  qmat_planned_run_uninit(&planned);
+  return status;
+}
+
+static const qmat_option options[] = {
+    {"status", 0, NULL, "Show what a run would do with each node: hit, run, or depends on nodes before it"},
+    {"set", 0, "NAME=VALUE", "With --status: set a parameter as 'qmat run' would; may be repeated"},
+    {"output", 'o', "[NAME=]PATH", "With --status: save an output as 'qmat run' would; may be repeated"},
+    {0},
+};
 
 const qmat_command qmat_command_dot = {
     .name = "dot",
@@ -111,6 +145,8 @@ const qmat_command qmat_command_dot = {
     .doc =
         "Prints a graph file in the language of Graphviz: qmat dot GRAPH | dot -Tsvg -o graph.svg. Inputs stand above "
         "a node's name and outputs below; colours are the types of values.",
+    .options = options,
+    .caching = qmat_cache_option_rows,
     .least = 1,
     .most = 1,
     .run = run,

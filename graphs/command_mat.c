@@ -65,6 +65,7 @@ const qmat_command qmat_command_mat = {
         "0, which means no bound on the distance. Every other parameter is reached by --set; 'qmat nodes' lists the "
         "nodes and 'qmat node NAME' their parameters.",
     .common = qmat_common_options,
+    .caching = qmat_cache_option_rows,
     .least = 1,
     .most = 1,
     .add_options = add_options,

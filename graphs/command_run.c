@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/command.h"
 
-static qmat_status read_graph(qmat_context *context, qmat_invocation *invocation) {
-  return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
-}
-
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  return qmat_execute(context, invocation, read_graph);
+  return qmat_execute(context, invocation, qmat_read_graph_argument);
 }
 
 static const qmat_option options[] = {
@@ -24,6 +20,7 @@ const qmat_command qmat_command_run = {
         "the graph file, paths given here to the working folder.",
     .options = options,
     .common = qmat_common_options,
+    .caching = qmat_cache_option_rows,
     .least = 1,
     .most = 1,
     .run = run,

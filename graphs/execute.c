@@ -11,6 +11,8 @@ const qmat_option qmat_common_options[] = {
     {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},
     {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"},
     {"report", 0, "FILE", "Write what was done, or the error, as JSON"},
+    {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
+    {"dry-run", 0, NULL, "Print which nodes would run and which results the cache has, and stop there"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };
@@ -56,15 +58,54 @@ static qmat_status read_save(qmat_context *context, const qmat_graph *graph, con
   return context->error.status;
 }
 
-static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, qmat_run_save *saves, qmat_run *run) {
-  qmat_run_options options = {.saves = saves, .to_node = qmat_invocation_value(invocation, "to")};
+static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
+  qmat_run_options options = {.saves = planned->saves,
+                              .to_node = qmat_invocation_value(invocation, "to"),
+                              .cache = planned->cached ? &planned->cache : NULL,
+                              .forced = planned->forced};
   for (size_t i = 0; i < invocation->given_count; i++) {
-    if (strcmp(invocation->given[i].name, "output") != 0) continue;
-    qmat_status status =
-        read_save(context, &invocation->graph, invocation->given[i].value, &saves[options.save_count++]);
-    if (status != QMAT_OK) return qmat_fail_field(context, "--output");
+    const char *name = invocation->given[i].name, *value = invocation->given[i].value;
+    qmat_status status = QMAT_OK;
+    if (strcmp(name, "force") == 0 && !*value) options.force_all = true;
+    if (strcmp(name, "force") == 0 && *value) {
+      status = qmat_graph_find_node(context, &invocation->graph, value, &planned->forced[options.forced_count++]);
+      if (status != QMAT_OK) return qmat_fail_field(context, "--force");
+    }
+    if (strcmp(name, "output") == 0) {
+      status = read_save(context, &invocation->graph, value, &planned->saves[options.save_count++]);
+      if (status != QMAT_OK) return qmat_fail_field(context, "--output");
+    }
   }
-  return qmat_run_plan(context, &invocation->graph, &options, run);
+  return qmat_run_plan(context, &invocation->graph, &options, &planned->run);
+}
+
+qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
+                                 qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                                 qmat_planned_run *planned) {
+  *planned = (qmat_planned_run){0};
+  planned->saves = qmat_calloc(invocation->given_count, sizeof *planned->saves);
+  planned->forced = qmat_calloc(invocation->given_count, sizeof *planned->forced);
+  if (!planned->saves || !planned->forced) return qmat_fail_memory(context, "options");
+  qmat_status status = prepare(context, invocation);
+  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
+    if (strcmp(invocation->given[i].name, "set") == 0) {
+      status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
+      if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
+    }
+  if (status == QMAT_OK) status = qmat_open_cache(context, invocation, &planned->cache, &planned->cached);
+  return status == QMAT_OK ? plan(context, invocation, planned) : status;
+}
+
+void qmat_planned_run_uninit(qmat_planned_run *planned) {
+  qmat_run_uninit(&planned->run);
+  qmat_cache_close(&planned->cache);
+  qmat_free(planned->saves);
+  qmat_free(planned->forced);
+  *planned = (qmat_planned_run){0};
+}
+
+qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation) {
+  return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
 }
 
 // A report of a failure must not replace what the run would have read or written, however early it failed.
@@ -92,38 +133,36 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation)) {
   const char *report_path = qmat_invocation_value(invocation, "report");
   bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
+  bool dry = qmat_invocation_value(invocation, "dry-run") != NULL;
   const char *mode = qmat_invocation_value(invocation, "progress");
   qmat_progress_view view = {0};
   qmat_run_observer observer;
-  qmat_run run = {0};
-  qmat_run_save *saves = qmat_calloc(invocation->given_count, sizeof *saves);
-  qmat_status status = saves ? QMAT_OK : qmat_fail_memory(context, "options");
-  if (status == QMAT_OK) status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
+  qmat_planned_run planned = {0};
+  qmat_run *run = &planned.run;
+  qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
   if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
-  if (status == QMAT_OK) status = prepare(context, invocation);
-  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
-    if (strcmp(invocation->given[i].name, "set") == 0) {
-      status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
-      if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
-    }
-  if (status == QMAT_OK) status = plan(context, invocation, saves, &run);
-  if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, &run, "the report", report_path);
-  bool planned = status == QMAT_OK, reported = false;
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, &planned);
+  if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
+  bool ready = status == QMAT_OK, reported = false;
+  if (ready && dry) {
+    qmat_run_foresee(run);
+    qmat_run_print_plan(run, stdout);
+  }
+  if (ready && !dry) {
     qmat_progress_view_connect(&view, context, &observer);
-    status = qmat_run_execute(context, &run, &observer);
+    status = qmat_run_execute(context, run, &observer);
     qmat_progress_view_end(&view);
     context->progress = NULL;
+    if (status == QMAT_OK) status = qmat_run_write(context, run);
   }
-  if (status == QMAT_OK) status = qmat_run_write(context, &run);
-  if (status == QMAT_OK && report_path) {
-    json_t *report = qmat_run_report(context, &run);
+  if (status == QMAT_OK && report_path && !dry) {
+    json_t *report = qmat_run_report(context, run);
     status = qmat_save_json(context, report, report_path);
     json_decref(report);
     reported = true;
   }
-  if (status == QMAT_OK && !quiet) qmat_run_print(&run, stdout);
-  if (status != QMAT_OK && report_path && !reported && (planned || may_write_error(invocation, report_path))) {
+  if (status == QMAT_OK && !quiet && !dry) qmat_run_print(run, stdout);
+  if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
     // The first error is the one to be told, also when its report cannot be written.
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);
@@ -131,7 +170,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     context->error = error;
   }
-  qmat_run_uninit(&run);
-  qmat_free(saves);
+  if (*planned.cache.warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", planned.cache.warning);
+  qmat_planned_run_uninit(&planned);
   return status;
 }

@@ -10,12 +10,18 @@
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/run_cache.h"
 #include "io/bytes.h"
 
 static double now(void) {
   struct timespec time;
   clock_gettime(CLOCK_MONOTONIC, &time);
   return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+const char *qmat_step_state_name(qmat_step_state state) {
+  static const char *const names[] = {"run", "hit", "same", "depends"};
+  return names[state];
 }
 
 const char *const *qmat_value_count_names(qmat_value_type type) {
@@ -265,11 +271,18 @@ static void plan_needs(run_planner *planner) {
   }
 }
 
+static bool is_forced(const qmat_run_options *options, size_t node) {
+  for (size_t i = 0; i < options->forced_count; i++)
+    if (options->forced[i] == node) return true;
+  return options->force_all;
+}
+
 static qmat_status add_step(run_planner *planner, size_t index, int format) {
   const qmat_graph_node *node = &planner->graph->nodes[index];
   qmat_run *run = planner->run;
   qmat_run_step *step = &run->steps[run->step_count++];
-  *step = (qmat_run_step){.node = index, .format = format, .first_slot = run->slot_count};
+  *step = (qmat_run_step){
+      .node = index, .format = format, .first_slot = run->slot_count, .forced = is_forced(planner->options, index)};
   size_t outputs = qmat_output_count(node->type);
   run->slot_count += outputs;
   step->params = qmat_calloc(1, node->type->params_size);
@@ -322,6 +335,13 @@ static qmat_status find_slot(run_planner *planner, size_t node, size_t port, siz
                    owner->id, owner->type->outputs[port].name);
 }
 
+static void count_readers(qmat_run *run) {
+  for (size_t i = 0; i < run->slot_count; i++) run->slots[i].readers = 0;
+  for (size_t i = 0; i < run->step_count; i++)
+    for (size_t port = 0; port < qmat_input_count(run->graph->nodes[run->steps[i].node].type); port++)
+      if (run->steps[i].inputs[port] != SIZE_MAX) run->slots[run->steps[i].inputs[port]].readers++;
+}
+
 static qmat_status plan_slots(run_planner *planner) {
   const qmat_graph *graph = planner->graph;
   const qmat_run_options *options = planner->options;
@@ -331,8 +351,11 @@ static qmat_status plan_slots(run_planner *planner) {
   if (!run->given || !run->slots) return qmat_fail_memory(planner->context, "plan");
   for (size_t i = 0; i < options->given_count; i++) {
     run->given[i] = options->given[i];
-    run->slots[run->slot_count + i] =
-        (qmat_run_slot){.value = qmat_value_retain(options->given[i].value), .kept = true};
+    run->slots[run->slot_count + i] = (qmat_run_slot){.value = qmat_value_retain(options->given[i].value),
+                                                      .digest = options->given[i].value->digest,
+                                                      .known = true,
+                                                      .step = SIZE_MAX,
+                                                      .kept = true};
   }
   run->given_count = options->given_count;
   run->slot_count += options->given_count;
@@ -340,15 +363,16 @@ static qmat_status plan_slots(run_planner *planner) {
   for (size_t i = 0; i < run->step_count; i++) {
     qmat_run_step *step = &run->steps[i];
     const qmat_graph_node *node = &graph->nodes[step->node];
+    for (size_t port = 0; port < qmat_output_count(node->type); port++) run->slots[step->first_slot + port].step = i;
     for (size_t port = 0; port < qmat_input_count(node->type); port++) {
       const qmat_graph_link *link = &node->links[port];
       step->inputs[port] = SIZE_MAX;
       if (link->node == SIZE_MAX) continue;
       status = find_slot(planner, link->node, link->port, &step->inputs[port]);
       if (status != QMAT_OK) return status;
-      run->slots[step->inputs[port]].readers++;
     }
   }
+  count_readers(run);
   for (size_t i = 0; i < options->want_count; i++) {
     size_t slot;
     status = find_slot(planner, options->wants[i].node, options->wants[i].port, &slot);
@@ -385,7 +409,7 @@ static void name_run(qmat_run *run) {
 
 qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const qmat_run_options *options,
                           qmat_run *run) {
-  *run = (qmat_run){.graph = graph};
+  *run = (qmat_run){.graph = graph, .cache = options->cache};
   run_planner planner = {.context = context, .graph = graph, .options = options, .run = run};
   planner.within = qmat_calloc(graph->node_count, sizeof *planner.within);
   planner.replaced = qmat_calloc(graph->node_count, sizeof *planner.replaced);
@@ -434,94 +458,213 @@ static void release_slot(qmat_run_slot *slot) {
   slot->value = NULL;
 }
 
-static void note_made(qmat_run *run, qmat_run_step *step, const qmat_node *type) {
-  for (size_t port = 0; port < qmat_output_count(type); port++) {
-    const qmat_value *value = run->slots[step->first_slot + port].value;
-    qmat_run_made *made = &step->made[port];
-    made->digest = value->digest;
-    made->bytes = qmat_value_bytes(value);
-    qmat_value_counts(value, made->counts);
-    if (value->type == QMAT_REPORT && !step->report) step->report = json_incref(((const qmat_report *)value)->root);
-  }
+// Lets go of what nobody reads any more.
+static void release_unread(qmat_run *run) {
+  for (size_t i = 0; i < run->slot_count; i++)
+    if (run->slots[i].readers == 0 && !run->slots[i].kept) release_slot(&run->slots[i]);
 }
 
-static qmat_status run_step(qmat_context *context, qmat_run *run, size_t index) {
-  qmat_run_step *step = &run->steps[index];
+// Takes the outputs of a step that has run. False when a node before it was told to read something else: the cache had
+// other bytes for this step than it makes.
+static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *outputs) {
   const qmat_node *type = run->graph->nodes[step->node].type;
-  size_t input_count = qmat_input_count(type), output_count = qmat_output_count(type);
+  bool steady = true;
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    qmat_run_slot *slot = &run->slots[step->first_slot + port];
+    qmat_run_made *made = &step->made[port];
+    if (slot->known && !qmat_digest_equal(&slot->digest, &outputs[port]->digest)) steady = false;
+    qmat_value_release(slot->value);
+    slot->value = outputs[port];
+    slot->digest = made->digest = outputs[port]->digest;
+    slot->known = true;
+    made->bytes = qmat_value_bytes(slot->value);
+    qmat_value_counts(slot->value, made->counts);
+    if (slot->value->type == QMAT_REPORT && !step->report)
+      step->report = json_incref(((const qmat_report *)slot->value)->root);
+  }
+  step->done = true;
+  step->state = QMAT_STEP_RUN;
+  return steady;
+}
+
+// One execution of a plan.
+typedef struct executor {
+  qmat_context *context;
+  qmat_run *run;
+  const qmat_run_observer *observer;
+  bool unsteady; /* a node made other bytes than the cache had of it */
+} executor;
+
+static qmat_status run_step(executor *executor, size_t index);
+
+// Sees to it that a value is there: from the cache, or else by running the step that makes it.
+static qmat_status need_value(executor *executor, size_t index) {
+  qmat_run_slot *slot = &executor->run->slots[index];
+  if (slot->value) return QMAT_OK;
+  slot->value = qmat_run_load(executor->run, slot->step, index - executor->run->steps[slot->step].first_slot);
+  return slot->value ? QMAT_OK : run_step(executor, slot->step);
+}
+
+static void tell_started(const executor *executor, size_t index) {
+  const qmat_run_observer *observer = executor->observer;
+  if (observer && observer->started) observer->started(observer->user, executor->run, index);
+}
+
+static void tell_done(const executor *executor, size_t index) {
+  const qmat_run_observer *observer = executor->observer;
+  if (observer && observer->done) observer->done(observer->user, executor->run, index);
+}
+
+static qmat_status run_step(executor *executor, size_t index) {
+  qmat_context *context = executor->context;
+  qmat_run *run = executor->run;
+  qmat_run_step *step = &run->steps[index];
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  size_t input_count = qmat_input_count(node->type), output_count = qmat_output_count(node->type);
   const qmat_value **inputs = qmat_calloc(input_count, sizeof *inputs);
   qmat_value **outputs = qmat_calloc(output_count, sizeof *outputs);
-  qmat_status status = QMAT_OK;
-  if (!inputs || !outputs) {
-    status = qmat_fail_memory(context, "values");
-    goto cleanup;
-  }
-  for (size_t port = 0; port < input_count; port++) {
+  qmat_step_reads reads = {0};
+  qmat_status status = inputs && outputs ? QMAT_OK : qmat_fail_memory(context, "values");
+  for (size_t port = 0; port < input_count && status == QMAT_OK; port++) {
     if (step->inputs[port] == SIZE_MAX) continue;
+    status = need_value(executor, step->inputs[port]);
     inputs[port] = run->slots[step->inputs[port]].value;
-    if (type->inputs[port].type == QMAT_MESH && step->mesh_triangles == 0)
-      step->mesh_triangles = ((const qmat_mesh *)inputs[port])->triangle_count;
+  }
+  if (status != QMAT_OK) goto cleanup;
+  context->node_id = node->id;
+  context->node_type = node->type->name;
+  tell_started(executor, index);
+  if (run->cache) {
+    context->file_read = qmat_step_note_read;
+    context->file_read_user = &reads;
   }
   double start = now();
-  status = qmat_node_run(context, type, step->params, inputs, outputs);
+  status = qmat_node_run(context, node->type, step->params, inputs, outputs);
   step->seconds = now() - start;
+  context->file_read = NULL;
   if (status != QMAT_OK) goto cleanup;
-  for (size_t port = 0; port < output_count; port++) run->slots[step->first_slot + port].value = outputs[port];
-  note_made(run, step, type);
-  step->done = true;
+  if (!take_outputs(run, step, outputs)) {
+    executor->unsteady = true;
+    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the node makes other bytes than the cache has of it");
+    goto cleanup;
+  }
+  qmat_run_store(run, index, &reads);
+  tell_done(executor, index);
 cleanup:
+  qmat_step_reads_uninit(&reads);
   qmat_free(inputs);
   qmat_free(outputs);
   return status;
 }
 
-// Lets go of what nobody reads any more.
-static void finish_step(qmat_run *run, const qmat_run_step *step) {
+static void note_mesh(const qmat_run *run, qmat_run_step *step) {
   const qmat_node *type = run->graph->nodes[step->node].type;
-  for (size_t port = 0; port < qmat_input_count(type); port++) {
-    if (step->inputs[port] == SIZE_MAX) continue;
-    qmat_run_slot *slot = &run->slots[step->inputs[port]];
-    if (--slot->readers == 0 && !slot->kept) release_slot(slot);
-  }
-  for (size_t port = 0; port < qmat_output_count(type); port++) {
-    qmat_run_slot *slot = &run->slots[step->first_slot + port];
-    if (slot->readers == 0 && !slot->kept) release_slot(slot);
+  for (size_t port = 0; port < qmat_input_count(type) && step->mesh_triangles == 0; port++) {
+    if (type->inputs[port].type != QMAT_MESH || step->inputs[port] == SIZE_MAX) continue;
+    const qmat_run_slot *slot = &run->slots[step->inputs[port]];
+    const qmat_run_step *maker = slot->step == SIZE_MAX ? NULL : &run->steps[slot->step];
+    step->mesh_triangles = maker ? maker->made[step->inputs[port] - maker->first_slot].counts[1]
+                                 : ((const qmat_mesh *)slot->value)->triangle_count;
   }
 }
 
 // Takes the run's name from the first scene.
-static void take_name(qmat_run *run, const qmat_run_step *step, bool *named) {
+static qmat_status take_name(executor *executor, const qmat_run_step *step, bool *named) {
+  qmat_run *run = executor->run;
   const qmat_node *type = run->graph->nodes[step->node].type;
   for (size_t port = 0; port < qmat_output_count(type) && !*named; port++) {
-    const qmat_value *value = run->slots[step->first_slot + port].value;
-    if (value->type != QMAT_SCENE || !((const qmat_scene *)value)->name[0]) continue;
-    snprintf(run->name, sizeof run->name, "%s", ((const qmat_scene *)value)->name);
+    if (type->outputs[port].type != QMAT_SCENE) continue;
+    qmat_status status = need_value(executor, step->first_slot + port);
+    if (status != QMAT_OK) return status;
+    const qmat_scene *scene = (const qmat_scene *)run->slots[step->first_slot + port].value;
+    if (!scene->name[0]) continue;
+    snprintf(run->name, sizeof run->name, "%s", scene->name);
     *named = true;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status execute_step(executor *executor, size_t index, bool *named) {
+  qmat_run *run = executor->run;
+  qmat_run_step *step = &run->steps[index];
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  executor->context->node_id = node->id;
+  executor->context->node_type = node->type->name;
+  note_mesh(run, step);
+  double start = now();
+  qmat_status status = QMAT_OK;
+  if (qmat_run_look_up(run, index)) {
+    tell_started(executor, index);
+    step->seconds = now() - start;
+    step->done = true;
+    tell_done(executor, index);
+  } else {
+    status = run_step(executor, index);
+  }
+  if (status == QMAT_OK) status = take_name(executor, step, named);
+  for (size_t port = 0; port < qmat_input_count(node->type); port++)
+    if (step->inputs[port] != SIZE_MAX) run->slots[step->inputs[port]].readers--;
+  release_unread(run);
+  return status;
+}
+
+static qmat_status execute_steps(executor *executor) {
+  qmat_run *run = executor->run;
+  qmat_status status = QMAT_OK;
+  bool named = false;
+  for (size_t i = 0; i < run->given_count; i++)
+    if (run->given[i].value->type == QMAT_SCENE) named = true;
+  for (size_t i = 0; i < run->step_count && status == QMAT_OK; i++) status = execute_step(executor, i, &named);
+  for (size_t i = 0; i < run->slot_count && status == QMAT_OK; i++)
+    if (run->slots[i].kept) status = need_value(executor, i);
+  release_unread(run);
+  return status;
+}
+
+// Forgets what has been made, to start again.
+static void reset(qmat_run *run) {
+  count_readers(run);
+  for (size_t i = 0; i < run->slot_count; i++) {
+    if (run->slots[i].step == SIZE_MAX) continue;
+    release_slot(&run->slots[i]);
+    run->slots[i].known = false;
+  }
+  for (size_t i = 0; i < run->step_count; i++) {
+    json_decref(run->steps[i].report);
+    run->steps[i].report = NULL;
+    run->steps[i].done = false;
+    run->steps[i].state = QMAT_STEP_RUN;
   }
 }
 
 qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer) {
   const char *outer_id = context->node_id, *outer_type = context->node_type;
+  executor executor = {.context = context, .run = run, .observer = observer};
   double start = now();
-  qmat_status status = QMAT_OK;
-  bool named = false;
-  for (size_t i = 0; i < run->given_count; i++)
-    if (run->given[i].value->type == QMAT_SCENE) named = true;
-  for (size_t i = 0; i < run->step_count && status == QMAT_OK; i++) {
-    const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];
-    context->node_id = node->id;
-    context->node_type = node->type->name;
-    if (observer && observer->started) observer->started(observer->user, run, i);
-    status = run_step(context, run, i);
-    if (status != QMAT_OK) break;
-    take_name(run, &run->steps[i], &named);
-    finish_step(run, &run->steps[i]);
-    if (observer && observer->done) observer->done(observer->user, run, i);
+  qmat_status status = execute_steps(&executor);
+  if (executor.unsteady) {
+    // What ran before this was noticed may rest on the wrong bytes.
+    reset(run);
+    run->bypass = true;
+    status = execute_steps(&executor);
   }
   context->node_id = outer_id;
   context->node_type = outer_type;
   run->seconds = now() - start;
   return status;
+}
+
+void qmat_run_foresee(qmat_run *run) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    qmat_run_step *step = &run->steps[i];
+    bool known = true;
+    for (size_t port = 0; port < qmat_input_count(run->graph->nodes[step->node].type); port++)
+      if (step->inputs[port] != SIZE_MAX && !run->slots[step->inputs[port]].known) known = false;
+    if (!known)
+      step->state = QMAT_STEP_DEPENDS;
+    else if (!qmat_run_look_up(run, i))
+      step->state = QMAT_STEP_RUN;
+  }
 }
 
 /* ---- writing ---- */
@@ -542,12 +685,8 @@ static qmat_status add_part(qmat_context *context, part_group *group, const char
 }
 
 static qmat_status digest_bytes(qmat_context *context, const void *bytes, size_t size, qmat_digest *digest) {
-  qmat_hasher hasher = {0};
-  qmat_status status = qmat_hasher_init(&hasher);
-  if (status != QMAT_OK) return qmat_fail(context, status, "the digest of an output cannot be computed");
-  qmat_hasher_add(&hasher, bytes, size);
-  qmat_hasher_finish(&hasher, digest);
-  return QMAT_OK;
+  qmat_status status = qmat_digest_of(bytes, size, digest);
+  return status == QMAT_OK ? status : qmat_fail(context, status, "the digest of an output cannot be computed");
 }
 
 // Refuses side files that would overwrite an input: their names were not known before the run.
@@ -675,7 +814,10 @@ void qmat_run_uninit(qmat_run *run) {
     qmat_free(run->steps[i].inputs);
     qmat_free(run->steps[i].made);
     json_decref(run->steps[i].report);
+    json_decref(run->steps[i].key_items);
   }
+  for (size_t i = 0; i < run->hashed_count; i++) qmat_free(run->hashed[i].path);
+  qmat_free(run->hashed);
   for (size_t i = 0; run->slots && i < run->slot_count; i++) release_slot(&run->slots[i]);
   for (size_t i = 0; i < run->file_count; i++) qmat_free(run->files[i].path);
   qmat_free(run->steps);

@@ -2,6 +2,7 @@
 #ifndef QMAT_GRAPHS_GRAPH_RUN_H
 #define QMAT_GRAPHS_GRAPH_RUN_H
 
+#include "graphs/cache.h"
 #include "graphs/graph_file.h"
 
 /* Running a graph: plan (everything that can be refused is refused here), execute, write. */
@@ -31,9 +32,24 @@ typedef struct qmat_run_options {
   size_t want_count;
   const qmat_run_given *given;
   size_t given_count;
-  bool only_wanted;    /* leave out what neither `saves` nor `wants` needs; else every output of the graph is made */
-  const char *to_node; /* stop there: only this node and what it needs; NULL: the whole graph */
+  bool only_wanted;     /* leave out what neither `saves` nor `wants` needs; else every output of the graph is made */
+  const char *to_node;  /* stop there: only this node and what it needs; NULL: the whole graph */
+  qmat_cache *cache;    /* where results are looked for and kept; it must outlive the run; NULL: nowhere */
+  bool force_all;       /* run every node, whatever the cache has */
+  const size_t *forced; /* nodes that run whatever the cache has */
+  size_t forced_count;
 } qmat_run_options;
+
+/* Where the result of a step comes from. */
+typedef enum qmat_step_state {
+  QMAT_STEP_RUN,    /* the node runs */
+  QMAT_STEP_HIT,    /* from the cache */
+  QMAT_STEP_SAME,   /* the node has run and made what was in the cache already */
+  QMAT_STEP_DEPENDS /* not run yet: it depends on what nodes before it will make */
+} qmat_step_state;
+
+/* "run", "hit", "same", "depends". */
+const char *qmat_step_state_name(qmat_step_state state);
 
 /* What is known of a value that a node has made, also after the value is gone. */
 typedef struct qmat_run_made {
@@ -50,6 +66,12 @@ typedef struct qmat_run_step {
   size_t *inputs;    /* per input port its slot; SIZE_MAX: not connected */
   size_t first_slot; /* of its output ports */
   bool done;
+  bool forced; /* runs whatever the cache has */
+  qmat_step_state state;
+  bool keyed;            /* the three below are set: there is a cache, and every file that it reads can be read */
+  json_t *key_items;     /* what its key is made of */
+  qmat_digest key;       /* of all of them */
+  qmat_digest first_key; /* of those that are known before it has run: without the files beside its own */
   double seconds;
   qmat_run_made *made;   /* per output port */
   json_t *report;        /* root of its first report output; NULL: it makes none */
@@ -58,7 +80,10 @@ typedef struct qmat_run_step {
 
 /* A value on its way between steps. */
 typedef struct qmat_run_slot {
-  qmat_value *value;
+  qmat_value *value;  /* NULL: not made yet, or only its digest is known, or released */
+  qmat_digest digest; /* where it is known */
+  bool known;
+  size_t step;    /* that makes it; SIZE_MAX: it is given */
   size_t readers; /* steps that still read it */
   bool kept;      /* until the run is uninitialised */
 } qmat_run_slot;
@@ -78,8 +103,12 @@ typedef struct qmat_run {
   qmat_run_step *steps; /* in the order in which they run */
   qmat_run_slot *slots; /* of the steps, then of the given values */
   qmat_run_file *files;
-  qmat_run_given *given; /* given[i] is in slots[slot_count - given_count + i] */
-  char name[128];        /* of the first scene that was made or given; else of the graph file */
+  qmat_run_given *given;               /* given[i] is in slots[slot_count - given_count + i] */
+  qmat_cache *cache;                   /* NULL: none */
+  bool bypass;                         /* records are not believed: one of them turned out to be wrong */
+  struct qmat_run_file_digest *hashed; /* the files that keys hold */
+  size_t hashed_count, hashed_capacity;
+  char name[128]; /* of the first scene that was made or given; else of the graph file */
   double seconds;
 } qmat_run;
 
@@ -104,9 +133,14 @@ bool qmat_same_file(const char *a, const char *b);
  * error. QMAT_ERROR_USAGE, QMAT_ERROR_IO. */
 qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path);
 
-/* Runs the steps one after another; a value is released when its last reader is done. Nothing is written. Returns the
- * first failing node's status; QMAT_CANCELLED when the context's progress function asks to stop. Once per plan. */
+/* Runs the steps one after another; a value is released when its last reader is done. No output is written. With a
+ * cache, a step whose result is known is not run, and its values are loaded only where a node that does run, an output
+ * file or a want needs them. Returns the first failing node's status; QMAT_CANCELLED when the context's progress
+ * function asks to stop. Once per plan. */
 qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer);
+
+/* Sets the state of every step as if it were run, without running any. Instead of qmat_run_execute, once per plan. */
+void qmat_run_foresee(qmat_run *run);
 
 /* Writes the files of a finished run: those of one folder together, all through temporaries. */
 qmat_status qmat_run_write(qmat_context *context, qmat_run *run);

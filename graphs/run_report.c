@@ -51,6 +51,8 @@ static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
   json_object_set_new(json, "id", json_string(node->id));
   json_object_set_new(json, "type", json_string(type->name));
   json_object_set_new(json, "version", json_integer((json_int_t)type->version));
+  if (run->cache) json_object_set_new(json, "cache", json_string(qmat_step_state_name(step->state)));
+  if (step->keyed) json_object_set_new(json, "key", digest_json(&step->key));
   json_object_set_new(json, "seconds", json_real(step->seconds));
   json_object_set_new(json, "params", params);
   json_object_set_new(json, "outputs", outputs);
@@ -94,6 +96,20 @@ static json_t *input_json(const qmat_run *run) {
   return json_null();
 }
 
+// Where results are kept, or null.
+static json_t *cache_json(const qmat_run *run) {
+  if (!run->cache) return json_null();
+  size_t hits = 0;
+  for (size_t i = 0; i < run->step_count; i++)
+    if (run->steps[i].state == QMAT_STEP_HIT) hits++;
+  json_t *json = json_object();
+  json_object_set_new(json, "folder", text_json(run->cache->folder));
+  json_object_set_new(json, "read_only", json_boolean(run->cache->read_only));
+  json_object_set_new(json, "hits", json_integer((json_int_t)hits));
+  json_object_set_new(json, "warning", *run->cache->warning ? text_json(run->cache->warning) : json_null());
+  return json;
+}
+
 // jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for.
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   json_t *nodes = json_array(), *outputs = json_array(), *report = json_object(), *brief = json_null();
@@ -120,6 +136,7 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   if (json_object_set_new(report, "input", input_json(run)) != 0) whole = false;
   if (json_object_set_new(report, "seconds", json_real(run->seconds)) != 0) whole = false;
   if (json_object_set_new(report, "threads", json_integer(qmat_threads(context))) != 0) whole = false;
+  if (json_object_set_new(report, "cache", cache_json(run)) != 0) whole = false;
   if (json_object_set_new(report, "nodes", nodes) != 0) whole = false;
   if (json_object_set_new(report, "outputs", outputs) != 0) whole = false;
   if (json_object_set_new(report, "summary", brief) != 0) whole = false;
@@ -215,8 +232,7 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
   if (summary->triangles > 0)
     snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
   bool one = summary->spheres == 1;
-  const char *between =
-      summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
+  const char *between = summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
   const char *end = summary->evaluated ? " from the surface" : "", *proof = "";
   if (summary->certified)
     proof = " (certified)";
@@ -253,22 +269,49 @@ static int widest(int width, const char *text) {
   return length > width ? length : width;
 }
 
-void qmat_run_print(const qmat_run *run, FILE *out) {
-  const qmat_graph *graph = run->graph;
+// The columns that identify a step.
+static void print_step(const qmat_run *run, const qmat_run_step *step, FILE *out) {
   int id_width = 0, type_width = 0;
   for (size_t i = 0; i < run->step_count; i++) {
-    id_width = widest(id_width, graph->nodes[run->steps[i].node].id);
-    type_width = widest(type_width, graph->nodes[run->steps[i].node].type->name);
+    id_width = widest(id_width, run->graph->nodes[run->steps[i].node].id);
+    type_width = widest(type_width, run->graph->nodes[run->steps[i].node].type->name);
   }
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  fprintf(out, "%-*s  %-*s", id_width, node->id, type_width, node->type->name);
+  if (!run->cache) return;
+  char key[65] = "";
+  if (step->keyed) qmat_digest_hex(&step->key, key);
+  fprintf(out, "  %-7s  %-12.12s", qmat_step_state_name(step->state), key);
+}
+
+void qmat_run_print_plan(const qmat_run *run, FILE *out) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    print_step(run, &run->steps[i], out);
+    fputc('\n', out);
+  }
+  if (!run->cache) fprintf(out, "There is no cache: every node would run.\n");
+}
+
+void qmat_run_print(const qmat_run *run, FILE *out) {
+  const qmat_graph *graph = run->graph;
   for (size_t i = 0; i < run->step_count; i++) {
     const qmat_run_step *step = &run->steps[i];
     const qmat_graph_node *node = &graph->nodes[step->node];
-    fprintf(out, "%-*s  %-*s  %8.2f s", id_width, node->id, type_width, node->type->name, step->seconds);
+    print_step(run, step, out);
+    fprintf(out, "  %8.2f s", step->seconds);
+    if (run->cache) {
+      char size[32];
+      size_t bytes = 0;
+      for (size_t port = 0; port < qmat_output_count(node->type); port++) bytes += step->made[port].bytes;
+      qmat_format_bytes(bytes, size);
+      fprintf(out, "  %9s", size);
+    }
     const char *joint = "  ";
     for (size_t port = 0; port < qmat_output_count(node->type); port++) {
       char made[128];
       describe_made(&node->type->outputs[port], &step->made[port], made, sizeof made);
-      if (!*made) continue;
+      // The size of a file has been told already.
+      if (!*made || (run->cache && node->type->outputs[port].type == QMAT_FILE)) continue;
       fprintf(out, "%s%s", joint, made);
       joint = ", ";
     }

@@ -18,8 +18,12 @@ json_t *qmat_error_report(const qmat_error *error);
 /* Writes JSON as a file, through a temporary. */
 qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path);
 
-/* Prints a line per step (node, type, seconds, what it made), a line per file, and the summary if there is one. */
+/* Prints a line per step (node, type, where its result comes from and the start of its key if there is a cache,
+ * seconds, what it made), a line per file, and the summary if there is one. */
 void qmat_run_print(const qmat_run *run, FILE *out);
+
+/* Prints a line per step of a run that was foreseen: node, type, state, and the start of its key where it is known. */
+void qmat_run_print_plan(const qmat_run *run, FILE *out);
 
 /* One sentence: how many spheres describe the model, and how well. Terminated; cut when `size` is short. */
 void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size);

@@ -18,6 +18,8 @@ if [ ! -e "$1" ]; then
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+QMAT_CACHE=off # a time is that of a run
+export QMAT_CACHE
 
 # number NAME FILE: the last number of that name in a JSON file.
 number() {
