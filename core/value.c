@@ -58,6 +58,11 @@ static const row medial_rows[] = {ARRAY(qmat_medial, spheres, F64, sphere_count,
                                   ARRAY(qmat_medial, region_offsets, U32, region_offset_count, 1),
                                   ARRAY(qmat_medial, region_samples, U32, region_sample_count, 1),
                                   END};
+static const row chain_rows[] = {
+    ARRAY(qmat_chain, spheres, F64, sphere_count, 4),     ARRAY(qmat_chain, edges, U32, edge_count, 2),
+    ARRAY(qmat_chain, triangles, U32, triangle_count, 3), ARRAY(qmat_chain, owners, U32, sample_count, 1),
+    ARRAY(qmat_chain, ends, U32, collapse_count, 2),      ARRAY(qmat_chain, merged, F64, collapse_count, 4),
+    ARRAY(qmat_chain, errors, F64, collapse_count, 2),    END};
 static const row report_rows[] = {SCALAR(qmat_report, root, JSON), END};
 static const row file_rows[] = {SCALAR(qmat_file, format, TEXT), ARRAY(qmat_file, parts, PARTS, part_count, 1), END};
 
@@ -66,6 +71,7 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value);
 static qmat_status check_field(qmat_context *context, const qmat_value *value);
 static qmat_status check_samples(qmat_context *context, const qmat_value *value);
 static qmat_status check_medial(qmat_context *context, const qmat_value *value);
+static qmat_status check_chain(qmat_context *context, const qmat_value *value);
 static qmat_status check_report(qmat_context *context, const qmat_value *value);
 static qmat_status check_file(qmat_context *context, const qmat_value *value);
 
@@ -82,6 +88,7 @@ static const value_type value_types[QMAT_VALUE_TYPE_COUNT] = {
     [QMAT_FIELD] = {"field", sizeof(qmat_field), field_rows, check_field},
     [QMAT_SAMPLES] = {"samples", sizeof(qmat_samples), samples_rows, check_samples},
     [QMAT_MEDIAL] = {"medial", sizeof(qmat_medial), medial_rows, check_medial},
+    [QMAT_CHAIN] = {"chain", sizeof(qmat_chain), chain_rows, check_chain},
     [QMAT_REPORT] = {"report", sizeof(qmat_report), report_rows, check_report},
     [QMAT_FILE] = {"file", sizeof(qmat_file), file_rows, check_file},
 };
@@ -165,6 +172,10 @@ qmat_samples *qmat_samples_new(void) {
 
 qmat_medial *qmat_medial_new(void) {
   return value_new(QMAT_MEDIAL);
+}
+
+qmat_chain *qmat_chain_new(void) {
+  return value_new(QMAT_CHAIN);
 }
 
 qmat_report *qmat_report_new(void) {
@@ -634,22 +645,27 @@ static qmat_status check_regions(qmat_context *context, const qmat_medial *media
   return QMAT_OK;
 }
 
+/* Every number is finite, and no radius negative. */
+static qmat_status check_spheres(qmat_context *context, const double *spheres, size_t count, const char *kind) {
+  const qmat_status status = check_finite(context, spheres, count, 4, kind, "centre or radius");
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < count; ++i) {
+    if (spheres[4 * i + 3] >= 0) continue;
+    char number[32];
+    qmat_format_number(spheres[4 * i + 3], number, sizeof number);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the radius %s is negative", number);
+    return fail_element(context, kind, i);
+  }
+  return QMAT_OK;
+}
+
 static qmat_status check_medial(qmat_context *context, const qmat_value *value) {
   const qmat_medial *medial = (const qmat_medial *)value;
   qmat_status status = check_u32_count(context, medial->sphere_count, "spheres");
   if (status == QMAT_OK) status = check_u32_count(context, medial->edge_count, "edges");
   if (status == QMAT_OK) status = check_u32_count(context, medial->triangle_count, "triangles");
-  if (status == QMAT_OK) {
-    status = check_finite(context, medial->spheres, medial->sphere_count, 4, "sphere", "centre or radius");
-  }
+  if (status == QMAT_OK) status = check_spheres(context, medial->spheres, medial->sphere_count, "sphere");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < medial->sphere_count; ++i) {
-    if (medial->spheres[4 * i + 3] >= 0) continue;
-    char number[32];
-    qmat_format_number(medial->spheres[4 * i + 3], number, sizeof number);
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the radius %s is negative", number);
-    return fail_element(context, "sphere", i);
-  }
   status = check_simplices(context, medial->edges, medial->edge_count, 2, medial->sphere_count, "edge");
   if (status != QMAT_OK) return status;
   status = check_simplices(context, medial->triangles, medial->triangle_count, 3, medial->sphere_count, "triangle");
@@ -665,6 +681,58 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
     }
   }
   return check_regions(context, medial);
+}
+
+/* Every collapse joins two spheres that are still there. */
+static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
+  uint8_t *gone = qmat_calloc(chain->sphere_count, 1);
+  if (gone == NULL) return qmat_fail_memory(context, "the spheres of a chain");
+  size_t i = 0;
+  const char *fault = NULL;
+  for (; i < chain->collapse_count; ++i) {
+    const uint32_t stays = chain->ends[2 * i], goes = chain->ends[2 * i + 1];
+    if (stays >= chain->sphere_count || goes >= chain->sphere_count)
+      fault = "it names a sphere that is not there";
+    else if (stays == goes)
+      fault = "it joins a sphere with itself";
+    else if (gone[stays] || gone[goes])
+      fault = "it names a sphere that went before";
+    if (fault != NULL) break;
+    gone[goes] = 1;
+  }
+  qmat_free(gone);
+  if (fault == NULL) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s", fault);
+  return fail_element(context, "collapse", i);
+}
+
+static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
+  const qmat_chain *chain = (const qmat_chain *)value;
+  const qmat_medial initial = {.base.type = QMAT_MEDIAL,
+                               .sphere_count = chain->sphere_count,
+                               .edge_count = chain->edge_count,
+                               .triangle_count = chain->triangle_count,
+                               .spheres = chain->spheres,
+                               .edges = chain->edges,
+                               .triangles = chain->triangles};
+  qmat_status status = check_medial(context, &initial.base);
+  if (status == QMAT_OK) status = check_u32_count(context, chain->sample_count, "samples");
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < chain->sample_count; ++i) {
+    if (chain->owners[i] < chain->sphere_count || chain->owners[i] == UINT32_MAX) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its owner is sphere %u of %zu", chain->owners[i], chain->sphere_count);
+    return fail_element(context, "sample", i);
+  }
+  status = check_ends(context, chain);
+  if (status == QMAT_OK) status = check_spheres(context, chain->merged, chain->collapse_count, "collapse");
+  if (status == QMAT_OK) status = check_finite(context, chain->errors, chain->collapse_count, 2, "collapse", "error");
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < 2 * chain->collapse_count; ++i) {
+    if (chain->errors[i] >= (i < 2 ? 0 : chain->errors[i - 2])) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error falls");
+    return fail_element(context, "collapse", i / 2);
+  }
+  return QMAT_OK;
 }
 
 static qmat_status check_report(qmat_context *context, const qmat_value *value) {

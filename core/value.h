@@ -22,6 +22,7 @@ typedef enum qmat_value_type {
   QMAT_FIELD,
   QMAT_SAMPLES,
   QMAT_MEDIAL,
+  QMAT_CHAIN,
   QMAT_REPORT,
   QMAT_FILE,
   QMAT_VALUE_TYPE_COUNT
@@ -85,6 +86,23 @@ typedef struct qmat_medial {
   uint32_t *region_samples;
 } qmat_medial;
 
+/* A medial mesh and the edge collapses that simplify it, in their order: after the first n of them sphere_count - n
+ * spheres are left (nodes/collapse_chain.h). */
+typedef struct qmat_chain {
+  qmat_value base;
+  size_t sphere_count, edge_count, triangle_count; /* of the initial medial mesh */
+  double *spheres;                                 /* spheres, edges and triangles as those of qmat_medial */
+  uint32_t *edges;
+  uint32_t *triangles;
+  size_t sample_count;
+  uint32_t *owners; /* sample_count: the initial sphere that answers for a sample, UINT32_MAX: none */
+  size_t collapse_count;
+  uint32_t *ends; /* 2 * collapse_count: the sphere that stays, and the one that goes */
+  double *merged; /* 4 * collapse_count: what becomes of the one that stays */
+  double *errors; /* 2 * collapse_count: surface to envelope and envelope to surface after a collapse or before, in
+                     diagonals; they never fall */
+} qmat_chain;
+
 /* Named counts and errors as a JSON object; never times, so that equal work gives an equal digest. */
 typedef struct qmat_report {
   qmat_value base;
@@ -112,6 +130,7 @@ qmat_mesh *qmat_mesh_new(void);
 qmat_field *qmat_field_new(void);
 qmat_samples *qmat_samples_new(void);
 qmat_medial *qmat_medial_new(void);
+qmat_chain *qmat_chain_new(void);
 qmat_report *qmat_report_new(void);
 qmat_file *qmat_file_new(void);
 

@@ -7,8 +7,8 @@
 // One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip.
 static const char *type_colour(qmat_value_type type) {
   static const char *const colours[QMAT_VALUE_TYPE_COUNT] = {
-      [QMAT_SCENE] = "#7f7f7f",  [QMAT_MESH] = "#0072b2",   [QMAT_FIELD] = "#56b4e9", [QMAT_SAMPLES] = "#009e73",
-      [QMAT_MEDIAL] = "#d55e00", [QMAT_REPORT] = "#cc79a7", [QMAT_FILE] = "#000000",
+      [QMAT_SCENE] = "#7f7f7f",  [QMAT_MESH] = "#0072b2",  [QMAT_FIELD] = "#56b4e9",  [QMAT_SAMPLES] = "#009e73",
+      [QMAT_MEDIAL] = "#d55e00", [QMAT_CHAIN] = "#e69f00", [QMAT_REPORT] = "#cc79a7", [QMAT_FILE] = "#000000",
   };
   return colours[type];
 }

@@ -27,7 +27,8 @@ const char *qmat_step_state_name(qmat_step_state state) {
 const char *const *qmat_value_count_names(qmat_value_type type) {
   static const char *const none[] = {NULL}, *const mesh[] = {"vertices", "triangles", NULL},
                            *const field[] = {"values", NULL}, *const samples[] = {"samples", NULL},
-                           *const medial[] = {"spheres", "cones", "slabs", NULL}, *const file[] = {"parts", NULL};
+                           *const medial[] = {"spheres", "cones", "slabs", NULL}, *const file[] = {"parts", NULL},
+                           *const chain[] = {"spheres", "collapses", NULL};
   switch (type) {
     case QMAT_MESH:
       return mesh;
@@ -37,6 +38,8 @@ const char *const *qmat_value_count_names(qmat_value_type type) {
       return samples;
     case QMAT_MEDIAL:
       return medial;
+    case QMAT_CHAIN:
+      return chain;
     case QMAT_FILE:
       return file;
     default:
@@ -61,6 +64,10 @@ void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
       counts[0] = ((const qmat_medial *)value)->sphere_count;
       counts[1] = ((const qmat_medial *)value)->edge_count;
       counts[2] = ((const qmat_medial *)value)->triangle_count;
+      break;
+    case QMAT_CHAIN:
+      counts[0] = ((const qmat_chain *)value)->sphere_count;
+      counts[1] = ((const qmat_chain *)value)->collapse_count;
       break;
     case QMAT_FILE:
       counts[0] = ((const qmat_file *)value)->part_count;

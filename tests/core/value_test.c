@@ -79,6 +79,25 @@ static qmat_medial *medial_example(void) {
   return medial;
 }
 
+/* Sphere 3 joins sphere 1, then that sphere 0; nobody answers for the last sample. */
+static qmat_chain *chain_example(void) {
+  qmat_chain *chain = qmat_chain_new();
+  assert_non_null(chain);
+  chain->sphere_count = 4;
+  chain->edge_count = 4;
+  chain->triangle_count = 1;
+  chain->sample_count = 3;
+  chain->collapse_count = 2;
+  ASSIGN(chain->spheres, (double[]){0, 0, 0, 1, 1, 0, 0, 0.5, 0, 1, 0, 0.25, 0, 0, 9, 0});
+  ASSIGN(chain->edges, (uint32_t[]){0, 1, 0, 2, 1, 2, 1, 3});
+  ASSIGN(chain->triangles, (uint32_t[]){0, 1, 2});
+  ASSIGN(chain->owners, (uint32_t[]){3, 0, UINT32_MAX});
+  ASSIGN(chain->ends, (uint32_t[]){1, 3, 0, 1});
+  ASSIGN(chain->merged, (double[]){1, 0, 4, 0.25, 0.5, 0, 0, 1});
+  ASSIGN(chain->errors, (double[]){0, 0.25, 0.125, 0.25});
+  return chain;
+}
+
 static qmat_report *report_example(void) {
   qmat_report *report = qmat_report_new();
   assert_non_null(report);
@@ -112,6 +131,8 @@ static qmat_value *example_of(qmat_value_type type) {
       return &samples_example()->base;
     case QMAT_MEDIAL:
       return &medial_example()->base;
+    case QMAT_CHAIN:
+      return &chain_example()->base;
     case QMAT_REPORT:
       return &report_example()->base;
     case QMAT_FILE:
@@ -143,6 +164,7 @@ static void test_types_have_names(void **state) {
   (void)state;
   assert_string_equal(qmat_value_type_name(QMAT_SCENE), "scene");
   assert_string_equal(qmat_value_type_name(QMAT_MEDIAL), "medial");
+  assert_string_equal(qmat_value_type_name(QMAT_CHAIN), "chain");
   assert_string_equal(qmat_value_type_name(QMAT_FILE), "file");
   assert_string_equal(qmat_value_type_name(QMAT_VALUE_TYPE_COUNT), "unknown");
   assert_string_equal(qmat_value_type_name((qmat_value_type)-1), "unknown");
@@ -151,8 +173,8 @@ static void test_types_have_names(void **state) {
 static void test_new_values_are_empty_and_can_be_released_at_once(void **state) {
   (void)state;
   qmat_value *values[] = {&qmat_scene_new()->base,   &qmat_mesh_new()->base,   &qmat_field_new()->base,
-                          &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_report_new()->base,
-                          &qmat_file_new()->base};
+                          &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_chain_new()->base,
+                          &qmat_report_new()->base,  &qmat_file_new()->base};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
     assert_non_null(values[type]);
     assert_int_equal(values[type]->type, type);
@@ -189,6 +211,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              [QMAT_FIELD] = 3 * 8 + 10,
                              [QMAT_SAMPLES] = 6 * 8 + 2 * 4 + 6 * 8,
                              [QMAT_MEDIAL] = 16 * 8 + 8 * 4 + 3 * 4 + 5 * 4 + 6 * 4,
+                             [QMAT_CHAIN] = 16 * 8 + 8 * 4 + 3 * 4 + 3 * 4 + 4 * 4 + 8 * 8 + 4 * 8,
                              [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
                              [QMAT_FILE] = 4 + 8};
@@ -338,9 +361,10 @@ static void test_empty_values_are_valid(void **state) {
   qmat_context context = {0};
   qmat_field *field = qmat_field_new();
   field->unit = qmat_strdup("");
-  qmat_value *values[] = {&qmat_mesh_new()->base, &field->base, &qmat_samples_new()->base, &qmat_medial_new()->base,
-                          &qmat_report_new()->base};
-  for (size_t i = 0; i < 5; ++i) {
+  qmat_value *values[] = {&qmat_mesh_new()->base,   &field->base,            &qmat_samples_new()->base,
+                          &qmat_medial_new()->base, &qmat_chain_new()->base, &qmat_report_new()->base};
+  enum { COUNT = sizeof values / sizeof *values };
+  for (size_t i = 0; i < COUNT; ++i) {
     assert_sealed(&context, values[i]);
     uint8_t *bytes;
     size_t size;
@@ -355,7 +379,7 @@ static void test_empty_values_are_valid(void **state) {
     qmat_free(bytes);
     qmat_value_release(again);
   }
-  for (size_t i = 0; i < 5; ++i) qmat_value_release(values[i]);
+  for (size_t i = 0; i < COUNT; ++i) qmat_value_release(values[i]);
 }
 
 static void test_every_bit_of_content_moves_the_digest(void **state) {
@@ -548,6 +572,37 @@ static void test_bad_regions_are_refused(void **state) {
 static void set_part_name(qmat_file *file, size_t part, const char *name) {
   qmat_free(file->parts[part].name);
   file->parts[part].name = qmat_strdup(name);
+}
+
+static void test_bad_chains_name_the_first_bad_element(void **state) {
+  (void)state;
+  qmat_chain *chain = chain_example();
+  chain->edges[7] = 4;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "edge 3: it names sphere 4 of 4");
+  chain = chain_example();
+  chain->owners[1] = 4;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "sample 1: its owner is sphere 4 of 4");
+  chain = chain_example();
+  chain->ends[2] = 4;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that is not there");
+  chain = chain_example();
+  chain->ends[1] = 1;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: it joins a sphere with itself");
+  chain = chain_example();
+  chain->ends[3] = 3;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that went before");
+  chain = chain_example();
+  chain->merged[7] = -1;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the radius -1 is negative");
+  chain = chain_example();
+  chain->errors[2] = (double)INFINITY;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is not finite");
+  chain = chain_example();
+  chain->errors[0] = -0.5;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: the error falls");
+  chain = chain_example();
+  chain->errors[3] = 0.125;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error falls");
 }
 
 static void test_part_names_stay_in_one_folder_and_are_unique(void **state) {
@@ -847,6 +902,7 @@ int main(void) {
       cmocka_unit_test(test_barycentrics_may_be_off_by_rounding),
       cmocka_unit_test(test_bad_medial_meshes_name_the_first_bad_element),
       cmocka_unit_test(test_bad_regions_are_refused),
+      cmocka_unit_test(test_bad_chains_name_the_first_bad_element),
       cmocka_unit_test(test_part_names_stay_in_one_folder_and_are_unique),
       cmocka_unit_test(test_cut_bytes_are_refused_at_every_length),
       cmocka_unit_test(test_bytes_after_the_last_row_are_refused),

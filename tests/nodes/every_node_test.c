@@ -219,6 +219,18 @@ static qmat_value *make(const char *name, const char *port, world in, const char
   return value;
 }
 
+/* An unsealed chain without a collapse. */
+static qmat_value *chain_of(const qmat_medial *medial) {
+  qmat_chain *chain = qmat_chain_new();
+  chain->sphere_count = medial->sphere_count;
+  chain->edge_count = medial->edge_count;
+  chain->triangle_count = medial->triangle_count;
+  chain->spheres = copy_of(medial->spheres, 4 * medial->sphere_count * sizeof(double));
+  chain->edges = copy_of(medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
+  chain->triangles = copy_of(medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
+  return &chain->base;
+}
+
 static void save_model(const qmat_model *model, const char *path) {
   FILE *file = fopen(path, "w");
   assert_non_null(file);
@@ -246,6 +258,7 @@ static void make_solid(world to, const qmat_model *model) {
   qmat_value *simple = make("medial.simplify", "medial", to, "epsilon", "3%");
   qmat_value_release(values[QMAT_MEDIAL]);
   values[QMAT_MEDIAL] = simple;
+  seal(values[QMAT_CHAIN] = chain_of((const qmat_medial *)simple));
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
   print_message("%s: %zu facets, %zu samples, %zu medial spheres\n", world_names[to],
                 ((const qmat_mesh *)values[QMAT_MESH])->triangle_count,
@@ -302,6 +315,7 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
                    QMAT_OK);
   qmat_context_uninit(&context);
   values[QMAT_MEDIAL] = &medial->base;
+  values[QMAT_CHAIN] = chain_of(medial);
   values[QMAT_REPORT] = &qmat_report_new()->base;
   qmat_file *file = qmat_file_new();
   file->format = qmat_strdup("ma");
@@ -840,6 +854,8 @@ static qmat_value *new_value(qmat_value_type type) {
       return &qmat_samples_new()->base;
     case QMAT_MEDIAL:
       return &qmat_medial_new()->base;
+    case QMAT_CHAIN:
+      return &qmat_chain_new()->base;
     case QMAT_REPORT:
       return &qmat_report_new()->base;
     default:
