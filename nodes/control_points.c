@@ -7,6 +7,7 @@
 
 #include "core/envelope.h"
 #include "core/medial_distance.h"
+#include "nodes/inner_points.h"
 
 enum { FINEST_GRID = 256 };
 
@@ -129,8 +130,8 @@ static void store(qmat_control_points *control, size_t i, const witness *w) {
   control->distances[i] = w->distance;
 }
 
-static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count,
-                        double epsilon, witness *best) {
+static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double epsilon,
+                        witness *best) {
   *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
   for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
   if (!(best->distance > content_with_sphere * epsilon)) return;
@@ -213,48 +214,6 @@ static qmat_status ask_envelope(qmat_context *context, const qmat_complex *compl
   return QMAT_OK;
 }
 
-/* An initial sphere and the cube of a lattice that its centre lies in. */
-typedef struct {
-  uint64_t cube;
-  double radius;
-  uint32_t vertex;
-} inner_sphere;
-
-static int by_cube(const void *left, const void *right) {
-  const inner_sphere *a = left, *b = right;
-  if (a->cube != b->cube) return a->cube < b->cube ? -1 : 1;
-  if (a->radius != b->radius) return a->radius > b->radius ? -1 : 1;
-  return a->vertex < b->vertex ? -1 : a->vertex > b->vertex;
-}
-
-/* The cubes' side as a share of epsilon, and no smaller than this. */
-static const double cube_share = 0.25, smallest_cube = 1e-5;
-
-/* The spheres that the inside is held by: of each cube the largest, in the order of the cubes. */
-static inner_sphere *find_inner_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
-                                        size_t *count) {
-  inner_sphere *inner = qmat_arena_alloc(&context->arena, complex->vertex_count, sizeof *inner);
-  if (!inner) return NULL;
-  const double side = fmax(cube_share * epsilon, smallest_cube);
-  *count = 0;
-  for (size_t v = 0; v < complex->vertex_count; v++) {
-    const double *s = &complex->spheres[4 * v];
-    if (!(s[3] > epsilon)) continue;
-    uint64_t cube = 0;
-    for (int k = 0; k < 3; k++) {
-      const double step = floor((s[k] + 1) / side); /* the unit frame lies within -1/2 and 1/2 */
-      cube = cube << 21 | (uint64_t)fmin(fmax(step, 0), (1 << 21) - 1);
-    }
-    inner[(*count)++] = (inner_sphere){cube, s[3], (uint32_t)v};
-  }
-  qsort(inner, *count, sizeof *inner, by_cube);
-  size_t kept = 0;
-  for (size_t i = 0; i < *count; i++)
-    if (i == 0 || inner[i].cube != inner[i - 1].cube) inner[kept++] = inner[i];
-  *count = kept;
-  return inner;
-}
-
 qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                      size_t most, const qmat_extra_points *extra, bool inside,
@@ -266,10 +225,10 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   uint32_t *parts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *parts);
   answering a = {.mesh = mesh, .complex = complex};
-  size_t inner_count = 0;
-  const inner_sphere *inner = inside ? find_inner_spheres(context, complex, epsilon, &inner_count) : NULL;
-  if (!starts || !parts || (inside && !inner)) return qmat_fail_memory(context, "control points");
+  qmat_inner_points inner = {.count = 0};
+  if (!starts || !parts) return qmat_fail_memory(context, "control points");
   qmat_status status = find_answering(context, samples, medial, &a);
+  if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
   if (status != QMAT_OK) return status;
   for (size_t added = most + 1; added > most; control->spacing *= 1.25) {
     added = 0;
@@ -280,14 +239,13 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
     }
     control->surface_count = samples->count + added + extra->count;
   }
-  control->count = control->surface_count + inner_count;
+  control->count = control->surface_count + inner.count;
   control->spacing /= 1.25;
   control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
   control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
   control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
   control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
-  control->radii = qmat_arena_calloc(arena, control->count, sizeof(double));
-  if (!control->radii || !control->points || !control->witnesses || !control->weights || !control->distances)
+  if (!control->points || !control->witnesses || !control->weights || !control->distances)
     return qmat_fail_memory(context, "control points");
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, control->points);
   const int threads = qmat_threads(context);
@@ -317,13 +275,11 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
     look_around(&a, &extra->points[3 * i], &mesh->triangles[3 * (size_t)extra->facets[i]], 3, epsilon, &best);
     store(control, first_extra + i, &best);
   }
-  for (size_t i = 0; i < inner_count; i++) {
-    const size_t place = control->surface_count + i;
-    const double *s = &complex->spheres[4 * (size_t)inner[i].vertex];
-    const witness itself = {-s[3], {inner[i].vertex, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-    memcpy(&control->points[3 * place], s, 3 * sizeof *s);
-    control->radii[place] = s[3];
-    store(control, place, &itself);
+  if (inner.count) memcpy(&control->points[3 * control->surface_count], inner.points, 3 * inner.count * sizeof(double));
+  control->inner_limits = inner.limits;
+  for (size_t i = 0; i < inner.count; i++) {
+    const witness own = {inner.distances[i], {inner.spheres[i], QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+    store(control, control->surface_count + i, &own);
   }
   const size_t far = count_far(control, epsilon);
   if (far == 0) return QMAT_OK;

@@ -5,20 +5,18 @@
 #include "core/medial_complex.h"
 #include "core/surface.h"
 
-/* The places at which the distance to the envelope is held: on the surface the samples, then a grid on each facet that is
- * large against the wanted error, then extra points; and inside the solid, when asked for, spheres of the initial medial
- * mesh. Such a sphere, shrunk by the wanted error, has to stay inside one sphere of the envelope: a point of the surface
- * is a sphere of radius 0. Without them the envelope could cover the surface and be hollow. Each place comes with its
- * first witness. All arrays live in the context's arena. */
+/* The places at which the distance to the envelope is held: on the surface the samples, then a grid on each facet that
+ * is large against the wanted error, then extra points, and when asked for inner points, which the envelope has to
+ * contain (nodes/inner_points.h). Each place comes with its first witness. All arrays live in the context's arena. */
 typedef struct qmat_control_points {
   size_t count, sample_count;
-  size_t surface_count; /* those on the surface, which come first */
-  double *points;      /* 3 per point, unit frame */
-  double *radii;       /* per point: 0 on the surface */
-  uint32_t *witnesses; /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
-  double *weights;     /* 3 per point */
-  double *distances;   /* per point: F at the witness */
-  double spacing;      /* of the grid, unit frame */
+  size_t surface_count;       /* those on the surface, which come first */
+  const double *inner_limits; /* per inner point: what F may be at most */
+  double *points;             /* 3 per point, unit frame */
+  uint32_t *witnesses;        /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
+  double *weights;            /* 3 per point */
+  double *distances;          /* per point: F at the witness */
+  double spacing;             /* of the grid, unit frame */
 } qmat_control_points;
 
 /* Places on facets, in the unit frame, to be control points besides. */
@@ -30,9 +28,9 @@ typedef struct qmat_extra_points {
 
 /* Makes the control points of a model whose medial mesh `complex` (unit frame) is not yet changed. `medial` gives the
  * responsible regions; without any the envelope is searched. `epsilon` is the error that is to be held (unit frame,
- * > 0, may be INFINITY: samples only). At most `most` points are added in grids; their spacing grows until they are few enough. then come
- * `extra` and, with `inside`, initial spheres larger than epsilon, at most one in each cube of a quarter of epsilon.
- * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples). Uses all threads. */
+ * > 0, may be INFINITY: samples only). At most `most` points are added in grids; their spacing grows until they are few
+ * enough. Then come `extra` and, with `inside`, inner points that are epsilon deep. QMAT_ERROR_MEMORY,
+ * QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples). Uses all threads. */
 qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                      size_t most, const qmat_extra_points *extra, bool inside,

@@ -55,7 +55,8 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
   double *limits = qmat_arena_alloc(&context->arena, control->count, sizeof *limits);
   if (!s->quadrics || !limits) return qmat_fail_memory(context, "the simplification");
   for (size_t i = 0; i < control->count; i++)
-    limits[i] = fmax(s->rules.limit - control->radii[i], control->distances[i]);
+    limits[i] = i < control->surface_count ? fmax(s->rules.limit, control->distances[i])
+                                           : control->inner_limits[i - control->surface_count];
   qmat_medial_quadrics_add(c, s->quadrics);
   qmat_status status = fill_heap(s);
   if (status == QMAT_OK)
