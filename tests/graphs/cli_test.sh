@@ -65,7 +65,7 @@ expect 0 "qmat COMMAND" "$qmat" help
 expect 0 "qmat COMMAND" "$qmat" --help
 expect 2 "did you mean 'run'?" "$qmat" rnu
 expect 2 "did you mean 'check'?" "$qmat" help chekc
-for command in mat run check dot nodes node version help; do
+for command in mat run why cache check dot nodes node version help; do
   expect 0 "Options:" "$qmat" help $command
   expect 0 "qmat $command" "$qmat" $command --help
 done
@@ -123,14 +123,14 @@ holds "both files" test -s box.glb -a -s box.ma
 holds "the report names both" test "$(grep -c '"sha256"' report.json)" -eq 2
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
-  --set simple.epsilon=2% -o again.glb --threads 2
+  --set epsilon=2% -o again.glb --threads 2
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --set epsilon=0.02 -o asset=again.ma
 holds "the same bytes from mat and run" cmp box.glb again.glb
 holds "the same bytes from mat and run, .ma" cmp box.ma again.ma
 expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 2%
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
 expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 2%
-holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 7
+holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 8
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
 # A number of spheres alone means no bound on the distance.

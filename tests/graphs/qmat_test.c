@@ -243,7 +243,7 @@ static void test_the_shipped_graph_is_the_built_in_one(void **state) {
   ball b;
   make_ball(&b);
   ok(job, qmat_job_give_mesh(job, "model.mesh", "ball", b.positions, VERTICES, b.triangles, TRIANGLES));
-  ok(job, qmat_job_set(job, "simple.epsilon=0.03"));
+  ok(job, qmat_job_set(job, "epsilon=0.03"));
   qmat_job *built_in = job_with_ball(), *jobs[] = {job, built_in};
   const uint8_t *bytes[2];
   size_t sizes[2];
