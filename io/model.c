@@ -6,6 +6,7 @@
 #include "io/gltf.h"
 #include "io/ma.h"
 #include "io/mesh_formats.h"
+#include "io/usd_scene.h"
 
 static const struct {
   const char *title; /* as people write it */
@@ -101,11 +102,6 @@ qmat_status qmat_format_choose(qmat_context *context, const char *path, const qm
   const qmat_format named = qmat_format_of_name(path), found = qmat_format_of_bytes(bytes);
   const bool both = named != QMAT_FORMAT_UNKNOWN && found != QMAT_FORMAT_UNKNOWN;
   *format = found != QMAT_FORMAT_UNKNOWN ? found : named;
-  if (*format == QMAT_FORMAT_USD) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "USD is not read yet");
-    qmat_fail_at(context, path, 0, 0);
-    return qmat_fail_hint(context, "convert the model to glTF");
-  }
   if (both && named != found) {
     qmat_fail(context, QMAT_ERROR_FORMAT, "the name says %s, but the file holds %s", formats[named].title,
               formats[found].title);
@@ -118,7 +114,8 @@ qmat_status qmat_format_choose(qmat_context *context, const char *path, const qm
                                          : "neither the bytes nor the ending of the file "
                                            "show a format that is read");
     qmat_fail_at(context, path, 0, 0);
-    return qmat_fail_hint(context, "models are read from .off, .obj, .ply, .stl, .gltf and .glb");
+    return qmat_fail_hint(context,
+                          "models are read from .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc and .usdz");
   }
   return QMAT_OK;
 }
@@ -153,6 +150,8 @@ static qmat_status read_surface(qmat_context *context, qmat_format format, const
     case QMAT_FORMAT_GLTF:
     case QMAT_FORMAT_GLB:
       return qmat_gltf_parse(context, bytes->data, bytes->size, path, soup, report);
+    case QMAT_FORMAT_USD:
+      return qmat_usd_read(context, bytes, path, soup, report);
     default:
       qmat_fail(context, QMAT_ERROR_FORMAT, "the file holds a medial mesh, not a surface");
       qmat_fail_at(context, path, 0, 0);

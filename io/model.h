@@ -30,16 +30,16 @@ qmat_format qmat_format_of_name(const char *path);
 qmat_format qmat_format_of_bytes(const qmat_bytes *bytes);
 
 /* The format of the file: what its bytes show, else what its ending says. QMAT_ERROR_FORMAT when the two disagree or
- * neither is known, and for USD, which is not read yet. `path` is for the ending and for errors. */
+ * neither is known. `path` is for the ending and for errors. */
 qmat_status qmat_format_choose(qmat_context *context, const char *path, const qmat_bytes *bytes, qmat_format *format);
 
 /* The base name of `path` without its ending, as valid UTF-8 (other bytes become U+FFFD); "model" when nothing is left.
  * qmat_free frees it; NULL when memory is short. */
 char *qmat_model_name(const char *path);
 
-/* Reads the surface in the file `path` (OFF, OBJ, PLY, STL, glTF): all of its polygons as one mesh, and a report with
- * "format" and the counts of qmat_soup_to_mesh and qmat_gltf_read. The three values are sealed; the caller releases
- * them; all are NULL on failure, and the error names the file and the place in it. */
+/* Reads the surface in the file `path` (OFF, OBJ, PLY, STL, glTF, USD): all of its polygons as one mesh, and a report
+ * with "format" and what qmat_soup_to_mesh, qmat_gltf_read or qmat_usd_read report. The three values are sealed; the
+ * caller releases them; all are NULL on failure, and the error names the file and the place in it. */
 qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
                             qmat_scene **scene, qmat_mesh **mesh, qmat_report **report);
 

@@ -12,7 +12,7 @@ static const char *const defects_choices[] = {"refuse", "drop", NULL};
 
 static const qmat_param params[] = {
     {.name = "path",
-     .doc = "The model: .off, .obj, .ply, .stl, .gltf or .glb",
+     .doc = "The model: .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc or .usdz",
      .unit = "",
      .type = QMAT_PARAM_PATH,
      .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
@@ -60,7 +60,8 @@ const qmat_node qmat_node_scene_read = {
         "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "
         "become one, polygons are cut into triangles, unused vertices are left out, and the triangles get one "
         "orientation, outward where the surface is closed. The report counts all of this, border edges, "
-        "non-manifold edges, components and the Euler characteristic.",
+        "non-manifold edges, components and the Euler characteristic. Of a scene (glTF, USD) all meshes are placed as "
+        "one; USD layers are composed from the files beside them, and the report's warnings say what was left out.",
     .citation = "",
     .params_size = sizeof(scene_read_params),
     .params = params,
