@@ -7,6 +7,7 @@
 #include "core/surface.h"
 #include "core/triangle.h"
 #include "nodes/libraries.h"
+#include "nodes/sample_thinning.h"
 
 #define MOST_RAYS 1024
 /* Rays start at the facet; its own plane is met at a distance of rounding. In the unit frame. */
@@ -16,10 +17,15 @@
 #define SAME_SIDE 1e-6
 /* Facets around one vertex that are asked for their value: a fan of thousands must not cost its square. */
 #define MOST_NEIGHBOURS 256
+/* A facet may take the value of one that is at most this share of that value away. */
+#define SAME_VALUE 0.1
+/* How far out of each other's planes such facets may be, as a share of the spacing. */
+#define SAME_PLANE 0.25
 
 typedef struct mesh_sdf_params {
   double cone_angle;
   int64_t rays;
+  double spacing;
 } mesh_sdf_params;
 
 typedef enum facet_state { MEASURED, NO_VALID_RAY, DEGENERATE } facet_state;
@@ -218,17 +224,63 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
   return QMAT_OK;
 }
 
-static qmat_status measure_facets(qmat_context *context, const qmat_surface *surface, const cone_ray *rays,
-                                  size_t ray_count, uint8_t *states, double *values) {
-  const size_t count = qmat_surface_mesh(surface)->triangle_count;
+/* For each facet the one that is measured in its place, itself when it is one. */
+static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *surface, double spacing,
+                                  uint32_t *stand_ins) {
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  const size_t count = mesh->triangle_count;
+  for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+  if (spacing == 0) return QMAT_OK;
+  double *centroids = qmat_arena_alloc(&context->arena, count, 3 * sizeof *centroids);
+  double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
+  double *radii = qmat_arena_alloc(&context->arena, count, sizeof *radii);
+  if (centroids == NULL || normals == NULL || radii == NULL) return qmat_fail_memory(context, "the facets");
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *ids = mesh->triangles + 3 * i;
+    const double *a = positions + 3 * (size_t)ids[0], *b = positions + 3 * (size_t)ids[1],
+                 *c = positions + 3 * (size_t)ids[2];
+    for (int k = 0; k < 3; k++) centroids[3 * i + (size_t)k] = (a[k] + b[k] + c[k]) / 3;
+    (void)qmat_triangle_area(a, b, c, normals + 3 * i);
+    radii[i] = spacing;
+  }
+  return qmat_samples_thin(context, centroids, normals, radii, count, spacing, SAME_PLANE * spacing, stand_ins);
+}
+
+/* What every facet's measuring needs. */
+typedef struct measuring {
+  const qmat_surface *surface;
+  const cone_ray *rays;
+  size_t ray_count;
+  const uint32_t *stand_ins;
+  uint8_t *states;
+  double *values;
+} measuring;
+
+static bool takes_value(const measuring *m, uint32_t facet) {
+  const uint32_t measured = m->stand_ins[facet];
+  if (m->states[measured] != MEASURED) return false;
+  const double reach = 3 * SAME_VALUE * m->values[measured]; /* the distance is between sums of three corners */
+  return squared_centroid_distance(m->surface, facet, measured) <= reach * reach;
+}
+
+/* Measures the facets that stand for themselves, or else those that are left. */
+static qmat_status measure_facets(qmat_context *context, const measuring *m, bool stand_ins) {
+  const size_t count = qmat_surface_mesh(m->surface)->triangle_count;
   /* About a tenth of a second of rays between two looks at the progress function. */
-  const size_t slice = 100000 / ray_count + 1;
+  const size_t slice = 100000 / m->ray_count + 1;
   const int threads = qmat_threads(context);
   for (size_t begin = 0; begin < count; begin += slice) {
     const size_t end = count - begin < slice ? count : begin + slice;
 #pragma omp parallel for schedule(dynamic, 16) num_threads(threads)
     for (size_t i = begin; i < end; i++) {
-      states[i] = (uint8_t)measure_facet(surface, rays, ray_count, (uint32_t)i, values + i);
+      if ((m->stand_ins[i] == i) != stand_ins) continue;
+      if (!stand_ins && takes_value(m, (uint32_t)i)) {
+        m->values[i] = m->values[m->stand_ins[i]];
+        m->states[i] = MEASURED;
+      } else {
+        m->states[i] = (uint8_t)measure_facet(m->surface, m->rays, m->ray_count, (uint32_t)i, m->values + i);
+      }
     }
     const qmat_status status = qmat_progress(context, end, count, "facets");
     if (status != QMAT_OK) return status;
@@ -251,12 +303,14 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 
   cone_ray *rays = qmat_arena_alloc(&context->arena, ray_count, sizeof *rays);
   uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
+  uint32_t *stand_ins = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *stand_ins);
   field = qmat_field_new();
   if (field != NULL) {
     field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
     field->unit = qmat_strdup("model unit");
   }
-  if (rays == NULL || states == NULL || field == NULL || field->values == NULL || field->unit == NULL) {
+  if (rays == NULL || states == NULL || stand_ins == NULL || field == NULL || field->values == NULL ||
+      field->unit == NULL) {
     status = qmat_fail_memory(context, "the thickness");
     goto done;
   }
@@ -264,7 +318,10 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   field->domain = QMAT_PER_FACET;
 
   make_cone(params->cone_angle, ray_count, rays);
-  status = measure_facets(context, surface, rays, ray_count, states, field->values);
+  const measuring m = {surface, rays, ray_count, stand_ins, states, field->values};
+  status = find_stand_ins(context, surface, params->spacing, stand_ins);
+  if (status == QMAT_OK) status = measure_facets(context, &m, true);
+  if (status == QMAT_OK && params->spacing > 0) status = measure_facets(context, &m, false);
   if (status == QMAT_OK) status = fill_gaps(context, surface, states, field->values);
   if (status != QMAT_OK) goto done;
   for (size_t i = 0; i < field->count; i++) field->values[i] *= qmat_surface_frame(surface)->diagonal;
@@ -296,6 +353,17 @@ static const qmat_param params[] = {
      .min = 1,
      .max = MOST_RAYS,
      .offset = offsetof(mesh_sdf_params, rays)},
+    {.name = "spacing",
+     .unit = "diagonal",
+     .doc =
+         "Facets of the same plane whose centroids are nearer than this share one value, where the solid is ten times "
+         "as thick as they are apart; 0: every facet is measured",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.002,
+     .min = 0,
+     .max = 0.1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = offsetof(mesh_sdf_params, spacing)},
     {0},
 };
 
@@ -313,7 +381,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_mesh_sdf = {
     .name = "mesh.sdf",
-    .version = 1,
+    .version = 2,
     .summary = "Measures how thick a solid is at each facet",
     .doc =
         "The shape diameter function: from each facet's centroid a fixed pattern of rays goes into the solid within a "
@@ -321,7 +389,8 @@ const qmat_node qmat_node_mesh_sdf = {
         "thickness is the mean of the ray lengths within 1.5 median absolute deviations of their median, weighted by "
         "the inverse of the angle to the normal. It is neither smoothed nor normalised. Facets without a valid ray "
         "take the median of the facets at their corners, or the mean of all; degenerate facets take the value of the "
-        "nearest facet at their corners.",
+        "nearest facet at their corners. On meshes far finer than the spacing only some facets are measured, and "
+        "their neighbours take their values.",
     .citation =
         "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
         "diameter function",

@@ -13,9 +13,9 @@
 
 extern const qmat_node qmat_node_mesh_sdf;
 
-/* Runs the node with its defaults but for `cone_angle` and `rays` (NULL: default). Releases the mesh. */
-static qmat_status try_sdf(qmat_context *context, qmat_mesh *mesh, const char *cone_angle, const char *rays,
-                           qmat_field **thickness) {
+/* Runs the node with its defaults but for `cone_angle`, `rays` and `spacing` (NULL: default). Releases the mesh. */
+static qmat_status try_spaced_sdf(qmat_context *context, qmat_mesh *mesh, const char *cone_angle, const char *rays,
+                                  const char *spacing, qmat_field **thickness) {
   const qmat_node *node = &qmat_node_mesh_sdf;
   double params[8];
   assert_true(node->params_size <= sizeof params);
@@ -26,6 +26,9 @@ static qmat_status try_sdf(qmat_context *context, qmat_mesh *mesh, const char *c
   if (rays != NULL) {
     assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "rays"), rays, params), QMAT_OK);
   }
+  if (spacing != NULL) {
+    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "spacing"), spacing, params), QMAT_OK);
+  }
   const qmat_value *inputs[1] = {&mesh->base};
   qmat_value *outputs[1] = {NULL};
   const qmat_status status = node->run(context, params, inputs, outputs);
@@ -33,6 +36,11 @@ static qmat_status try_sdf(qmat_context *context, qmat_mesh *mesh, const char *c
   *thickness = (qmat_field *)outputs[0];
   qmat_value_release(&mesh->base);
   return status;
+}
+
+static qmat_status try_sdf(qmat_context *context, qmat_mesh *mesh, const char *cone_angle, const char *rays,
+                           qmat_field **thickness) {
+  return try_spaced_sdf(context, mesh, cone_angle, rays, NULL, thickness);
 }
 
 static qmat_field *sdf(qmat_mesh *mesh, const char *cone_angle, const char *rays) {
@@ -130,6 +138,48 @@ static void test_thin_sheets_keep_their_thickness(void **state) {
     qmat_value_release(&sheet->base);
   }
   qmat_value_release(&slab->base);
+}
+
+static size_t count_differences(const qmat_field *a, const qmat_field *b) {
+  size_t count = 0;
+  for (size_t i = 0; i < a->count; i++) count += a->values[i] != b->values[i];
+  return count;
+}
+
+static void test_fine_facets_share_values_that_are_nearly_theirs(void **state) {
+  (void)state;
+  /* A torus of diagonal about 2.6 with a tube of 0.4 in diameter. */
+  qmat_field *fields[3];
+  static const char *const spacings[3] = {"0", "0.001", "0.012"};
+  for (int i = 0; i < 3; i++) {
+    qmat_context context = {0};
+    assert_int_equal(
+        try_spaced_sdf(&context, shape_seal(shape_torus(0.7, 0.2, 140, 60)), NULL, NULL, spacings[i], &fields[i]),
+        QMAT_OK);
+    qmat_context_uninit(&context);
+  }
+  /* Facets are farther apart than the second spacing. */
+  assert_memory_equal(fields[0]->values, fields[1]->values, fields[0]->count * sizeof(double));
+  assert_true(count_differences(fields[2], fields[0]) > fields[0]->count / 3);
+  for (size_t i = 0; i < fields[0]->count; i++)
+    assert_near(fields[2]->values[i], fields[0]->values[i], 0.15 * fields[0]->values[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(&fields[i]->base);
+}
+
+static void test_facets_of_thin_parts_are_all_measured(void **state) {
+  (void)state;
+  /* Thinner than ten times the spacing: the values are those of every facet. */
+  qmat_field *fields[2];
+  static const char *const spacings[2] = {"0", "0.05"};
+  for (int i = 0; i < 2; i++) {
+    qmat_context context = {0};
+    qmat_mesh *mesh = shape_torus(1, 0.3, 100, 40);
+    for (size_t v = 0; v < mesh->vertex_count; v++) mesh->positions[3 * v + 2] *= 0.01;
+    assert_int_equal(try_spaced_sdf(&context, shape_seal(mesh), "20", NULL, spacings[i], &fields[i]), QMAT_OK);
+    qmat_context_uninit(&context);
+  }
+  assert_true(count_differences(fields[0], fields[1]) < fields[0]->count / 100);
+  for (int i = 0; i < 2; i++) qmat_value_release(&fields[i]->base);
 }
 
 static void test_rotation_scale_and_offset_change_nothing_but_the_unit(void **state) {
@@ -321,6 +371,8 @@ int main(void) {
       cmocka_unit_test(test_sphere_gives_the_mean_over_the_kept_cone),
       cmocka_unit_test(test_wide_slab_gives_the_mean_over_the_kept_cone),
       cmocka_unit_test(test_thin_sheets_keep_their_thickness),
+      cmocka_unit_test(test_fine_facets_share_values_that_are_nearly_theirs),
+      cmocka_unit_test(test_facets_of_thin_parts_are_all_measured),
       cmocka_unit_test(test_rotation_scale_and_offset_change_nothing_but_the_unit),
       cmocka_unit_test(test_order_of_vertices_and_facets_does_not_matter),
       cmocka_unit_test(test_degenerate_facets_take_their_nearest_neighbours_value),
