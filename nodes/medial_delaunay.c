@@ -8,7 +8,6 @@
 #include "core/node.h"
 #include "core/surface.h"
 #include "core/thickness.h"
-#include "core/triangle.h"
 #include "nodes/delaunay_cgal.h"
 #include "nodes/libraries.h"
 #include "nodes/refine_medial.h"
@@ -682,52 +681,6 @@ static void mark_thin_samples(delaunay *d, const qmat_field *thickness, const do
   d->thin = thin;
 }
 
-/* The unit normals of samples: 3 doubles each, zero where there is none. */
-static void find_normals(const delaunay *d, double *normals) {
-  const double *positions = qmat_surface_positions(d->surface);
-  const qmat_samples *samples = d->samples;
-  memset(normals, 0, 3 * samples->count * sizeof *normals);
-  for (size_t t = 0; t < d->mesh->triangle_count; t++) {
-    const uint32_t *ids = &d->mesh->triangles[3 * t];
-    double normal[3];
-    const double area = qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
-                                           &positions[3 * (size_t)ids[2]], normal);
-    for (size_t corner = 0; corner < 3; corner++)
-      for (size_t k = 0; k < 3; k++) normals[3 * (size_t)ids[corner] + k] += area * normal[k];
-  }
-  for (size_t i = 0; i < samples->vertex_count; i++) {
-    double *normal = &normals[3 * i];
-    const double length = sqrt(dot(normal, normal));
-    for (size_t k = 0; k < 3; k++) normal[k] = length > 0 ? normal[k] / length : 0;
-  }
-  for (size_t i = samples->vertex_count; i < samples->count; i++) {
-    const uint32_t *ids = &d->mesh->triangles[3 * (size_t)samples->facets[i]];
-    (void)qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
-                             &positions[3 * (size_t)ids[2]], &normals[3 * i]);
-  }
-}
-
-/* A sample stands for others up to this share of the thickness away, and up to this share of the diagonal. */
-static const double thinning_share = 0.25, thinning_reach = 0.01;
-
-static qmat_status find_stand_ins(delaunay *d, const double *thickness, uint32_t *stand_ins) {
-  qmat_arena *arena = &d->context->arena;
-  const size_t count = d->samples->count;
-  const double detail = d->params->detail, diagonal = qmat_surface_frame(d->surface)->diagonal;
-  d->stand_ins = stand_ins;
-  if (detail == 0) {
-    for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
-    return QMAT_OK;
-  }
-  double *normals = qmat_arena_alloc(arena, count, 3 * sizeof *normals);
-  double *radii = qmat_arena_alloc(arena, count, sizeof *radii);
-  if (!normals || !radii) return qmat_fail_memory(d->context, "samples");
-  find_normals(d, normals);
-  for (size_t i = 0; i < count; i++)
-    radii[i] = fmin(fmax(thinning_share * (thickness[i] / diagonal), detail), thinning_reach);
-  return qmat_samples_thin(d->context, d->points, normals, radii, count, thinning_reach, detail, stand_ins);
-}
-
 /* The Delaunay tetrahedra of the samples that stand for themselves. */
 static qmat_status triangulate(delaunay *d) {
   qmat_arena *arena = &d->context->arena;
@@ -770,7 +723,9 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   d.points = points;
   qmat_thickness_of_samples(d.mesh, thickness, d.samples, values);
   mark_thin_samples(&d, thickness, values, thin);
-  if ((status = find_stand_ins(&d, values, stand_ins)) != QMAT_OK) goto done;
+  d.stand_ins = stand_ins;
+  if ((status = qmat_stand_ins_find(context, d.surface, d.samples, points, values, d.params->detail, stand_ins)))
+    goto done;
   if ((status = triangulate(&d)) != QMAT_OK) goto done;
   if ((status = select_medial_vertices(&d)) != QMAT_OK) goto done;
   for (size_t i = 0; i < d.cells.count; i++) by_kind[d.kinds[i]]++;

@@ -2,8 +2,10 @@
 #include "nodes/sample_thinning.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/hash.h"
+#include "core/triangle.h"
 
 /* Each level's cells are half as wide as those of the one before; smaller radii search the finest level. */
 enum { LEVELS = 8, REPORT_EVERY = 65536 };
@@ -98,4 +100,49 @@ qmat_status qmat_samples_thin(qmat_context *context, const double *points, const
     if (stand_ins[i] == i) grid_add(&t.grid, &points[3 * i], (uint32_t)i);
   }
   return status;
+}
+
+/* The unit normals of samples: 3 doubles each, zero where there is none. */
+static void find_normals(const qmat_surface *surface, const qmat_samples *samples, double *normals) {
+  const double *positions = qmat_surface_positions(surface);
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  memset(normals, 0, 3 * samples->count * sizeof *normals);
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const uint32_t *ids = &mesh->triangles[3 * t];
+    double normal[3];
+    const double area = qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                                           &positions[3 * (size_t)ids[2]], normal);
+    for (size_t corner = 0; corner < 3; corner++)
+      for (size_t k = 0; k < 3; k++) normals[3 * (size_t)ids[corner] + k] += area * normal[k];
+  }
+  for (size_t i = 0; i < samples->vertex_count; i++) {
+    double *normal = &normals[3 * i];
+    const double length = sqrt(dot(normal, normal));
+    for (size_t k = 0; k < 3; k++) normal[k] = length > 0 ? normal[k] / length : 0;
+  }
+  for (size_t i = samples->vertex_count; i < samples->count; i++) {
+    const uint32_t *ids = &mesh->triangles[3 * (size_t)samples->facets[i]];
+    (void)qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                             &positions[3 * (size_t)ids[2]], &normals[3 * i]);
+  }
+}
+
+/* How far a sample may be from what stands for it: this share of the thickness, and of the diagonal at most. */
+static const double thickness_share = 0.25, longest_reach = 0.01;
+
+qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                const double *points, const double *thickness, double detail, uint32_t *stand_ins) {
+  const size_t count = samples->count;
+  if (detail == 0) {
+    for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+    return QMAT_OK;
+  }
+  double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
+  double *radii = qmat_arena_alloc(&context->arena, count, sizeof *radii);
+  if (!normals || !radii) return qmat_fail_memory(context, "samples");
+  find_normals(surface, samples, normals);
+  const double diagonal = qmat_surface_frame(surface)->diagonal;
+  for (size_t i = 0; i < count; i++)
+    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), detail), longest_reach);
+  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, detail, stand_ins);
 }
