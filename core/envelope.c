@@ -334,8 +334,10 @@ static inline double item_distance(const qmat_envelope *envelope, envelope_item 
   return qmat_sphere_distance(envelope->spheres + 4 * (size_t)item.slot, p);
 }
 
-/* The smallest distance that is at most `limit`, INFINITY when there is none, and the item that attains it. */
-static double search(const qmat_envelope *envelope, const double p[3], double limit, envelope_item *nearest) {
+/* The smallest distance that is at most `limit`, INFINITY when there is none, and the item that attains it; or the first
+ * that is found below `enough`. */
+static double search(const qmat_envelope *envelope, const double p[3], double limit, double enough,
+                     envelope_item *nearest) {
   if (envelope->node_count == 0) return INFINITY;
   struct {
     double bound;
@@ -372,6 +374,7 @@ static double search(const qmat_envelope *envelope, const double p[3], double li
           found = true;
         }
       }
+      if (found && best < enough) break;
     }
     if (top == 0) break;
     bound = stack[--top].bound;
@@ -382,20 +385,25 @@ static double search(const qmat_envelope *envelope, const double p[3], double li
 
 double qmat_envelope_distance(const qmat_envelope *envelope, const double point[3], size_t *primitive) {
   envelope_item nearest = {0, 0};
-  double distance = search(envelope, point, INFINITY, &nearest);
+  double distance = search(envelope, point, INFINITY, -INFINITY, &nearest);
   if (primitive) *primitive = nearest.primitive;
   return distance;
 }
 
 double qmat_envelope_distance_within(const qmat_envelope *envelope, const double point[3], double limit) {
   envelope_item nearest;
-  return search(envelope, point, limit, &nearest);
+  return search(envelope, point, limit, -INFINITY, &nearest);
+}
+
+bool qmat_envelope_holds(const qmat_envelope *envelope, const double point[3], double depth) {
+  envelope_item nearest;
+  return search(envelope, point, -depth, -depth, &nearest) < -depth;
 }
 
 double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3], size_t *primitive,
                              double sphere[4]) {
   envelope_item nearest = {0, 0};
-  double distance = search(envelope, point, INFINITY, &nearest);
+  double distance = search(envelope, point, INFINITY, -INFINITY, &nearest);
   if (primitive) *primitive = nearest.primitive;
   if (envelope->primitive_count == 0) return distance;
   int count;

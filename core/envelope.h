@@ -47,4 +47,7 @@ double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3
 /* F(point) when it is at most `limit`, else INFINITY: cheaper where only near points matter. */
 double qmat_envelope_distance_within(const qmat_envelope *envelope, const double point[3], double limit);
 
+/* Whether F(point) < -depth: the first primitive that holds the point so deep ends the search. */
+bool qmat_envelope_holds(const qmat_envelope *envelope, const double point[3], double depth);
+
 #endif

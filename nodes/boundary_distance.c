@@ -19,8 +19,9 @@ static const double outside_floor = 0.25;
 
 static const double least_tolerance = 1e-5;
 
-/* Features are searched in groups of this many, and a group ends after so many looks. */
-enum { GROUP_SIZE = 1 << 16, MOST_LOOKS = 1 << 22 };
+/* Where there are more features, most of them are buried in others, and space is searched instead of them. After so
+ * many looks at either nothing is split any more: F is slow where hundreds of primitives hold a point. */
+enum { MOST_FEATURES = 10000, MOST_LOOKS = 1 << 22, MOST_CELL_LOOKS = 1 << 17 };
 
 static double maximum(double a, double b) {
   return a > b ? a : b;
@@ -276,7 +277,7 @@ static qmat_status sample_boundary(qmat_context *context, const features *f, con
         const double wanted = area * (((double)i + 0.5) / (double)sample_count);
         feature_point(f, feature_at(areas, count, wanted), qmat_hash_unit(qmat_hash3(1, i, 0)),
                       qmat_hash_unit(qmat_hash3(1, i, 1)), point);
-        if (qmat_envelope_distance_within(envelope, point, -rounding) < -rounding) continue;
+        if (qmat_envelope_holds(envelope, point, rounding)) continue;
         const double d = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
         sum.sum += d;
         sum.count++;
@@ -302,8 +303,12 @@ static qmat_status sample_boundary(qmat_context *context, const features *f, con
 
 enum { SIDES_EITHER = 1, SIDES_OUT = 2 };
 
-/* A piece of a feature's surface. `at` is, of a sphere, three unit vectors: what is between them; of a mantle, t from
- * and to and the angle from and to; of a sheet, three corners. */
+/* Stands for a feature: a cube of space. */
+#define CELL UINT32_MAX
+
+/* A piece of a feature's surface, or of space. `at` is, of a sphere, three unit vectors: what is between them; of a
+ * mantle, t from and to and the angle from and to; of a sheet, three corners; of a cell, the centre and half the side.
+ */
 typedef struct patch {
   double at[9];
   uint32_t feature;
@@ -319,8 +324,8 @@ typedef struct search {
   const features *features;
   const qmat_surface *surface;
   const qmat_envelope *envelope;
-  double target[2], smallest; /* either side, outside */
-  bool last;                  /* nothing is split any more */
+  double lo[2], target[2], smallest; /* either side, outside */
+  bool last;                         /* nothing is split any more */
 } search;
 
 /* What a look at a patch says. */
@@ -409,6 +414,11 @@ static void look_at_sheet(const patch *p, double middle[3], double *reach) {
   for (int i = 0; i < 3; i++) *reach = maximum(*reach, distance(middle, &p->at[3 * i]));
 }
 
+static void look_at_cell(const patch *p, double middle[3], double *reach) {
+  memcpy(middle, p->at, 3 * sizeof *middle);
+  *reach = sqrt(3) * p->at[3];
+}
+
 static int mantle_children(const features *f, const patch *p) {
   double along, around;
   const mantle m = mantle_of(f, p);
@@ -416,21 +426,44 @@ static int mantle_children(const features *f, const patch *p) {
   return along > 2 * around || around > 2 * along ? 2 : 4;
 }
 
+/* Whether no point within `reach` of the middle lies on the boundary. A patch's own middle is never out of it. */
+static bool is_off_boundary(const search *s, bool is_cell, const double middle[3], double reach) {
+  if (qmat_envelope_holds(s->envelope, middle, reach + QMAT_BOUNDARY_SKIN)) return true;
+  return is_cell && qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
+}
+
+/* Moves a cell's middle to the surface of its nearest medial sphere. */
+static void move_to_sphere(const search *s, double middle[3]) {
+  double sphere[4];
+  qmat_envelope_nearest(s->envelope, middle, NULL, sphere);
+  const double length = distance(middle, sphere);
+  for (int k = 0; k < 3 && length > 0; k++) middle[k] = sphere[k] + sphere[3] / length * (middle[k] - sphere[k]);
+}
+
+/* Asks at the middle, when it lies on the boundary. */
+static void find(const search *s, bool is_cell, double middle[3], uint8_t sides, finding *result) {
+  if (is_cell) move_to_sphere(s, middle);
+  if (qmat_envelope_holds(s->envelope, middle, rounding)) return;
+  result->found[0] = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
+  if ((sides & SIDES_OUT) && !qmat_surface_inside(s->surface, middle)) result->found[1] = result->found[0];
+}
+
 static finding look_at(const search *s, const patch *p) {
   const features *f = s->features;
   finding result = {.found = {0, 0}, .bound = {0, 0}};
   double middle[3], reach;
-  const bool is_sphere = p->feature < f->sphere_count,
-             is_mantle = !is_sphere && p->feature < f->sphere_count + f->edge_count;
+  const bool is_cell = p->feature == CELL, is_sphere = !is_cell && p->feature < f->sphere_count;
+  const bool is_mantle = !is_cell && !is_sphere && p->feature < f->sphere_count + f->edge_count;
   bool open = true;
   if (is_sphere)
     open = look_at_sphere(s, p, middle, &reach);
   else if (is_mantle)
     open = look_at_mantle(s, p, middle, &reach);
+  else if (is_cell)
+    look_at_cell(p, middle, &reach);
   else
     look_at_sheet(p, middle, &reach);
   if (!open) return result;
-  const double deep = -(reach + QMAT_BOUNDARY_SKIN);
   uint8_t sides = p->sides;
   if (s->last || reach < s->target[0]) {
     const double d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL), bound = d + reach;
@@ -440,24 +473,20 @@ static finding look_at(const search *s, const patch *p) {
         sides &= (uint8_t) ~(1 << side);
       }
     if (!sides) return result;
-    const double f_middle = qmat_envelope_distance_within(s->envelope, middle, -rounding);
-    if (f_middle < deep) return (finding){.found = {0, 0}};
+    if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
     const bool inside = (sides & SIDES_OUT) && qmat_surface_inside(s->surface, middle);
     if (inside && d > reach) sides &= SIDES_EITHER;
-    if (!(f_middle < -rounding)) {
-      result.found[0] = d;
-      if ((sides & SIDES_OUT) && !inside) result.found[1] = d;
-    }
+    if (d > s->lo[0] || ((sides & SIDES_OUT) && !inside && d > s->lo[1])) find(s, is_cell, middle, sides, &result);
     if (s->last || reach <= s->smallest) {
       for (int side = 0; side < 2; side++)
         if (sides >> side & 1) result.bound[side] = bound;
       return result;
     }
-  } else if (qmat_envelope_distance_within(s->envelope, middle, deep) < deep) {
+  } else if (is_off_boundary(s, is_cell, middle, reach)) {
     return result;
   }
   result.sides = sides;
-  if (sides) result.children = is_sphere ? 4 : is_mantle ? mantle_children(f, p) : 2;
+  if (sides) result.children = is_sphere ? 4 : is_mantle ? mantle_children(f, p) : is_cell ? 8 : 2;
   return result;
 }
 
@@ -501,12 +530,21 @@ static void split_mantle(const features *f, const patch *p, int count, patch chi
   }
 }
 
+static void split_cell(const patch *p, patch children[8]) {
+  for (int i = 0; i < 8; i++) {
+    children[i].at[3] = 0.5 * p->at[3];
+    for (int k = 0; k < 3; k++) children[i].at[k] = p->at[k] + (i >> k & 1 ? 0.5 : -0.5) * p->at[3];
+  }
+}
+
 static void split(const features *f, const patch *p, const finding *found, patch children[]) {
   for (int i = 0; i < found->children; i++) {
     children[i] = *p;
     children[i].sides = found->sides;
   }
-  if (p->feature < f->sphere_count)
+  if (p->feature == CELL)
+    split_cell(p, children);
+  else if (p->feature < f->sphere_count)
     split_sphere(p, children);
   else if (p->feature < f->sphere_count + f->edge_count)
     split_mantle(f, p, found->children, children);
@@ -569,23 +607,45 @@ static qmat_status search_level(qmat_context *context, const search *s, const pa
   return QMAT_OK;
 }
 
-static qmat_status search_group(qmat_context *context, search *s, size_t first, size_t last, double epsilon,
-                                double tolerance, qmat_boundary_distance *result) {
+/* The cube around all spheres. */
+static patch whole_space(const features *f) {
+  patch root = {.feature = CELL, .sides = SIDES_EITHER | SIDES_OUT};
+  for (int k = 0; k < 3; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < f->sphere_count; i++) {
+      const double *sphere = &f->spheres[4 * i];
+      low = minimum(low, sphere[k] - sphere[3]);
+      high = maximum(high, sphere[k] + sphere[3]);
+    }
+    root.at[k] = 0.5 * (low + high);
+    root.at[3] = maximum(root.at[3], 0.5 * (high - low));
+  }
+  root.at[3] *= 1 + rounding;
+  return root;
+}
+
+static qmat_status search_pieces(qmat_context *context, search *s, double epsilon, double tolerance,
+                                 qmat_boundary_distance *result) {
+  const size_t count = feature_count(s->features);
   patch_list lists[2] = {{0}, {0}};
   finding *findings = NULL;
   size_t capacity = 0;
-  const size_t looks = result->looks;
   qmat_status status = QMAT_OK;
-  if (qmat_grow((void **)&lists[0].items, &lists[0].capacity, 8 * (last - first), sizeof *lists[0].items))
+  if (qmat_grow((void **)&lists[0].items, &lists[0].capacity, 8 * (count <= MOST_FEATURES ? count : 1),
+                sizeof *lists[0].items))
     status = qmat_fail_memory(context, "pieces of the envelope's boundary");
-  for (size_t i = first; i < last && status == QMAT_OK; i++) add_roots(s->features, i, &lists[0]);
+  for (size_t i = 0; count <= MOST_FEATURES && i < count && status == QMAT_OK; i++)
+    add_roots(s->features, i, &lists[0]);
+  if (count > MOST_FEATURES && status == QMAT_OK) lists[0].items[lists[0].count++] = whole_space(s->features);
   for (int level = 0; status == QMAT_OK && lists[level & 1].count > 0; level++) {
     const patch_list *from = &lists[level & 1];
     const double lo = result->either_side.lo;
+    s->lo[0] = lo;
+    s->lo[1] = result->outside.lo;
     s->target[0] = qmat_bound_target(lo, epsilon, tolerance) - rounding;
     s->target[1] = maximum(qmat_bound_target(result->outside.lo, epsilon, tolerance), outside_floor * epsilon);
     s->smallest = smallest_share * minimum(tolerated(lo, epsilon, tolerance), s->target[0] - lo);
-    s->last = result->looks - looks + from->count > MOST_LOOKS;
+    s->last = result->looks + from->count > (count > MOST_FEATURES ? MOST_CELL_LOOKS : MOST_LOOKS);
     if (qmat_grow((void **)&findings, &capacity, from->count, sizeof *findings))
       status = qmat_fail_memory(context, "pieces of the envelope's boundary");
     if (status == QMAT_OK) status = search_level(context, s, from, &lists[1 - (level & 1)], findings, result);
@@ -610,10 +670,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
     status = qmat_fail_memory(context, "the envelope's boundary");
   if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, sample_count, result);
   search s = {.features = &f, .surface = surface, .envelope = envelope};
-  for (size_t first = 0; first < feature_count(&f) && status == QMAT_OK; first += GROUP_SIZE) {
-    const size_t last = first + GROUP_SIZE < feature_count(&f) ? first + GROUP_SIZE : feature_count(&f);
-    status = search_group(context, &s, first, last, epsilon, tolerance, result);
-  }
+  if (status == QMAT_OK) status = search_pieces(context, &s, epsilon, tolerance, result);
   result->either_side = closed_bounds(result->either_side);
   result->outside = closed_bounds(result->outside);
   return status;
