@@ -1,0 +1,94 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Four processes on one cache, killed at random moments: cache_kill_test.sh PROGRAM [ROUNDS, default 100]
+#
+# After every round nothing in the cache may be broken, and nothing may be stuck; at the end a run on what is left is
+# right, and nothing but records and blobs remains.
+qmat=$1
+rounds=${2:-100}
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+QMAT_CACHE=$work/cache
+export QMAT_CACHE
+
+cat >graph.yaml <<'END'
+qmat: 1
+nodes:
+  model:     { type: scene.read, params: { path: box.off } }
+  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
+  samples:   { type: mesh.sample, params: { spacing: 4% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
+  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
+  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
+inputs: { spacing: samples.spacing, model: model.path }
+outputs: { asset: asset.file }
+END
+cat >box.off <<'END'
+OFF
+8 6 0
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+0 0 1
+2 0 1
+2 1 1
+0 1 1
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+END
+
+die() {
+  echo "FAILED in round $round: $*"
+  exit 1
+}
+
+# run NAME SPACING OPTION...
+run() {
+  name=$1
+  spacing=$2
+  shift 2
+  "$qmat" run graph.yaml --set spacing="$spacing" --threads 1 --quiet -o "$name" "$@"
+}
+
+round=0
+for spacing in 4% 5% 6% 7%; do run "right-$spacing.glb" $spacing --no-cache || die "a run without a cache"; done
+
+# Random delays from a counter, so that a failing seed can be run again.
+seed=${QMAT_TEST_SEED:-1}
+delay() {
+  seed=$(((seed * 1103515245 + 12345) % 2147483648))
+  echo "0.0$((seed / 65536 % 90 + 10))"
+}
+
+killed=0
+while [ "$round" -lt "$rounds" ]; do
+  round=$((round + 1))
+  # Every fifth round starts anew, so that there is something to store.
+  if [ $((round % 5)) -eq 1 ]; then rm -rf cache; fi
+  pids=
+  for process in 1 2 3 4; do
+    spacing=$((process % 2 + 4 + round % 2 * 2))% # two of them make the same
+    "$qmat" run graph.yaml --set spacing=$spacing --threads 1 --quiet -o "out-$process.glb" 2>/dev/null &
+    pids="$pids $!"
+  done
+  for pid in $pids; do
+    sleep "$(delay)"
+    kill -KILL "$pid" 2>/dev/null
+    wait "$pid" 2>/dev/null
+    if [ $? -eq 137 ]; then killed=$((killed + 1)); fi
+  done
+  "$qmat" cache verify >said.txt 2>&1 || die "$(cat said.txt)"
+done
+for spacing in 4% 5% 6% 7%; do
+  timeout 60 "$qmat" run graph.yaml --set spacing=$spacing --quiet -o "last-$spacing.glb" || die "a run afterwards"
+  cmp "last-$spacing.glb" "right-$spacing.glb" || die "another result afterwards"
+done
+"$qmat" cache verify >said.txt 2>&1 || die "$(cat said.txt)"
+[ -z "$(ls cache/bad cache/tmp | grep -v ':$')" ] || die "something is left over: $(ls cache/bad cache/tmp)"
+[ "$killed" -gt 0 ] || die "no process was killed"
+echo "$rounds rounds, $killed processes killed"
