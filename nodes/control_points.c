@@ -7,46 +7,87 @@
 
 #include "core/envelope.h"
 #include "core/medial_distance.h"
+#include "core/vector.h"
 #include "nodes/inner_points.h"
 
 enum { FINEST_GRID = 256 };
 
-/* Into how many parts the sides of facet t are divided. */
-static uint32_t grid_of(const double *positions, const uint32_t *corners, double spacing) {
-  double longest = 0;
-  for (int k = 0; k < 3; k++) {
-    const double *a = &positions[3 * (size_t)corners[k]], *b = &positions[3 * (size_t)corners[(k + 1) % 3]];
-    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    longest = fmax(longest, x * x + y * y + z * z);
-  }
-  const double parts = ceil(sqrt(longest) / spacing);
+/* The grid's spacing as a share of epsilon. What happens between is bounded afterwards (nodes/medial_errors.h). */
+static const double spacing_share = 0.4;
+
+/* Into how many parts a length is divided. */
+static uint32_t parts_of(double length, double spacing) {
+  const double parts = ceil(length / spacing);
   return parts < 1 ? 1 : parts > FINEST_GRID ? FINEST_GRID : (uint32_t)parts;
 }
 
-/* Points inside a facet's grid, and on those of its sides that run from a smaller to a larger vertex, so that the facet
- * across has the others. */
-static size_t grid_points(const uint32_t *corners, uint32_t parts) {
-  size_t count = (size_t)(parts - 1) * (parts - 2) / 2;
-  for (int k = 0; k < 3; k++)
-    if (corners[k] < corners[(k + 1) % 3]) count += parts - 1;
-  return parts < 2 ? 0 : count;
+/* A facet's grid: points on those of its sides that run from a smaller to a larger vertex, so that the facet across has
+ * the others, and inside on rows along the longest side. */
+typedef struct {
+  const double *corners[3]; /* the longest side first, from corner 0 to corner 1 */
+  double longest;
+  bool own[3];       /* whether side k, from corner k on, is this facet's to divide */
+  uint32_t parts[3]; /* of the sides */
+  uint32_t rows;
+} grid;
+
+static grid grid_of(const double *positions, const uint32_t *corners, double spacing) {
+  double lengths[3];
+  size_t first = 0;
+  for (size_t k = 0; k < 3; k++) {
+    lengths[k] = qmat_point_distance(&positions[3 * (size_t)corners[k]], &positions[3 * (size_t)corners[(k + 1) % 3]]);
+    if (lengths[k] > lengths[first]) first = k;
+  }
+  grid g = {.longest = lengths[first]};
+  for (size_t k = 0; k < 3; k++) {
+    const size_t side = (first + k) % 3;
+    g.corners[k] = &positions[3 * (size_t)corners[side]];
+    g.own[k] = corners[side] < corners[(side + 1) % 3];
+    g.parts[k] = parts_of(lengths[side], spacing);
+  }
+  double along = 0, square = 0;
+  for (int k = 0; k < 3; k++) {
+    const double side = g.corners[1][k] - g.corners[0][k], across = g.corners[2][k] - g.corners[0][k];
+    along += side * across;
+    square += across * across;
+  }
+  const double foot = g.longest > 0 ? along / g.longest : 0;
+  g.rows = parts_of(sqrt(fmax(square - foot * foot, 0)), spacing);
+  return g;
 }
 
-static void fill_grid(const double *positions, const uint32_t *corners, uint32_t parts, double *points) {
-  const double *p[3];
-  for (int k = 0; k < 3; k++) p[k] = &positions[3 * (size_t)corners[k]];
-  for (uint32_t i = 0; i <= parts; i++)
-    for (uint32_t j = 0; i + j <= parts; j++) {
-      const uint32_t w[3] = {parts - i - j, i, j};
-      const int zeros = (w[0] == 0) + (w[1] == 0) + (w[2] == 0);
-      if (zeros > 1) continue;
-      if (zeros == 1) {
-        const int opposite = w[0] == 0 ? 0 : w[1] == 0 ? 1 : 2;
-        if (corners[(opposite + 1) % 3] > corners[(opposite + 2) % 3]) continue;
-      }
-      for (int d = 0; d < 3; d++) points[d] = (w[0] * p[0][d] + w[1] * p[1][d] + w[2] * p[2][d]) / parts;
-      points += 3;
+static uint32_t parts_of_row(const grid *g, uint32_t row, double spacing) {
+  return parts_of(g->longest * (1 - (double)row / g->rows), spacing);
+}
+
+static size_t grid_points(const grid *g, double spacing) {
+  size_t count = 0;
+  for (int k = 0; k < 3; k++) count += g->own[k] ? g->parts[k] - 1 : 0;
+  for (uint32_t row = 1; row < g->rows; row++) count += parts_of_row(g, row, spacing) - 1;
+  return count;
+}
+
+static double *put_point(const double *const corners[3], double a, double b, double c, double *points) {
+  for (int k = 0; k < 3; k++) points[k] = a * corners[0][k] + b * corners[1][k] + c * corners[2][k];
+  return points + 3;
+}
+
+static void fill_grid(const grid *g, double spacing, double *points) {
+  for (int k = 0; k < 3; k++)
+    for (uint32_t i = 1; g->own[k] && i < g->parts[k]; i++) {
+      double weights[3] = {0, 0, 0};
+      weights[(k + 1) % 3] = (double)i / g->parts[k];
+      weights[k] = 1 - weights[(k + 1) % 3];
+      points = put_point(g->corners, weights[0], weights[1], weights[2], points);
     }
+  for (uint32_t row = 1; row < g->rows; row++) {
+    const double height = (double)row / g->rows;
+    const uint32_t parts = parts_of_row(g, row, spacing);
+    for (uint32_t i = 1; i < parts; i++) {
+      const double along = (1 - height) * i / parts;
+      points = put_point(g->corners, 1 - height - along, along, height, points);
+    }
+  }
 }
 
 /* Which spheres answer for each sample, and which samples lie in each facet besides its corners. */
@@ -119,7 +160,7 @@ static void take_star(const qmat_complex *complex, const double *point, uint32_t
 
 /* A point is content with a sphere that comes this close, as a part of epsilon; else it looks at the primitives around,
  * and when those are farther than the second part it asks the whole medial mesh. */
-static const double content_with_sphere = 0.1, content_with_star = 0.9;
+static const double content_with_sphere = 0.5, content_with_star = 0.9;
 
 /* About a second of looks at single spheres: more far points than that are worth a search structure. */
 static const size_t most_sphere_looks = 1000000000;
@@ -221,26 +262,25 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = 0.25 * epsilon};
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
-  uint32_t *parts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *parts);
   answering a = {.mesh = mesh, .complex = complex};
   qmat_inner_points inner = {.count = 0};
-  if (!starts || !parts) return qmat_fail_memory(context, "control points");
+  if (!starts) return qmat_fail_memory(context, "control points");
   qmat_status status = find_answering(context, samples, medial, &a);
   if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
   if (status != QMAT_OK) return status;
-  for (size_t added = most + 1; added > most; control->spacing *= 1.25) {
-    added = 0;
+  for (;; control->spacing *= 1.25) {
+    size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-      parts[t] = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
       starts[t] = samples->count + added;
-      added += grid_points(&mesh->triangles[3 * t], parts[t]);
+      added += grid_points(&g, control->spacing);
     }
     control->surface_count = samples->count + added + extra->count;
+    if (added <= most) break;
   }
   control->count = control->surface_count + inner.count;
-  control->spacing /= 1.25;
   control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
   control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
   control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
@@ -259,8 +299,9 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const uint32_t *corners = &mesh->triangles[3 * t];
-    const size_t count = grid_points(corners, parts[t]);
-    if (count) fill_grid(positions, corners, parts[t], &control->points[3 * starts[t]]);
+    const grid g = grid_of(positions, corners, control->spacing);
+    const size_t count = grid_points(&g, control->spacing);
+    if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
     for (size_t i = starts[t]; i < starts[t] + count; i++) {
       witness best;
       look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);

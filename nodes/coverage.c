@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/vector.h"
+
 typedef struct qmat_new_witness {
   uint32_t point, vertices[3];
   double weights[3];
@@ -15,6 +17,7 @@ static void link_slot(qmat_coverage *coverage, uint32_t slot, uint32_t vertex) {
   coverage->previous[slot] = QMAT_NONE;
   if (head != QMAT_NONE) coverage->previous[head] = slot;
   coverage->heads[vertex] = slot;
+  coverage->slot_counts[vertex]++;
 }
 
 static void unlink_slot(qmat_coverage *coverage, uint32_t slot, uint32_t vertex) {
@@ -24,11 +27,11 @@ static void unlink_slot(qmat_coverage *coverage, uint32_t slot, uint32_t vertex)
     coverage->next[previous] = next;
   else
     coverage->heads[vertex] = next;
+  coverage->slot_counts[vertex]--;
 }
 
-qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, size_t point_count,
-                               const double *points, double *limits, const uint32_t *witnesses, const double *weights,
-                               size_t vertex_count) {
+qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, size_t point_count, const double *points,
+                               double *limits, const uint32_t *witnesses, const double *weights, size_t vertex_count) {
   *coverage = (qmat_coverage){.point_count = point_count, .points = points, .limits = limits};
   if (point_count >= QMAT_NONE / 3) return qmat_fail_memory(context, "control points");
   coverage->witnesses = qmat_alloc(point_count, 3 * sizeof(uint32_t));
@@ -36,9 +39,10 @@ qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, s
   coverage->next = qmat_alloc(point_count, 3 * sizeof(uint32_t));
   coverage->previous = qmat_alloc(point_count, 3 * sizeof(uint32_t));
   coverage->heads = qmat_alloc(vertex_count, sizeof(uint32_t));
+  coverage->slot_counts = qmat_calloc(vertex_count, sizeof(uint32_t));
   coverage->marks = qmat_calloc(point_count, sizeof(uint32_t));
   if (!coverage->witnesses || !coverage->weights || !coverage->next || !coverage->previous || !coverage->heads ||
-      !coverage->marks)
+      !coverage->slot_counts || !coverage->marks)
     return qmat_fail_memory(context, "control points");
   memcpy(coverage->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
   memcpy(coverage->weights, weights, 3 * point_count * sizeof *weights);
@@ -54,11 +58,11 @@ void qmat_coverage_uninit(qmat_coverage *coverage) {
   qmat_free(coverage->next);
   qmat_free(coverage->previous);
   qmat_free(coverage->heads);
+  qmat_free(coverage->slot_counts);
   qmat_free(coverage->marks);
   qmat_free(coverage->found);
-  qmat_free(coverage->slabs);
-  qmat_free(coverage->cones);
-  qmat_free(coverage->cone_ends);
+  qmat_free(coverage->star.items);
+  qmat_free(coverage->link.items);
   *coverage = (qmat_coverage){0};
 }
 
@@ -77,96 +81,143 @@ static double witness_distance(const qmat_coverage *coverage, const qmat_complex
   return qmat_sphere_distance(s, &coverage->points[3 * point]);
 }
 
-qmat_status qmat_coverage_prepare(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
-                                  const qmat_collapse *collapse, const double sphere[4]) {
-  if (qmat_grow((void **)&coverage->slabs, &coverage->slab_capacity, collapse->triangle_count,
-                sizeof *coverage->slabs) ||
-      qmat_grow((void **)&coverage->cones, &coverage->cone_capacity, collapse->neighbour_count,
-                sizeof *coverage->cones) ||
-      qmat_grow((void **)&coverage->cone_ends, &coverage->cone_end_capacity, collapse->neighbour_count,
-                sizeof *coverage->cone_ends))
+/* A prepared slab or loose cone, and the ball that holds it. */
+typedef struct qmat_star_part {
+  double centre[3], radius;
+  union {
+    qmat_slab slab;
+    qmat_cone cone;
+  };
+  uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
+} star_part;
+
+static qmat_status add_part(qmat_context *context, qmat_star_parts *parts, const double *const spheres[3],
+                            const uint32_t vertices[3]) {
+  if (qmat_grow((void **)&parts->items, &parts->capacity, parts->count + 1, sizeof *parts->items))
     return qmat_fail_memory(context, "the star of a collapse");
-  for (size_t t = 0; t < collapse->triangle_count; t++)
-    qmat_slab_prepare(&coverage->slabs[t], sphere, &complex->spheres[4 * (size_t)collapse->triangle_pairs[2 * t]],
-                      &complex->spheres[4 * (size_t)collapse->triangle_pairs[2 * t + 1]]);
-  coverage->cone_count = 0;
-  for (size_t n = 0; n < collapse->neighbour_count; n++) {
-    bool loose = true;
-    for (size_t i = 0; i < 2 * collapse->triangle_count && loose; i++)
-      loose = collapse->triangle_pairs[i] != collapse->neighbours[n];
-    if (!loose) continue;
-    qmat_cone_prepare(&coverage->cones[coverage->cone_count], sphere,
-                      &complex->spheres[4 * (size_t)collapse->neighbours[n]]);
-    coverage->cone_ends[coverage->cone_count++] = collapse->neighbours[n];
+  star_part *part = &parts->items[parts->count++];
+  const int corners = vertices[2] == QMAT_NONE ? 2 : 3;
+  for (int k = 0; k < 3; k++) {
+    part->vertices[k] = vertices[k];
+    part->centre[k] = 0;
+    for (int c = 0; c < corners; c++) part->centre[k] += spheres[c][k] / corners;
   }
-  coverage->prepared = true;
+  part->radius = 0;
+  for (int c = 0; c < corners; c++)
+    part->radius = qmat_larger(part->radius, qmat_point_distance(part->centre, spheres[c]) + spheres[c][3]);
+  if (corners == 3)
+    qmat_slab_prepare(&part->slab, spheres[0], spheres[1], spheres[2]);
+  else
+    qmat_cone_prepare(&part->cone, spheres[0], spheres[1]);
   return QMAT_OK;
 }
 
-static void set_witness(new_witness *witness, uint32_t a, uint32_t b, uint32_t c, const double *weights, int count) {
-  witness->vertices[0] = a;
-  witness->vertices[1] = b;
-  witness->vertices[2] = c;
-  for (int k = 0; k < 3; k++) witness->weights[k] = k < count ? weights[k] : 0;
+/* Whether no point of the part is as close as `best`: a look at its ball. */
+static inline bool is_farther(const star_part *part, const double *point, double best) {
+  double square = 0;
+  for (int k = 0; k < 3; k++) square += (point[k] - part->centre[k]) * (point[k] - part->centre[k]);
+  const double reach = best + part->radius;
+  return reach < 0 || square > reach * reach;
+}
+
+static double part_foot(const star_part *part, const double *point, double weights[3]) {
+  if (part->vertices[2] != QMAT_NONE) return qmat_slab_foot(&part->slab, point, weights);
+  weights[2] = 0;
+  return qmat_cone_foot(&part->cone, point, weights);
+}
+
+/* Collapses leave the vertices of the link where they are, so that `sphere` stands for both ends of the edge. */
+static const double *corner(const qmat_complex *complex, const qmat_collapse *collapse, const double *sphere,
+                            uint32_t vertex) {
+  return vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
+}
+
+static qmat_status add_simplex(qmat_context *context, qmat_star_parts *parts, const qmat_complex *complex,
+                               const qmat_collapse *collapse, const double *sphere, uint32_t a, uint32_t b,
+                               uint32_t c) {
+  const uint32_t vertices[3] = {a, b, c};
+  const double *spheres[3] = {corner(complex, collapse, sphere, a), corner(complex, collapse, sphere, b), NULL};
+  if (c != QMAT_NONE) spheres[2] = corner(complex, collapse, sphere, c);
+  return add_part(context, parts, spheres, vertices);
+}
+
+qmat_status qmat_coverage_prepare(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                  const qmat_collapse *collapse, const double sphere[4]) {
+  qmat_status status = QMAT_OK;
+  coverage->star.count = coverage->link.count = 0;
+  coverage->link_known = false;
+  for (size_t t = 0; t < collapse->triangle_count && status == QMAT_OK; t++)
+    status = add_simplex(context, &coverage->star, complex, collapse, sphere, collapse->kept,
+                         collapse->triangle_pairs[2 * t], collapse->triangle_pairs[2 * t + 1]);
+  for (size_t n = 0; n < collapse->neighbour_count && status == QMAT_OK; n++) {
+    bool loose = true;
+    for (size_t i = 0; i < 2 * collapse->triangle_count && loose; i++)
+      loose = collapse->triangle_pairs[i] != collapse->neighbours[n];
+    if (loose)
+      status = add_simplex(context, &coverage->star, complex, collapse, sphere, collapse->kept, collapse->neighbours[n],
+                           QMAT_NONE);
+  }
+  coverage->prepared = status == QMAT_OK;
+  return status;
+}
+
+static bool is_touched(const qmat_collapse *collapse, const uint32_t *vertices, int count) {
+  for (int k = 0; k < count; k++)
+    if (vertices[k] == collapse->kept || vertices[k] == collapse->removed) return true;
+  return false;
+}
+
+/* Prepares the primitives of the link's vertices that the collapse does not touch. */
+static qmat_status prepare_link(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                const qmat_collapse *collapse) {
+  qmat_status status = QMAT_OK;
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const uint32_t vertex = collapse->neighbours[n];
+    size_t count;
+    const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
+      if (!is_touched(collapse, t, 3))
+        status = add_simplex(context, &coverage->link, complex, collapse, NULL, t[0], t[1], t[2]);
+    }
+    at = qmat_complex_edges_at(complex, vertex, &count);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
+      if (!complex->edge_triangles[at[i]] && !is_touched(collapse, ends, 2))
+        status = add_simplex(context, &coverage->link, complex, collapse, NULL, ends[0], ends[1], QMAT_NONE);
+    }
+  }
+  coverage->link_known = status == QMAT_OK;
+  return status;
 }
 
 /* The nearest primitive of the merged vertex's star. */
 static double search_star(const qmat_coverage *coverage, const qmat_collapse *collapse, const double sphere[4],
                           const double *point, new_witness *witness) {
-  static const double whole[1] = {1};
   double best = qmat_sphere_distance(sphere, point);
-  set_witness(witness, collapse->kept, QMAT_NONE, QMAT_NONE, whole, 1);
-  for (size_t t = 0; t < collapse->triangle_count; t++) {
+  *witness = (new_witness){witness->point, {collapse->kept, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+  for (size_t i = 0; i < coverage->star.count; i++) {
+    const star_part *part = &coverage->star.items[i];
     double weights[3];
-    const double f = qmat_slab_prepared_distance(&coverage->slabs[t], point);
-    if (!(f < best)) continue;
-    best = qmat_slab_foot(&coverage->slabs[t], point, weights);
-    set_witness(witness, collapse->kept, collapse->triangle_pairs[2 * t], collapse->triangle_pairs[2 * t + 1], weights,
-                3);
-  }
-  for (size_t n = 0; n < coverage->cone_count; n++) {
-    double weights[2];
-    const double f = qmat_cone_foot(&coverage->cones[n], point, weights);
+    if (is_farther(part, point, best)) continue;
+    const double f = part_foot(part, point, weights);
     if (!(f < best)) continue;
     best = f;
-    set_witness(witness, collapse->kept, coverage->cone_ends[n], QMAT_NONE, weights, 2);
+    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->weights, weights, sizeof witness->weights);
   }
   return best;
 }
 
-/* The primitives of the link's vertices that the collapse does not touch, until one is within the limit. */
-static bool search_link(const qmat_complex *complex, const qmat_collapse *collapse, const double *point, double limit,
-                        new_witness *witness) {
-  for (size_t n = 0; n < collapse->neighbour_count; n++) {
-    const uint32_t vertex = collapse->neighbours[n];
-    size_t count;
-    const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
-    for (size_t i = 0; i < count; i++) {
-      const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
-      bool touched = false;
-      for (int k = 0; k < 3; k++) touched = touched || t[k] == collapse->kept || t[k] == collapse->removed;
-      if (touched) continue;
-      qmat_slab slab;
-      double weights[3];
-      qmat_slab_prepare(&slab, &complex->spheres[4 * (size_t)t[0]], &complex->spheres[4 * (size_t)t[1]],
-                        &complex->spheres[4 * (size_t)t[2]]);
-      if (qmat_slab_foot(&slab, point, weights) > limit) continue;
-      set_witness(witness, t[0], t[1], t[2], weights, 3);
-      return true;
-    }
-    at = qmat_complex_edges_at(complex, vertex, &count);
-    for (size_t i = 0; i < count; i++) {
-      if (complex->edge_triangles[at[i]]) continue;
-      const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
-      const uint32_t other = qmat_complex_other_end(complex, at[i], vertex);
-      if (other == collapse->kept || other == collapse->removed) continue;
-      qmat_cone cone;
-      double weights[2];
-      qmat_cone_prepare(&cone, &complex->spheres[4 * (size_t)ends[0]], &complex->spheres[4 * (size_t)ends[1]]);
-      if (qmat_cone_foot(&cone, point, weights) > limit) continue;
-      set_witness(witness, ends[0], ends[1], QMAT_NONE, weights, 2);
-      return true;
-    }
+/* Looks in the link until a primitive is within the limit. */
+static bool search_link(const qmat_coverage *coverage, const double *point, double limit, new_witness *witness) {
+  for (size_t i = 0; i < coverage->link.count; i++) {
+    const star_part *part = &coverage->link.items[i];
+    double weights[3];
+    if (is_farther(part, point, limit) || part_foot(part, point, weights) > limit) continue;
+    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->weights, weights, sizeof witness->weights);
+    return true;
   }
   return false;
 }
@@ -187,8 +238,15 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
   new_witness *witness = &coverage->found[coverage->found_count];
   witness->point = point;
   const double *p = &coverage->points[3 * (size_t)point];
-  if (search_star(coverage, collapse, sphere, p, witness) <= limit ||
-      search_link(complex, collapse, p, limit, witness)) {
+  if (search_star(coverage, collapse, sphere, p, witness) <= limit) {
+    coverage->found_count++;
+    return QMAT_OK;
+  }
+  if (!coverage->link_known) {
+    const qmat_status status = prepare_link(context, coverage, complex, collapse);
+    if (status != QMAT_OK) return status;
+  }
+  if (search_link(coverage, p, limit, witness)) {
     coverage->found_count++;
     return QMAT_OK;
   }
@@ -200,7 +258,7 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
 double qmat_coverage_star_foot(const qmat_coverage *coverage, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double sphere[4], const double point[3],
                                double foot[4], double *share) {
-  new_witness witness;
+  new_witness witness = {.point = QMAT_NONE};
   const double distance = search_star(coverage, collapse, sphere, point, &witness);
   *share = witness.weights[0];
   for (int i = 0; i < 4; i++) foot[i] = witness.weights[0] * sphere[i];
@@ -275,7 +333,9 @@ static void merge_lists(qmat_coverage *coverage, uint32_t kept, uint32_t removed
     if (coverage->heads[kept] != QMAT_NONE) coverage->previous[coverage->heads[kept]] = tail;
     coverage->heads[kept] = coverage->heads[removed];
   }
+  coverage->slot_counts[kept] += coverage->slot_counts[removed];
   coverage->heads[removed] = QMAT_NONE;
+  coverage->slot_counts[removed] = 0;
 }
 
 void qmat_coverage_commit(qmat_coverage *coverage, const qmat_collapse *collapse) {

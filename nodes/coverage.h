@@ -5,6 +5,12 @@
 #include "core/medial_complex.h"
 #include "core/medial_distance.h"
 
+/* A growing list of prepared primitives. */
+typedef struct qmat_star_parts {
+  struct qmat_star_part *items;
+  size_t count, capacity;
+} qmat_star_parts;
+
 /* Holds the distance from the surface to the envelope while a medial mesh is simplified (eq. 9-12, with the signed F).
  *
  * Each control point on the surface has a witness: a point of the medial complex, as weights on one live simplex, whose
@@ -13,32 +19,28 @@
  * primitives around searched for another. The points that a vertex's witnesses serve are its responsible region. */
 typedef struct qmat_coverage {
   size_t point_count;
-  const double *points;  /* 3 per point */
-  double *limits;        /* per point: what F may reach there */
-  uint32_t *witnesses;   /* 3 per point: live vertices, QMAT_NONE where fewer */
-  double *weights;       /* 3 per point; sum 1 */
+  const double *points;      /* 3 per point */
+  double *limits;            /* per point: what F may reach there */
+  uint32_t *witnesses;       /* 3 per point: live vertices, QMAT_NONE where fewer */
+  double *weights;           /* 3 per point; sum 1 */
   uint32_t *next, *previous; /* per witness slot (3 * point + k): the list of its vertex */
-  uint32_t *heads;       /* per vertex: its first slot, or QMAT_NONE */
-  uint32_t *marks, stamp; /* per point */
+  uint32_t *heads;           /* per vertex: its first slot, or QMAT_NONE */
+  uint32_t *slot_counts;     /* per vertex */
+  uint32_t *marks, stamp;    /* per point */
   /* Witnesses found by the newest test, taken over by a commit. */
   struct qmat_new_witness *found;
   size_t found_count, found_capacity;
-  /* The primitives of the merged vertex's star, prepared when first needed. */
-  qmat_slab *slabs;
-  size_t slab_capacity;
-  qmat_cone *cones;
-  uint32_t *cone_ends;
-  size_t cone_count, cone_capacity, cone_end_capacity;
-  bool prepared;
+  /* The primitives of the merged vertex's star, prepared when first needed, and those of the link's vertices. */
+  qmat_star_parts star, link;
+  bool prepared, link_known;
   uint32_t failed_point; /* why the newest test failed */
 } qmat_coverage;
 
 /* Starts with the given control points; the arrays `points` and `limits` stay the caller's, `witnesses` and `weights`
  * (3 per point) are copied. `vertex_count` is the complex's. QMAT_ERROR_MEMORY. Free with qmat_coverage_uninit, also
  * after a failure. */
-qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, size_t point_count,
-                               const double *points, double *limits, const uint32_t *witnesses, const double *weights,
-                               size_t vertex_count);
+qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, size_t point_count, const double *points,
+                               double *limits, const uint32_t *witnesses, const double *weights, size_t vertex_count);
 void qmat_coverage_uninit(qmat_coverage *coverage);
 
 /* Whether every control point keeps within its limit when `collapse` makes `sphere` (4 doubles) of its edge. `first` is

@@ -21,25 +21,19 @@ static bool is_first_slot(const qmat_coverage *coverage, const qmat_collapse *co
   return true;
 }
 
-static size_t walk(const qmat_coverage *coverage, const qmat_collapse *collapse, size_t surface_count, size_t stride,
-                   uint32_t *points) {
-  const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  size_t count = 0, stored = 0;
-  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot]) {
-      if (slot / 3 >= surface_count || !is_first_slot(coverage, collapse, slot)) continue;
-      if (points && count % stride == 0) points[stored++] = slot / 3;
-      count++;
-    }
-  return points ? stored : count;
-}
-
 qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_coverage *coverage,
                                    const qmat_collapse *collapse, size_t surface_count) {
   if (qmat_grow((void **)&fit->points, &fit->capacity, MOST_POINTS, sizeof *fit->points))
     return qmat_fail_memory(context, "the fit of a sphere");
-  const size_t all = walk(coverage, collapse, surface_count, 1, NULL);
-  fit->count = walk(coverage, collapse, surface_count, (all + MOST_POINTS - 1) / MOST_POINTS, fit->points);
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  size_t slots = 0, at = 0;
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += coverage->slot_counts[ends[e]];
+  const size_t stride = (slots + MOST_POINTS - 1) / MOST_POINTS;
+  fit->count = 0;
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot], at++)
+      if (at % stride == 0 && slot / 3 < surface_count && is_first_slot(coverage, collapse, slot))
+        fit->points[fit->count++] = slot / 3;
   return QMAT_OK;
 }
 
