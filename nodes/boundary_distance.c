@@ -579,7 +579,7 @@ static void add_roots(const features *f, size_t feature, patch_list *list) {
 static qmat_status search_level(qmat_context *context, const search *s, const patch_list *from, patch_list *to,
                                 finding *findings, qmat_boundary_distance *result) {
   const int threads = qmat_threads(context);
-  const size_t slice = 1 << 15;
+  const size_t slice = 1 << 13;
   for (size_t first = 0; first < from->count; first += slice) {
     const qmat_status status = qmat_progress(context, first, from->count, "pieces of the envelope");
     if (status != QMAT_OK) return status;
@@ -645,7 +645,7 @@ static qmat_status search_pieces(qmat_context *context, search *s, double epsilo
     s->target[0] = qmat_bound_target(lo, epsilon, tolerance) - rounding;
     s->target[1] = maximum(qmat_bound_target(result->outside.lo, epsilon, tolerance), outside_floor * epsilon);
     s->smallest = smallest_share * minimum(tolerated(lo, epsilon, tolerance), s->target[0] - lo);
-    s->last = result->looks + from->count > (count > MOST_FEATURES ? MOST_CELL_LOOKS : MOST_LOOKS);
+    s->last = result->looks + 4 * from->count > (count > MOST_FEATURES ? MOST_CELL_LOOKS : MOST_LOOKS);
     if (qmat_grow((void **)&findings, &capacity, from->count, sizeof *findings))
       status = qmat_fail_memory(context, "pieces of the envelope's boundary");
     if (status == QMAT_OK) status = search_level(context, s, from, &lists[1 - (level & 1)], findings, result);

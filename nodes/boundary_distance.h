@@ -26,9 +26,10 @@ typedef struct qmat_boundary_distance {
  * the slabs, and those on the boundary asked. Then branch and bound over pieces of these same: the distance to the
  * surface is 1-Lipschitz, so it is at most `reach` above that at a piece's middle. A piece that lies deeper than
  * QMAT_BOUNDARY_SKIN within the envelope is no part of the boundary: within a neighbour whose support is larger
- * along all of its normals, or within a primitive that holds its middle deeper than its reach. Pieces are taken level
- * by level, and all of a level are compared with the one `lo` of the levels before, so that the answer does not depend
- * on threads.
+ * along all of its normals, or within a primitive that holds its middle deeper than its reach. Of a medial mesh of more
+ * than 10,000 features cells of space are searched instead, of which those that may meet the boundary count. Pieces are
+ * taken level by level, and all of a level are compared with the one `lo` of the levels before, so that the answer does
+ * not depend on threads.
  *
  * hi - lo is at most `tolerance` (a share of `epsilon` or of lo, the larger), and less where that decides whether hi is
  * at most `epsilon`; `outside` is not told from a quarter of epsilon below that. Where two primitives meet so
