@@ -25,7 +25,8 @@ typedef enum element {
   ELEMENT_BOOL = 6, /* bool, one byte 0 or 1 */
   ELEMENT_ENUM = 7, /* an enum, as u32 */
   ELEMENT_SIZE = 8, /* size_t that is no row's count, as u64 */
-  ELEMENT_PARTS = 9 /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
+  ELEMENT_PARTS = 9, /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
+  ELEMENT_NUMBER = 10 /* one double */
 } element;
 
 typedef struct row {
@@ -43,7 +44,8 @@ typedef struct row {
 #define END \
   { NULL, ELEMENT_U32, 0, 0, 0 }
 
-static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT), SCALAR(qmat_scene, format, TEXT), END};
+static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT), SCALAR(qmat_scene, format, TEXT),
+                                 SCALAR(qmat_scene, meters_per_unit, NUMBER), SCALAR(qmat_scene, is_z_up, BOOL), END};
 static const row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),
                                 ARRAY(qmat_mesh, triangles, U32, triangle_count, 3), SCALAR(qmat_mesh, closed, BOOL),
                                 SCALAR(qmat_mesh, oriented, BOOL), END};
@@ -338,6 +340,9 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
     case ELEMENT_SIZE:
       put_u64(to, *(const size_t *)place);
       return true;
+    case ELEMENT_NUMBER:
+      put_array(to, ELEMENT_F64, place, 1);
+      return true;
     case ELEMENT_PARTS: {
       const qmat_file_part *parts = pointer_of(value, r);
       const size_t count = count_of(value, r);
@@ -512,6 +517,9 @@ static qmat_status check_utf8(qmat_context *context, const char *text, const cha
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   const qmat_scene *scene = (const qmat_scene *)value;
   const qmat_status status = check_utf8(context, scene->name, "name of the scene");
+  if (status == QMAT_OK && !(scene->meters_per_unit >= 0 && isfinite(scene->meters_per_unit))) {
+    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the unit of the scene is no length");
+  }
   return status != QMAT_OK ? status : check_utf8(context, scene->format, "format of the scene");
 }
 
@@ -935,6 +943,10 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
     case ELEMENT_SIZE:
       if (!take_u64(from, &large) || large > SIZE_MAX) return fail_form(context, from, "a count is cut short");
       *(size_t *)mutable_slot(value, r->offset) = (size_t)large;
+      return QMAT_OK;
+    case ELEMENT_NUMBER:
+      if (!take_u64(from, &large)) return fail_form(context, from, "a number is cut short");
+      memcpy(mutable_slot(value, r->offset), &large, sizeof large);
       return QMAT_OK;
   }
   return fail_form(context, from, "a row is of an unknown kind");

@@ -39,7 +39,9 @@ typedef struct qmat_value {
 typedef struct qmat_scene {
   qmat_value base;
   char *name;   /* NUL-terminated UTF-8: the file's base name without its ending */
-  char *format; /* "off", "obj", "ply", "stl", "gltf", "glb", "ma" */
+  char *format; /* "off", "obj", "ply", "stl", "gltf", "glb", "ma", "usd" */
+  double meters_per_unit; /* of the model's unit of length; 0: not known */
+  bool is_z_up;           /* else y is up, or it is not known */
 } qmat_scene;
 
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. */
@@ -118,7 +120,7 @@ typedef struct qmat_file_part {
 
 typedef struct qmat_file {
   qmat_value base;
-  char *format; /* "glb", "gltf", "ma", "ply" */
+  char *format; /* "glb", "gltf", "ma", "ply", "usda", "usdz" */
   size_t part_count;
   qmat_file_part *parts;
 } qmat_file;

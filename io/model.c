@@ -169,6 +169,16 @@ static qmat_scene *make_scene(const char *path, qmat_format format) {
   return NULL;
 }
 
+/* Takes over what the reader found out about the unit of length. */
+static void set_units(qmat_scene *scene, qmat_format format, const json_t *report) {
+  if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) scene->meters_per_unit = 1;
+  if (format != QMAT_FORMAT_USD) return;
+  const double unit = json_real_value(json_object_get(report, "meters_per_unit"));
+  const char *up = json_string_value(json_object_get(report, "up_axis"));
+  scene->meters_per_unit = unit > 0 ? unit : 0;
+  scene->is_z_up = up && up[0] == 'Z';
+}
+
 qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
                             qmat_scene **scene, qmat_mesh **mesh, qmat_report **report) {
   *scene = NULL;
@@ -195,6 +205,7 @@ qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_
   qmat_bytes_uninit(&bytes);
   if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made_mesh, made_report->root);
   qmat_soup_uninit(&soup);
+  if (status == QMAT_OK) set_units(made_scene, format, made_report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_scene->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_report->base);
 

@@ -29,7 +29,7 @@ static const qmat_param params[] = {
 enum { SCENE, MESH, REPORT };
 
 static const qmat_port outputs[] = {
-    [SCENE] = {.name = "scene", .type = QMAT_SCENE, .doc = "The model's name and format"},
+    [SCENE] = {.name = "scene", .type = QMAT_SCENE, .doc = "The model's name, format and unit"},
     [MESH] = {.name = "mesh", .type = QMAT_MESH, .doc = "Its surface as triangles"},
     [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "What was read and what was done to it"},
     {0}};
@@ -54,7 +54,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 1,
+    .version = 2,
     .summary = "Reads a 3D model as one triangle mesh",
     .doc =
         "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "

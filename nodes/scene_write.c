@@ -6,13 +6,14 @@
 #include "io/gltf_write.h"
 #include "io/ma.h"
 #include "io/mesh_formats.h"
+#include "io/usd_write.h"
 #include "nodes/libraries.h"
 
 /* Quantisation spends this part of epsilon at most; without a report epsilon is taken for this part of the diagonal. */
 #define PART_OF_EPSILON 0.05
 #define USUAL_EPSILON 1e-3
 
-typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY } file_format;
+typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMAT_USDA, FORMAT_USDZ } file_format;
 
 typedef struct scene_write_params {
   int format; /* a file_format */
@@ -43,12 +44,17 @@ static double reported(const qmat_report *report, const char *key) {
   return json_is_number(value) ? json_number_value(value) : NAN;
 }
 
+static qmat_certificate certificate_of(const qmat_report *report) {
+  const json_t *certified = report ? json_object_get(report->root, "certified") : NULL;
+  if (!json_is_boolean(certified)) return QMAT_CERTIFICATE_UNKNOWN;
+  return json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
+}
+
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
   const qmat_medial *medial = (const qmat_medial *)inputs[IN_MEDIAL];
   const qmat_report *report = (const qmat_report *)inputs[IN_REPORT];
-  const json_t *certified = report ? json_object_get(report->root, "certified") : NULL;
   double epsilon = reported(report, "epsilon");
   qmat_gltf_options options = {
       .binary = params->format == FORMAT_GLB,
@@ -60,11 +66,27 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
       .epsilon = epsilon,
       .error_out = reported(report, "surface_to_envelope"),
       .error_in = reported(report, "envelope_to_surface"),
+      .certified = certificate_of(report),
   };
-  if (json_is_boolean(certified)) {
-    options.certified = json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
-  }
   return qmat_gltf_write(context, medial, (const qmat_mesh *)inputs[IN_SKIN], &options, file);
+}
+
+static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
+                             qmat_file **file) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  const qmat_report *report = (const qmat_report *)inputs[IN_REPORT];
+  const qmat_usd_options options = {
+      .package = params->format == FORMAT_USDZ,
+      .name = scene ? scene->name : NULL,
+      .meters_per_unit = scene ? scene->meters_per_unit : 0,
+      .is_z_up = scene && scene->is_z_up,
+      .epsilon = reported(report, "epsilon"),
+      .error_out = reported(report, "surface_to_envelope"),
+      .error_in = reported(report, "envelope_to_surface"),
+      .certified = certificate_of(report),
+  };
+  return qmat_usd_write(context, (const qmat_medial *)inputs[IN_MEDIAL], (const qmat_mesh *)inputs[IN_SKIN], &options,
+                        file);
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -84,6 +106,10 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
     case FORMAT_PLY:
       status = qmat_ply_write_medial(context, medial, &file);
       break;
+    case FORMAT_USDA:
+    case FORMAT_USDZ:
+      status = write_usd(context, params, inputs, &file);
+      break;
     default:
       status = write_gltf(context, params, inputs, &file);
       break;
@@ -92,7 +118,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   return status;
 }
 
-static const char *const formats[] = {"glb", "gltf", "ma", "ply", NULL};
+static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", NULL};
 
 static const qmat_param params[] = {
     {.name = "format",
@@ -126,9 +152,9 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "scene", .type = QMAT_SCENE, .optional = true, .doc = "Where the model came from: names the node"},
+    {.name = "scene", .type = QMAT_SCENE, .optional = true, .doc = "Where the model came from: names the node; its unit (usda and usdz)"},
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh"},
-    {.name = "skin", .type = QMAT_MESH, .optional = true, .doc = "The surface that viewers show (glb and gltf)"},
+    {.name = "skin", .type = QMAT_MESH, .optional = true, .doc = "The surface that viewers show (not ma and ply)"},
     {.name = "report", .type = QMAT_REPORT, .optional = true, .doc = "From medial.evaluate or medial.simplify: epsilon and the errors"},
     {0},
 };
@@ -152,8 +178,10 @@ const qmat_node qmat_node_scene_write = {
         "bits given, quantisation moves the solid by at most 5 % of the report's epsilon, or of 0.1 % of the diagonal "
         "without a report; the measured move is in the extras as qmat_quantisation, in model units. The report's "
         "epsilon, surface_to_envelope, envelope_to_surface and certified go into the extras as they are: "
-        "qmat_epsilon, qmat_error_out and qmat_error_in are fractions of the diagonal, before quantisation. ma and ply "
-        "hold the medial mesh alone, unquantised: draco and the bits do not apply to them.",
+        "qmat_epsilon, qmat_error_out and qmat_error_in are fractions of the diagonal, before quantisation. usda and "
+        "usdz hold the skin as a Mesh, and as guides the spheres as Points, the edges as BasisCurves and the triangles "
+        "as a Mesh, all with primvars:radius in single precision, and the same facts in the prim's customData. ma and "
+        "ply hold the medial mesh alone, unquantised. draco and the bits apply to glb and gltf only.",
     .citation = "",
     .params_size = sizeof(scene_write_params),
     .params = params,

@@ -97,6 +97,33 @@ static void test_a_name_that_is_not_utf8_becomes_valid_utf8(void **state) {
                "\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD");
 }
 
+static void test_a_scene_knows_its_unit_where_the_format_has_one(void **state) {
+  (void)state;
+  static const char usda[] =
+      "#usda 1.0\n(metersPerUnit = 0.01 upAxis = \"Z\")\ndef Mesh \"m\" { point3f[] points = [(0, 0, 0), (1, 0, 0), "
+      "(0, "
+      "1, 0)] int[] faceVertexCounts = [3] int[] faceVertexIndices = [0, 1, 2] }";
+  static const struct {
+    const char *name, *content;
+    double unit;
+    bool z_up;
+  } cases[] = {{"a.off", off, 0, false}, {"a.gltf", gltf, 1, false}, {"a.usda", usda, 0.01, true}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    qmat_context context = {0};
+    qmat_scene *scene;
+    qmat_mesh *mesh;
+    qmat_report *report;
+    assert_int_equal(
+        read_as(&context, cases[i].name, cases[i].content, strlen(cases[i].content), &scene, &mesh, &report), QMAT_OK);
+    assert_true(scene->meters_per_unit == cases[i].unit);
+    assert_int_equal(scene->is_z_up, cases[i].z_up);
+    qmat_value_release(&scene->base);
+    qmat_value_release(&mesh->base);
+    qmat_value_release(&report->base);
+    qmat_context_uninit(&context);
+  }
+}
+
 static void assert_not_read(const char *name, const void *content, size_t size, qmat_status expected,
                             const char *message, const char *hint) {
   qmat_context context = {0};
@@ -273,6 +300,7 @@ int main(void) {
       cmocka_unit_test(test_the_bytes_decide_where_the_ending_says_nothing),
       cmocka_unit_test(test_the_ending_decides_where_the_bytes_say_nothing),
       cmocka_unit_test(test_a_name_that_is_not_utf8_becomes_valid_utf8),
+      cmocka_unit_test(test_a_scene_knows_its_unit_where_the_format_has_one),
       cmocka_unit_test(test_a_wrong_ending_is_an_error_that_says_what_the_file_holds),
       cmocka_unit_test(test_what_is_not_read_is_refused_by_name),
       cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),

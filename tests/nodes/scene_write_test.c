@@ -197,8 +197,8 @@ static void test_scene_and_skin_name_and_show_the_node(void **state) {
 static void test_each_format_is_made(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
-  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"}, {"ma", "3 1 0"}, {"ply", "ply"}};
-  for (size_t i = 0; i < 4; i++) {
+  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"}, {"ma", "3 1 0"}, {"ply", "ply"}, {"usda", "#usda 1.0\n"}, {"usdz", "PK\3\4"}};
+  for (size_t i = 0; i < 6; i++) {
     const char *const settings[][2] = {{"format", formats[i][0]}, {NULL, NULL}};
     qmat_file *file = must_write(medial, (wiring){0}, settings);
     assert_string_equal(file->format, formats[i][0]);
@@ -232,10 +232,10 @@ static void test_ma_keeps_every_number(void **state) {
 static void test_compression_does_not_apply_to_formats_that_have_none(void **state) {
   (void)state;
   static const char *const fields[][2] = {{"draco", "true"}, {"position_bits", "8"}, {"radius_bits", "8"}};
-  static const char *const formats[] = {"ma", "ply"};
+  static const char *const formats[] = {"ma", "ply", "usda", "usdz"};
   qmat_medial *medial = make_medial();
-  for (size_t i = 0; i < 6; i++) {
-    const char *const *field = fields[i / 2], *format = formats[i % 2];
+  for (size_t i = 0; i < 12; i++) {
+    const char *const *field = fields[i / 4], *format = formats[i % 4];
     qmat_file *with = must_write(medial, (wiring){0},
                                  (const char *const[][2]){{"format", format}, {field[0], field[1]}, {NULL, NULL}});
     qmat_file *without = must_write(medial, (wiring){0}, (const char *const[][2]){{"format", format}, {NULL, NULL}});
