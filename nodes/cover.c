@@ -6,6 +6,9 @@
 
 #include "core/medial_distance.h"
 
+/* Pieces are not split beyond what rounding leaves of F. */
+static const double least_tolerance = 1e-6;
+
 typedef struct facet_search {
   const qmat_envelope *envelope;
   const double *spheres;
@@ -93,7 +96,7 @@ qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surfac
     for (size_t t = first; t < last; t++) {
       facet_search search = {.envelope = envelope,
                              .spheres = spheres,
-                             .tolerance = tolerance,
+                             .tolerance = fmax(tolerance, least_tolerance),
                              .found = known,
                              .bound = -INFINITY,
                              .worst = -INFINITY};
