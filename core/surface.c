@@ -9,8 +9,7 @@
 #include <string.h>
 
 /* Embree stores single precision. In the unit frame coordinates are at most 1/2 and rays at most about 2 long, so that
- * its hits are within a few 1e-7 of the triangle's plane; everything within TIE of the nearest hit is looked at again
- * in double. */
+ * its hits are within a few 1e-7 of the triangle's plane; TIE is well above that. */
 #define TIE 4e-6
 /* How far along the ray the double precision hit may be from the single precision one. */
 #define LONGEST_CORRECTION 1e-4
@@ -114,7 +113,9 @@ static void see_hit(const struct RTCFilterFunctionNArguments *args) {
   args->valid[0] = 0;
   if (query->kind == NEAREST_HIT) {
     const uint32_t triangle = hit->primID;
-    const double distance = refine_hit(surface, query, triangle, query->offset + (double)ray->tfar);
+    const double found = query->offset + (double)ray->tfar;
+    if (found > query->distance + LONGEST_CORRECTION) return;
+    const double distance = refine_hit(surface, query, triangle, found);
     if (distance > query->start &&
         (distance < query->distance || (distance == query->distance && triangle < query->triangle))) {
       query->distance = distance;
@@ -145,16 +146,6 @@ static void set_ray(struct RTCRay *ray, const double origin[3], const double dir
   ray->flags = 0;
 }
 
-/* Looks at all hits between `near` and `far` of the single precision ray; true when one of them is beyond start. */
-static bool nearest_between(const qmat_surface *surface, query_context *query, double near, double far) {
-  struct RTCRay ray;
-  query->distance = INFINITY;
-  query->triangle = UINT32_MAX;
-  set_ray(&ray, query->origin, query->direction, query->offset, (float)near, (float)far);
-  rtcOccluded1(surface->scene, &query->base, &ray);
-  return query->triangle != UINT32_MAX;
-}
-
 bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], const double direction[3], double start,
                        double *distance, uint32_t *triangle, double *normal) {
   query_context query;
@@ -170,20 +161,13 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   if (foot - 1 > query.offset) query.offset = foot - 1;
   if (!(foot + 1 > query.offset)) return false;
 
-  /* What lies right at the start is found by its double precision distance alone. */
-  bool found = nearest_between(surface, &query, 0, 3 * TIE) && query.distance - query.offset <= 2 * TIE;
-  for (double near = 1.5 * TIE; !found;) {
-    struct RTCRayHit hit;
-    set_ray(&hit.ray, origin, direction, query.offset, (float)near, INFINITY);
-    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    hit.hit.primID = RTC_INVALID_GEOMETRY_ID;
-    hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(surface->scene, &query.base, &hit);
-    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    const double nearest = (double)hit.ray.tfar;
-    found = nearest_between(surface, &query, fmax(near, nearest - TIE), nearest + TIE);
-    near = nearest + TIE; /* all that was there lies before `start` in double */
-  }
+  /* All hits in one go: a look at the nearest one first, and at its equals after, takes longer. */
+  struct RTCRay ray;
+  query.distance = INFINITY;
+  query.triangle = UINT32_MAX;
+  set_ray(&ray, origin, direction, query.offset, 0, INFINITY);
+  rtcOccluded1(surface->scene, &query.base, &ray);
+  if (query.triangle == UINT32_MAX) return false;
   if (distance != NULL) *distance = query.distance;
   if (triangle != NULL) *triangle = query.triangle;
   if (normal != NULL) {
