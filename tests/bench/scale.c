@@ -161,7 +161,8 @@ static double seconds_of(struct timeval time) {
 static int run_qmat(const char *qmat, const char *model, const char *asset, const char *report, struct rusage *usage) {
   const pid_t child = fork();
   if (child == 0) {
-    execl(qmat, qmat, "mat", model, "-o", asset, "--report", report, "--quiet", "--progress", "off", (char *)NULL);
+    execl(qmat, qmat, "mat", model, "-o", asset, "--report", report, "--no-cache", "--quiet", "--progress", "off",
+          (char *)NULL);
     complain(qmat, strerror(errno));
     _exit(127);
   }
