@@ -54,9 +54,9 @@ QMAT_API void qmat_text_free(char *text);
 
 /* ---- making a job ---- */
 
-/* A job of the built-in graph, graphs/qmat_plus.yaml: nodes model, thickness, samples, initial, simple, skin, asset;
- * inputs model, epsilon, vertices; output asset. `*job` is NULL only when memory is short; after any other failure it
- * holds the error. Free it with qmat_job_free. */
+/* A job of the built-in graph, graphs/qmat_plus.yaml: nodes model, thickness, samples, initial, simple, errors, skin,
+ * asset; inputs model, epsilon, vertices; output asset. `*job` is NULL only when memory is short; after any other
+ * failure it holds the error. Free it with qmat_job_free. */
 QMAT_API qmat_result qmat_job_new(qmat_job **job);
 /* The same of a graph file; its relative paths are relative to its folder. */
 QMAT_API qmat_result qmat_job_new_from_file(qmat_job **job, const char *path);

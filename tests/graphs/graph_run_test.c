@@ -391,6 +391,33 @@ static void test_the_report_tells_every_node_file_and_the_summary(void **state) 
   json_decref(report);
 }
 
+static void test_the_summary_tells_what_is_certified(void **state) {
+  (void)state;
+  static const struct {
+    bool certified, estimate;
+    double epsilon;
+    const char *end;
+  } cases[] = {{true, false, 0.01, " from the surface (certified)."},
+               {false, false, 0.01, " from the surface (not certified)."},
+               {false, true, 0.01, " from the surface (an estimate: the surface is not closed)."},
+               {false, false, 0, "0.5 % from the surface."}};
+  const qmat_run run = {.name = "x"};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char text[512];
+    const qmat_run_summary summary = {.spheres = 2,
+                                      .triangles = 4,
+                                      .epsilon = cases[i].epsilon,
+                                      .surface_to_envelope = 0.004,
+                                      .envelope_to_surface = 0.005,
+                                      .evaluated = true,
+                                      .certified = cases[i].certified,
+                                      .estimate = cases[i].estimate};
+    qmat_summary_format(&run, &summary, text, sizeof text);
+    assert_non_null(strstr(text, "farther than 0.4 % of the diagonal from the envelope, and no point of its boundary"));
+    assert_string_equal(text + strlen(text) - strlen(cases[i].end), cases[i].end);
+  }
+}
+
 static void test_two_runs_give_the_same_digests(void **state) {
   fixture *f = *state;
   read_graph(f, ball_graph);
@@ -456,6 +483,7 @@ int main(void) {
       TEST(test_rules_between_parameters_are_checked_before_the_run),
       TEST(test_given_values_replace_a_node),
       TEST(test_the_report_tells_every_node_file_and_the_summary),
+      TEST(test_the_summary_tells_what_is_certified),
       TEST(test_two_runs_give_the_same_digests),
       TEST(test_counts_sizes_and_bounds_are_written_for_people),
   };
