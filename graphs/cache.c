@@ -165,14 +165,30 @@ qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *opt
     return qmat_fail_at(context, options->folder, 0, 0);
   }
   if (stat(options->folder, &about) == 0 && access(options->folder, W_OK) != 0) cache->read_only = true;
-  return QMAT_OK;
+  if (!options->remote) return QMAT_OK;
+  if (strncmp(options->remote, "http://", 7) != 0 && strncmp(options->remote, "https://", 8) != 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "a remote cache is at http://... or https://..., not '%.200s'",
+              options->remote);
+    return QMAT_ERROR_USAGE;
+  }
+  cache->remote = qmat_remote_open(options->remote, options->read_only || options->remote_read_only);
+  return cache->remote ? QMAT_OK : qmat_fail_memory(context, "remote cache");
 }
 
 void qmat_cache_close(qmat_cache *cache) {
   if (cache->stored > 0) qmat_cache_collect(cache, cache->most_size, false);
+  qmat_remote_close(cache->remote);
   qmat_free(cache->folder);
   qmat_free(cache->bad);
   *cache = (qmat_cache){0};
+}
+
+bool qmat_cache_is_writable(const qmat_cache *cache) {
+  return !cache->read_only || qmat_remote_is_writable(cache->remote);
+}
+
+const char *qmat_cache_warning(const qmat_cache *cache) {
+  return *cache->warning || !cache->remote ? cache->warning : qmat_remote_warning(cache->remote);
 }
 
 char *qmat_cache_default_folder(void) {
@@ -226,6 +242,35 @@ static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest
   return NULL;
 }
 
+// Stores bytes in the folder.
+static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
+                       size_t size) {
+  char *path = path_of_digest(cache, kind, digest);
+  bool kept = path && make_ready(cache) && place_file(cache, path, bytes, size);
+  qmat_free(path);
+  return kept;
+}
+
+static void warn_of_lie(qmat_cache *cache, const char *what) {
+  if (!*cache->warning)
+    snprintf(cache->warning, sizeof cache->warning, "the remote cache has %s that is not what its name says", what);
+}
+
+static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
+  const uint64_t most_size = (uint64_t)1 << 24;
+  qmat_writer body = {0};
+  json_t *record = NULL;
+  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_RECORD], key, most_size, &body)) {
+    record = parse_record(body.bytes, body.size, key);
+    if (record)
+      keep_bytes(cache, QMAT_CACHE_RECORD, key, body.bytes, body.size);
+    else
+      warn_of_lie(cache, "a record");
+  }
+  qmat_writer_uninit(&body);
+  return record;
+}
+
 json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
   qmat_bytes bytes = {0};
   char *path = path_of_digest(cache, QMAT_CACHE_RECORD, key);
@@ -236,10 +281,10 @@ json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
   }
   qmat_bytes_uninit(&bytes);
   qmat_free(path);
-  return record;
+  return record ? record : remote_record(cache, key);
 }
 
-bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
+static bool has_locally(const qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
   struct stat about;
   char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   bool there = path && !is_bad(cache, digest) && stat(path, &about) == 0 && (uint64_t)about.st_size == size;
@@ -247,23 +292,47 @@ bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size)
   return there;
 }
 
-qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, qmat_value_type type) {
+bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
+  return has_locally(cache, digest, size) ||
+         qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
+}
+
+// The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
+// twice.
+static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest, qmat_value_type type) {
   qmat_context nobody = {0};  // bad bytes are no error here
+  qmat_value *value;
+  if (qmat_value_deserialize(&nobody, bytes, size, &value) != QMAT_OK) return NULL;
+  if (value->type == type && qmat_digest_equal(&value->digest, digest)) return value;
+  qmat_value_release(value);
+  return NULL;
+}
+
+static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type) {
+  qmat_writer body = {0};
+  qmat_value *value = NULL;
+  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size, &body)) {
+    value = body.size == size ? parse_value(body.bytes, body.size, digest, type) : NULL;
+    if (value)
+      keep_bytes(cache, QMAT_CACHE_BLOB, digest, body.bytes, body.size);
+    else
+      warn_of_lie(cache, "a blob");
+  }
+  qmat_writer_uninit(&body);
+  return value;
+}
+
+qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type) {
   qmat_value *value = NULL;
   qmat_bytes bytes = {0};
   char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   if (path && !is_bad(cache, digest) && read_file(path, &bytes)) {
-    // Sealing takes the digest of the value's binary form, so the bytes need not be hashed twice.
-    qmat_status status = qmat_value_deserialize(&nobody, bytes.data, bytes.size, &value);
-    if (status == QMAT_OK && (value->type != type || !qmat_digest_equal(&value->digest, digest))) {
-      qmat_value_release(value);
-      value = NULL;
-    }
-    if (!value && status != QMAT_ERROR_MEMORY) set_aside(cache, QMAT_CACHE_BLOB, digest);
+    value = parse_value(bytes.data, bytes.size, digest, type);
+    if (!value) set_aside(cache, QMAT_CACHE_BLOB, digest);
   }
   qmat_bytes_uninit(&bytes);
   qmat_free(path);
-  return value;
+  return value ? value : remote_value(cache, digest, size, type);
 }
 
 static void touch(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
@@ -282,42 +351,49 @@ void qmat_cache_touch_blob(qmat_cache *cache, const qmat_digest *digest) {
 
 /* ---- writing ---- */
 
+// Sends bytes to the remote cache. Of a blob it is enough that it is there; a record may be newer than the one that is.
+static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
+                       size_t size) {
+  const char *folder = kind_folders[kind];
+  if (!qmat_remote_is_writable(cache->remote)) return false;
+  return (kind == QMAT_CACHE_BLOB && qmat_remote_has(cache->remote, folder, digest, size)) ||
+         qmat_remote_put(cache->remote, folder, digest, bytes, size);
+}
+
 bool qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, uint64_t *blob_size, bool *added) {
   qmat_context nobody = {0};
+  const qmat_digest *digest = &value->digest;
   uint8_t *bytes;
   size_t size;
   *added = false;
-  if (!make_ready(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return false;
+  if (!qmat_cache_is_writable(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return false;
   *blob_size = size;
-  bool done = qmat_cache_has(cache, &value->digest, size);
-  if (!done) {
-    char *path = path_of_digest(cache, QMAT_CACHE_BLOB, &value->digest);
-    done = *added = path && place_file(cache, path, bytes, size);
-    qmat_free(path);
-  }
+  bool kept = has_locally(cache, digest, size);
+  if (!kept) kept = *added = keep_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
+  bool sent = send_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
   qmat_free(bytes);
-  return done;
+  return kept || sent;
 }
 
 bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record) {
   qmat_digest digest;
   char hex[66];
   size_t length;
-  if (!make_ready(cache)) return false;
+  if (!qmat_cache_is_writable(cache)) return false;
   char *text = qmat_json_text(record, JSON_COMPACT | JSON_SORT_KEYS, &length);
-  char *path = path_of_digest(cache, QMAT_CACHE_RECORD, key);
   qmat_writer writer = {0};
-  bool done = text && path && qmat_digest_of(text, length, &digest) == QMAT_OK;
+  bool done = text && qmat_digest_of(text, length, &digest) == QMAT_OK;
   if (done) {
     qmat_digest_hex(&digest, hex);
     qmat_put_bytes(&writer, text, length);
     qmat_put_text(&writer, record_end);
     qmat_put_text(&writer, hex);
     qmat_put_text(&writer, "\n");
-    done = !writer.failed && place_file(cache, path, writer.bytes, writer.size);
+    bool kept = !writer.failed && keep_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    bool sent = !writer.failed && send_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    done = kept || sent;
   }
   qmat_writer_uninit(&writer);
-  qmat_free(path);
   qmat_free(text);
   return done;
 }

@@ -3,6 +3,7 @@
 #define QMAT_GRAPHS_CACHE_H
 
 #include "core/value.h"
+#include "graphs/remote_cache.h"
 
 /* A store of results, shared by any number of processes:
  *
@@ -11,14 +12,19 @@
  *     tmp/          files that are being written; their writers hold a lock on them
  *     bad/          blobs and records that did not hold what their name says, for whoever wants to know why
  *
+ * Beside the folder there may be a remote cache of the same bytes: what is not in the folder is looked for there and
+ * then kept in the folder, and what is stored goes to both.
+ *
  * Everything is written to tmp/, flushed and renamed, blobs before the record that names them: what exists is complete.
  * Readers take no lock and check every digest; what does not agree is set aside and counts as absent. No failure of the
  * cache fails a run: it is told once, in `warning`. One thread at a time uses a qmat_cache. */
 
 typedef struct qmat_cache_options {
   const char *folder;
-  bool read_only;     /* store nothing and change nothing */
-  uint64_t most_size; /* in bytes; above it the least recently used is deleted; 0: QMAT_CACHE_SIZE */
+  bool read_only;        /* store nothing and change nothing */
+  uint64_t most_size;    /* in bytes; above it the least recently used is deleted; 0: QMAT_CACHE_SIZE */
+  const char *remote;    /* URL of a remote cache; NULL: none */
+  bool remote_read_only; /* store nothing there */
 } qmat_cache_options;
 
 #define QMAT_CACHE_SIZE ((uint64_t)10000000000)
@@ -33,6 +39,7 @@ typedef struct qmat_cache {
   char warning[384];    /* what went wrong first; "": nothing */
   qmat_digest *bad;     /* blobs that did not hold what they should and could not be set aside */
   size_t bad_count, bad_capacity;
+  qmat_remote_cache *remote; /* NULL: none */
 } qmat_cache;
 
 /* Opens the cache in a folder, which need not exist yet: it is made when something is stored. QMAT_ERROR_USAGE: the
@@ -46,6 +53,12 @@ void qmat_cache_close(qmat_cache *cache);
  * is short; free with qmat_free. */
 char *qmat_cache_default_folder(void);
 
+/* Whether anything that is stored may be kept, in the folder or remotely. */
+bool qmat_cache_is_writable(const qmat_cache *cache);
+
+/* What went wrong first, here or remotely; "": nothing. */
+const char *qmat_cache_warning(const qmat_cache *cache);
+
 /* The record of a key, checked: its own digest, and that its items make the key. NULL: there is none. The caller calls
  * json_decref. */
 json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key);
@@ -53,8 +66,9 @@ json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key);
 /* Whether a blob is there and `size` bytes long; its bytes are not looked at. */
 bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size);
 
-/* The value of that digest, sealed and checked; NULL: it is not there, or not what it should be. */
-qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, qmat_value_type type);
+/* The value of that digest, whose blob has `size` bytes, sealed and checked; NULL: it is not there, or not what it
+ * should be. */
+qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type);
 
 /* Notes that a record or a blob was used just now: what was used least recently is deleted first. */
 void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key);

@@ -9,6 +9,8 @@ const qmat_option qmat_cache_option_rows[] = {
     {"no-cache", 0, NULL, "Keep no results and use none; so does QMAT_CACHE=off"},
     {"cache-size", 0, "SIZE", "Delete what was used least recently above this size; default 10GB"},
     {"cache-read-only", 0, NULL, "Use results that are kept, but keep none"},
+    {"remote-cache", 0, "URL", "Share results through an HTTP server that takes GET and PUT; else $QMAT_REMOTE_CACHE"},
+    {"remote-read-only", 0, NULL, "Use results of the remote cache, but send it none"},
     {0},
 };
 
@@ -38,6 +40,10 @@ qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invoca
   const char *named = qmat_invocation_value(invocation, "cache"), *given = named ? named : getenv("QMAT_CACHE");
   const char *size = qmat_invocation_value(invocation, "cache-size");
   qmat_cache_options options = {.read_only = qmat_invocation_value(invocation, "cache-read-only") != NULL};
+  const char *remote = qmat_invocation_value(invocation, "remote-cache");
+  options.remote = remote ? remote : getenv("QMAT_REMOTE_CACHE");
+  options.remote_read_only = qmat_invocation_value(invocation, "remote-read-only") != NULL;
+  if (options.remote && !*options.remote) options.remote = NULL;
   *open = false;
   *cache = (qmat_cache){0};
   if (size && !parse_size(size, &options.most_size)) {

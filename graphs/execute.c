@@ -170,7 +170,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     context->error = error;
   }
-  if (*planned.cache.warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", planned.cache.warning);
+  const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
+  if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
   qmat_planned_run_uninit(&planned);
   return status;
 }

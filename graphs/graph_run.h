@@ -55,7 +55,8 @@ const char *qmat_step_state_name(qmat_step_state state);
 typedef struct qmat_run_made {
   qmat_digest digest;
   size_t bytes;
-  size_t counts[3]; /* see qmat_value_counts */
+  uint64_t blob_size; /* of its binary form; 0: it is in no cache */
+  size_t counts[3];   /* see qmat_value_counts */
 } qmat_run_made;
 
 /* One run of one node. */

@@ -131,7 +131,7 @@ static bool add_sides(qmat_run *run, const qmat_run_step *step, const json_t *si
 
 /* ---- records ---- */
 
-static bool read_output(const json_t *output, const qmat_port *port, qmat_run_made *made, uint64_t *blob) {
+static bool read_output(const json_t *output, const qmat_port *port, qmat_run_made *made) {
   const char *name = json_string_value(json_object_get(output, "port"));
   const char *type = json_string_value(json_object_get(output, "type"));
   const char *hex = json_string_value(json_object_get(output, "digest"));
@@ -141,7 +141,7 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   if (!name || strcmp(name, port->name) != 0 || !type || strcmp(type, qmat_value_type_name(port->type)) != 0 || !hex ||
       !qmat_digest_parse(hex, &made->digest) || size <= 0 || bytes < 0)
     return false;
-  *blob = (uint64_t)size;
+  made->blob_size = (uint64_t)size;
   made->bytes = (size_t)bytes;
   for (size_t i = 0; i < 3; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
   return true;
@@ -153,8 +153,7 @@ bool qmat_record_fits(const qmat_node *type, const json_t *record) {
   if (json_array_size(outputs) != count) return false;
   for (size_t port = 0; port < count; port++) {
     qmat_run_made made;
-    uint64_t blob;
-    if (!read_output(json_array_get(outputs, port), &type->outputs[port], &made, &blob)) return false;
+    if (!read_output(json_array_get(outputs, port), &type->outputs[port], &made)) return false;
   }
   return true;
 }
@@ -166,9 +165,8 @@ static bool take_record(qmat_run *run, size_t index, const json_t *record) {
   if (!record || !qmat_record_fits(type, record)) return false;
   const json_t *outputs = json_object_get(record, "outputs");
   for (size_t port = 0; port < qmat_output_count(type); port++) {
-    uint64_t blob;
-    read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port], &blob);
-    if (!qmat_cache_has(run->cache, &step->made[port].digest, blob)) return false;
+    read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port]);
+    if (!qmat_cache_has(run->cache, &step->made[port].digest, step->made[port].blob_size)) return false;
   }
   // Reports are small, and the summary of the run is made of them.
   for (size_t port = 0; port < qmat_output_count(type) && !step->report; port++) {
@@ -211,8 +209,9 @@ bool qmat_run_look_up(qmat_run *run, size_t index) {
 
 qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
   const qmat_run_step *step = &run->steps[index];
-  return run->cache ? qmat_cache_value(run->cache, &step->made[port].digest, type_of(run, step)->outputs[port].type)
-                    : NULL;
+  const qmat_run_made *made = &step->made[port];
+  qmat_value_type type = type_of(run, step)->outputs[port].type;
+  return run->cache ? qmat_cache_value(run->cache, &made->digest, made->blob_size, type) : NULL;
 }
 
 /* ---- storing ---- */
@@ -275,17 +274,16 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
   json_t *outputs = json_array();
   bool done = outputs != NULL;
   for (size_t port = 0; port < qmat_output_count(type) && done; port++) {
-    const qmat_run_made *made = &step->made[port];
+    qmat_run_made *made = &step->made[port];
     const qmat_value *value = run->slots[step->first_slot + port].value;
-    uint64_t blob = 0;
     bool added;
     char hex[65];
     qmat_digest_hex(&made->digest, hex);
-    done = qmat_cache_put_value(run->cache, value, &blob, &added);
+    done = qmat_cache_put_value(run->cache, value, &made->blob_size, &added);
     *any_added = *any_added || added;
     json_t *output = json_pack("{s:s, s:s, s:s, s:I, s:I, s:[I, I, I]}", "port", type->outputs[port].name, "type",
-                               qmat_value_type_name(value->type), "digest", hex, "blob", (json_int_t)blob, "bytes",
-                               (json_int_t)made->bytes, "counts", (json_int_t)made->counts[0],
+                               qmat_value_type_name(value->type), "digest", hex, "blob", (json_int_t)made->blob_size,
+                               "bytes", (json_int_t)made->bytes, "counts", (json_int_t)made->counts[0],
                                (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
     done = json_array_append_new(outputs, output) == 0 && done;
   }
@@ -301,8 +299,7 @@ static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
   if (record && qmat_record_fits(node->type, record)) {
     for (size_t port = 0; port < qmat_output_count(node->type); port++) {
       qmat_run_made made;
-      uint64_t blob;
-      read_output(json_array_get(json_object_get(record, "outputs"), port), &node->type->outputs[port], &made, &blob);
+      read_output(json_array_get(json_object_get(record, "outputs"), port), &node->type->outputs[port], &made);
       if (!qmat_digest_equal(&made.digest, &step->made[port].digest) && !*run->cache->warning)
         snprintf(run->cache->warning, sizeof run->cache->warning,
                  "node '%s' (%s) has made another '%s' than the cache has from the same inputs", node->id,
@@ -327,7 +324,7 @@ static bool put_sides(qmat_run *run, const qmat_run_step *step, const side_file 
 
 void qmat_run_store(qmat_run *run, size_t index, const qmat_step_reads *reads) {
   qmat_run_step *step = &run->steps[index];
-  if (!run->cache || !step->keyed || run->cache->read_only || reads->incomplete) return;
+  if (!run->cache || !step->keyed || !qmat_cache_is_writable(run->cache) || reads->incomplete) return;
   side_file *sides = qmat_alloc(reads->count, sizeof *sides);
   size_t side_count;
   json_t *first_items = make_items(run, step), *items = json_deep_copy(first_items);

@@ -106,7 +106,7 @@ static json_t *cache_json(const qmat_run *run) {
   json_object_set_new(json, "folder", text_json(run->cache->folder));
   json_object_set_new(json, "read_only", json_boolean(run->cache->read_only));
   json_object_set_new(json, "hits", json_integer((json_int_t)hits));
-  json_object_set_new(json, "warning", *run->cache->warning ? text_json(run->cache->warning) : json_null());
+  json_object_set_new(json, "warning", *qmat_cache_warning(run->cache) ? text_json(qmat_cache_warning(run->cache)) : json_null());
   return json;
 }
 
