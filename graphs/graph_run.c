@@ -479,10 +479,16 @@ static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *
   for (size_t port = 0; port < qmat_output_count(type); port++) {
     qmat_run_slot *slot = &run->slots[step->first_slot + port];
     qmat_run_made *made = &step->made[port];
-    if (slot->known && !qmat_digest_equal(&slot->digest, &outputs[port]->digest)) steady = false;
-    qmat_value_release(slot->value);
-    slot->value = outputs[port];
-    slot->digest = made->digest = outputs[port]->digest;
+    bool same = slot->known && qmat_digest_equal(&slot->digest, &outputs[port]->digest);
+    if (slot->known && !same) steady = false;
+    // A step that waits for another output of this one may already have taken the value that is there.
+    if (slot->value && same) {
+      qmat_value_release(outputs[port]);
+    } else {
+      qmat_value_release(slot->value);
+      slot->value = outputs[port];
+    }
+    slot->digest = made->digest = slot->value->digest;
     slot->known = true;
     made->bytes = qmat_value_bytes(slot->value);
     qmat_value_counts(slot->value, made->counts);

@@ -109,8 +109,28 @@ static qmat_node test_scale = {.name = "test.scale",
                                .libraries = test_libraries,
                                .run = scale_run};
 
-static const qmat_node *const counted_table[] = {&test_read_file, &test_scale};
-static const qmat_registry counted = {counted_table, 2};
+/* Takes two outputs of one node. */
+static qmat_status pair_run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                            qmat_value *outputs[]) {
+  const scale_params *params = data;
+  const size_t letters = strlen(((const qmat_scene *)inputs[0])->name);
+  return test_report(context, params->factor * (double)(letters + ((const qmat_mesh *)inputs[1])->triangle_count),
+                     &outputs[0]);
+}
+
+static const qmat_node test_pair = {.name = "test.pair",
+                                    .version = 1,
+                                    .summary = "Two values of one node",
+                                    .doc = "",
+                                    .citation = "",
+                                    .params_size = sizeof(scale_params),
+                                    .params = scale_rows,
+                                    .inputs = mesh_outputs,
+                                    .outputs = number_outputs,
+                                    .run = pair_run};
+
+static const qmat_node *const counted_table[] = {&test_mesh, &test_pair, &test_read_file, &test_scale};
+static const qmat_registry counted = {counted_table, sizeof counted_table / sizeof *counted_table};
 
 /* ---- one run after another on one cache ---- */
 
@@ -482,6 +502,38 @@ static void test_a_node_that_makes_other_bytes_when_its_blob_is_lost_starts_the_
   assert_true(f->result == 5 * (3 * ('a' + 'b' + 'c') + 1) + 1);
 }
 
+static void test_a_node_that_runs_again_for_one_output_leaves_the_other_as_it_is(void **state) {
+  fixture *f = *state;
+  put_file(f->model, "abc");
+  for (int round = 0; round < 2; round++) {
+    char text[512];
+    snprintf(text, sizeof text,
+             "qmat: 1\nnodes:\n  model: { type: test.mesh, params: { path: %s } }\n"
+             "  pair: { type: test.pair, params: { factor: %d }, in: { scene: model.scene, mesh: model.mesh } }\n"
+             "outputs: { pair: pair.number }\n",
+             f->model, round + 1);
+    qmat_context context = {0};
+    qmat_graph graph;
+    qmat_cache cache;
+    qmat_run run = {0};
+    test_ok(&context, qmat_graph_read_text(&context, &counted, "g.yaml", text, strlen(text), &graph));
+    open_cache(f, &cache);
+    const qmat_run_port want = {1, 0};
+    const qmat_run_options options = {.wants = &want, .want_count = 1, .cache = &cache};
+    test_ok(&context, qmat_run_plan(&context, &graph, &options, &run));
+    test_ok(&context, qmat_run_execute(&context, &run, NULL));
+    assert_true(test_value(qmat_run_value(&run, 1, 0)) == (round + 1) * (double)(strlen("model") + 4));
+    char hex[65], path[256];
+    qmat_digest_hex(&run.steps[0].made[1].digest, hex);
+    snprintf(path, sizeof path, "%s/cas/%s", f->cache_folder, hex);
+    damage(path, -6, false); /* the mesh; the scene stays */
+    qmat_run_uninit(&run);
+    qmat_graph_uninit(&graph);
+    qmat_cache_close(&cache);
+    qmat_context_uninit(&context);
+  }
+}
+
 static void test_a_cache_that_cannot_be_made_is_told_once_and_the_run_goes_on(void **state) {
   fixture *f = *state;
   put_file(f->model, "abc");
@@ -848,6 +900,7 @@ int main(void) {
       CASE(test_a_record_under_another_key_is_not_believed),
       CASE(test_a_cache_that_is_read_only_is_used_and_left_alone),
       CASE(test_a_node_that_makes_other_bytes_when_its_blob_is_lost_starts_the_run_again),
+      CASE(test_a_node_that_runs_again_for_one_output_leaves_the_other_as_it_is),
       CASE(test_a_cache_that_cannot_be_made_is_told_once_and_the_run_goes_on),
       CASE(test_a_file_is_no_cache),
       CASE(test_a_key_is_the_digest_of_its_items_with_their_lengths),
