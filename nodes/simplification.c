@@ -261,6 +261,7 @@ static void update_neighbourhood(qmat_simplification *s) {
     s->stale[at[i]] = 1;
     if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
   }
+  if (!s->fitting) return; /* all get another chance then */
   for (size_t n = 0; n < c->neighbour_count; n++) {
     at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
     for (size_t i = 0; i < count; i++)
