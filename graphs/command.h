@@ -49,8 +49,9 @@ struct qmat_command {
   qmat_status (*run)(qmat_context *context, qmat_invocation *invocation);
 };
 
-extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_why, qmat_command_cache, qmat_command_check,
-    qmat_command_dot, qmat_command_nodes, qmat_command_node, qmat_command_version, qmat_command_help;
+extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_why, qmat_command_cache,
+    qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node, qmat_command_version,
+    qmat_command_help;
 
 /* All commands, in the order in which help lists them. */
 extern const qmat_command *const qmat_commands[];

@@ -28,6 +28,10 @@ void qmat_catch_interrupts(void) {
   sigaction(SIGTERM, &action, NULL);
 }
 
+bool qmat_interrupted(void) {
+  return interrupted != 0;
+}
+
 static double now(void) {
   struct timespec time;
   clock_gettime(CLOCK_MONOTONIC, &time);

@@ -32,5 +32,7 @@ void qmat_progress_view_end(qmat_progress_view *view);
 
 /* Makes SIGINT and SIGTERM cancel the run; the second of them ends the program at once. */
 void qmat_catch_interrupts(void);
+/* Whether one of them has come. */
+bool qmat_interrupted(void);
 
 #endif

@@ -1,0 +1,143 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# qmat batch as a user meets it: batch_test.sh PROGRAM
+qmat=$1
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+QMAT_CACHE=$work/cache
+TMPDIR=$work
+export QMAT_CACHE TMPDIR
+failures=0
+
+holds() {
+  what=$1
+  shift
+  if ! "$@"; then
+    echo "FAILED: $what"
+    cat out.txt err.txt
+    failures=$((failures + 1))
+  fi
+}
+
+cat >graph.yaml <<'END'
+qmat: 1
+nodes:
+  model:     { type: scene.read }
+  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
+  samples:   { type: mesh.sample, params: { spacing: 20% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
+  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
+  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
+inputs: { model: model.path }
+outputs: { asset: asset.file }
+END
+mkdir models
+for width in 1 2 3 4 5 6 7 8 9; do
+  cat >models/box$width.off <<END
+OFF
+8 6 0
+0 0 0
+$width 0 0
+$width 1 0
+0 1 0
+0 0 1
+$width 0 1
+$width 1 1
+0 1 1
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+END
+done
+echo "OFF 1 2" >"models/bad one.off"
+
+# batch OPTION...
+batch() {
+  timeout 100 "$qmat" batch graph.yaml "$@" >out.txt 2>err.txt
+  code=$?
+}
+
+batch --inputs 'models/*.off' --out results --jobs 3
+holds "a failing asset makes exit code 1, not $code" test $code -eq 1
+holds "the others are made" test "$(ls results/*.glb | wc -l)" -eq 9
+holds "they are counted" grep -q '^9 done, 1 failed, 0 not run' out.txt
+holds "the failure is told with its place" grep -q '^models/bad one.off: .*line\|^models/bad one.off: models/bad one.off:1' out.txt
+for width in 1 5 9; do
+  "$qmat" run graph.yaml --set model=models/box$width.off -o alone.glb --no-cache --quiet
+  holds "the same bytes as alone" cmp alone.glb results/box$width.glb
+done
+rm -r results "models/bad one.off"
+batch --inputs 'models/*.off' --out results --format ma --json
+holds "exit code 0, not $code" test $code -eq 0
+holds "a line of JSON each" test "$(grep -c '"result":"ok"' out.txt)" -eq 9
+holds "what was done before comes from the cache" test "$(grep -c '"hits":4' out.txt)" -eq 9
+holds "the other format" test -s results/box1.ma
+
+# A list, relative to its folder.
+printf '# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
+batch --inputs models/list.txt --out listed --quiet
+holds "a list" test "$code" -eq 0 -a "$(ls listed | wc -l)" -eq 2
+holds "quiet" test ! -s out.txt -a ! -s err.txt
+
+# A process that crashes, and a batch that is interrupted and goes on.
+awk 'BEGIN {
+  n = 300; m = 150; pi = 3.14159265358979
+  printf "OFF\n%d %d 0\n", n * m, n * m
+  for (i = 0; i < n; i++) for (j = 0; j < m; j++) {
+    a = 2 * pi * i / n; b = 2 * pi * j / m
+    printf "%.9f %.9f %.9f\n", (3 + cos(b)) * cos(a), (3 + cos(b)) * sin(a), sin(b)
+  }
+  for (i = 0; i < n; i++) for (j = 0; j < m; j++) {
+    k = (i + 1) % n; l = (j + 1) % m
+    printf "4 %d %d %d %d\n", i * m + j, k * m + j, k * m + l, i * m + l
+  }
+}' >models/aaa_torus.off
+"$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
+running=$!
+child=
+for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30; do
+  child=$(cat "/proc/$running/task/$running/children" 2>/dev/null | tr -d ' ')
+  if [ -n "$child" ]; then break; fi
+  sleep 0.05
+done
+kill -SEGV "$child"
+wait $running
+code=$?
+holds "a crash is one asset's failure" test $code -eq 1
+holds "a crash is told" grep -q '^models/aaa_torus.off: ended by signal 11' out.txt
+holds "the rest is made" grep -q '^9 done, 1 failed' out.txt
+rm -r rest cache
+"$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
+running=$!
+sleep 0.3
+kill -TERM $running
+wait $running
+code=$?
+holds "exit code 3 after a signal, not $code" test $code -eq 3
+holds "nothing goes on after a signal" test ! -e rest/box9.glb
+batch --inputs 'models/box*.off' --out rest --set samples.spacing=2%
+holds "it goes on" test $code -eq 0
+holds "no reports are left" test -z "$(ls -d qmat-batch-* 2>/dev/null)"
+
+# Mistakes.
+mkdir other
+cp models/box1.off other/
+batch --inputs '[mo]*/*.off' --out results
+holds "two results of one name" test $code -eq 2
+holds "two results of one name are told" grep -q "would have one name" err.txt
+batch --inputs 'nothing*' --out results
+holds "a pattern without a match" test $code -eq 2
+batch --inputs models/list.txt
+holds "no folder" test $code -eq 2
+batch --inputs models/list.txt --out graph.yaml
+holds "a folder that is a file" test $code -eq 1
+batch --inputs models/list.txt --out results --jobs 0
+holds "no jobs" test $code -eq 2
+
+if [ $failures -ne 0 ]; then
+  echo "$failures failed"
+  exit 1
+fi
