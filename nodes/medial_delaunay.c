@@ -607,7 +607,7 @@ static qmat_status find_stood_for(const delaunay *d, stood_for *s) {
 }
 
 /* The responsible regions: a medial vertex answers for the corners of its tetrahedra, and for the samples that these
- * stand for. */
+ * stand for, each behind its corner. */
 static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
   const size_t count = medial->sphere_count; /* those added by refinement answer for none */
   uint32_t *offsets = qmat_calloc(count + 1, sizeof *offsets);
@@ -644,13 +644,12 @@ static qmat_status set_regions(delaunay *d, qmat_medial *medial) {
   uint32_t next = 0;
   for (size_t i = 0; i < count; i++) {
     const uint32_t *row = &all[starts[i]];
-    const size_t length = starts[i + 1] - starts[i], first = next;
+    const size_t length = starts[i + 1] - starts[i];
     for (size_t k = 0; k < length; k++) {
       if (k > 0 && row[k] == row[k - 1]) continue;
       for (size_t m = stood_for.starts[row[k]]; m < stood_for.starts[row[k] + 1]; m++)
         medial->region_samples[next++] = stood_for.items[m];
     }
-    sort_numbers(&medial->region_samples[first], next - first);
     offsets[i + 1] = next;
   }
   medial->region_sample_count = next;
@@ -858,7 +857,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 2,
+    .version = 3,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc = "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
            "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "
