@@ -13,6 +13,7 @@ const qmat_option qmat_common_options[] = {
     {"report", 0, "FILE", "Write what was done, or the error, as JSON"},
     {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
     {"dry-run", 0, NULL, "Print which nodes would run and which results the cache has, and stop there"},
+    {"depfile", 0, "FILE", "Write what the saved files depend on as a rule for Make or Ninja"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };
@@ -129,6 +130,17 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
   return true;
 }
 
+// What readers of files left out, say: strings in the reports of steps that ran.
+static void print_warnings(const qmat_run *run) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
+    for (size_t k = 0; k < json_array_size(warnings); k++) {
+      const char *text = json_string_value(json_array_get(warnings, k));
+      if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", run->graph->nodes[run->steps[i].node].id, text);
+    }
+  }
+}
+
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation)) {
   const char *report_path = qmat_invocation_value(invocation, "report");
@@ -143,6 +155,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, &planned);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
+  if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
+    status = qmat_run_check_path(context, run, "the depfile", qmat_invocation_value(invocation, "depfile"));
   bool ready = status == QMAT_OK, reported = false;
   if (ready && dry) {
     qmat_run_foresee(run);
@@ -155,6 +169,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     context->progress = NULL;
     if (status == QMAT_OK) status = qmat_run_write(context, run);
   }
+  const char *depfile = qmat_invocation_value(invocation, "depfile");
+  if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
   if (status == QMAT_OK && report_path && !dry) {
     json_t *report = qmat_run_report(context, run);
     status = qmat_save_json(context, report, report_path);
@@ -170,6 +186,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     context->error = error;
   }
+  if (ready && !quiet && !dry) print_warnings(run);
   const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
   if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
   qmat_planned_run_uninit(&planned);

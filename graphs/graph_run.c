@@ -547,10 +547,8 @@ static qmat_status run_step(executor *executor, size_t index) {
   context->node_id = node->id;
   context->node_type = node->type->name;
   tell_started(executor, index);
-  if (run->cache) {
-    context->file_read = qmat_step_note_read;
-    context->file_read_user = &reads;
-  }
+  context->file_read = qmat_step_note_read;
+  context->file_read_user = &reads;
   double start = now();
   status = qmat_node_run(context, node->type, step->params, inputs, outputs);
   step->seconds = now() - start;
@@ -562,6 +560,7 @@ static qmat_status run_step(executor *executor, size_t index) {
     goto cleanup;
   }
   qmat_run_store(run, index, &reads);
+  qmat_run_note_reads(run, &reads);
   tell_done(executor, index);
 cleanup:
   qmat_step_reads_uninit(&reads);

@@ -107,7 +107,7 @@ typedef struct qmat_run {
   qmat_run_given *given;               /* given[i] is in slots[slot_count - given_count + i] */
   qmat_cache *cache;                   /* NULL: none */
   bool bypass;                         /* records are not believed: one of them turned out to be wrong */
-  struct qmat_run_file_digest *hashed; /* the files that keys hold */
+  struct qmat_run_file_digest *hashed; /* the files that were read, or that keys hold */
   size_t hashed_count, hashed_capacity;
   char name[128]; /* of the first scene that was made or given; else of the graph file */
   double seconds;

@@ -52,6 +52,15 @@ void qmat_step_reads_uninit(qmat_step_reads *reads) {
   *reads = (qmat_step_reads){0};
 }
 
+void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads) {
+  for (size_t i = 0; i < reads->count; i++) {
+    const struct qmat_run_file_digest *file = &reads->files[i];
+    if (!find_file(run->hashed, run->hashed_count, file->path))
+      add_file(&run->hashed, &run->hashed_count, &run->hashed_capacity, file->path,
+               file->readable ? &file->digest : NULL);
+  }
+}
+
 // What is known of a file; it is hashed when it is asked for first. NULL when memory is short.
 static const struct qmat_run_file_digest *digest_file(qmat_run *run, const char *path) {
   const struct qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, path);

@@ -29,6 +29,9 @@ void qmat_step_reads_uninit(qmat_step_reads *reads);
  * that the run has not hashed yet. */
 bool qmat_run_look_up(qmat_run *run, size_t step);
 
+/* Adds what a step has read to the files that the run knows. */
+void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads);
+
 /* Stores what a step has made, under the bytes that it has read; its state becomes QMAT_STEP_SAME when all of it was in
  * the cache before. */
 void qmat_run_store(qmat_run *run, size_t step, const qmat_step_reads *reads);

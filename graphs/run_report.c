@@ -7,6 +7,7 @@
 
 #include "core/json_text.h"
 #include "graphs/node_json.h"
+#include "graphs/run_cache.h"
 #include "io/bytes.h"
 
 /* ---- JSON ---- */
@@ -106,7 +107,8 @@ static json_t *cache_json(const qmat_run *run) {
   json_object_set_new(json, "folder", text_json(run->cache->folder));
   json_object_set_new(json, "read_only", json_boolean(run->cache->read_only));
   json_object_set_new(json, "hits", json_integer((json_int_t)hits));
-  json_object_set_new(json, "warning", *qmat_cache_warning(run->cache) ? text_json(qmat_cache_warning(run->cache)) : json_null());
+  json_object_set_new(json, "warning",
+                      *qmat_cache_warning(run->cache) ? text_json(qmat_cache_warning(run->cache)) : json_null());
   return json;
 }
 
@@ -179,6 +181,39 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
   return status;
 }
 
+/* ---- depfile ---- */
+
+// A path as Make and Ninja read it in a depfile.
+static void put_escaped(qmat_writer *writer, const char *path) {
+  for (; *path; path++) {
+    if (*path == ' ' || *path == '#' || *path == '\\') qmat_put_text(writer, "\\");
+    if (*path == '$') qmat_put_text(writer, "$");
+    qmat_put_bytes(writer, path, 1);
+  }
+}
+
+qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path) {
+  qmat_writer writer = {0};
+  qmat_file *file = NULL;
+  for (size_t i = 0; i < run->file_count; i++) {
+    if (i > 0) qmat_put_text(&writer, " ");
+    put_escaped(&writer, run->files[i].path);
+  }
+  qmat_put_text(&writer, ": ");
+  put_escaped(&writer, run->graph->file);
+  for (size_t i = 0; i < run->hashed_count; i++) {
+    // A file that was looked for and is not there cannot be waited for.
+    if (!run->hashed[i].readable) continue;
+    qmat_put_text(&writer, " \\\n  ");
+    put_escaped(&writer, run->hashed[i].path);
+  }
+  qmat_put_text(&writer, "\n");
+  qmat_status status = qmat_writer_to_file(context, &writer, "d", &file);
+  if (status == QMAT_OK) status = qmat_file_save(context, file, path);
+  if (file) qmat_value_release(&file->base);
+  return status;
+}
+
 /* ---- text ---- */
 
 void qmat_format_count(uint64_t count, char *text) {
@@ -232,7 +267,8 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
   if (summary->triangles > 0)
     snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
   bool one = summary->spheres == 1;
-  const char *between = summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
+  const char *between =
+      summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
   const char *end = summary->evaluated ? " from the surface" : "", *proof = "";
   if (summary->certified)
     proof = " (certified)";

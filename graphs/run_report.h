@@ -12,6 +12,10 @@
  * executed and written. NULL when memory is short; the caller calls json_decref. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run);
 
+/* Writes a rule for Make and Ninja: the files that a finished run has saved depend on the graph file and on every file
+ * that was read, or whose bytes a result from the cache was made of. Through a temporary. */
+qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path);
+
 /* {"error": {...}} with the fields of the record and "text", the line that is printed. NULL when memory is short. */
 json_t *qmat_error_report(const qmat_error *error);
 

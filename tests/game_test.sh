@@ -1,0 +1,60 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs qmat and builds examples/game on top, with Ninja and with Make: game_test.sh SOURCE_FOLDER BUILD_FOLDER
+source=$1
+built=$2
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+QMAT_CACHE=$work/cache
+export QMAT_CACHE
+
+die() {
+  echo "FAILED: $*"
+  cat out.txt
+  exit 1
+}
+
+cmake --install "$built" --prefix "$work/installed" >out.txt 2>&1 || die "the installation"
+# It must not matter where the installation is.
+mv installed moved
+PKG_CONFIG_PATH=$(dirname "$(find "$work/moved" -name qmat.pc)")
+export PKG_CONFIG_PATH
+printf '#include <stdio.h>\n#include <qmat.h>\nint main(void) { return puts(qmat_version()) < 0; }\n' >version.c
+# shellcheck disable=SC2046
+cc version.c -o version $(pkg-config --cflags --libs qmat) -Wl,-rpath,"$(pkg-config --variable=libdir qmat)" >out.txt 2>&1 ||
+  die "pkg-config"
+./version >out.txt || die "the program that pkg-config helped to build"
+
+# make_assets: builds; the assets that were made anew, in $made.
+make_assets() {
+  touch before
+  sleep 1.1
+  cmake --build build >out.txt 2>&1 || die "the build"
+  made=$(find build/assets -name '*.ma' -newer before | sort | sed 's/.*\///' | tr '\n' ' ')
+}
+
+for generator in Ninja "Unix Makefiles"; do
+  rm -rf game build
+  cp -r "$source/examples/game" game
+  cmake -G "$generator" -S game -B build -DCMAKE_PREFIX_PATH="$work/moved" >out.txt 2>&1 || die "$generator: configuring"
+  make_assets
+  [ "$made" = "crate.ma roof.ma " ] || die "$generator: the first build made '$made'"
+  build/game >out.txt || die "$generator: the game"
+  grep -q '^crate: [1-9]' out.txt || die "$generator: the game has no colliders"
+  make_assets
+  [ -z "$made" ] || die "$generator: the second build made '$made'"
+  sed 's/^2 1 1$/2 1 1.1/' game/models/crate.off >edited.off
+  cp edited.off game/models/crate.off
+  make_assets
+  [ "$made" = "crate.ma " ] || die "$generator: an edited model made '$made'"
+  # x of the second vertex: 4 becomes 3.
+  printf '\000\000\100\100' | dd of=game/models/roof.bin bs=1 seek=12 conv=notrunc status=none
+  make_assets
+  [ "$made" = "roof.ma " ] || die "$generator: an edited side file made '$made'"
+  echo "# edited" >>game/colliders.yaml
+  make_assets
+  [ "$made" = "crate.ma roof.ma " ] || die "$generator: an edited graph made '$made'"
+  make_assets
+  [ -z "$made" ] || die "$generator: the last build made '$made'"
+done
