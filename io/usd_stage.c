@@ -85,6 +85,14 @@ static const char *shown(const char *text) {
   return qmat_is_utf8(text) ? text : "?";
 }
 
+/* Takes out what a terminal would act on, and the rest of a character that was cut. */
+static void clean_text(char *text) {
+  for (char *c = text; *c; c++) {
+    if ((unsigned char)*c < ' ' || *c == 127) *c = '?';
+  }
+  for (size_t end = strlen(text); end > 0 && !qmat_is_utf8(text); end--) text[end - 1] = '\0';
+}
+
 qmat_status qmat_usd_warn(qmat_context *context, qmat_usd_stage *stage, const qmat_usd_prim *prim, const char *format,
                           ...) {
   char text[1024], path[PATH_TEXT];
@@ -98,8 +106,7 @@ qmat_status qmat_usd_warn(qmat_context *context, qmat_usd_stage *stage, const qm
     vsnprintf(text + used, sizeof text - used, format, arguments);
     va_end(arguments);
   }
-  /* Cutting may have split a character. */
-  for (size_t end = strlen(text); end > 0 && !qmat_is_utf8(text); end--) text[end - 1] = '\0';
+  clean_text(text);
   json_t *warning = json_string(text);
   int failed = stage->warning_count > MOST_WARNINGS + 1 ? json_array_set_new(stage->warnings, MOST_WARNINGS, warning)
                                                         : json_array_append_new(stage->warnings, warning);
@@ -114,6 +121,7 @@ qmat_status qmat_usd_prim_fail(qmat_context *context, const qmat_usd_stage *stag
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   qmat_fail(context, QMAT_ERROR_FORMAT, "%s: %s", path_of(prim, path), text);
+  clean_text(context->error.message);
   return qmat_fail_at(context, stage->path, 0, 0);
 }
 

@@ -631,8 +631,8 @@ static qmat_status read_inlined(const crate *c, uint32_t bits, unsigned type, qm
   }
   for (unsigned i = 0; i < components && components > 1; i++) {
     /* Vectors as signed bytes, matrices as their diagonals. */
-    unsigned at = rows > 0 ? i / rows : i;
-    int8_t byte = rows > 0 && i / rows != i % rows ? 0 : (int8_t)(bits >> (8 * at));
+    const bool is_off_diagonal = rows > 0 && i / rows != i % rows;
+    const int8_t byte = (int8_t)(is_off_diagonal ? 0 : bits >> (8 * (rows > 0 ? i / rows : i)) & 0xFF);
     if (qmat_usd_is_integer(kind)) {
       integers[i] = byte;
     } else {
