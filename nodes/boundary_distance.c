@@ -14,14 +14,19 @@ static const double rounding = 1e-9;
  * epsilon that much is tolerated. */
 static const double smallest_share = 1.0 / 16;
 
-/* `outside` is not told from this share of epsilon. */
-static const double outside_floor = 0.25;
+/* Errors are not told from this many times what is tolerated at epsilon: where the boundary lies close to the surface
+ * all over, looks would be without number. */
+static const double least_told = 5;
 
 static const double least_tolerance = 1e-5;
 
-/* Where there are more features, most of them are buried in others, and space is searched instead of them. After so
- * many looks at either nothing is split any more: F is slow where hundreds of primitives hold a point. */
-enum { MOST_FEATURES = 10000, MOST_LOOKS = 1 << 22, MOST_CELL_LOOKS = 1 << 17 };
+/* Where less of the features' surfaces than this share lies on the boundary, or there are more features than that,
+ * space is searched instead of them. */
+static const double least_exposed = 0.05;
+enum { MANY_FEATURES = 10000 };
+
+/* After so many looks nothing is split any more; F is slow where hundreds of primitives hold a point. */
+enum { MOST_LOOKS = 1 << 21, MOST_LOOKS_OF_MANY = 1 << 17 };
 
 static double maximum(double a, double b) {
   return a > b ? a : b;
@@ -625,27 +630,29 @@ static patch whole_space(const features *f) {
 }
 
 static qmat_status search_pieces(qmat_context *context, search *s, double epsilon, double tolerance,
-                                 qmat_boundary_distance *result) {
+                                 size_t sample_count, qmat_boundary_distance *result) {
   const size_t count = feature_count(s->features);
+  const size_t most_looks = count > MANY_FEATURES ? MOST_LOOKS_OF_MANY : MOST_LOOKS;
+  const bool in_space = count > MANY_FEATURES || (double)result->sample_count < least_exposed * (double)sample_count;
   patch_list lists[2] = {{0}, {0}};
   finding *findings = NULL;
   size_t capacity = 0;
   qmat_status status = QMAT_OK;
-  if (qmat_grow((void **)&lists[0].items, &lists[0].capacity, 8 * (count <= MOST_FEATURES ? count : 1),
-                sizeof *lists[0].items))
+  if (qmat_grow((void **)&lists[0].items, &lists[0].capacity, 8 * (in_space ? 1 : count), sizeof *lists[0].items))
     status = qmat_fail_memory(context, "pieces of the envelope's boundary");
-  for (size_t i = 0; count <= MOST_FEATURES && i < count && status == QMAT_OK; i++)
-    add_roots(s->features, i, &lists[0]);
-  if (count > MOST_FEATURES && status == QMAT_OK) lists[0].items[lists[0].count++] = whole_space(s->features);
+  for (size_t i = 0; !in_space && i < count && status == QMAT_OK; i++) add_roots(s->features, i, &lists[0]);
+  if (in_space && status == QMAT_OK) lists[0].items[lists[0].count++] = whole_space(s->features);
   for (int level = 0; status == QMAT_OK && lists[level & 1].count > 0; level++) {
     const patch_list *from = &lists[level & 1];
     const double lo = result->either_side.lo;
     s->lo[0] = lo;
     s->lo[1] = result->outside.lo;
-    s->target[0] = qmat_bound_target(lo, epsilon, tolerance) - rounding;
-    s->target[1] = maximum(qmat_bound_target(result->outside.lo, epsilon, tolerance), outside_floor * epsilon);
+    for (int side = 0; side < 2; side++)
+      s->target[side] =
+          maximum(qmat_bound_target(s->lo[side], epsilon, tolerance), minimum(1, least_told * tolerance) * epsilon) -
+          rounding;
     s->smallest = smallest_share * minimum(tolerated(lo, epsilon, tolerance), s->target[0] - lo);
-    s->last = result->looks + 4 * from->count > (count > MOST_FEATURES ? MOST_CELL_LOOKS : MOST_LOOKS);
+    s->last = result->looks + 4 * from->count > most_looks;
     if (qmat_grow((void **)&findings, &capacity, from->count, sizeof *findings))
       status = qmat_fail_memory(context, "pieces of the envelope's boundary");
     if (status == QMAT_OK) status = search_level(context, s, from, &lists[1 - (level & 1)], findings, result);
@@ -670,7 +677,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
     status = qmat_fail_memory(context, "the envelope's boundary");
   if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, sample_count, result);
   search s = {.features = &f, .surface = surface, .envelope = envelope};
-  if (status == QMAT_OK) status = search_pieces(context, &s, epsilon, tolerance, result);
+  if (status == QMAT_OK) status = search_pieces(context, &s, epsilon, tolerance, sample_count, result);
   result->either_side = closed_bounds(result->either_side);
   result->outside = closed_bounds(result->outside);
   return status;

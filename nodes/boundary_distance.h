@@ -26,16 +26,17 @@ typedef struct qmat_boundary_distance {
  * the slabs, and those on the boundary asked. Then branch and bound over pieces of these same: the distance to the
  * surface is 1-Lipschitz, so it is at most `reach` above that at a piece's middle. A piece that lies deeper than
  * QMAT_BOUNDARY_SKIN within the envelope is no part of the boundary: within a neighbour whose support is larger
- * along all of its normals, or within a primitive that holds its middle deeper than its reach. Of a medial mesh of more
- * than 10,000 features cells of space are searched instead, of which those that may meet the boundary count. Pieces are
+ * along all of its normals, or within a primitive that holds its middle deeper than its reach. Where all but
+ * a twentieth of the samples are buried, or of more than 10,000 spheres, edges and sheets, cells of space are searched
+ * instead, of which those that may meet the boundary count. Pieces are
  * taken level by level, and all of a level are compared with the one `lo` of the levels before, so that the answer does
  * not depend on threads.
  *
  * hi - lo is at most `tolerance` (a share of `epsilon` or of lo, the larger), and less where that decides whether hi is
- * at most `epsilon`; `outside` is not told from a quarter of epsilon below that. Where two primitives meet so
- * that the boundary between them is undecided down to the smallest pieces, or the work is beyond all measure, hi is
- * higher, and still no point of the boundary is farther. `epsilon` > 0 and `tolerance` > 0; their product is taken for
- * 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+ * at most `epsilon`; but hi may be five times the tolerated share of epsilon where the truth is less. Where two
+ * primitives meet so that the boundary between them is undecided down to the smallest pieces, or where the work would
+ * be too much, hi is higher, and still no point of the boundary is farther. `epsilon` > 0 and `tolerance` > 0; their
+ * product is taken for 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
                                            double tolerance, size_t sample_count, qmat_boundary_distance *result);

@@ -354,21 +354,18 @@ const qmat_node qmat_node_medial_evaluate = {
     .summary = "Proves how far a medial mesh and a surface are apart",
     .doc =
         "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
-        "distance "
-        "from any point of the surface to the solid that spheres, cones and slabs sweep (eq. 9 over all of the "
-        "surface); "
-        "envelope_to_surface one of the distance from any point of that solid's boundary to the surface, on either "
-        "side "
-        "of it; envelope_out_of_solid of the same over what lies outside of the model, to a quarter of epsilon at "
-        "best. "
+        "distance from any point of the surface to the solid that spheres, cones and slabs sweep (eq. 9 over all "
+        "of the surface); envelope_to_surface one of the distance from any point of that solid's boundary to the "
+        "surface, on either side of it; envelope_out_of_solid of the same over what lies outside of the model. "
         "Names with _at_least are lower bounds, found at a point. The bounds come from branch and bound and hold "
-        "between samples; the figures that are sampled or means do not. The first and the second together bound the "
-        "two-sided distance between the surface and the envelope's boundary but for surface that lies deep within the "
-        "envelope, in a gap that it fills: surface_buried_sampled shows how deep. certified says that the surface is "
-        "closed and oriented and that both are at most epsilon; of other surfaces all is an estimate. Loops and voids "
-        "are "
-        "Betti numbers over Z/2 of the medial mesh and of the solid; they are missing where the surface has no inside "
-        "or an edge of more than two triangles.",
+        "between samples; the figures that are sampled or means do not. The last two may be five tolerances where"
+        " the truth is less, and more of a medial mesh of ten thousand simplices and more. surface_to_envelope "
+        "and envelope_to_surface together bound the two-sided distance between the surface and the envelope's "
+        "boundary but for surface that lies deep within the envelope, in a gap that it fills: "
+        "surface_buried_sampled shows how deep. certified says that the surface is closed and oriented and that "
+        "both are at most epsilon; of other surfaces all is an estimate. Loops and voids are Betti numbers over "
+        "Z/2 of the medial mesh and of the solid; they are missing where the surface has no inside or an edge of "
+        "more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),
     .params = params,
