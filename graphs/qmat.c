@@ -30,6 +30,8 @@ struct qmat_job {
   size_t want_count, want_capacity;
   qmat_run_given *given;
   size_t given_count, given_capacity;
+  char *cache_folder; /* NULL: none */
+  qmat_cache cache;   /* open while a run lasts, and for as long as its report may be asked for */
   qmat_job_progress progress;
   void *progress_user;
   qmat_job_problem problem;
@@ -145,6 +147,8 @@ qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size
 void qmat_job_free(qmat_job *job) {
   if (!job) return;
   qmat_run_uninit(&job->run);
+  qmat_cache_close(&job->cache);
+  qmat_free(job->cache_folder);
   for (size_t i = 0; i < job->save_count; i++) qmat_free(job->saves[i].path);
   for (size_t i = 0; i < job->given_count; i++) qmat_value_release(job->given[i].value);
   qmat_free(job->saves);
@@ -274,6 +278,43 @@ qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
   return finish(job, status);
 }
 
+qmat_result qmat_job_cache(qmat_job *job, const char *folder) {
+  if (!job->loaded) return job->problem.result;
+  qmat_cache cache = {0};
+  qmat_status status = QMAT_OK;
+  char *copy = folder ? qmat_strdup(folder) : NULL;
+  if (folder && !*folder)
+    status = qmat_fail(&job->context, QMAT_ERROR_USAGE, "the folder of the cache is empty");
+  else if (folder && !copy)
+    status = qmat_fail_memory(&job->context, "cache");
+  else if (folder)
+    status = qmat_cache_open(&job->context, &(qmat_cache_options){.folder = folder}, &cache);
+  qmat_cache_close(&cache);
+  if (status == QMAT_OK) {
+    qmat_free(job->cache_folder);
+    job->cache_folder = copy;
+  } else {
+    qmat_free(copy);
+  }
+  return finish(job, status);
+}
+
+char *qmat_cache_folder(void) {
+  const char *named = getenv("QMAT_CACHE");
+  if (!named) return qmat_cache_default_folder();
+  return *named && strcmp(named, "off") != 0 ? qmat_strdup(named) : NULL;
+}
+
+qmat_result qmat_job_hits(qmat_job *job, size_t *hits, size_t *nodes) {
+  if (!job->loaded) return job->problem.result;
+  if (!job->ran) return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "the job has no results: run it first"));
+  size_t count = 0;
+  for (size_t i = 0; i < job->run.step_count; i++) count += job->run.steps[i].state == QMAT_STEP_HIT;
+  if (hits) *hits = count;
+  if (nodes) *nodes = job->run.step_count;
+  return QMAT_RESULT_OK;
+}
+
 /* ---- running ---- */
 
 static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
@@ -286,6 +327,7 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   if (!job->loaded) return job->problem.result;
   qmat_context *context = &job->context;
   qmat_run_uninit(&job->run);
+  qmat_cache_close(&job->cache);
   job->ran = false;
   if (threads < 0 || threads > 1024)
     return finish(job,
@@ -301,13 +343,17 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
       .given = job->given,
       .given_count = job->given_count,
       .only_wanted = job->want_count > 0,
+      .cache = job->cache_folder ? &job->cache : NULL,
   };
   job->progress = progress;
   job->progress_user = user;
   context->threads = threads;
   context->progress = progress ? forward_progress : NULL;
   context->progress_user = job;
-  qmat_status status = qmat_run_plan(context, &job->graph, &options, &job->run);
+  qmat_status status = QMAT_OK;
+  if (job->cache_folder)
+    status = qmat_cache_open(context, &(qmat_cache_options){.folder = job->cache_folder}, &job->cache);
+  if (status == QMAT_OK) status = qmat_run_plan(context, &job->graph, &options, &job->run);
   if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
   if (status == QMAT_OK) status = qmat_run_write(context, &job->run);
   context->progress = NULL;

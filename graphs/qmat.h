@@ -87,6 +87,18 @@ QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
  * path's ending chooses the format. May be called again for the same output with another path. */
 QMAT_API qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
 
+/* Keeps the results of every node in a folder, which is made when it is not there, and takes them from there when they
+ * are known: a mesh that is given in memory counts by its content, like one from a file. Any number of jobs, threads
+ * and processes may share a folder. NULL: no cache, which is how a job starts. What goes wrong with a cache never fails
+ * a run; qmat_job_run_report tells of it ("cache"). QMAT_RESULT_USAGE: the path leads to a file. */
+QMAT_API qmat_result qmat_job_cache(qmat_job *job, const char *folder);
+/* The folder that the command line uses: $QMAT_CACHE, or qmat in $XDG_CACHE_HOME or ~/.cache; NULL where that is "off"
+ * or there is no home. Free with qmat_text_free. */
+QMAT_API char *qmat_cache_folder(void);
+
+/* How many nodes of the last run came from the cache, and how many there were. NULL is allowed. */
+QMAT_API qmat_result qmat_job_hits(qmat_job *job, size_t *hits, size_t *nodes);
+
 /* ---- running ---- */
 
 /* Hears of the running node: `done` of `total` (0: not known) of `unit`. Returns false to cancel. Called from the

@@ -235,6 +235,40 @@ static void test_a_bad_graph_keeps_its_error(void **state) {
   qmat_job_free(job);
 }
 
+static void test_a_job_takes_from_the_cache_what_another_has_made(void **state) {
+  (void)state;
+  char folder[] = "/tmp/qmat-job-XXXXXX", command[64];
+  assert_non_null(mkdtemp(folder));
+  size_t spheres[2];
+  for (int i = 0; i < 2; i++) {
+    qmat_job *job = job_with_ball();
+    qmat_medial_view medial;
+    size_t hits, nodes;
+    assert_int_equal(qmat_job_hits(job, &hits, &nodes), QMAT_RESULT_USAGE);
+    ok(job, qmat_job_cache(job, folder));
+    ok(job, qmat_job_want(job, "simple.medial"));
+    ok(job, qmat_job_run(job, 1 + i, NULL, NULL));
+    ok(job, qmat_job_medial(job, "simple.medial", &medial));
+    ok(job, qmat_job_hits(job, &hits, &nodes));
+    assert_true(nodes >= 4);
+    assert_int_equal(hits, i == 0 ? 0 : nodes);
+    spheres[i] = medial.sphere_count;
+    char *json;
+    ok(job, qmat_job_run_report(job, &json));
+    assert_non_null(strstr(json, "\"hits\""));
+    qmat_text_free(json);
+    ok(job, qmat_job_cache(job, NULL));
+    ok(job, qmat_job_run(job, 1, NULL, NULL));
+    ok(job, qmat_job_hits(job, &hits, NULL));
+    assert_int_equal(hits, 0);
+    assert_int_equal(qmat_job_cache(job, "/proc/self/exe"), QMAT_RESULT_USAGE);
+    qmat_job_free(job);
+  }
+  assert_int_equal(spheres[0], spheres[1]);
+  snprintf(command, sizeof command, "rm -r %s", folder);
+  assert_int_equal(system(command), 0);
+}
+
 static void test_the_shipped_graph_is_the_built_in_one(void **state) {
   (void)state;
   // Tests run in the folder of the source.
@@ -267,6 +301,7 @@ int main(void) {
       cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
+      cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),
       cmocka_unit_test(test_the_shipped_graph_is_the_built_in_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
