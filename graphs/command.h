@@ -49,9 +49,9 @@ struct qmat_command {
   qmat_status (*run)(qmat_context *context, qmat_invocation *invocation);
 };
 
-extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_why, qmat_command_cache,
-    qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node, qmat_command_version,
-    qmat_command_help;
+extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_watch, qmat_command_why,
+    qmat_command_cache, qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node,
+    qmat_command_version, qmat_command_help;
 
 /* All commands, in the order in which help lists them. */
 extern const qmat_command *const qmat_commands[];
@@ -116,8 +116,11 @@ qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *inv
 /* The options that both have, beside their own. */
 extern const qmat_option qmat_common_options[];
 
-/* Makes invocation->graph with `prepare`, sets what --set says, runs it, and prints and writes what came of it. */
+/* Makes invocation->graph with `prepare`, sets what --set says, runs it, and prints and writes what came of it.
+ * `finished` hears of the run before it is freed, also of one that failed, whose graph or run may then be empty; NULL:
+ * nobody. */
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
-                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation));
+                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                         void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user);
 
 #endif

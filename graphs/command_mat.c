@@ -53,7 +53,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_fail(context, QMAT_ERROR_USAGE, "where to save the result is not given");
     return qmat_fail_hint(context, "-o PATH");
   }
-  return qmat_execute(context, invocation, set_inputs);
+  return qmat_execute(context, invocation, set_inputs, NULL, NULL);
 }
 
 const qmat_command qmat_command_mat = {

@@ -2,7 +2,7 @@
 #include "graphs/command.h"
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  return qmat_execute(context, invocation, qmat_read_graph_argument);
+  return qmat_execute(context, invocation, qmat_read_graph_argument, NULL, NULL);
 }
 
 static const qmat_option options[] = {

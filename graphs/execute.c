@@ -142,7 +142,8 @@ static void print_warnings(const qmat_run *run) {
 }
 
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
-                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation)) {
+                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                         void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
   const char *report_path = qmat_invocation_value(invocation, "report");
   bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
   bool dry = qmat_invocation_value(invocation, "dry-run") != NULL;
@@ -189,6 +190,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (ready && !quiet && !dry) print_warnings(run);
   const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
   if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
+  if (finished) finished(user, &invocation->graph, run);
   qmat_planned_run_uninit(&planned);
   return status;
 }

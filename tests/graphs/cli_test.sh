@@ -65,7 +65,7 @@ expect 0 "qmat COMMAND" "$qmat" help
 expect 0 "qmat COMMAND" "$qmat" --help
 expect 2 "did you mean 'run'?" "$qmat" rnu
 expect 2 "did you mean 'check'?" "$qmat" help chekc
-for command in mat run batch why cache check dot nodes node version help; do
+for command in mat run batch watch why cache check dot nodes node version help; do
   expect 0 "Options:" "$qmat" help $command
   expect 0 "qmat $command" "$qmat" $command --help
 done

@@ -1,0 +1,92 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# qmat watch: what a saved file makes it do: watch_test.sh PROGRAM
+qmat=$1
+work=$(mktemp -d) || exit 1
+watching=
+trap 'if [ -n "$watching" ]; then kill -KILL $watching 2>/dev/null; fi; rm -rf "$work"' EXIT
+cd "$work" || exit 1
+QMAT_CACHE=$work/cache
+export QMAT_CACHE
+
+die() {
+  echo "FAILED: $*"
+  cat out.txt err.txt
+  exit 1
+}
+
+cat >graph.yaml <<'END'
+qmat: 1
+nodes:
+  model:     { type: scene.read, params: { path: models/box.off } }
+  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
+  samples:   { type: mesh.sample, params: { spacing: 20% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
+outputs: { samples: samples.samples }
+END
+mkdir models
+cat >models/box.off <<'END'
+OFF
+8 6 0
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+0 0 1
+2 0 1
+2 1 1
+0 1 1
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+END
+
+# runs N WHAT: the N-th run ends within some seconds.
+runs() {
+  wait_left=100
+  while [ "$(grep -c '^qmat: watching' err.txt)" -lt "$1" ]; do
+    wait_left=$((wait_left - 1))
+    [ $wait_left -gt 0 ] || die "$2: no run"
+    sleep 0.1
+  done
+  [ "$(grep -c '^qmat: watching' err.txt)" -eq "$1" ] || die "$2: too many runs"
+}
+
+# was NODE STATE WHAT: of the last run.
+was() {
+  [ "$(awk -v node="$1" '$1 == node { state = $3 } END { print state }' out.txt)" = "$2" ] || die "$3: $1 is not $2"
+}
+
+"$qmat" watch graph.yaml >out.txt 2>err.txt &
+watching=$!
+runs 1 "the first"
+grep -q 'watching 2 files' err.txt || die "graph and model are watched"
+was samples run "the first"
+sed 's/20%/25%/' graph.yaml >new.yaml
+mv new.yaml graph.yaml
+runs 2 "a graph that was replaced"
+was thickness hit "a graph that was replaced"
+was samples run "a graph that was replaced"
+sed -i 's/^2 1 1$/2 1 1.1/' models/box.off
+runs 3 "a model that was saved"
+was model run "a model that was saved"
+touch models/box.off graph.yaml
+echo "not ours" >models/other.off
+sleep 1
+runs 3 "nothing that counts"
+cp graph.yaml right.yaml
+echo "nodes: twice" >>graph.yaml
+runs 4 "a mistake"
+grep -q 'graph.yaml:[0-9]*:[0-9]*:' err.txt || die "a mistake is told with its place"
+cp right.yaml graph.yaml
+runs 5 "the mistake mended"
+was samples hit "the mistake mended"
+rm models/box.off
+runs 6 "a model that is gone"
+kill -TERM $watching
+wait $watching
+code=$?
+watching=
+[ $code -eq 0 ] || die "exit code 0, not $code"
