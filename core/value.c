@@ -18,14 +18,14 @@ enum { FORM_VERSION = 1, JSON_FLAGS = JSON_SORT_KEYS | JSON_COMPACT | JSON_REAL_
 
 /* The numbers are part of the binary form. */
 typedef enum element {
-  ELEMENT_U32 = 2,  /* array of uint32_t */
-  ELEMENT_F64 = 3,  /* array of double */
-  ELEMENT_TEXT = 4, /* char *, NUL-terminated */
-  ELEMENT_JSON = 5, /* json_t *, an object */
-  ELEMENT_BOOL = 6, /* bool, one byte 0 or 1 */
-  ELEMENT_ENUM = 7, /* an enum, as u32 */
-  ELEMENT_SIZE = 8, /* size_t that is no row's count, as u64 */
-  ELEMENT_PARTS = 9, /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
+  ELEMENT_U32 = 2,    /* array of uint32_t */
+  ELEMENT_F64 = 3,    /* array of double */
+  ELEMENT_TEXT = 4,   /* char *, NUL-terminated */
+  ELEMENT_JSON = 5,   /* json_t *, an object */
+  ELEMENT_BOOL = 6,   /* bool, one byte 0 or 1 */
+  ELEMENT_ENUM = 7,   /* an enum, as u32 */
+  ELEMENT_SIZE = 8,   /* size_t that is no row's count, as u64 */
+  ELEMENT_PARTS = 9,  /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
   ELEMENT_NUMBER = 10 /* one double */
 } element;
 
@@ -47,8 +47,21 @@ typedef struct row {
 static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT), SCALAR(qmat_scene, format, TEXT),
                                  SCALAR(qmat_scene, meters_per_unit, NUMBER), SCALAR(qmat_scene, is_z_up, BOOL), END};
 static const row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),
-                                ARRAY(qmat_mesh, triangles, U32, triangle_count, 3), SCALAR(qmat_mesh, closed, BOOL),
-                                SCALAR(qmat_mesh, oriented, BOOL), END};
+                                ARRAY(qmat_mesh, triangles, U32, triangle_count, 3),
+                                SCALAR(qmat_mesh, closed, BOOL),
+                                SCALAR(qmat_mesh, oriented, BOOL),
+                                ARRAY(qmat_mesh, cage.surface_faces, U32, cage.surface_count, 1),
+                                ARRAY(qmat_mesh, cage.schemes, U32, cage.surface_count, 1),
+                                ARRAY(qmat_mesh, cage.boundaries, U32, cage.surface_count, 1),
+                                ARRAY(qmat_mesh, cage.positions, F64, cage.vertex_count, 3),
+                                ARRAY(qmat_mesh, cage.face_sizes, U32, cage.face_count, 1),
+                                ARRAY(qmat_mesh, cage.corners, U32, cage.corner_count, 1),
+                                ARRAY(qmat_mesh, cage.holes, U32, cage.hole_count, 1),
+                                ARRAY(qmat_mesh, cage.creases, U32, cage.crease_count, 2),
+                                ARRAY(qmat_mesh, cage.crease_sharpness, F64, cage.crease_count, 1),
+                                ARRAY(qmat_mesh, cage.sharp_vertices, U32, cage.sharp_count, 1),
+                                ARRAY(qmat_mesh, cage.vertex_sharpness, F64, cage.sharp_count, 1),
+                                END};
 static const row field_rows[] = {ARRAY(qmat_field, values, F64, count, 1), SCALAR(qmat_field, domain, ENUM),
                                  SCALAR(qmat_field, unit, TEXT), END};
 static const row samples_rows[] = {
@@ -523,6 +536,65 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   return status != QMAT_OK ? status : check_utf8(context, scene->format, "format of the scene");
 }
 
+/* Every id of an array is below `count`; names the first group of `components` that is not. */
+static qmat_status check_ids(qmat_context *context, const uint32_t *ids, size_t length, size_t count, const char *kind,
+                             size_t components, const char *of) {
+  for (size_t i = 0; i < length; ++i) {
+    if (ids[i] < count) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it names %s %u of %zu", of, ids[i], count);
+    return fail_element(context, kind, i / components);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status check_sharpness(qmat_context *context, const double *sharpness, size_t count, const char *kind) {
+  for (size_t i = 0; i < count; ++i) {
+    if (sharpness[i] >= 0 && isfinite(sharpness[i])) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its sharpness is negative or not finite");
+    return fail_element(context, kind, i);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status check_cage(qmat_context *context, const qmat_cage *cage) {
+  size_t faces = 0, corners = 0;
+  qmat_status status = check_u32_count(context, cage->vertex_count, "vertices of a cage");
+  if (status == QMAT_OK) status = check_u32_count(context, cage->face_count, "faces of a cage");
+  if (status == QMAT_OK) {
+    status = check_finite(context, cage->positions, cage->vertex_count, 3, "cage vertex", "position");
+  }
+  if (status == QMAT_OK) {
+    status = check_ids(context, cage->schemes, cage->surface_count, QMAT_SCHEME_COUNT, "surface", 1, "scheme");
+  }
+  if (status == QMAT_OK) {
+    status =
+        check_ids(context, cage->boundaries, cage->surface_count, QMAT_BOUNDARY_COUNT, "surface", 1, "boundary rule");
+  }
+  if (status == QMAT_OK) {
+    status = check_ids(context, cage->corners, cage->corner_count, cage->vertex_count, "cage corner", 1, "vertex");
+  }
+  if (status == QMAT_OK) {
+    status = check_ids(context, cage->holes, cage->hole_count, cage->face_count, "hole", 1, "face");
+  }
+  if (status == QMAT_OK) {
+    status = check_ids(context, cage->creases, 2 * cage->crease_count, cage->vertex_count, "crease", 2, "vertex");
+  }
+  if (status == QMAT_OK) {
+    status =
+        check_ids(context, cage->sharp_vertices, cage->sharp_count, cage->vertex_count, "sharp vertex", 1, "vertex");
+  }
+  if (status == QMAT_OK) status = check_sharpness(context, cage->crease_sharpness, cage->crease_count, "crease");
+  if (status == QMAT_OK) status = check_sharpness(context, cage->vertex_sharpness, cage->sharp_count, "sharp vertex");
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < cage->surface_count; ++i) faces += cage->surface_faces[i];
+  for (size_t i = 0; i < cage->face_count; ++i) corners += cage->face_sizes[i];
+  if (faces == cage->face_count && corners == cage->corner_count) return QMAT_OK;
+  return qmat_fail(context, QMAT_ERROR_GEOMETRY,
+                   "a cage has %zu faces and %zu corners, but its parts add up to %zu and "
+                   "%zu",
+                   cage->face_count, cage->corner_count, faces, corners);
+}
+
 static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
   const qmat_mesh *mesh = (const qmat_mesh *)value;
   qmat_status status = check_u32_count(context, mesh->vertex_count, "vertices");
@@ -535,7 +607,7 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
               mesh->vertex_count);
     return fail_element(context, "facet", i / 3);
   }
-  return QMAT_OK;
+  return check_cage(context, &mesh->cage);
 }
 
 static qmat_status check_field(qmat_context *context, const qmat_value *value) {

@@ -58,7 +58,89 @@ qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const ui
   return QMAT_OK;
 }
 
+/* The arrays of a cage: where they and their counts stand, and the bytes per count. */
+static const struct {
+  size_t array, count, bytes;
+} cage_arrays[QMAT_CAGE_ARRAYS] = {
+    {offsetof(qmat_cage, surface_faces), offsetof(qmat_cage, surface_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, schemes), offsetof(qmat_cage, surface_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, boundaries), offsetof(qmat_cage, surface_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, positions), offsetof(qmat_cage, vertex_count), 3 * sizeof(double)},
+    {offsetof(qmat_cage, face_sizes), offsetof(qmat_cage, face_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, corners), offsetof(qmat_cage, corner_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, holes), offsetof(qmat_cage, hole_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, creases), offsetof(qmat_cage, crease_count), 2 * sizeof(uint32_t)},
+    {offsetof(qmat_cage, crease_sharpness), offsetof(qmat_cage, crease_count), sizeof(double)},
+    {offsetof(qmat_cage, sharp_vertices), offsetof(qmat_cage, sharp_count), sizeof(uint32_t)},
+    {offsetof(qmat_cage, vertex_sharpness), offsetof(qmat_cage, sharp_count), sizeof(double)},
+};
+
+static size_t cage_count(const qmat_cage *cage, size_t row) {
+  return *(const size_t *)(const void *)((const char *)cage + cage_arrays[row].count);
+}
+
+static void **cage_array(qmat_cage *cage, size_t row) {
+  return (void **)(void *)((char *)cage + cage_arrays[row].array);
+}
+
+static const void *cage_items(const qmat_cage *cage, size_t row) {
+  return *(void *const *)(const void *)((const char *)cage + cage_arrays[row].array);
+}
+
+static void move_ids(uint32_t *ids, size_t count, size_t by) {
+  for (size_t i = 0; i < count; i++) ids[i] += (uint32_t)by;
+}
+
+qmat_status qmat_soup_add_cage(qmat_context *context, qmat_soup *soup, const qmat_cage *cage) {
+  qmat_cage *to = &soup->cage;
+  if (cage->vertex_count > UINT32_MAX - to->vertex_count || cage->face_count > UINT32_MAX - to->face_count) {
+    return qmat_fail_memory(context, "more than 2^32 - 1 vertices of cages");
+  }
+  for (size_t row = 0; row < QMAT_CAGE_ARRAYS; row++) {
+    const size_t before = cage_count(to, row), more = cage_count(cage, row), bytes = cage_arrays[row].bytes;
+    if (qmat_grow(cage_array(to, row), &soup->cage_capacities[row], before + more, bytes) != 0) {
+      return qmat_fail_memory(context, "the cages of subdivision surfaces");
+    }
+    if (more > 0) memcpy((char *)*cage_array(to, row) + before * bytes, cage_items(cage, row), more * bytes);
+  }
+  move_ids(to->corners + to->corner_count, cage->corner_count, to->vertex_count);
+  move_ids(to->holes + to->hole_count, cage->hole_count, to->face_count);
+  move_ids(to->creases + 2 * to->crease_count, 2 * cage->crease_count, to->vertex_count);
+  move_ids(to->sharp_vertices + to->sharp_count, cage->sharp_count, to->vertex_count);
+  to->surface_count += cage->surface_count;
+  to->vertex_count += cage->vertex_count;
+  to->face_count += cage->face_count;
+  to->corner_count += cage->corner_count;
+  to->hole_count += cage->hole_count;
+  to->crease_count += cage->crease_count;
+  to->sharp_count += cage->sharp_count;
+  return QMAT_OK;
+}
+
+void qmat_soup_clear_cage(qmat_soup *soup) {
+  for (size_t row = 0; row < QMAT_CAGE_ARRAYS; row++) {
+    qmat_free(*cage_array(&soup->cage, row));
+    soup->cage_capacities[row] = 0;
+  }
+  soup->cage = (qmat_cage){0};
+}
+
+/* A copy whose arrays hold what they count. */
+static qmat_status copy_cage(qmat_context *context, const qmat_cage *from, qmat_cage *to) {
+  if (from->surface_count == 0) return QMAT_OK;
+  for (size_t row = 0; row < QMAT_CAGE_ARRAYS; row++) {
+    const size_t count = cage_count(from, row), bytes = cage_arrays[row].bytes;
+    void *copy = qmat_alloc(count, bytes);
+    if (!copy) return qmat_fail_memory(context, "the cages of subdivision surfaces");
+    if (count > 0) memcpy(copy, cage_items(from, row), count * bytes);
+    *cage_array(to, row) = copy;
+    *(size_t *)(void *)((char *)to + cage_arrays[row].count) = count;
+  }
+  return QMAT_OK;
+}
+
 void qmat_soup_uninit(qmat_soup *soup) {
+  qmat_soup_clear_cage(soup);
   qmat_free(soup->positions);
   qmat_free(soup->facet_ends);
   qmat_free(soup->facet_ordinals);
@@ -427,6 +509,7 @@ qmat_status qmat_soup_to_mesh(qmat_context *context, const qmat_soup *soup, cons
     made->oriented = facts.oriented;
     if (report) status = fill_report(&c, made, &facts, report);
   }
+  if (status == QMAT_OK) status = copy_cage(context, &soup->cage, &made->cage);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made->base);
   if (status == QMAT_OK) {
     *mesh = made;

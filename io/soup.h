@@ -7,6 +7,8 @@
 
 #include "core/value.h"
 
+enum { QMAT_CAGE_ARRAYS = 11 };
+
 /* What a mesh file holds before it is a mesh: polygons in the file's own order, unchecked. Every reader fills one; all
  * checking, welding and triangulating is done once, in qmat_soup_to_mesh. A zeroed soup is empty and valid. */
 typedef struct qmat_soup {
@@ -18,6 +20,8 @@ typedef struct qmat_soup {
   int *facet_lines;         /* the line where it stands, from 1; 0: the format has no lines */
   size_t corner_count, corner_capacity;
   uint32_t *corners; /* corner_count vertex numbers */
+  qmat_cage cage;    /* of formats that have subdivision surfaces: goes into the mesh as it is */
+  size_t cage_capacities[QMAT_CAGE_ARRAYS];
 } qmat_soup;
 
 /* What a reader does with facets that name a vertex twice and facets that repeat another one's vertices. */
@@ -39,6 +43,13 @@ qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const
  * `ordinal` is what the file calls it, from 0; `line` is 0 where the format has none. QMAT_ERROR_MEMORY. */
 qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const uint32_t *corners, size_t count,
                                 uint32_t ordinal, int line);
+
+/* Adds the surfaces of `cage`, which counts its own vertices and faces from 0, behind those that are there.
+ * QMAT_ERROR_MEMORY, also beyond 2^32 - 1 vertices or faces. */
+qmat_status qmat_soup_add_cage(qmat_context *context, qmat_soup *soup, const qmat_cage *cage);
+
+/* Takes all surfaces out of the cage. */
+void qmat_soup_clear_cage(qmat_soup *soup);
 
 /* Frees the arrays; the soup is empty and usable again. */
 void qmat_soup_uninit(qmat_soup *soup);

@@ -239,7 +239,10 @@ static qmat_status read_transform(reader *r, const qmat_usd_prim *prim, const ch
 /* The arrays of a mesh; those that are not written have count 0. */
 typedef struct usd_mesh {
   const qmat_usd_value *points, *counts, *indices, *holes;
-  bool is_left_handed, is_cage;
+  const qmat_usd_value *crease_lengths, *crease_indices, *crease_sharpness, *sharp_vertices, *vertex_sharpness;
+  bool is_left_handed;
+  qmat_scheme scheme;
+  qmat_boundary boundary;
 } usd_mesh;
 
 static qmat_status read_array(reader *r, const qmat_usd_prim *prim, const char *name, bool numbers, unsigned components,
@@ -261,17 +264,91 @@ static qmat_status read_token(reader *r, const qmat_usd_prim *prim, const char *
   return status;
 }
 
+/* One of a few words; another is an error. */
+static qmat_status read_choice(reader *r, const qmat_usd_prim *prim, const char *name, const char *const *words,
+                               unsigned count, unsigned otherwise, unsigned *choice) {
+  const char *word;
+  qmat_status status = read_token(r, prim, name, words[otherwise], &word);
+  for (*choice = 0; status == QMAT_OK && *choice < count; ++*choice) {
+    if (strcmp(word, words[*choice]) == 0) return QMAT_OK;
+  }
+  if (status != QMAT_OK) return status;
+  return qmat_usd_prim_fail(r->context, r->stage, prim, "%s is '%.40s', which is unknown", name,
+                            qmat_is_utf8(word) ? word : "?");
+}
+
+static size_t count_of(const qmat_usd_value *value) {
+  return value ? value->count : 0;
+}
+
+/* Reads creases and sharp vertices: a crease of n vertices has n - 1 edges, and one sharpness or n - 1 of them. */
+static qmat_status read_sharpness(reader *r, const qmat_usd_prim *prim, usd_mesh *mesh) {
+  qmat_status status = read_array(r, prim, "creaseLengths", false, 1, &mesh->crease_lengths);
+  if (status == QMAT_OK) status = read_array(r, prim, "creaseIndices", false, 1, &mesh->crease_indices);
+  if (status == QMAT_OK) status = read_array(r, prim, "creaseSharpnesses", true, 1, &mesh->crease_sharpness);
+  if (status == QMAT_OK) status = read_array(r, prim, "cornerIndices", false, 1, &mesh->sharp_vertices);
+  if (status == QMAT_OK) status = read_array(r, prim, "cornerSharpnesses", true, 1, &mesh->vertex_sharpness);
+  if (status != QMAT_OK) return status;
+  const size_t lengths = count_of(mesh->crease_lengths), indices = count_of(mesh->crease_indices),
+               values = count_of(mesh->crease_sharpness);
+  size_t total = 0;
+  for (size_t i = 0; i < lengths; i++) {
+    const int64_t length = mesh->crease_lengths->integers[i];
+    if (length < 2 || (uint64_t)length > indices - total) {
+      return qmat_usd_prim_fail(r->context, r->stage, prim, "crease %zu has %lld vertices", i, (long long)length);
+    }
+    total += (size_t)length;
+  }
+  if (total != indices || (values != lengths && values != indices - lengths)) {
+    return qmat_usd_prim_fail(r->context, r->stage, prim,
+                              "%zu creases of %zu vertices do not go with %zu indices and %zu sharpnesses", lengths,
+                              total, indices, values);
+  }
+  if (count_of(mesh->sharp_vertices) != count_of(mesh->vertex_sharpness)) {
+    return qmat_usd_prim_fail(r->context, r->stage, prim, "%zu corners do not go with %zu sharpnesses",
+                              count_of(mesh->sharp_vertices), count_of(mesh->vertex_sharpness));
+  }
+  const qmat_usd_value *const ids[] = {mesh->crease_indices, mesh->sharp_vertices}, *const sharpness[] = {
+                                                                                        mesh->crease_sharpness,
+                                                                                        mesh->vertex_sharpness};
+  for (size_t k = 0; k < 2; k++) {
+    for (size_t i = 0; i < count_of(ids[k]); i++) {
+      if (ids[k]->integers[i] >= 0 && (uint64_t)ids[k]->integers[i] < count_of(mesh->points)) continue;
+      return qmat_usd_prim_fail(r->context, r->stage, prim, "a %s names vertex %lld, but there are %zu points",
+                                k ? "corner" : "crease", (long long)ids[k]->integers[i], count_of(mesh->points));
+    }
+    for (size_t i = 0; i < count_of(sharpness[k]); i++) {
+      if (sharpness[k]->numbers[i] >= 0 && isfinite(sharpness[k]->numbers[i])) continue;
+      return qmat_usd_prim_fail(r->context, r->stage, prim, "the sharpness of %s %zu is negative or not finite",
+                                k ? "corner" : "crease", i);
+    }
+  }
+  return QMAT_OK;
+}
+
 static qmat_status read_mesh(reader *r, const qmat_usd_prim *prim, usd_mesh *mesh) {
-  const char *handedness, *scheme;
+  static const char *const schemes[] = {"none", "catmullClark", "loop", "bilinear"}, *const boundaries[] = {
+                                                                                         "none", "edgeOnly",
+                                                                                         "edgeAndCorner"};
+  const char *handedness;
+  unsigned scheme = 0, boundary = 0;
   qmat_status status = read_array(r, prim, "points", true, 3, &mesh->points);
   if (status == QMAT_OK) status = read_array(r, prim, "faceVertexCounts", false, 1, &mesh->counts);
   if (status == QMAT_OK) status = read_array(r, prim, "faceVertexIndices", false, 1, &mesh->indices);
   if (status == QMAT_OK) status = read_array(r, prim, "holeIndices", false, 1, &mesh->holes);
   if (status == QMAT_OK) status = read_token(r, prim, "orientation", "rightHanded", &handedness);
-  if (status == QMAT_OK) status = read_token(r, prim, "subdivisionScheme", "catmullClark", &scheme);
+  if (status == QMAT_OK) {
+    status = read_choice(r, prim, "subdivisionScheme", schemes, QMAT_SCHEME_COUNT, QMAT_SCHEME_CATMULL_CLARK, &scheme);
+  }
+  if (status == QMAT_OK) {
+    status = read_choice(r, prim, "interpolateBoundary", boundaries, QMAT_BOUNDARY_COUNT, QMAT_BOUNDARY_EDGE_AND_CORNER,
+                         &boundary);
+  }
+  if (status == QMAT_OK && scheme != QMAT_SCHEME_NONE) status = read_sharpness(r, prim, mesh);
   if (status != QMAT_OK) return status;
   mesh->is_left_handed = strcmp(handedness, "leftHanded") == 0;
-  mesh->is_cage = strcmp(scheme, "none") != 0;
+  mesh->scheme = (qmat_scheme)scheme;
+  mesh->boundary = (qmat_boundary)boundary;
   if (!mesh->points || !mesh->counts || !mesh->indices) return QMAT_OK;
   size_t corners = 0;
   for (size_t f = 0; f < mesh->counts->count; f++) {
@@ -346,6 +423,69 @@ static qmat_status add_faces(reader *r, const usd_mesh *mesh, size_t first_verte
   return status;
 }
 
+/* Adds the mesh's polygons to the soup's cage; its points are the soup's from `first_vertex` on. */
+static qmat_status add_cage(reader *r, const usd_mesh *mesh, size_t first_vertex, bool turned) {
+  const size_t faces = mesh->counts->count, corners = mesh->indices->count, holes = count_of(mesh->holes),
+               creases = count_of(mesh->crease_indices) - count_of(mesh->crease_lengths),
+               sharp = count_of(mesh->sharp_vertices);
+  uint32_t scheme = mesh->scheme, boundary = mesh->boundary, face_count = (uint32_t)faces;
+  qmat_arena arena = {0};
+  qmat_cage cage = {
+      .surface_count = 1,
+      .surface_faces = &face_count,
+      .schemes = &scheme,
+      .boundaries = &boundary,
+      .vertex_count = mesh->points->count,
+      .positions = r->soup->positions + 3 * first_vertex,
+      .face_count = faces,
+      .face_sizes = qmat_arena_alloc(&arena, faces, sizeof(uint32_t)),
+      .corner_count = corners,
+      .corners = qmat_arena_alloc(&arena, corners, sizeof(uint32_t)),
+      .hole_count = holes,
+      .holes = qmat_arena_alloc(&arena, holes, sizeof(uint32_t)),
+      .crease_count = creases,
+      .creases = qmat_arena_alloc(&arena, creases, 2 * sizeof(uint32_t)),
+      .crease_sharpness = qmat_arena_alloc(&arena, creases, sizeof(double)),
+      .sharp_count = sharp,
+      .sharp_vertices = qmat_arena_alloc(&arena, sharp, sizeof(uint32_t)),
+      .vertex_sharpness = qmat_arena_alloc(&arena, sharp, sizeof(double)),
+  };
+  qmat_status status = QMAT_OK;
+  if (!cage.face_sizes || !cage.corners || !cage.holes || !cage.creases || !cage.crease_sharpness ||
+      !cage.sharp_vertices || !cage.vertex_sharpness || faces > UINT32_MAX) {
+    status = qmat_fail_memory(r->context, "the cage of a subdivision surface");
+    goto done;
+  }
+  size_t at = 0;
+  for (size_t f = 0; f < faces; f++) {
+    const size_t count = (size_t)mesh->counts->integers[f];
+    cage.face_sizes[f] = (uint32_t)count;
+    for (size_t k = 0; k < count; k++) {
+      cage.corners[at + k] = (uint32_t)mesh->indices->integers[at + (turned ? count - 1 - k : k)];
+    }
+    at += count;
+  }
+  for (size_t i = 0; i < holes; i++) cage.holes[i] = (uint32_t)mesh->holes->integers[i];
+  size_t edge = 0, vertex = 0;
+  const bool per_edge = creases > 0 && mesh->crease_sharpness->count == creases;
+  for (size_t i = 0; i < count_of(mesh->crease_lengths); i++) {
+    for (int64_t k = 1; k < mesh->crease_lengths->integers[i]; k++, vertex++, edge++) {
+      cage.creases[2 * edge] = (uint32_t)mesh->crease_indices->integers[vertex];
+      cage.creases[2 * edge + 1] = (uint32_t)mesh->crease_indices->integers[vertex + 1];
+      cage.crease_sharpness[edge] = mesh->crease_sharpness->numbers[per_edge ? edge : i];
+    }
+    vertex++;
+  }
+  for (size_t i = 0; i < sharp; i++) {
+    cage.sharp_vertices[i] = (uint32_t)mesh->sharp_vertices->integers[i];
+    cage.vertex_sharpness[i] = mesh->vertex_sharpness->numbers[i];
+  }
+  status = qmat_soup_add_cage(r->context, r->soup, &cage);
+done:
+  qmat_arena_uninit(&arena);
+  return status;
+}
+
 static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inherited *state) {
   usd_mesh mesh = {0};
   qmat_status status = read_mesh(r, prim, &mesh);
@@ -364,7 +504,7 @@ static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inheri
     return QMAT_ERROR_GEOMETRY;
   }
   r->elements += elements;
-  if (mesh.is_cage) {
+  if (mesh.scheme != QMAT_SCHEME_NONE) {
     r->cages++;
     status = qmat_usd_warn(r->context, r->stage, prim,
                            "the control cage of a subdivision surface is taken as it is, not its limit");
@@ -379,7 +519,8 @@ static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inheri
   if (status == QMAT_OK) status = add_points(r, &mesh, &state->world);
   /* A mirror and a left hand cancel out. */
   const bool turned = mesh.is_left_handed != (determinant3(&state->world) < 0);
-  return status == QMAT_OK ? add_faces(r, &mesh, first, turned) : status;
+  if (status == QMAT_OK) status = add_faces(r, &mesh, first, turned);
+  return status == QMAT_OK ? add_cage(r, &mesh, first, turned) : status;
 }
 
 /* ---- prims ---- */
@@ -532,6 +673,7 @@ qmat_status qmat_usd_read(qmat_context *context, const qmat_bytes *bytes, const 
   }
   qmat_usd_prim_uninit(&root);
   if (status == QMAT_OK) status = check_any(&r, path);
+  if (r.cages == 0) qmat_soup_clear_cage(soup); /* polygons of which nothing is to be made */
   if (status == QMAT_OK && report) status = fill_report(&r, report);
   qmat_usd_stage_close(r.stage);
   return status;

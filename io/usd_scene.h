@@ -10,7 +10,8 @@
  * leaves none, also of those below an "over" that nothing defines. Transforms are applied in double precision, in the
  * order of xformOpOrder, with every operation, !invert! and !resetXformStack!; left-handed meshes and transforms that
  * mirror turn their faces round; faces that are holes are left out. The control cages of subdivision surfaces are taken
- * as they are. What the scene is composed of, and what of that is left out, says io/usd_stage.h.
+ * as they are; where there are some, soup->cage holds every mesh with its scheme, boundary rule, holes, creases and
+ * corners. What the scene is composed of, and what of that is left out, says io/usd_stage.h.
  *
  * `report` (a JSON object, may be NULL) gains
  *   layers_read, prims_read, meshes_placed, cages (of subdivision surfaces among them), holes (faces left out),

@@ -26,6 +26,8 @@ static qmat_scene *scene_example(void) {
   assert_non_null(scene);
   scene->name = qmat_strdup("Kr\xc3\xa4he");
   scene->format = qmat_strdup("off");
+  scene->meters_per_unit = 0.01;
+  scene->is_z_up = true;
   return scene;
 }
 
@@ -361,8 +363,9 @@ static void test_empty_values_are_valid(void **state) {
   qmat_context context = {0};
   qmat_field *field = qmat_field_new();
   field->unit = qmat_strdup("");
-  qmat_value *values[] = {&qmat_mesh_new()->base,   &field->base,            &qmat_samples_new()->base,
-                          &qmat_medial_new()->base, &qmat_chain_new()->base, &qmat_report_new()->base};
+  qmat_value *values[] = {&qmat_mesh_new()->base,    &field->base,
+                          &qmat_samples_new()->base, &qmat_medial_new()->base,
+                          &qmat_chain_new()->base,   &qmat_report_new()->base};
   enum { COUNT = sizeof values / sizeof *values };
   for (size_t i = 0; i < COUNT; ++i) {
     assert_sealed(&context, values[i]);
@@ -473,6 +476,68 @@ static void test_bad_meshes_name_the_first_bad_element(void **state) {
   mesh = mesh_example();
   mesh->vertex_count = 0;
   assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "facet 0: corner 0 names vertex 0 of 0");
+}
+
+/* Two surfaces: a quad with everything that a cage can have, and a triangle. */
+static qmat_mesh *cage_example(void) {
+  qmat_mesh *mesh = mesh_example();
+  qmat_cage *cage = &mesh->cage;
+  cage->surface_count = 2;
+  cage->vertex_count = 7;
+  cage->face_count = 2;
+  cage->corner_count = 7;
+  cage->hole_count = cage->crease_count = cage->sharp_count = 1;
+  ASSIGN(cage->surface_faces, (uint32_t[]){1, 1});
+  ASSIGN(cage->schemes, (uint32_t[]){QMAT_SCHEME_LOOP, QMAT_SCHEME_NONE});
+  ASSIGN(cage->boundaries, (uint32_t[]){QMAT_BOUNDARY_EDGE, QMAT_BOUNDARY_NONE});
+  ASSIGN(cage->positions, (double[]){0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 5, 0, 0, 6, 0, 0, 5, 1, 0});
+  ASSIGN(cage->face_sizes, (uint32_t[]){4, 3});
+  ASSIGN(cage->corners, (uint32_t[]){0, 1, 2, 3, 4, 5, 6});
+  ASSIGN(cage->holes, (uint32_t[]){0});
+  ASSIGN(cage->creases, (uint32_t[]){0, 1});
+  ASSIGN(cage->crease_sharpness, (double[]){2.5});
+  ASSIGN(cage->sharp_vertices, (uint32_t[]){3});
+  ASSIGN(cage->vertex_sharpness, (double[]){10});
+  return mesh;
+}
+
+static void test_cages_come_back_and_bad_ones_name_the_first_bad_element(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *read;
+  qmat_mesh *mesh = cage_example();
+  assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_OK);
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &read), QMAT_OK);
+  assert_memory_equal(&read->digest, &mesh->base.digest, sizeof read->digest);
+  const qmat_cage *cage = &((qmat_mesh *)read)->cage;
+  assert_int_equal(cage->surface_count, 2);
+  assert_int_equal(cage->creases[1], 1);
+  assert_true(cage->crease_sharpness[0] == 2.5 && cage->vertex_sharpness[0] == 10);
+  qmat_free(bytes);
+  qmat_value_release(read);
+  qmat_value_release(&mesh->base);
+  for (int i = 0; i < 8; i++) {
+    static const char *const kinds[] = {"surface", "surface",      "cage corner", "hole",
+                                        "crease",  "sharp vertex", "crease",      ""};
+    static const int64_t elements[] = {1, 0, 6, 0, 0, 0, 0, -1};
+    mesh = cage_example();
+    if (i == 0) mesh->cage.schemes[1] = QMAT_SCHEME_COUNT;
+    if (i == 1) mesh->cage.boundaries[0] = QMAT_BOUNDARY_COUNT;
+    if (i == 2) mesh->cage.corners[6] = 7;
+    if (i == 3) mesh->cage.holes[0] = 2;
+    if (i == 4) mesh->cage.creases[1] = 7;
+    if (i == 5) mesh->cage.sharp_vertices[0] = 7;
+    if (i == 6) mesh->cage.crease_sharpness[0] = -1;
+    if (i == 7) mesh->cage.face_sizes[0] = 3;
+    assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_ERROR_GEOMETRY);
+    assert_string_equal(context.error.element_kind, kinds[i]);
+    assert_int_equal(context.error.element, elements[i]);
+    qmat_value_release(&mesh->base);
+  }
+  qmat_context_uninit(&context);
 }
 
 static void test_bad_scenes_and_fields_are_refused(void **state) {
@@ -897,6 +962,7 @@ int main(void) {
       cmocka_unit_test(test_an_open_value_cannot_be_serialized),
       cmocka_unit_test(test_missing_arrays_and_texts_are_internal_errors),
       cmocka_unit_test(test_bad_meshes_name_the_first_bad_element),
+      cmocka_unit_test(test_cages_come_back_and_bad_ones_name_the_first_bad_element),
       cmocka_unit_test(test_bad_scenes_and_fields_are_refused),
       cmocka_unit_test(test_bad_samples_name_the_first_bad_element),
       cmocka_unit_test(test_barycentrics_may_be_off_by_rounding),

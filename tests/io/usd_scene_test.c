@@ -196,6 +196,54 @@ static void test_holes_are_left_out_and_cages_are_reported(void **state) {
   json_decref(report);
 }
 
+static void test_cages_keep_schemes_creases_corners_and_holes_in_world_space(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n" MESH("first", "") "def Mesh \"m\" {\npoint3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]\n"
+      "int[] faceVertexCounts = [4, 3]\nint[] faceVertexIndices = [0, 1, 2, 3, 0, 1, 2]\nint[] holeIndices = [1]\n"
+      "int[] creaseLengths = [3, 2]\nint[] creaseIndices = [0, 1, 2, 2, 3]\nfloat[] creaseSharpnesses = [2, 10]\n"
+      "int[] cornerIndices = [3]\nfloat[] cornerSharpnesses = [5]\ntoken interpolateBoundary = \"edgeOnly\"\n"
+      "uniform token orientation = \"leftHanded\"\nuniform token subdivisionScheme = \"loop\"\n"
+      "double3 xformOp:translate = (0, 0, 4)\nuniform token[] xformOpOrder = [\"xformOp:translate\"] }",
+      &report);
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  qmat_context context = {0};
+  qmat_mesh *mesh;
+  assert_int_equal(qmat_soup_to_mesh(&context, &soup, "file", &options, &mesh, NULL), QMAT_OK);
+  const qmat_cage *cage = &mesh->cage;
+  static const uint32_t surface_faces[] = {1, 2}, schemes[] = {QMAT_SCHEME_NONE, QMAT_SCHEME_LOOP},
+                        boundaries[] = {QMAT_BOUNDARY_EDGE_AND_CORNER, QMAT_BOUNDARY_EDGE}, sizes[] = {3, 4, 3},
+                        corners[] = {0, 1, 2, 6, 5, 4, 3, 5, 4, 3}, creases[] = {3, 4, 4, 5, 5, 6};
+  static const double crease_sharpness[] = {2, 2, 10};
+  assert_int_equal(cage->surface_count, 2);
+  assert_memory_equal(cage->surface_faces, surface_faces, sizeof surface_faces);
+  assert_memory_equal(cage->schemes, schemes, sizeof schemes);
+  assert_memory_equal(cage->boundaries, boundaries, sizeof boundaries);
+  assert_int_equal(cage->vertex_count, 7);
+  assert_true(cage->positions[3 * 3 + 2] == 4);
+  assert_int_equal(cage->face_count, 3);
+  assert_memory_equal(cage->face_sizes, sizes, sizeof sizes);
+  assert_int_equal(cage->corner_count, 10);
+  assert_memory_equal(cage->corners, corners, sizeof corners);
+  assert_int_equal(cage->hole_count, 1);
+  assert_int_equal(cage->holes[0], 2);
+  assert_int_equal(cage->crease_count, 3);
+  assert_memory_equal(cage->creases, creases, sizeof creases);
+  assert_memory_equal(cage->crease_sharpness, crease_sharpness, sizeof crease_sharpness);
+  assert_int_equal(cage->sharp_count, 1);
+  assert_int_equal(cage->sharp_vertices[0], 6);
+  assert_true(cage->vertex_sharpness[0] == 5);
+  qmat_value_release(&mesh->base);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  soup = good_scene("#usda 1.0\n" MESH("first", ""), &report);
+  assert_int_equal(soup.cage.surface_count, 0);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  qmat_context_uninit(&context);
+}
+
 static void test_what_is_hidden_inactive_or_for_other_purposes_is_skipped(void **state) {
   (void)state;
   json_t *report;
@@ -358,6 +406,17 @@ static void test_broken_meshes_are_errors_that_name_the_prim(void **state) {
                        "/m: corner 2 names vertex 3, but there are 3 points");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] holeIndices = [1]"), QMAT_ERROR_FORMAT,
                        "/m: hole 0 names face 1, but there are 1 faces");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "uniform token subdivisionScheme = \"doo\""),
+                       QMAT_ERROR_FORMAT, "/m: subdivisionScheme is 'doo', which is unknown");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [3]\nint[] creaseIndices = [0, 1]"),
+                       QMAT_ERROR_FORMAT, "/m: crease 0 has 3 vertices");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [2]\nint[] creaseIndices = [0, 1]"),
+                       QMAT_ERROR_FORMAT, "/m: 1 creases of 2 vertices do not go with 2 indices and 0 sharpnesses");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [7]\nfloat[] cornerSharpnesses = [1]"),
+                       QMAT_ERROR_FORMAT, "/m: a corner names vertex 7, but there are 3 points");
+  assert_scene_refused(
+      BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [0]\nfloat[] cornerSharpnesses = [-1]"),
+      QMAT_ERROR_FORMAT, "/m: the sharpness of corner 0 is negative or not finite");
   assert_scene_refused("#usda 1.0\ndef Mesh \"m\" { float[] points = [1] }", QMAT_ERROR_FORMAT,
                        "/m: points is of another type than it has to be");
   assert_scene_refused("#usda 1.0\ndef Mesh \"m\" {}", QMAT_ERROR_GEOMETRY,
@@ -484,6 +543,7 @@ int main(void) {
       cmocka_unit_test(test_operations_that_are_none_are_errors_that_name_the_prim),
       cmocka_unit_test(test_mirrors_and_left_hands_turn_faces_and_cancel_out),
       cmocka_unit_test(test_holes_are_left_out_and_cages_are_reported),
+      cmocka_unit_test(test_cages_keep_schemes_creases_corners_and_holes_in_world_space),
       cmocka_unit_test(test_what_is_hidden_inactive_or_for_other_purposes_is_skipped),
       cmocka_unit_test(test_what_nothing_defines_is_read_where_there_is_nothing_else),
       cmocka_unit_test(test_strength_of_arcs_is_local_inherit_variant_reference_payload_specialize),
