@@ -251,10 +251,12 @@ static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qma
       const char *path = qmat_param_input_file(type, row, step->params);
       if (!path) continue;
       is_main = strcmp(path, file->path) == 0;
+      // A path that is neither below the folder nor absolute would be looked for elsewhere the next time.
       size_t folder = folder_length(path);
-      if (!side.param || (*side.path == '/' && strncmp(file->path, path, folder) == 0)) {
+      bool below = strncmp(file->path, path, folder) == 0 && file->path[folder] != '/';
+      if (below ? !side.param || *side.path == '/' : !side.param && *file->path == '/') {
         side.param = type->params[row].name;
-        side.path = file->path + (strncmp(file->path, path, folder) == 0 ? folder : 0);
+        side.path = file->path + (below ? folder : 0);
       }
     }
     if (is_main) {
