@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/json_text.h"
+
 const qmat_command *const qmat_commands[] = {
     &qmat_command_mat,   &qmat_command_run,   &qmat_command_batch,   &qmat_command_watch,
     &qmat_command_why,   &qmat_command_cache, &qmat_command_check,   &qmat_command_dot,
@@ -175,6 +177,15 @@ void qmat_print_wrapped(const char *text, int column, int indent) {
     while (*text == ' ') text++;
   }
   putchar('\n');
+}
+
+qmat_status qmat_print_json(qmat_context *context, json_t *json) {
+  char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
+  json_decref(json);
+  if (!text) return qmat_fail_memory(context, "listing");
+  printf("%s\n", text);
+  qmat_free(text);
+  return QMAT_OK;
 }
 
 static void print_row(const char *left, const char *text) {

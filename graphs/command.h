@@ -84,6 +84,9 @@ void qmat_commands_print(void);
  * `column`. */
 void qmat_print_wrapped(const char *text, int column, int indent);
 
+/* Prints JSON, indented, to the standard output, and releases it; NULL stands for a shortage of memory. */
+qmat_status qmat_print_json(qmat_context *context, json_t *json);
+
 /* ---- what commands that know of the cache share ---- */
 
 extern const qmat_option qmat_cache_option_rows[];

@@ -3,7 +3,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/run_report.h"
 
@@ -16,15 +15,6 @@ typedef struct cache_call {
   size_t count;
   bool json;
 } cache_call;
-
-static qmat_status print_json(qmat_context *context, json_t *json) {
-  char *text = json ? qmat_json_text(json, JSON_INDENT(2), NULL) : NULL;
-  json_decref(json);
-  if (!text) return qmat_fail_memory(context, "listing");
-  printf("%s\n", text);
-  qmat_free(text);
-  return QMAT_OK;
-}
 
 static void format_time(int64_t nanoseconds, char *text, size_t size) {
   time_t seconds = (time_t)(nanoseconds / 1000000000);
@@ -47,7 +37,7 @@ static qmat_status stats(cache_call *call) {
     for (int kind = 0; kind < QMAT_CACHE_KIND_COUNT; kind++)
       json_object_set_new(json, names[kind],
                           json_pack("{s:I, s:I}", "count", (json_int_t)counts[kind], "size", (json_int_t)sizes[kind]));
-    return print_json(call->context, json);
+    return qmat_print_json(call->context, json);
   }
   char size[32], most[32];
   qmat_format_bytes(total, size);
@@ -93,7 +83,7 @@ static qmat_status list(cache_call *call) {
     }
     json_decref(record);
   }
-  if (call->json) return print_json(call->context, rows);
+  if (call->json) return qmat_print_json(call->context, rows);
   json_decref(rows);
   return QMAT_OK;
 }
@@ -136,7 +126,7 @@ static qmat_status show(cache_call *call) {
     qmat_fail(call->context, QMAT_ERROR_USAGE, "the cache has no record of key '%s'", qmat_show(prefix).text);
     return qmat_fail_hint(call->context, "'qmat cache ls' lists them");
   }
-  if (call->json) return print_json(call->context, record);
+  if (call->json) return qmat_print_json(call->context, record);
   print_record(record);
   json_decref(record);
   return QMAT_OK;
@@ -158,8 +148,8 @@ static qmat_status verify(cache_call *call) {
   }
   qmat_status status = QMAT_OK;
   if (call->json)
-    status = print_json(call->context, json_pack("{s:I, s:I, s:I}", "checked", (json_int_t)checked, "broken",
-                                                 (json_int_t)broken, "incomplete", (json_int_t)incomplete));
+    status = qmat_print_json(call->context, json_pack("{s:I, s:I, s:I}", "checked", (json_int_t)checked, "broken",
+                                                      (json_int_t)broken, "incomplete", (json_int_t)incomplete));
   else
     printf("%zu checked, %zu broken, %zu incomplete\n", checked, broken, incomplete);
   if (status == QMAT_OK && broken > 0)
@@ -170,8 +160,8 @@ static qmat_status verify(cache_call *call) {
 static qmat_status print_sweep(cache_call *call, qmat_cache_sweep sweep) {
   if (call->cache->read_only) return qmat_fail(call->context, QMAT_ERROR_IO, "the cache is read only");
   if (call->json)
-    return print_json(call->context,
-                      json_pack("{s:I, s:I}", "deleted", (json_int_t)sweep.deleted, "freed", (json_int_t)sweep.freed));
+    return qmat_print_json(
+        call->context, json_pack("{s:I, s:I}", "deleted", (json_int_t)sweep.deleted, "freed", (json_int_t)sweep.freed));
   char size[32];
   qmat_format_bytes(sweep.freed, size);
   printf("%zu file%s deleted, %s\n", sweep.deleted, sweep.deleted == 1 ? "" : "s", size);

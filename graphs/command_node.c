@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/node_json.h"
 
@@ -71,16 +70,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     if (nearest) return qmat_fail_hint(context, "did you mean '%s'?", nearest);
     return qmat_fail_hint(context, "'qmat nodes' lists them");
   }
-  if (!qmat_invocation_value(invocation, "json")) {
-    print_page(type);
-    return QMAT_OK;
-  }
-  json_t *node = qmat_node_json(type);
-  char *text = node ? qmat_json_text(node, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
-  json_decref(node);
-  if (!text) return qmat_fail_memory(context, "listing");
-  puts(text);
-  qmat_free(text);
+  if (qmat_invocation_value(invocation, "json")) return qmat_print_json(context, qmat_node_json(type));
+  print_page(type);
   return QMAT_OK;
 }
 

@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/node_json.h"
 
@@ -14,15 +11,7 @@ static void print_ports(const qmat_port *ports, size_t count) {
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const qmat_registry *registry = &invocation->registry;
-  if (qmat_invocation_value(invocation, "json")) {
-    json_t *nodes = qmat_registry_json(registry);
-    char *text = nodes ? qmat_json_text(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
-    json_decref(nodes);
-    if (!text) return qmat_fail_memory(context, "listing");
-    puts(text);
-    qmat_free(text);
-    return QMAT_OK;
-  }
+  if (qmat_invocation_value(invocation, "json")) return qmat_print_json(context, qmat_registry_json(registry));
   for (size_t i = 0; i < registry->count; i++) {
     const qmat_node *type = registry->nodes[i];
     printf("%-18s%s\n%18s", type->name, type->summary, "");

@@ -2,7 +2,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/json_text.h"
 #include "graphs/command.h"
 #include "graphs/why.h"
 
@@ -27,14 +26,6 @@ static void mark_causes(const qmat_run *run, const json_t *whys, bool *marked) {
   }
 }
 
-static qmat_status print_json(qmat_context *context, const json_t *json) {
-  char *text = qmat_json_text(json, JSON_INDENT(2), NULL);
-  if (!text) return qmat_fail_memory(context, "listing");
-  printf("%s\n", text);
-  qmat_free(text);
-  return QMAT_OK;
-}
-
 static qmat_status tell(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
   qmat_run *run = &planned->run;
   bool *marked = qmat_calloc(run->step_count, sizeof *marked);
@@ -55,7 +46,8 @@ static qmat_status tell(qmat_context *context, const qmat_invocation *invocation
     json_array_append(shown, json_array_get(whys, i));
     if (!qmat_invocation_value(invocation, "json")) print_why(json_array_get(whys, i));
   }
-  if (status == QMAT_OK && qmat_invocation_value(invocation, "json")) status = print_json(context, shown);
+  if (status == QMAT_OK && qmat_invocation_value(invocation, "json"))
+    status = qmat_print_json(context, json_incref(shown));
   qmat_free(marked);
   json_decref(records);
   json_decref(whys);

@@ -79,15 +79,14 @@ void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
 
 /* ---- paths ---- */
 
-// The bytes before the name of the file: "" or a folder with its slash.
-static size_t folder_length(const char *path) {
+size_t qmat_folder_length(const char *path) {
   const char *slash = strrchr(path, '/');
   return slash ? (size_t)(slash - path) + 1 : 0;
 }
 
 // The folder of `path` as one that can be asked about; the caller frees it with qmat_free.
 static char *folder_of(const char *path) {
-  size_t length = folder_length(path);
+  size_t length = qmat_folder_length(path);
   char *folder = qmat_calloc(length + 2, 1);
   if (!folder) return NULL;
   if (length == 0)
@@ -101,7 +100,7 @@ bool qmat_same_file(const char *a, const char *b) {
   struct stat first, second;
   bool first_is = stat(a, &first) == 0, second_is = stat(b, &second) == 0;
   if (first_is && second_is) return first.st_dev == second.st_dev && first.st_ino == second.st_ino;
-  if (first_is != second_is || strcmp(a + folder_length(a), b + folder_length(b)) != 0) return false;
+  if (first_is != second_is || strcmp(a + qmat_folder_length(a), b + qmat_folder_length(b)) != 0) return false;
   char *first_folder = folder_of(a), *second_folder = folder_of(b);
   bool same = first_folder && second_folder && stat(first_folder, &first) == 0 && stat(second_folder, &second) == 0 &&
               first.st_dev == second.st_dev && first.st_ino == second.st_ino;
@@ -403,7 +402,7 @@ static qmat_status plan_slots(run_planner *planner) {
 }
 
 static void name_run(qmat_run *run) {
-  const char *file = run->graph->file + folder_length(run->graph->file);
+  const char *file = run->graph->file + qmat_folder_length(run->graph->file);
   snprintf(run->name, sizeof run->name, "%s", file);
   char *dot = strrchr(run->name, '.');
   if (dot && dot != run->name) *dot = 0;
@@ -703,7 +702,7 @@ static qmat_status digest_bytes(qmat_context *context, const void *bytes, size_t
 
 // Refuses side files that would overwrite an input: their names were not known before the run.
 static qmat_status check_side_part(qmat_context *context, const qmat_run *run, const char *path, const char *name) {
-  size_t folder = folder_length(path), length = strlen(name);
+  size_t folder = qmat_folder_length(path), length = strlen(name);
   char *side = qmat_alloc(folder + length + 1, 1);
   if (!side) return qmat_fail_memory(context, "output path");
   memcpy(side, path, folder);
@@ -717,7 +716,7 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
                                   char **text) {
   const qmat_value *value = run->slots[file->slot].value;
   // Inside a group the first main part has no name, which stands for the path given to the saver.
-  const char *main_name = group->count == 0 ? "" : file->path + folder_length(file->path);
+  const char *main_name = group->count == 0 ? "" : file->path + qmat_folder_length(file->path);
   if (value->type == QMAT_REPORT) {
     *text = qmat_json_text(((const qmat_report *)value)->root, JSON_INDENT(2) | JSON_SORT_KEYS, NULL);
     if (!*text) return qmat_fail_memory(context, "report");
@@ -743,8 +742,8 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
 }
 
 static bool same_folder(const char *a, const char *b) {
-  size_t length = folder_length(a);
-  return length == folder_length(b) && memcmp(a, b, length) == 0;
+  size_t length = qmat_folder_length(a);
+  return length == qmat_folder_length(b) && memcmp(a, b, length) == 0;
 }
 
 static qmat_status write_group(qmat_context *context, qmat_run *run, size_t first, char **texts) {

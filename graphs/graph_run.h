@@ -127,6 +127,9 @@ typedef struct qmat_run_observer {
 qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const qmat_run_options *options,
                           qmat_run *run);
 
+/* The bytes of `path` before the name of the file: 0, or those of a folder with its slash. */
+size_t qmat_folder_length(const char *path);
+
 /* Whether both paths lead to one file, which need not be there yet. */
 bool qmat_same_file(const char *a, const char *b);
 

@@ -71,12 +71,6 @@ static const struct qmat_run_file_digest *digest_file(qmat_run *run, const char 
   return &run->hashed[run->hashed_count - 1];
 }
 
-// The bytes before the name of the file: "" or a folder with its slash.
-static size_t folder_length(const char *path) {
-  const char *slash = strrchr(path, '/');
-  return slash ? (size_t)(slash - path) + 1 : 0;
-}
-
 /* ---- keys ---- */
 
 static const qmat_node *type_of(const qmat_run *run, const qmat_run_step *step) {
@@ -114,7 +108,7 @@ static char *side_path(const qmat_node *type, const qmat_run_step *step, const c
   for (size_t row = 0; row < qmat_param_count(type); row++) {
     const char *main_file = qmat_param_input_file(type, row, step->params);
     if (!main_file || strcmp(type->params[row].name, param) != 0) continue;
-    size_t folder = *name == '/' ? 0 : folder_length(main_file), length = strlen(name);
+    size_t folder = *name == '/' ? 0 : qmat_folder_length(main_file), length = strlen(name);
     char *path = qmat_alloc(folder + length + 1, 1);
     if (!path) return NULL;
     memcpy(path, main_file, folder);
@@ -156,7 +150,8 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   return true;
 }
 
-bool qmat_record_fits(const qmat_node *type, const json_t *record) {
+// Whether a record tells of the outputs of this node type.
+static bool record_fits(const qmat_node *type, const json_t *record) {
   const json_t *outputs = json_object_get(record, "outputs");
   size_t count = qmat_output_count(type);
   if (json_array_size(outputs) != count) return false;
@@ -171,7 +166,7 @@ bool qmat_record_fits(const qmat_node *type, const json_t *record) {
 static bool take_record(qmat_run *run, size_t index, const json_t *record) {
   qmat_run_step *step = &run->steps[index];
   const qmat_node *type = type_of(run, step);
-  if (!record || !qmat_record_fits(type, record)) return false;
+  if (!record || !record_fits(type, record)) return false;
   const json_t *outputs = json_object_get(record, "outputs");
   for (size_t port = 0; port < qmat_output_count(type); port++) {
     read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port]);
@@ -252,7 +247,7 @@ static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qma
       if (!path) continue;
       is_main = strcmp(path, file->path) == 0;
       // A path that is neither below the folder nor absolute would be looked for elsewhere the next time.
-      size_t folder = folder_length(path);
+      size_t folder = qmat_folder_length(path);
       bool below = strncmp(file->path, path, folder) == 0 && file->path[folder] != '/';
       if (below ? !side.param || *side.path == '/' : !side.param && *file->path == '/') {
         side.param = type->params[row].name;
@@ -307,7 +302,7 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
 static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   json_t *record = qmat_cache_record(run->cache, &step->key);
-  if (record && qmat_record_fits(node->type, record)) {
+  if (record && record_fits(node->type, record)) {
     for (size_t port = 0; port < qmat_output_count(node->type); port++) {
       qmat_run_made made;
       read_output(json_array_get(json_object_get(record, "outputs"), port), &node->type->outputs[port], &made);

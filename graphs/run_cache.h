@@ -39,7 +39,4 @@ void qmat_run_store(qmat_run *run, size_t step, const qmat_step_reads *reads);
 /* The value of an output from the cache; NULL: it is not there. */
 qmat_value *qmat_run_load(qmat_run *run, size_t step, size_t port);
 
-/* Whether a record tells of the outputs of this node type. */
-bool qmat_record_fits(const qmat_node *type, const json_t *record);
-
 #endif
