@@ -20,15 +20,13 @@ void qmat_quadric_add_plane(qmat_quadric *quadric, const double n[3], const doub
   quadric->c += weight * offset * offset;
 }
 
-bool qmat_quadric_add_slab(qmat_quadric *quadric, const double a[4], const double b[4], const double c[4],
-                           double weight) {
+bool qmat_tangent_normals(const double a[4], const double b[4], const double c[4], double normals[2][3]) {
   double e1[3], e2[3], normal[3], g[3];
   for (int k = 0; k < 3; k++) {
     e1[k] = b[k] - a[k];
     e2[k] = c[k] - a[k];
   }
-  for (int k = 0; k < 3; k++)
-    normal[k] = e1[(k + 1) % 3] * e2[(k + 2) % 3] - e1[(k + 2) % 3] * e2[(k + 1) % 3];
+  for (int k = 0; k < 3; k++) normal[k] = e1[(k + 1) % 3] * e2[(k + 2) % 3] - e1[(k + 2) % 3] * e2[(k + 1) % 3];
   double g11 = 0, g12 = 0, g22 = 0, length = 0;
   for (int k = 0; k < 3; k++) {
     g11 += e1[k] * e1[k];
@@ -48,11 +46,16 @@ bool qmat_quadric_add_slab(qmat_quadric *quadric, const double a[4], const doubl
   }
   if (!(slope < 1)) return false;
   const double rise = sqrt((1 - slope) / length);
-  for (int sign = -1; sign <= 1; sign += 2) {
-    double n[3];
-    for (int k = 0; k < 3; k++) n[k] = sign * rise * normal[k] - g[k];
-    qmat_quadric_add_plane(quadric, n, a, weight);
-  }
+  for (int side = 0; side < 2; side++)
+    for (int k = 0; k < 3; k++) normals[side][k] = (side ? rise : -rise) * normal[k] - g[k];
+  return true;
+}
+
+bool qmat_quadric_add_slab(qmat_quadric *quadric, const double a[4], const double b[4], const double c[4],
+                           double weight) {
+  double normals[2][3];
+  if (!qmat_tangent_normals(a, b, c, normals)) return false;
+  for (int side = 0; side < 2; side++) qmat_quadric_add_plane(quadric, normals[side], a, weight);
   return true;
 }
 

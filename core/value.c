@@ -77,7 +77,7 @@ static const row chain_rows[] = {
     ARRAY(qmat_chain, spheres, F64, sphere_count, 4),     ARRAY(qmat_chain, edges, U32, edge_count, 2),
     ARRAY(qmat_chain, triangles, U32, triangle_count, 3), ARRAY(qmat_chain, owners, U32, sample_count, 1),
     ARRAY(qmat_chain, ends, U32, collapse_count, 2),      ARRAY(qmat_chain, merged, F64, collapse_count, 4),
-    ARRAY(qmat_chain, errors, F64, collapse_count, 2),    END};
+    ARRAY(qmat_chain, errors, F64, collapse_count, 1),    END};
 static const row report_rows[] = {SCALAR(qmat_report, root, JSON), END};
 static const row file_rows[] = {SCALAR(qmat_file, format, TEXT), ARRAY(qmat_file, parts, PARTS, part_count, 1), END};
 
@@ -805,12 +805,12 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
   }
   status = check_ends(context, chain);
   if (status == QMAT_OK) status = check_spheres(context, chain->merged, chain->collapse_count, "collapse");
-  if (status == QMAT_OK) status = check_finite(context, chain->errors, chain->collapse_count, 2, "collapse", "error");
+  if (status == QMAT_OK) status = check_finite(context, chain->errors, chain->collapse_count, 1, "collapse", "error");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < 2 * chain->collapse_count; ++i) {
-    if (chain->errors[i] >= (i < 2 ? 0 : chain->errors[i - 2])) continue;
+  for (size_t i = 0; i < chain->collapse_count; ++i) {
+    if (chain->errors[i] >= (i == 0 ? 0 : chain->errors[i - 1])) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error falls");
-    return fail_element(context, "collapse", i / 2);
+    return fail_element(context, "collapse", i);
   }
   return QMAT_OK;
 }

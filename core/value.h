@@ -135,8 +135,7 @@ typedef struct qmat_chain {
   size_t collapse_count;
   uint32_t *ends; /* 2 * collapse_count: the sphere that stays, and the one that goes */
   double *merged; /* 4 * collapse_count: what becomes of the one that stays */
-  double *errors; /* 2 * collapse_count: surface to envelope and envelope to surface after a collapse or before, in
-                     diagonals; they never fall */
+  double *errors; /* collapse_count: what the errors were held to, in diagonals; never falls */
 } qmat_chain;
 
 /* Named counts and errors as a JSON object; never times, so that equal work gives an equal digest. */

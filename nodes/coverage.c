@@ -209,17 +209,21 @@ static double search_star(const qmat_coverage *coverage, const qmat_collapse *co
   return best;
 }
 
-/* Looks in the link until a primitive is within the limit. */
-static bool search_link(const qmat_coverage *coverage, const double *point, double limit, new_witness *witness) {
+/* The nearest primitive of the link, or the first that comes as close as `enough`. */
+static double search_link(const qmat_coverage *coverage, const double *point, double enough, new_witness *witness) {
+  double best = INFINITY;
   for (size_t i = 0; i < coverage->link.count; i++) {
     const star_part *part = &coverage->link.items[i];
     double weights[3];
-    if (is_farther(part, point, limit) || part_foot(part, point, weights) > limit) continue;
+    if (is_farther(part, point, best)) continue;
+    const double f = part_foot(part, point, weights);
+    if (!(f < best)) continue;
+    best = f;
     memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
     memcpy(witness->weights, weights, sizeof witness->weights);
-    return true;
+    if (best <= enough) break;
   }
-  return false;
+  return best;
 }
 
 static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
@@ -238,7 +242,8 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
   new_witness *witness = &coverage->found[coverage->found_count];
   witness->point = point;
   const double *p = &coverage->points[3 * (size_t)point];
-  if (search_star(coverage, collapse, sphere, p, witness) <= limit) {
+  const double star = search_star(coverage, collapse, sphere, p, witness);
+  if (star <= limit) {
     coverage->found_count++;
     return QMAT_OK;
   }
@@ -246,10 +251,12 @@ static qmat_status test_point(qmat_context *context, qmat_coverage *coverage, co
     const qmat_status status = prepare_link(context, coverage, complex, collapse);
     if (status != QMAT_OK) return status;
   }
-  if (search_link(coverage, p, limit, witness)) {
+  const double link = search_link(coverage, p, limit, witness);
+  if (link <= limit) {
     coverage->found_count++;
     return QMAT_OK;
   }
+  coverage->failed_distance = fmin(star, link);
   coverage->failed_point = point;
   *kept = false;
   return QMAT_OK;
@@ -268,6 +275,37 @@ double qmat_coverage_star_foot(const qmat_coverage *coverage, const qmat_complex
   return distance;
 }
 
+/* Every point is looked at once in a walk over several lists: a new stamp marks those that were. */
+static void start_marks(qmat_coverage *coverage) {
+  if (++coverage->stamp > 0) return;
+  memset(coverage->marks, 0, coverage->point_count * sizeof *coverage->marks);
+  coverage->stamp = 1;
+}
+
+qmat_status qmat_coverage_error(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                const qmat_collapse *collapse, const double sphere[4], size_t point_count,
+                                double *error) {
+  qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, sphere);
+  if (status == QMAT_OK) status = prepare_link(context, coverage, complex, collapse);
+  if (status != QMAT_OK) return status;
+  *error = -INFINITY;
+  start_marks(coverage);
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    for (uint32_t slot = coverage->heads[ends[e]]; slot != QMAT_NONE; slot = coverage->next[slot]) {
+      const uint32_t point = slot / 3;
+      if (point >= point_count || coverage->marks[point] == coverage->stamp) continue;
+      coverage->marks[point] = coverage->stamp;
+      const double *p = &coverage->points[3 * (size_t)point];
+      new_witness witness = {.point = point};
+      double f = witness_distance(coverage, complex, collapse, sphere, point);
+      if (f > *error) f = fmin(f, search_star(coverage, collapse, sphere, p, &witness));
+      if (f > *error) f = fmin(f, search_link(coverage, p, *error, &witness));
+      *error = fmax(*error, f);
+    }
+  return QMAT_OK;
+}
+
 static bool touches(const qmat_coverage *coverage, const qmat_collapse *collapse, uint32_t point) {
   for (size_t k = 0; k < 3; k++) {
     const uint32_t vertex = coverage->witnesses[3 * (size_t)point + k];
@@ -281,10 +319,7 @@ qmat_status qmat_coverage_test(qmat_context *context, qmat_coverage *coverage, c
   *kept = true;
   coverage->found_count = 0;
   coverage->prepared = false;
-  if (++coverage->stamp == 0) {
-    memset(coverage->marks, 0, coverage->point_count * sizeof *coverage->marks);
-    coverage->stamp = 1;
-  }
+  start_marks(coverage);
   qmat_status status = QMAT_OK;
   if (first != QMAT_NONE && touches(coverage, collapse, first))
     status = test_point(context, coverage, complex, collapse, sphere, first, kept);

@@ -33,7 +33,8 @@ typedef struct qmat_coverage {
   /* The primitives of the merged vertex's star, prepared when first needed, and those of the link's vertices. */
   qmat_star_parts star, link;
   bool prepared, link_known;
-  uint32_t failed_point; /* why the newest test failed */
+  uint32_t failed_point;  /* why the newest test failed */
+  double failed_distance; /* F there */
 } qmat_coverage;
 
 /* Starts with the given control points; the arrays `points` and `limits` stay the caller's, `witnesses` and `weights`
@@ -59,6 +60,13 @@ qmat_status qmat_coverage_prepare(qmat_context *context, qmat_coverage *coverage
 double qmat_coverage_star_foot(const qmat_coverage *coverage, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double sphere[4], const double point[3],
                                double foot[4], double *share);
+
+/* How far `collapse` to `sphere` leaves the control points that its vertices answer for, of the first `point_count`:
+ * the largest F, to the primitives of the merged vertex and to those at the vertices around it; -INFINITY where there
+ * is no such point. QMAT_ERROR_MEMORY. Cost: points times primitives. */
+qmat_status qmat_coverage_error(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                const qmat_collapse *collapse, const double sphere[4], size_t point_count,
+                                double *error);
 
 /* Takes the collapse of the newest successful test over (or, without limits, of any): call it before the complex
  * changes. */

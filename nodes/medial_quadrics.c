@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "core/triangle.h"
 #include "core/vector.h"
 
 /* Rims and tips hold on to their place by this share of a slab's weight. */
@@ -49,7 +50,10 @@ static void add_tip(const qmat_complex *c, uint32_t vertex, uint32_t edge, qmat_
   qmat_quadric_add_plane(&quadrics[vertex], n, tip, boundary_weight * gamma * gamma);
 }
 
-void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
+/* The slabs at each of their corners, and the rims, each with the corner that it stands opposite to. */
+static void add_slabs(const qmat_complex *c, qmat_quadric *quadrics,
+                      void (*add_rim_of)(const qmat_complex *c, uint32_t edge, const double *inner,
+                                         qmat_quadric *quadrics)) {
   for (size_t t = 0; t < c->triangle_count; t++) {
     const uint32_t *corners = &c->triangles[3 * t];
     const double *m[3];
@@ -59,9 +63,13 @@ void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
       for (int k = 0; k < 3; k++) qmat_quadric_add(&quadrics[corners[k]], &slab);
     for (int k = 0; k < 3; k++) {
       const uint32_t side = c->triangle_edges[3 * t + (size_t)k];
-      if (c->edge_triangles[side] == 1) add_rim(c, side, m[k], quadrics);
+      if (c->edge_triangles[side] == 1) add_rim_of(c, side, m[k], quadrics);
     }
   }
+}
+
+void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
+  add_slabs(c, quadrics, add_rim);
   for (size_t e = 0; e < c->edge_count; e++) {
     if (c->edge_triangles[e]) continue;
     const uint32_t *ends = &c->edges[2 * e];
@@ -71,4 +79,63 @@ void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
   }
   for (uint32_t v = 0; v < c->vertex_count; v++)
     if (c->vertex_edges.counts[v] == 1) add_tip(c, v, c->vertex_edges.items[c->vertex_edges.starts[v]], quadrics);
+}
+
+/* The plane through a rim that stands on its triangle; `n` is as long as the rim. */
+static void add_published_rim(const qmat_complex *c, uint32_t edge, const double *inner, qmat_quadric *quadrics) {
+  const uint32_t *ends = &c->edges[2 * (size_t)edge];
+  const double *a = &c->spheres[4 * (size_t)ends[0]], *b = &c->spheres[4 * (size_t)ends[1]];
+  double normal[3], n[3], inwards = 0;
+  if (!(qmat_triangle_area(a, b, inner, normal) > 0)) return;
+  for (int k = 0; k < 3; k++) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    n[k] = normal[i] * (a[j] - b[j]) - normal[j] * (a[i] - b[i]);
+    inwards += n[k] * (inner[k] - a[k]);
+  }
+  if (inwards > 0)
+    for (int k = 0; k < 3; k++) n[k] = -n[k];
+  const double gamma = qmat_stability_ratio(a, b), weight = boundary_weight * gamma * gamma;
+  for (int e = 0; e < 2; e++) qmat_quadric_add_plane(&quadrics[ends[e]], n, e ? b : a, weight);
+}
+
+static void add_published_cone(const qmat_complex *c, uint32_t edge, qmat_quadric *quadrics) {
+  const uint32_t *ends = &c->edges[2 * (size_t)edge];
+  const double *m[2];
+  double third[4], normals[2][3], along[3];
+  for (int e = 0; e < 2; e++) m[e] = &c->spheres[4 * (size_t)ends[e]];
+  for (int k = 0; k < 3; k++) {
+    third[k] = m[0][k] + m[1][k];
+    along[k] = m[0][k] - m[1][k];
+  }
+  third[3] = 0.5 * (m[0][3] + m[1][3]);
+  if (!qmat_tangent_normals(m[0], m[1], third, normals)) return;
+  for (int side = 0; side < 2; side++) {
+    const double *n = normals[side];
+    double across[3];
+    for (int k = 0; k < 3; k++) across[k] = along[(k + 1) % 3] * n[(k + 2) % 3] - along[(k + 2) % 3] * n[(k + 1) % 3];
+    for (int e = 0; e < 2; e++) {
+      qmat_quadric_add_plane(&quadrics[ends[e]], n, m[e], 1);
+      qmat_quadric_add_plane(&quadrics[ends[e]], across, m[e], 1);
+    }
+  }
+}
+
+static void add_published_tip(const qmat_complex *c, uint32_t vertex, uint32_t edge, qmat_quadric *quadrics) {
+  const double *tip = &c->spheres[4 * (size_t)vertex];
+  const double *base = &c->spheres[4 * (size_t)qmat_complex_other_end(c, edge, vertex)];
+  double n[3];
+  for (int k = 0; k < 3; k++) n[k] = tip[k] - base[k];
+  const double gamma = qmat_stability_ratio(tip, base);
+  qmat_quadric_add_plane(&quadrics[vertex], n, tip, boundary_weight * gamma * gamma);
+}
+
+void qmat_medial_quadrics_add_published(const qmat_complex *c, qmat_quadric *quadrics) {
+  add_slabs(c, quadrics, add_published_rim);
+  for (uint32_t e = 0; e < c->edge_count; e++)
+    if (!c->edge_triangles[e]) add_published_cone(c, e, quadrics);
+  for (uint32_t v = 0; v < c->vertex_count; v++) {
+    if (c->vertex_edges.counts[v] != 1) continue;
+    const uint32_t edge = c->vertex_edges.items[c->vertex_edges.starts[v]];
+    if (!c->edge_triangles[edge]) add_published_tip(c, v, edge, quadrics);
+  }
 }

@@ -14,4 +14,10 @@ double qmat_stability_ratio(const double a[4], const double b[4]);
  * hundredth of a slab's weight (section 3.1.2, boundary preservation). Cost: linear. */
 void qmat_medial_quadrics_add(const qmat_complex *complex, qmat_quadric *quadrics);
 
+/* What the public Q-MAT code has in their place (compat: qmat): the same slabs, and its fourth method of preserving
+ * boundaries. The rim's plane stands on the triangle with a normal as long as the edge; an edge without slabs takes two
+ * tangent planes of a slab with a third sphere at the sum of both centres, which depends on the origin, and two planes
+ * across them; a tip's normal is as long as its edge. */
+void qmat_medial_quadrics_add_published(const qmat_complex *complex, qmat_quadric *quadrics);
+
 #endif

@@ -4,28 +4,14 @@
 #include <string.h>
 
 #include "core/node.h"
-#include "core/surface.h"
-#include "core/thickness.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
-#include "nodes/simplification.h"
+#include "nodes/simplifier.h"
 
-typedef struct {
-  double epsilon;
-  int64_t vertices;
-  double cost;
-  int error;
-  int on_exceed;
-  int topology;
-  int protect;
-  double theta;
-  double k;
-  int64_t refits;
-} medial_simplify_params;
+typedef qmat_simplify_params medial_simplify_params;
 
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
  * is repeated, at most this often, with control points in the places found. */
-static const double control_share = 0.975;
 enum { MOST_ROUNDS = 4 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
@@ -37,36 +23,11 @@ typedef struct {
   qmat_simplification simplification;
 } simplifier;
 
-/* The exact depth at the centre of a medial sphere. Most are inscribed: a look no farther than their radius finds it.
- */
-static double depth_of(const qmat_surface *surface, const double *sphere) {
-  double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
-  if (!(depth < INFINITY)) depth = qmat_surface_distance(surface, sphere, INFINITY, NULL, NULL);
-  return qmat_surface_inside(surface, sphere) ? depth : -depth;
-}
-
-static qmat_status measure_depths(const simplifier *s, const double *spheres, size_t count, double *depths) {
-  const size_t slice = 1 << 15;
-  const int threads = qmat_threads(s->context);
-  for (size_t first = 0; first < count; first += slice) {
-    const qmat_status status = qmat_progress(s->context, 0, 0, "depths");
-    if (status != QMAT_OK) return status;
-    const size_t last = first + slice < count ? first + slice : count;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-    for (size_t v = first; v < last; v++) depths[v] = depth_of(s->surface, &spheres[4 * v]);
-  }
-  return QMAT_OK;
-}
-
 /* The reported errors are at most this share of epsilon above the true ones, but never below the second share. */
 static const double error_tolerance = 0.01, least_reported = 0.5;
 
 /* What an unbounded run (epsilon 0) measures its errors against. */
 static const double default_epsilon = 0.01;
-
-/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
- * digits. */
-static const double farthest_sphere = 1e6;
 
 static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
@@ -75,79 +36,14 @@ static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_e
                                     tolerance, least_reported * epsilon, epsilon - tolerance, errors);
 }
 
-/* The initial medial mesh in the unit frame, its depths, and which samples are thin: the same in every round. */
-typedef struct {
-  double *spheres, *depths;
-  uint8_t *thin;
-} initial_state;
-
-static qmat_status prepare(simplifier *s, const qmat_mesh *mesh, const qmat_field *thickness,
-                           const qmat_samples *samples, const qmat_medial *medial, initial_state *state) {
-  qmat_context *context = s->context;
-  qmat_status status = qmat_thickness_check(context, mesh, thickness, samples);
-  if (status == QMAT_OK && medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
-    status = qmat_fail_field(context, "medial");
-  }
-  if (status == QMAT_OK) status = qmat_surface_new(context, mesh, &s->surface);
-  if (status != QMAT_OK) return status;
-  double *spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof *spheres);
-  double *depths = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *depths);
-  double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
-  uint8_t *thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *thin);
-  if (!spheres || !depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
-  qmat_thickness_of_samples(mesh, thickness, samples, values);
-  const double theta = qmat_thickness_threshold(thickness, s->params->theta);
-  for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
-  qmat_frame_spheres_to_unit(qmat_surface_frame(s->surface), medial->spheres, medial->sphere_count, spheres);
-  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
-    if (fabs(spheres[i]) <= farthest_sphere) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
-    qmat_fail_field(context, "medial");
-    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
-  }
-  *state = (initial_state){spheres, depths, thin};
-  return measure_depths(s, spheres, medial->sphere_count, depths);
-}
-
-/* The Euler characteristic of the solid within a closed surface: half that of the surface. */
-static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mesh, int64_t *euler) {
-  uint8_t *used = qmat_arena_calloc(&context->arena, mesh->vertex_count, sizeof *used);
-  if (!used) return qmat_fail_memory(context, "the surface's vertices");
-  int64_t vertices = 0;
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-    vertices += !used[mesh->triangles[i]];
-    used[mesh->triangles[i]] = 1;
-  }
-  /* Every triangle has three sides, every side two triangles. */
-  *euler = (vertices - (int64_t)mesh->triangle_count / 2) / 2;
-  return QMAT_OK;
-}
-
-static qmat_status set_rules(const simplifier *s, const uint8_t *thin, qmat_simplification_rules *rules) {
-  const medial_simplify_params *p = s->params;
-  const qmat_mesh *mesh = qmat_surface_mesh(s->surface);
-  *rules = (qmat_simplification_rules){.limit = p->epsilon > 0 ? control_share * p->epsilon : INFINITY,
-                                       .vertices = (size_t)p->vertices,
-                                       .most_cost = p->cost,
-                                       .k = p->k,
-                                       .error = (qmat_error_kind)p->error,
-                                       .on_exceed = (qmat_exceed_rule)p->on_exceed,
-                                       .topology = (qmat_topology_policy)p->topology,
-                                       .protect = (qmat_protection)p->protect,
-                                       .refits = (int)p->refits,
-                                       .thin = thin,
-                                       .has_target = mesh->closed && mesh->oriented};
-  return rules->has_target ? find_target_euler(s->context, mesh, &rules->target_euler) : QMAT_OK;
-}
-
 /* Sets one round up: everything that collapses change. */
-static qmat_status start(simplifier *s, const initial_state *state, const qmat_samples *samples,
+static qmat_status start(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                          const qmat_medial *medial, const qmat_extra_points *extra) {
   qmat_simplification *simplification = &s->simplification;
   *simplification = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_complex_init(s->context, &simplification->complex, medial, state->spheres);
-  if (status == QMAT_OK) status = set_rules(s, state->thin, &simplification->rules);
+  if (status == QMAT_OK)
+    status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &simplification->rules);
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : INFINITY;
   const bool inside = s->params->error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
@@ -215,7 +111,7 @@ static double farthest_at_first(const qmat_control_points *control) {
 }
 
 /* Rounds of collapses until the surface between the control points keeps within epsilon as they do. */
-static qmat_status simplify(simplifier *s, const initial_state *state, const qmat_samples *samples,
+static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                             const qmat_medial *initial, qmat_medial **medial, qmat_report *report) {
   qmat_extra_points extra = {0};
   const double epsilon = s->params->epsilon;
@@ -238,18 +134,78 @@ static qmat_status simplify(simplifier *s, const initial_state *state, const qma
   }
 }
 
+static int set_count(json_t *root, const char *key, size_t count) {
+  return json_object_set_new(root, key, json_integer((json_int_t)count));
+}
+
+static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, const qmat_medial *unit,
+                                   const qmat_medial_errors *errors, qmat_report *report) {
+  const qmat_simplification *run = &o->simplification;
+  json_t *root = report->root;
+  int bad = set_count(root, "initial_spheres", run->complex.vertex_count);
+  bad |= set_count(root, "spheres", unit->sphere_count);
+  bad |= set_count(root, "edges", unit->edge_count);
+  bad |= set_count(root, "triangles", unit->triangle_count);
+  bad |= set_count(root, "collapses", run->collapses);
+  bad |= set_count(root, "control_points", o->control.count);
+  bad |= set_count(root, "refused_by_surface", run->refused_by_surface);
+  bad |= set_count(root, "refused_by_coverage", run->refused_by_coverage);
+  bad |= set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
+  bad |= set_count(root, "refused_by_protection", run->refused_by_protection);
+  bad |= set_count(root, "refused_by_topology", run->refused_by_topology);
+  bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
+  if (run->rules.has_target)
+    bad |=
+        json_object_set_new(root, "euler_characteristic_of_solid", json_integer((json_int_t)run->rules.target_euler));
+  bad |= json_object_set_new(root, "epsilon", json_real(o->params.epsilon));
+  bad |= json_object_set_new(root, "held", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
+  bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors->surface_to_envelope));
+  bad |= json_object_set_new(root, "envelope_to_surface", json_real(errors->envelope_to_surface));
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
+}
+
+/* Collapses that are the same for every epsilon: in a single round, without fitting spheres. */
+static qmat_status run_in_order(qmat_context *context, const medial_simplify_params *params,
+                                const qmat_value *const inputs[], qmat_value *outputs[]) {
+  qmat_ordered_collapses o = {.surface = NULL};
+  qmat_medial *medial = qmat_medial_new();
+  qmat_report *report = qmat_report_new();
+  qmat_status status = medial && report ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
+  if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, params, inputs, &o);
+  if (status == QMAT_OK) status = qmat_simplification_extract(&o.simplification, medial);
+  qmat_medial_errors errors = {.surface_to_envelope = 0};
+  const double epsilon = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
+  if (status == QMAT_OK)
+    status = qmat_medial_errors_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
+                                        error_tolerance * epsilon, least_reported * epsilon, INFINITY, &errors);
+  if (status == QMAT_OK) status = report_in_order(context, &o, medial, &errors, report);
+  if (status == QMAT_OK) {
+    qmat_frame_spheres_to_model(qmat_surface_frame(o.surface), medial->spheres, medial->sphere_count, medial->spheres);
+    status = qmat_value_seal(context, &medial->base);
+  }
+  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
+  if (status == QMAT_OK) {
+    outputs[0] = &medial->base;
+    outputs[1] = &report->base;
+  } else {
+    qmat_value_release(medial ? &medial->base : NULL);
+    qmat_value_release(report ? &report->base : NULL);
+  }
+  qmat_ordered_collapses_uninit(&o);
+  return status;
+}
+
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
-  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
-  const qmat_field *thickness = (const qmat_field *)inputs[1];
+  if (qmat_simplify_in_order(params)) return run_in_order(context, params, inputs, outputs);
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
   simplifier s = {.context = context, .params = params};
-  initial_state state = {NULL, NULL, NULL};
+  qmat_initial_medial state = {NULL, NULL, NULL};
   qmat_medial *medial = NULL;
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
-  if (status == QMAT_OK) status = prepare(&s, mesh, thickness, samples, initial, &state);
+  if (status == QMAT_OK) status = qmat_simplify_prepare(context, params, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &medial, report);
   if (status == QMAT_OK) {
     qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), medial->spheres, medial->sphere_count, medial->spheres);
@@ -269,11 +225,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
 }
 
 static const char *const error_kinds[] = {"two_sided", "one_sided", NULL};
-static const char *const exceed_rules[] = {"skip", "stop", NULL};
-static const char *const topology_policies[] = {"free", "guard", "preserve", NULL};
-static const char *const protections[] = {"off", "late", "always", NULL};
-
-#define AT(field) offsetof(medial_simplify_params, field)
+static const char *const exceed_rules[] = {"skip", "stop", "raise", NULL};
+#define AT(field) offsetof(qmat_simplify_params, field)
 
 static const qmat_param params[] = {
     {.name = "epsilon",
@@ -293,14 +246,6 @@ static const qmat_param params[] = {
      .min = 0,
      .max = 4294967294.0,
      .offset = AT(vertices)},
-    {.name = "cost",
-     .unit = "1",
-     .doc = "Stop when the cheapest collapse costs more than this (eq. 6); 0: no such stop",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0,
-     .min = 0,
-     .max = 1e9,
-     .offset = AT(cost)},
     {.name = "error",
      .unit = "",
      .doc = "What epsilon bounds: surface to envelope and envelope to surface, or the first alone as in the paper",
@@ -310,41 +255,12 @@ static const qmat_param params[] = {
      .offset = AT(error)},
     {.name = "on_exceed",
      .unit = "",
-     .doc = "At a collapse that would exceed epsilon: skip it and go on, or stop as in the paper",
+     .doc = "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise what is held to it",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_EXCEED_SKIP,
      .choices = exceed_rules,
      .offset = AT(on_exceed)},
-    {.name = "topology",
-     .unit = "",
-     .doc = "Free as in the paper, guarded so that loops and voids become the solid's, or preserved (link condition)",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_TOPOLOGY_GUARD,
-     .choices = topology_policies,
-     .offset = AT(topology)},
-    {.name = "protect",
-     .unit = "",
-     .doc = "Keep thin tubular features whatever their cost: never, at the late stage, or from the start",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_PROTECT_OFF,
-     .choices = protections,
-     .offset = AT(protect)},
-    {.name = "theta",
-     .unit = "mean thickness",
-     .doc = "A feature is thin when the thickness of its whole responsible region is at most this ratio of the mean",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.5,
-     .min = 0,
-     .max = 10,
-     .offset = AT(theta)},
-    {.name = "k",
-     .unit = "1",
-     .doc = "The constant of the collapse cost (eq. 6)",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 1e-5,
-     .min = 0,
-     .max = 1,
-     .offset = AT(k)},
+    QMAT_COLLAPSE_PARAMS,
     {.name = "refits",
      .unit = "passes",
      .doc = "How often, when no edge is left to collapse, spheres are fitted to the surface to make room for more",
@@ -374,7 +290,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 1,
+    .version = 2,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -383,7 +299,18 @@ const qmat_node qmat_node_medial_simplify = {
         "from the envelope of spheres, cones and slabs to the surface. Spheres of the initial medial mesh, shrunk by "
         "epsilon, have to stay inside too, so that the envelope has no hollow. The largest distance from the surface "
         "between the control points is bounded afterwards, and the collapses are repeated with points in the places "
-        "found where it is above epsilon.",
+        "found where it is above epsilon. "
+        "With on_exceed=raise both errors are held to a quarter of a percent of the diagonal first, "
+        "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
+        "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
+        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is held rises "
+        "as soon as the cheapest collapse asks for it, as in the paper. Both have control points of their own, "
+        "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
+        "leaves the samples of both ends nearest to the envelope, and that distance for the cost; pmat keeps the "
+        "larger end, and the cost is the distance of the centres over the difference of the radii. With compat=qmat "
+        "new spheres are the optimum wherever it lies, else the middle; its boundary terms are those of the public "
+        "code (the virtual sphere of edges without slabs, which depends on the origin, is taken about the centre of "
+        "the bounding box), k is 1e-5, the topology is free, and there is no inside test and no bound.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(medial_simplify_params),
     .params = params,

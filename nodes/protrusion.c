@@ -112,7 +112,10 @@ static bool search_piece(search *s, const piece *p, int level) {
   if (s->lattice) {
     double gap;
     const double near = qmat_depth_lattice_near(s->lattice, centre, &gap);
-    if (centre[3] - near - gap > s->limit) return false;
+    if (centre[3] - near - gap > s->limit) {
+      s->found = centre[3] - near - gap;
+      return false;
+    }
     if (is_done(s, farthest - near + gap, size, last)) return true;
     ask = size <= s->smallest || last;
   }
@@ -281,6 +284,7 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
       s.found = s.bound = -INFINITY;
       *kept = search_piece(&s, &p, 0);
       bound = s.bound;
+      protrusion->failed = maximum(s.found, protrusion->limit);
     }
     *result = bound;
   }

@@ -11,37 +11,131 @@
 
 enum { REPORT_EVERY = 256 };
 
+/* What depths are remembered for where the limit rises. */
+static const double usual_limit = 0.002;
+
 /* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
 static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
 }
 
-/* Eq. 6, with the error of the best candidate. */
-static void set_cost(qmat_simplification *s, uint32_t edge) {
+/* Whether the collapses are the same for every limit. */
+static bool in_order(const qmat_simplification *s) {
+  return s->rules.on_exceed != QMAT_EXCEED_SKIP;
+}
+
+static bool is_two_sided(const qmat_simplification *s) {
+  return s->rules.error == QMAT_ERROR_TWO_SIDED;
+}
+
+/* The lowest level is the largest that is not above a thousandth; above the highest nothing is held. Epsilon 1 % and
+ * whatever is larger or smaller by a power of 2 are among them. */
+enum { LOWEST_LEVEL = -24, HIGHEST_LEVEL = 80, LEVELS_TO_A_DOUBLING = 12 };
+
+static double held_at(int level) {
+  if (level > HIGHEST_LEVEL) return INFINITY;
+  return ldexp(exp2((double)((level + 120) % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING),
+               (level + 120) / LEVELS_TO_A_DOUBLING - 10) *
+         (qmat_control_share * 0.01);
+}
+
+/* Points that the initial medial mesh leaves farther away are kept from getting worse. An inner point that is deeper
+ * than what is held has to stay inside the envelope, lest it be hollow. */
+static void hold(qmat_simplification *s, int level) {
+  const qmat_control_points *control = s->control;
+  s->level = level;
+  s->held = held_at(level);
+  for (size_t i = 0; i < control->surface_count; i++) s->coverage.limits[i] = fmax(s->held, control->distances[i]);
+  for (size_t i = control->surface_count; i < control->count; i++)
+    s->coverage.limits[i] = -control->distances[i] > s->held ? 0 : INFINITY;
+  s->protrusion.limit = is_two_sided(s) ? s->held : INFINITY;
+}
+
+/* False where the next level is above the limit, or there is none. */
+static bool hold_next(qmat_simplification *s) {
+  if (s->level > HIGHEST_LEVEL || held_at(s->level + 1) > s->rules.limit) return false;
+  hold(s, s->level + 1);
+  return true;
+}
+
+static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
+  if (s->rules.cost == QMAT_COST_PMAT) {
+    qmat_candidates_find_larger(&s->complex, s->quadrics, edge, c);
+  } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
+    const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+    if (status != QMAT_OK) return status;
+    return qmat_hausdorff_candidates(s->context, &s->coverage, &s->complex, &s->collapse, s->control->sample_count, c);
+  } else if (s->rules.published) {
+    qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
+  } else {
+    qmat_candidates_find(&s->complex, s->quadrics, edge, c);
+  }
+  return QMAT_OK;
+}
+
+/* The cost of the best candidate. */
+static qmat_status set_cost(qmat_simplification *s, uint32_t edge) {
   qmat_candidates c;
-  qmat_candidates_find(&s->complex, s->quadrics, edge, &c);
+  const qmat_status status = find_candidates(s, edge, &c);
+  if (status != QMAT_OK) return status;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
-  const double gamma =
-      qmat_stability_ratio(&s->complex.spheres[4 * (size_t)ends[0]], &s->complex.spheres[4 * (size_t)ends[1]]);
-  s->heap.errors[edge] = c.errors[0];
-  s->heap.costs[edge] = (c.errors[0] + s->rules.k) * gamma * gamma;
+  const double *a = &s->complex.spheres[4 * (size_t)ends[0]], *b = &s->complex.spheres[4 * (size_t)ends[1]];
+  const bool slab = s->rules.cost == QMAT_COST_SLAB;
+  s->heap.errors[edge] = slab ? c.errors[0] : qmat_point_distance(a, b);
+  s->heap.costs[edge] = slab                              ? qmat_slab_cost(c.errors[0], s->rules.k, a, b)
+                        : s->rules.cost == QMAT_COST_PMAT ? qmat_pmat_cost(a, b)
+                                                          : c.errors[0];
   s->stale[edge] = 0;
+  return QMAT_OK;
 }
 
 static qmat_status fill_heap(qmat_simplification *s) {
   const size_t count = s->complex.edge_count;
   s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
   s->stale = qmat_arena_alloc(&s->context->arena, count, sizeof *s->stale);
-  if (!s->failed_points || !s->stale) return qmat_fail_memory(s->context, "the heap of edges");
-  const qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
+  s->asked = qmat_arena_alloc(&s->context->arena, count, sizeof *s->asked);
+  if (!s->failed_points || !s->stale || !s->asked) return qmat_fail_memory(s->context, "the heap of edges");
+  qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
   if (status != QMAT_OK) return status;
-  const int threads = qmat_threads(s->context);
-#pragma omp parallel for num_threads(threads) schedule(static)
   for (size_t e = 0; e < count; e++) {
-    set_cost(s, (uint32_t)e);
     s->failed_points[e] = QMAT_NONE;
+    s->asked[e] = 0;
+  }
+  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* looks at stars, one at a time */
+    for (size_t e = 0; e < count && status == QMAT_OK; e++) {
+      if (e % REPORT_EVERY == 0) status = qmat_progress(s->context, e, count, "costs");
+      if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
+    }
+  } else {
+    const int threads = qmat_threads(s->context);
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (size_t e = 0; e < count; e++) set_cost(s, (uint32_t)e);
   }
   qmat_edge_heap_fill(&s->heap);
+  return status;
+}
+
+/* The sample's owner: the corner of its witness with the largest weight. */
+static uint32_t owner_of(const qmat_coverage *coverage, size_t point) {
+  uint32_t best = 0;
+  for (uint32_t k = 1; k < 3; k++)
+    if (coverage->witnesses[3 * point + k] != QMAT_NONE &&
+        coverage->weights[3 * point + k] > coverage->weights[3 * point + best])
+      best = k;
+  return coverage->witnesses[3 * point + best];
+}
+
+/* Room for every collapse, and who answers for the samples before the first. */
+static qmat_status start_log(qmat_simplification *s) {
+  const size_t most = s->complex.vertex_count, samples = s->control->sample_count;
+  qmat_arena *arena = &s->context->arena;
+  s->log.ends = qmat_arena_alloc(arena, most, 2 * sizeof(uint32_t));
+  s->log.merged = qmat_arena_alloc(arena, most, 4 * sizeof(double));
+  s->log.errors = qmat_arena_alloc(arena, most, sizeof(double));
+  s->log.owners = qmat_arena_alloc(arena, samples, sizeof(uint32_t));
+  if (!s->log.ends || !s->log.merged || !s->log.errors || !s->log.owners)
+    return qmat_fail_memory(s->context, "the collapses");
+  for (size_t i = 0; i < samples; i++) s->log.owners[i] = owner_of(&s->coverage, i);
   return QMAT_OK;
 }
 
@@ -57,14 +151,20 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
   for (size_t i = 0; i < control->count; i++)
     limits[i] = i < control->surface_count ? fmax(s->rules.limit, control->distances[i])
                                            : control->inner_limits[i - control->surface_count];
-  qmat_medial_quadrics_add(c, s->quadrics);
-  qmat_status status = fill_heap(s);
-  if (status == QMAT_OK)
-    status = qmat_coverage_init(context, &s->coverage, control->count, control->points, limits, control->witnesses,
-                                control->weights, c->vertex_count);
+  if (s->rules.published)
+    qmat_medial_quadrics_add_published(c, s->quadrics);
+  else
+    qmat_medial_quadrics_add(c, s->quadrics);
+  qmat_status status = qmat_coverage_init(context, &s->coverage, control->count, control->points, limits,
+                                          control->witnesses, control->weights, c->vertex_count);
+  if (status == QMAT_OK) status = fill_heap(s);
   if (status != QMAT_OK) return status;
-  return qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths,
-                              s->rules.error == QMAT_ERROR_TWO_SIDED ? s->rules.limit : INFINITY);
+  s->held = s->rules.limit;
+  const double limit = in_order(s) ? usual_limit : s->rules.limit;
+  status = qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths, is_two_sided(s) ? limit : INFINITY);
+  if (status != QMAT_OK || !in_order(s)) return status;
+  hold(s, LOWEST_LEVEL);
+  return start_log(s);
 }
 
 void qmat_simplification_uninit(qmat_simplification *s) {
@@ -143,26 +243,45 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
 typedef enum { DONE, REFUSED, EXCEEDED } outcome;
 
 static bool holds_protrusion(const qmat_simplification *s) {
-  return s->rules.limit < INFINITY && s->rules.error == QMAT_ERROR_TWO_SIDED;
+  return s->held < INFINITY && is_two_sided(s);
 }
 
-/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. */
-static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uint32_t first, outcome *result) {
+static bool is_inner(const qmat_simplification *s, size_t point) {
+  return point >= s->control->surface_count;
+}
+
+/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may.
+ */
+static outcome test_inside(qmat_simplification *s, const double *sphere) {
+  const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere);
+  const bool inside = s->rules.published || s->protrusion.sphere_depth > 0;
+  if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
+  if (!s->rules.published && !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere))
+    return REFUSED;
+  return kept || !(sphere[3] - s->protrusion.sphere_depth > s->protrusion.limit) ? DONE : EXCEEDED;
+}
+
+/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
+ * they exceed it, `*asked` is no more than what would have to be held. */
+static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uint32_t first, outcome *result,
+                               double *asked) {
   bool kept;
-  *result = REFUSED;
   s->coverage.found_count = 0;
-  if (!qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) ||
-      !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere)) {
+  *result = test_inside(s, sphere);
+  *asked = sphere[3] - s->protrusion.sphere_depth;
+  if (*result != DONE) {
     s->refused_by_surface++;
     return QMAT_OK;
   }
   *result = EXCEEDED;
-  if (s->rules.limit < INFINITY) {
+  if (s->held < INFINITY) {
     const qmat_status status =
         qmat_coverage_test(s->context, &s->coverage, &s->complex, &s->collapse, sphere, first, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->refused_by_coverage++;
+      *asked = fmax(s->held, is_inner(s, s->coverage.failed_point) ? -s->control->distances[s->coverage.failed_point]
+                                                                   : s->coverage.failed_distance);
       return QMAT_OK;
     }
   }
@@ -172,6 +291,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->refused_by_protrusion++;
+      *asked = s->protrusion.failed;
       return QMAT_OK;
     }
   }
@@ -179,8 +299,20 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
   return QMAT_OK;
 }
 
+/* The largest error that is recorded: more than the whole model. */
+static const double most_error = 2;
+
+static void record(qmat_simplification *s, const double *sphere) {
+  const size_t i = s->log.count++;
+  s->log.ends[2 * i] = s->collapse.kept;
+  s->log.ends[2 * i + 1] = s->collapse.removed;
+  memcpy(&s->log.merged[4 * i], sphere, 4 * sizeof *sphere);
+  s->log.errors[i] = fmin(s->held, most_error);
+}
+
 /* Does what the newest preview and the newest test allow. */
 static qmat_status commit(qmat_simplification *s, const double *sphere) {
+  if (in_order(s)) record(s, sphere);
   if (holds_protrusion(s))
     qmat_protrusion_commit(&s->protrusion, &s->collapse);
   else
@@ -201,21 +333,21 @@ static qmat_status fit_candidate(qmat_simplification *s, const qmat_candidates *
     memcpy(sphere, c->spheres[i], 4 * sizeof *sphere);
   }
   if (status != QMAT_OK) return status;
-  return qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->rules.limit, sphere,
-                             error);
+  return qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, error);
 }
 
 /* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
 static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *result) {
   qmat_candidates c;
-  qmat_candidates_find(&s->complex, s->quadrics, edge, &c);
   *result = REFUSED;
+  qmat_status status = find_candidates(s, edge, &c);
+  if (status != QMAT_OK) return status;
   bool bound = false;
   if (s->protecting && !apply_protection(s, edge, &c, &bound)) {
     s->refused_by_protection++;
     return QMAT_OK;
   }
-  qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+  status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
   if (status != QMAT_OK) return status;
   int64_t change;
   if (!keeps_topology(s, &change)) {
@@ -223,18 +355,21 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
     return QMAT_OK;
   }
   bool exceeded = false;
+  double asked;
+  s->asked[edge] = INFINITY;
   const double *sphere = NULL;
   for (int i = 0; i < c.count && status == QMAT_OK && *result != DONE; i++) {
     sphere = c.spheres[i];
     const size_t refused = s->refused_by_coverage;
-    status = test_sphere(s, sphere, s->failed_points[edge], result);
+    status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
     if (s->refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
+    if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
     exceeded |= *result == EXCEEDED;
   }
   double fitted[4], error;
   if (status == QMAT_OK && *result != DONE && s->fitting && !bound) {
     status = fit_candidate(s, &c, fitted, &error);
-    if (status == QMAT_OK && error <= 1.1 * s->rules.limit) status = test_sphere(s, fitted, QMAT_NONE, result);
+    if (status == QMAT_OK && error <= 1.1 * s->held) status = test_sphere(s, fitted, QMAT_NONE, result, &asked);
     sphere = fitted;
   }
   if (status == QMAT_OK && *result == DONE) {
@@ -287,7 +422,7 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
     if (status != QMAT_OK) return status;
     const uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
-      set_cost(s, edge);
+      if ((status = set_cost(s, edge)) != QMAT_OK) return status;
       qmat_edge_heap_update(&s->heap, edge);
       continue;
     }
@@ -303,7 +438,8 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
       s->collapses++;
       update_neighbourhood(s);
     } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
-      *ended = true;
+      *ended = !hold_next(s);
+      qmat_edge_heap_update(&s->heap, edge);
     }
   }
   return QMAT_OK;
@@ -330,7 +466,8 @@ static qmat_status refit(qmat_simplification *s, size_t *moved) {
     if (status != QMAT_OK) return status;
     if (!(after <= (1 - least_gain) * before)) continue;
     outcome result;
-    status = test_sphere(s, sphere, QMAT_NONE, &result);
+    double asked;
+    status = test_sphere(s, sphere, QMAT_NONE, &result, &asked);
     if (status == QMAT_OK && result == DONE) {
       status = commit(s, sphere);
       update_neighbourhood(s);
@@ -348,10 +485,22 @@ static void queue_all(qmat_simplification *s) {
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
 }
 
+/* The edges that may collapse with what is held now. */
+static void queue_raised(qmat_simplification *s) {
+  for (uint32_t e = 0; e < s->complex.edge_count; e++)
+    if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->asked[e] <= s->held)
+      qmat_edge_heap_update(&s->heap, e);
+}
+
 qmat_status qmat_simplification_run(qmat_simplification *s) {
   bool ended = false;
   qmat_status status = collapse_edges(s, &ended);
-  if (status != QMAT_OK || ended || !(s->rules.limit < INFINITY)) return status;
+  while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
+         hold_next(s)) {
+    queue_raised(s);
+    status = collapse_edges(s, &ended);
+  }
+  if (status != QMAT_OK || ended || in_order(s) || !(s->rules.limit < INFINITY)) return status;
   for (int i = 0; i < s->rules.refits && !ended; i++) {
     const size_t collapses = s->collapses;
     size_t moved;
@@ -364,34 +513,20 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
   return status;
 }
 
-/* The sample's owner: the corner of its witness with the largest weight. */
-static uint32_t owner_of(const qmat_coverage *coverage, size_t point) {
-  uint32_t best = 0;
-  for (uint32_t k = 1; k < 3; k++)
-    if (coverage->witnesses[3 * point + k] != QMAT_NONE &&
-        coverage->weights[3 * point + k] > coverage->weights[3 * point + best])
-      best = k;
-  return coverage->witnesses[3 * point + best];
-}
-
+/* Where collapses come in order the merged sphere inherits the regions of both ends (section 3.3): who answers does not
+ * depend on the limits that were tested. */
 static qmat_status set_regions(const qmat_simplification *s, const uint32_t *ids, qmat_medial *medial) {
-  const size_t count = medial->sphere_count, samples = s->control->sample_count;
-  medial->region_offsets = qmat_calloc(count + 2, sizeof(uint32_t));
-  medial->region_samples = qmat_alloc(samples, sizeof(uint32_t));
-  if (!medial->region_offsets || !medial->region_samples) return qmat_fail_memory(s->context, "responsible regions");
-  uint32_t *offsets = medial->region_offsets;
+  const size_t samples = s->control->sample_count;
+  uint32_t *owners = qmat_arena_alloc(&s->context->arena, samples, sizeof *owners);
+  uint32_t *roots = qmat_arena_alloc(&s->context->arena, s->complex.vertex_count, sizeof *roots);
+  if (!owners || !roots) return qmat_fail_memory(s->context, "responsible regions");
+  if (in_order(s)) qmat_collapse_roots(s->log.ends, s->log.count, s->complex.vertex_count, roots);
   for (size_t i = 0; i < samples; i++) {
-    const uint32_t owner = owner_of(&s->coverage, i);
-    if (owner != QMAT_NONE) offsets[ids[owner] + 2]++;
+    uint32_t owner = in_order(s) ? s->log.owners[i] : owner_of(&s->coverage, i);
+    if (in_order(s) && owner != QMAT_NONE) owner = roots[owner];
+    owners[i] = owner == QMAT_NONE ? QMAT_NONE : ids[owner];
   }
-  for (size_t v = 0; v < count; v++) offsets[v + 2] += offsets[v + 1];
-  for (size_t i = 0; i < samples; i++) {
-    const uint32_t owner = owner_of(&s->coverage, i);
-    if (owner != QMAT_NONE) medial->region_samples[offsets[ids[owner] + 1]++] = (uint32_t)i;
-  }
-  medial->region_offset_count = count + 1;
-  medial->region_sample_count = offsets[count];
-  return QMAT_OK;
+  return qmat_medial_set_regions(s->context, owners, samples, medial);
 }
 
 qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_medial *medial) {

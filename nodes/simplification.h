@@ -3,6 +3,8 @@
 #define QMAT_NODES_SIMPLIFICATION_H
 
 #include "core/surface.h"
+#include "nodes/collapse_chain.h"
+#include "nodes/collapse_cost.h"
 #include "nodes/control_points.h"
 #include "nodes/coverage.h"
 #include "nodes/edge_heap.h"
@@ -11,7 +13,7 @@
 #include "nodes/sphere_fit.h"
 
 typedef enum { QMAT_ERROR_TWO_SIDED, QMAT_ERROR_ONE_SIDED } qmat_error_kind;
-typedef enum { QMAT_EXCEED_SKIP, QMAT_EXCEED_STOP } qmat_exceed_rule;
+typedef enum { QMAT_EXCEED_SKIP, QMAT_EXCEED_STOP, QMAT_EXCEED_RAISE } qmat_exceed_rule;
 typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_protection;
 typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
 
@@ -21,6 +23,8 @@ typedef struct qmat_simplification_rules {
   size_t vertices;  /* collapses end when so few are left; 0: never */
   double most_cost; /* or when the cheapest costs more; 0: never */
   double k;         /* of eq. 6 */
+  qmat_cost_kind cost;
+  bool published; /* quadrics and candidates of the public Q-MAT code, inside the model or not */
   qmat_error_kind error;
   qmat_exceed_rule on_exceed;
   qmat_topology_policy topology;
@@ -31,8 +35,13 @@ typedef struct qmat_simplification_rules {
   int64_t target_euler;
 } qmat_simplification_rules;
 
-/* A medial mesh while its edges collapse: the cheapest first by slab quadratic error and stability ratio (eq. 6), each
- * to the best candidate that lies inside the model and keeps both errors (sections 3.1.2, 3.3 and 3.4). */
+/* A medial mesh while its edges collapse, the cheapest first, each to the best candidate that lies inside the model and
+ * keeps both errors (sections 3.1.2, 3.3 and 3.4).
+ *
+ * With QMAT_EXCEED_SKIP the limit is what is held from the first collapse on. With the others the collapses are the
+ * same for any limit and number of vertices, which only say where they end: what is held starts at a thousandth and
+ * rises, by twelve levels to each doubling, when the next collapse in the order of costs would exceed it (STOP), or
+ * when every one would (RAISE). */
 typedef struct qmat_simplification {
   qmat_context *context;
   qmat_simplification_rules rules;
@@ -45,7 +54,11 @@ typedef struct qmat_simplification {
   qmat_protrusion protrusion;
   qmat_collapse collapse;
   qmat_sphere_fit fit;
+  double held;             /* what both errors are held to now; INFINITY: nothing is held */
+  int level;               /* of it, where it rises */
+  qmat_collapse_log log;   /* every collapse, where what is held rises */
   uint32_t *failed_points; /* per edge: the control point that refused it, or QMAT_NONE */
+  double *asked;           /* per edge: no less has to be held for it to collapse, as far as is known */
   uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
   bool protecting, fitting;
   int64_t euler; /* of the medial mesh */

@@ -96,7 +96,7 @@ static qmat_chain *chain_example(void) {
   ASSIGN(chain->owners, (uint32_t[]){3, 0, UINT32_MAX});
   ASSIGN(chain->ends, (uint32_t[]){1, 3, 0, 1});
   ASSIGN(chain->merged, (double[]){1, 0, 4, 0.25, 0.5, 0, 0, 1});
-  ASSIGN(chain->errors, (double[]){0, 0.25, 0.125, 0.25});
+  ASSIGN(chain->errors, (double[]){0.25, 0.5});
   return chain;
 }
 
@@ -213,7 +213,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              [QMAT_FIELD] = 3 * 8 + 10,
                              [QMAT_SAMPLES] = 6 * 8 + 2 * 4 + 6 * 8,
                              [QMAT_MEDIAL] = 16 * 8 + 8 * 4 + 3 * 4 + 5 * 4 + 6 * 4,
-                             [QMAT_CHAIN] = 16 * 8 + 8 * 4 + 3 * 4 + 3 * 4 + 4 * 4 + 8 * 8 + 4 * 8,
+                             [QMAT_CHAIN] = 16 * 8 + 8 * 4 + 3 * 4 + 3 * 4 + 4 * 4 + 8 * 8 + 2 * 8,
                              [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
                              [QMAT_FILE] = 4 + 8};
@@ -660,13 +660,13 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   chain->merged[7] = -1;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the radius -1 is negative");
   chain = chain_example();
-  chain->errors[2] = (double)INFINITY;
+  chain->errors[1] = (double)INFINITY;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is not finite");
   chain = chain_example();
   chain->errors[0] = -0.5;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: the error falls");
   chain = chain_example();
-  chain->errors[3] = 0.125;
+  chain->errors[1] = 0.125;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error falls");
 }
 

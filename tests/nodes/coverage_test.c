@@ -173,7 +173,8 @@ static void make_model(model *m, qmat_mesh *mesh, double epsilon, bool with_regi
                    QMAT_OK);
   m->limits = qmat_alloc(m->control.count, sizeof *m->limits);
   for (size_t i = 0; i < m->control.count; i++)
-    m->limits[i] = fmax(epsilon - m->control.radii[i], m->control.distances[i]);
+    m->limits[i] = i < m->control.surface_count ? fmax(epsilon, m->control.distances[i])
+                                                : m->control.inner_limits[i - m->control.surface_count];
   assert_int_equal(qmat_coverage_init(&m->context, &m->coverage, m->control.count, m->control.points, m->limits,
                                       m->control.witnesses, m->control.weights, m->complex.vertex_count),
                    QMAT_OK);
