@@ -51,7 +51,7 @@ struct qmat_command {
 
 extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_watch, qmat_command_why,
     qmat_command_cache, qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node,
-    qmat_command_version, qmat_command_help;
+    qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract;
 
 /* All commands, in the order in which help lists them. */
 extern const qmat_command *const qmat_commands[];

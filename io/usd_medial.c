@@ -10,7 +10,9 @@ typedef struct reader {
   qmat_context *context;
   qmat_usd_stage *stage;
   json_t *facts;
-  qmat_medial *medial; /* NULL until one is found */
+  const char *name;    /* of the prim that is wanted, or NULL */
+  size_t carriers;     /* prims that have one */
+  qmat_medial *medial; /* NULL until the one is found */
 } reader;
 
 /* Whether the prim has a child of this name, which is then composed. */
@@ -131,11 +133,15 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
 
 static qmat_status search(reader *r, qmat_usd_prim *prim) {
   const qmat_usd_value *data = prim->parent ? qmat_usd_prim_field(prim, "customData") : NULL;
-  if (qmat_usd_text(qmat_usd_entry(data, "qmat_version"))) return read_carrier(r, prim, data);
+  if (qmat_usd_text(qmat_usd_entry(data, "qmat_version"))) {
+    r->carriers++;
+    if (r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
+    return read_carrier(r, prim, data);
+  }
   const char *const *names;
   size_t count;
   qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK && !r->medial; i++) {
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     qmat_usd_prim child;
     status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], &child);
     if (status == QMAT_OK) status = search(r, &child);
@@ -144,9 +150,9 @@ static qmat_status search(reader *r, qmat_usd_prim *prim) {
   return status;
 }
 
-qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_medial **medial,
-                                 json_t *facts) {
-  reader r = {.context = context, .facts = facts};
+qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
+                                 qmat_medial **medial, json_t *facts) {
+  reader r = {.context = context, .facts = facts, .name = name};
   qmat_usd_prim root = {0};
   *medial = NULL;
   qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
@@ -155,7 +161,12 @@ qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes,
   if (status == QMAT_OK) status = search(&r, &root);
   qmat_usd_prim_uninit(&root);
   qmat_usd_stage_close(r.stage);
-  if (status == QMAT_OK && !r.medial) qmat_fail(context, status = QMAT_ERROR_GEOMETRY, "no prim has a medial mesh");
+  if (status == QMAT_OK && !r.medial) {
+    qmat_fail(context, status = QMAT_ERROR_GEOMETRY,
+              r.carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
+  } else if (status == QMAT_OK && !name && r.carriers > 1) {
+    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: one has to be named", r.carriers);
+  }
   if (status == QMAT_OK) {
     *medial = r.medial;
     return QMAT_OK;

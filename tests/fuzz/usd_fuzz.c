@@ -111,7 +111,7 @@ static bool read_all(const uint8_t *content, size_t size) {
     if (mesh) qmat_value_release(&mesh->base);
   }
   if (made != QMAT_OK) assert_true(context.error.message[0] != '\0' && context.error.status != QMAT_ERROR_INTERNAL);
-  if (qmat_usd_read_medial(&context, &bytes, path, &medial, facts) == QMAT_OK) qmat_value_release(&medial->base);
+  if (qmat_usd_read_medial(&context, &bytes, path, NULL, &medial, facts) == QMAT_OK) qmat_value_release(&medial->base);
   qmat_soup_uninit(&soup);
   json_decref(report);
   json_decref(facts);

@@ -65,7 +65,7 @@ expect 0 "qmat COMMAND" "$qmat" help
 expect 0 "qmat COMMAND" "$qmat" --help
 expect 2 "did you mean 'run'?" "$qmat" rnu
 expect 2 "did you mean 'check'?" "$qmat" help chekc
-for command in mat run batch watch why cache check dot nodes node version help; do
+for command in mat run batch watch why cache check info extract dot nodes node version help; do
   expect 0 "Options:" "$qmat" help $command
   expect 0 "qmat $command" "$qmat" $command --help
 done
@@ -120,6 +120,20 @@ rm box.ma
 
 expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.ma --epsilon 2% --report report.json --threads 1
 holds "both files" test -s box.glb -a -s box.ma
+expect 0 "a medial mesh of" "$qmat" info box.glb
+expect 0 "triangles: 12" "$qmat" info box.off
+expect 0 "not refuted" "$qmat" info box.glb --against box.off
+expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
+expect 0 "spheres" "$qmat" extract box.glb -o back.ma
+holds "as many spheres as before" test "$(head -n 1 back.ma)" = "$(head -n 1 box.ma)"
+expect 2 "-o PATH" "$qmat" extract box.glb
+expect 2 "known endings" "$qmat" extract box.glb -o back.off
+expect 2 "would overwrite" "$qmat" extract box.ma -o ./box.ma
+expect 1 "OFF does not carry" "$qmat" extract box.off -o back.ma
+expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
+expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5%
+expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
+holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
 holds "the report names both" test "$(grep -c '"sha256"' report.json)" -eq 2
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \

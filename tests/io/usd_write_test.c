@@ -1,31 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd_write.h"
 
-#include "core/medial_build.h"
 #include "io/usd_medial.h"
 #include "io/usd_scene.h"
 #include "tests/io/files.h"
+#include "tests/io/medial_examples.h"
 #include "tests/shapes.h"
-
-static qmat_medial *make_medial(const double *spheres, size_t sphere_count, const uint32_t *edges, size_t edge_count,
-                                const uint32_t *triangles, size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->spheres = qmat_alloc(sphere_count, 4 * sizeof(double));
-  assert_non_null(medial->spheres);
-  memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof(double));
-  medial->sphere_count = sphere_count;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 /* A slab, an edge beside it, and a sphere alone. */
 static qmat_medial *make_small(void) {
   static const double spheres[] = {0, 0, 0, 1, 4, 0, 0, 0.5, 0, 4, 0, 0.25, 0.1, 0.2, 5, 0, 1e-3, -7.5, 9, 2};
-  return make_medial(spheres, 5, (const uint32_t[]){1, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
+  return example_build(spheres, 5, (const uint32_t[]){1, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
 }
 
 static qmat_file *must_write(const qmat_medial *medial, const qmat_mesh *skin, const qmat_usd_options *options) {
@@ -40,7 +25,7 @@ static qmat_medial *read_back(const qmat_file *file, json_t *facts) {
   qmat_context context = {0};
   qmat_medial *medial = NULL;
   qmat_bytes bytes = memory_file(file->parts[0].bytes, file->parts[0].size);
-  if (qmat_usd_read_medial(&context, &bytes, "file", &medial, facts) != QMAT_OK) {
+  if (qmat_usd_read_medial(&context, &bytes, "file", NULL, &medial, facts) != QMAT_OK) {
     fail_msg("%s", context.error.message);
   }
   free(bytes.data);
@@ -71,20 +56,7 @@ static void assert_same(const qmat_medial *written, const qmat_medial *read, dou
 
 static void test_a_medial_mesh_comes_back_as_it_was_within_what_the_file_states(void **state) {
   (void)state;
-  enum { MANY = 200 };
-  double spheres[4 * MANY];
-  uint32_t edges[2 * MANY];
-  for (size_t i = 0; i < MANY; i++) {
-    for (size_t k = 0; k < 3; k++) spheres[4 * i + k] = (double)(qmat_hash3(3, i, k) >> 11) * 0x1p-53 * 100;
-    spheres[4 * i + 3] = (double)(qmat_hash3(4, i, 0) >> 11) * 0x1p-53;
-    edges[2 * i] = (uint32_t)i;
-    edges[2 * i + 1] = (uint32_t)((i * 7 + 1) % MANY);
-  }
-  static const double one[] = {1.1, 2.2, 3.3, 4.4};
-  static const double three[] = {0, 0, 0, 0.1, 1, 0, 0, 0.2, 0, 1, 0, 0.3};
-  qmat_medial *cases[] = {make_small(), make_medial(one, 1, NULL, 0, NULL, 0),
-                          make_medial(three, 3, (const uint32_t[]){0, 1}, 1, NULL, 0),
-                          make_medial(spheres, MANY, edges, MANY - 1, NULL, 0)};
+  qmat_medial *cases[] = {make_small(), example_medial(1), example_medial(3), example_medial(200)};
   for (size_t i = 0; i < 8; i++) {
     const qmat_medial *medial = cases[i / 2];
     const qmat_usd_options options = {.package = i % 2, .epsilon = (double)NAN, .error_out = 0.5, .error_in = 0.25};
@@ -131,7 +103,7 @@ static void test_the_text_of_a_small_one_is_as_by_hand(void **state) {
       "            interpolation = \"vertex\"\n        )\n        float[] widths = [2, 1] (\n"
       "            interpolation = \"vertex\"\n        )\n        uniform token type = \"linear\"\n"
       "        uniform token purpose = \"guide\"\n    }\n}\n";
-  qmat_medial *medial = make_medial(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0);
+  qmat_medial *medial = example_build(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0);
   const qmat_usd_options options = {.name = "2 caf\xC3\xA9\"s",
                                     .meters_per_unit = 0.01,
                                     .is_z_up = true,
@@ -179,7 +151,7 @@ static void test_a_scene_reader_sees_the_skin_only(void **state) {
 static void test_what_single_precision_cannot_hold_is_refused_by_its_element(void **state) {
   (void)state;
   static const double spheres[] = {0, 0, 0, 1, 0, 1e39, 0, 1};
-  qmat_medial *medial = make_medial(spheres, 2, NULL, 0, NULL, 0);
+  qmat_medial *medial = example_build(spheres, 2, NULL, 0, NULL, 0);
   qmat_context context = {0};
   qmat_file *file;
   const qmat_usd_options options = {0};
@@ -205,13 +177,14 @@ static void test_broken_medial_meshes_are_errors_that_name_the_prim(void **state
        "/a/m/cones: primvars:qmat:sphere names sphere 1, but there are 1"},
       {CARRIER(SPHERES "def BasisCurves \"cones\" { int[] primvars:qmat:sphere = [0] }"),
        "/a/m/cones: primvars:qmat:sphere is not what it has to be"},
+      {CARRIER(SPHERES) "def \"b\" ( references = </a/m> ) {}", "2 prims have a medial mesh: one has to be named"},
       {CARRIER(SPHERES "def Mesh \"slabs\" {}"), "/a/m/slabs: faceVertexIndices is not what it has to be"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     qmat_context context = {0};
     qmat_medial *medial;
     qmat_bytes bytes = memory_file(cases[i][0], strlen(cases[i][0]));
-    assert_int_not_equal(qmat_usd_read_medial(&context, &bytes, "file", &medial, NULL), QMAT_OK);
+    assert_int_not_equal(qmat_usd_read_medial(&context, &bytes, "file", NULL, &medial, NULL), QMAT_OK);
     assert_null(medial);
     assert_string_equal(context.error.message, cases[i][1]);
     assert_string_equal(context.error.file, "file");

@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <stdio.h>
+
+#include "core/node.h"
+#include "graphs/command.h"
+#include "io/extract.h"
+#include "io/model.h"
+#include "nodes/nodes.h"
+
+static void print_object(const json_t *object) {
+  const char *key;
+  json_t *value;
+  json_object_foreach((json_t *)(uintptr_t)object, key, value) {
+    if (json_is_array(value)) {
+      for (size_t i = 0; i < json_array_size(value); i++) {
+        const char *text = json_string_value(json_array_get(value, i));
+        if (text) printf("  %s: %s\n", key, text);
+      }
+    } else if (json_is_string(value)) {
+      printf("  %s: %s\n", key, qmat_show(json_string_value(value)).text);
+    } else if (json_is_boolean(value)) {
+      printf("  %s: %s\n", key, json_is_true(value) ? "yes" : "no");
+    } else if (json_is_number(value)) {
+      char number[32];
+      qmat_format_number(json_number_value(value), number, sizeof number);
+      printf("  %s: %s\n", key, number);
+    }
+  }
+}
+
+static double diagonal_of(const qmat_mesh *mesh) {
+  double square = 0;
+  for (size_t axis = 0; axis < 3; axis++) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+      low = fmin(low, mesh->positions[3 * v + axis]);
+      high = fmax(high, mesh->positions[3 * v + axis]);
+    }
+    if (high > low) square += (high - low) * (high - low);
+  }
+  return sqrt(square);
+}
+
+static double number_of(const json_t *object, const char *key) {
+  const json_t *value = json_object_get(object, key);
+  return json_is_number(value) ? json_number_value(value) : (double)NAN;
+}
+
+// Whether what the file states is refuted: the error is larger for certain, also with what quantisation added.
+static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured, double diagonal) {
+  const struct {
+    const char *title, *stated, *most, *least;
+  } rows[] = {
+      {"surface to envelope", "qmat_error_out", "surface_to_envelope", "surface_to_envelope_at_least"},
+      {"envelope to surface", "qmat_error_in", "envelope_to_surface", "envelope_to_surface_at_least"},
+  };
+  double quantisation = number_of(facts, "qmat_quantisation") / diagonal;
+  if (!(quantisation >= 0)) quantisation = 0;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < 2; i++) {
+    const double stated = number_of(facts, rows[i].stated), least = number_of(measured, rows[i].least);
+    printf("  %s: between %.6g and %.6g of the diagonal", rows[i].title, least, number_of(measured, rows[i].most));
+    if (isnan(stated)) {
+      printf("; the file states none\n");
+      continue;
+    }
+    const bool holds = !(least > stated + quantisation);
+    printf("; stated %.6g, and %.2g for quantisation: %s\n", stated, quantisation, holds ? "not refuted" : "REFUTED");
+    if (!holds) {
+      status =
+          qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states", rows[i].title);
+    }
+  }
+  return status;
+}
+
+static qmat_status check_against(qmat_context *context, const char *path, const qmat_medial *medial,
+                                 const json_t *facts) {
+  const qmat_node *node = qmat_node_find("medial.evaluate");
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *read;
+  qmat_value *output = NULL;
+  void *params = qmat_calloc(1, node->params_size);
+  if (!params) return qmat_fail_memory(context, "parameters");
+  qmat_params_default(node, params);
+  qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &read);
+  if (status == QMAT_OK) {
+    const qmat_value *inputs[] = {&mesh->base, &medial->base};
+    status = qmat_node_run(context, node, params, inputs, &output);
+    if (status == QMAT_OK) {
+      printf("against %s\n", path);
+      status = compare(context, facts, ((const qmat_report *)output)->root, diagonal_of(mesh));
+      if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
+    }
+    qmat_value_release(output);
+    qmat_value_release(&scene->base);
+    qmat_value_release(&mesh->base);
+    qmat_value_release(&read->base);
+  }
+  qmat_free(params);
+  return status;
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  const char *path = invocation->arguments[0], *against = qmat_invocation_value(invocation, "against");
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  qmat_medial *medial = NULL;
+  json_t *facts = json_object();
+  if (!facts) return qmat_fail_memory(context, "facts");
+  qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &report);
+  const bool has_surface = status == QMAT_OK;
+  if (has_surface) {
+    printf("%s: a surface\n", path);
+    print_object(report->root);
+    qmat_value_release(&scene->base);
+    qmat_value_release(&mesh->base);
+    qmat_value_release(&report->base);
+  }
+  const qmat_error first = context->error;
+  qmat_status carried = qmat_medial_extract(context, path, qmat_invocation_value(invocation, "node"), &medial, facts);
+  if (carried == QMAT_OK) {
+    status = QMAT_OK;
+    printf("%s: a medial mesh of %zu spheres, %zu cones, %zu slabs\n", path, medial->sphere_count, medial->edge_count,
+           medial->triangle_count);
+    print_object(facts);
+    if (against) status = check_against(context, against, medial, facts);
+    qmat_value_release(&medial->base);
+  } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
+    status = carried;  // it has one that cannot be told apart or read, or should have one
+  } else if (!has_surface) {
+    context->error = first;
+  }
+  json_decref(facts);
+  return status;
+}
+
+static const qmat_option options[] = {
+    {"against", 0, "MODEL", "Bound the errors of the medial mesh to this model anew, and compare with what is stated"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh is meant, where several have one"},
+    {0},
+};
+
+const qmat_command qmat_command_info = {
+    .name = "info",
+    .arguments = "FILE",
+    .summary = "Tell what a model's file holds",
+    .doc =
+        "Prints what reading the file finds: counts, units, what was left out. Of a file that carries a medial mesh, "
+        "its counts and what the file says of it. With --against, its errors are bounded anew, and the exit code is 1 "
+        "where one is for certain larger than stated.",
+    .options = options,
+    .least = 1,
+    .most = 1,
+    .run = run,
+};

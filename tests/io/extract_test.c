@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/extract.h"
+
+#include <math.h>
+
+#include "core/json_text.h"
+#include "io/gltf_write.h"
+#include "io/ma.h"
+#include "tests/io/files.h"
+#include "tests/io/medial_examples.h"
+
+static char folder[64];
+
+static int set_up(void **state) {
+  (void)state;
+  make_folder(folder);
+  return 0;
+}
+
+static int tear_down(void **state) {
+  (void)state;
+  return rmdir(folder);
+}
+
+static qmat_status extract_from(qmat_context *context, const char *file, const void *content, size_t size,
+                                const char *name, qmat_medial **medial, json_t *facts) {
+  char path[128];
+  snprintf(path, sizeof path, "%s/%s", folder, file);
+  write_file(path, content, size);
+  qmat_status status = qmat_medial_extract(context, path, name, medial, facts);
+  unlink(path);
+  return status;
+}
+
+/* A .gltf of one node, as JSON. */
+static json_t *write_gltf(const qmat_medial *medial) {
+  qmat_context context = {0};
+  qmat_file *file;
+  const qmat_gltf_options options = {.quantisation = 1e-4, .name = "first", .epsilon = 0.01};
+  assert_int_equal(qmat_gltf_write(&context, medial, NULL, &options, &file), QMAT_OK);
+  json_t *root = json_loadb((const char *)file->parts[0].bytes, file->parts[0].size, 0, NULL);
+  assert_non_null(root);
+  qmat_value_release(&file->base);
+  qmat_context_uninit(&context);
+  return root;
+}
+
+static qmat_status extract_json(qmat_context *context, const json_t *root, const char *name, qmat_medial **medial,
+                                json_t *facts) {
+  size_t size;
+  char *text = qmat_json_text(root, 0, &size);
+  assert_non_null(text);
+  qmat_status status = extract_from(context, "a.gltf", text, size, name, medial, facts);
+  qmat_free(text);
+  return status;
+}
+
+static json_t *extras_of(json_t *root, size_t node) {
+  return json_object_get(json_array_get(json_object_get(root, "nodes"), node), "extras");
+}
+
+static void test_what_was_written_comes_back_with_its_facts(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = example_medial(200), *read;
+  json_t *root = write_gltf(medial), *facts = json_object();
+  assert_int_equal(extract_json(&context, root, NULL, &read, facts), QMAT_OK);
+  assert_int_equal(read->sphere_count, medial->sphere_count);
+  assert_int_equal(read->edge_count, medial->edge_count);
+  assert_memory_equal(read->edges, medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
+  assert_int_equal(read->triangle_count, medial->triangle_count);
+  assert_true(json_real_value(json_object_get(facts, "qmat_epsilon")) == 0.01);
+  assert_null(json_object_get(facts, "qmat_data"));
+  qmat_value_release(&read->base);
+  json_decref(facts);
+  json_decref(root);
+
+  qmat_file *file;
+  assert_int_equal(qmat_ma_write(&context, medial, &file), QMAT_OK);
+  assert_int_equal(extract_from(&context, "a.ma", file->parts[0].bytes, file->parts[0].size, NULL, &read, NULL),
+                   QMAT_OK);
+  assert_memory_equal(&read->base.digest, &medial->base.digest, sizeof read->base.digest);
+  qmat_value_release(&read->base);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void assert_fails(const json_t *root, const char *name, qmat_status expected, const char *message) {
+  qmat_context context = {0};
+  qmat_medial *read;
+  assert_int_equal(extract_json(&context, root, name, &read, NULL), expected);
+  assert_null(read);
+  assert_string_equal(context.error.message, message);
+  assert_non_null(strstr(context.error.file, "a.gltf"));
+  qmat_context_uninit(&context);
+}
+
+static void test_of_several_one_has_to_be_named(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = example_medial(20), *read;
+  json_t *root = write_gltf(medial), *nodes = json_object_get(root, "nodes");
+  json_t *second = json_deep_copy(json_array_get(nodes, 0));
+  json_object_set_new(second, "name", json_string("second"));
+  json_array_append_new(nodes, second);
+  assert_fails(root, NULL, QMAT_ERROR_USAGE, "2 nodes have a medial mesh: one has to be named");
+  assert_fails(root, "third", QMAT_ERROR_GEOMETRY, "no node of this name has a medial mesh");
+  assert_int_equal(extract_json(&context, root, "second", &read, NULL), QMAT_OK);
+  qmat_value_release(&read->base);
+  json_decref(root);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_broken_data_and_wrong_counts_are_errors(void **state) {
+  (void)state;
+  qmat_medial *medial = example_medial(20);
+  json_t *root = write_gltf(medial);
+  char message[128];
+  snprintf(message, sizeof message, "qmat_edges is not the %zu that the file holds", medial->edge_count);
+  json_object_set_new(extras_of(root, 0), "qmat_edges", json_integer(77));
+  assert_fails(root, NULL, QMAT_ERROR_FORMAT, message);
+  json_object_set_new(extras_of(root, 0), "qmat_data", json_string("AAAA"));
+  qmat_context context = {0};
+  qmat_medial *read;
+  assert_int_equal(extract_json(&context, root, NULL, &read, NULL), QMAT_ERROR_FORMAT);
+  assert_null(read);
+  assert_int_equal(context.error.element, 0);
+  json_object_del(extras_of(root, 0), "qmat_data");
+  assert_fails(root, NULL, QMAT_ERROR_GEOMETRY, "no node has a medial mesh");
+  static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  assert_int_equal(extract_from(&context, "a.off", off, sizeof off - 1, NULL, &read, NULL), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "OFF does not carry medial meshes");
+  json_decref(root);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_what_was_written_comes_back_with_its_facts),
+      cmocka_unit_test(test_of_several_one_has_to_be_named),
+      cmocka_unit_test(test_broken_data_and_wrong_counts_are_errors),
+  };
+  return cmocka_run_group_tests(tests, set_up, tear_down);
+}
