@@ -231,8 +231,10 @@ static qmat_status take_packed_integers(const crate *c, qmat_byte_reader *reader
 
 /* The same as indices, in the scratch memory. */
 static qmat_status take_packed_indices(crate *c, qmat_byte_reader *reader, size_t count, uint32_t **indices) {
-  /* Two bits each at least: refused before memory is taken. */
-  if (count / 4 > largest_unpacked(qmat_bytes_left(reader))) return fail_short(c);
+  /* Two bits each at least, and no more than the file justifies: refused before memory is taken. */
+  if (count / 4 > largest_unpacked(qmat_bytes_left(reader)) || count > c->layer->allowance / sizeof(int64_t)) {
+    return fail(c, "a table is longer than the file justifies");
+  }
   int64_t *wide = qmat_alloc(count, sizeof *wide);
   *indices = qmat_arena_alloc(&c->scratch, count, sizeof **indices);
   qmat_status status = wide && *indices ? take_packed_integers(c, reader, count, 4, wide) : fail_memory(c);
