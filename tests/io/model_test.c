@@ -234,13 +234,24 @@ void *__wrap_aligned_alloc(size_t alignment, size_t size) {
   return __real_aligned_alloc(alignment, size);
 }
 
+/* Every arc, a file that is not there, a cage, and a package's worth of values. */
+static const char usda[] =
+    "#usda 1.0\n( subLayers = [@none.usda@] )\nclass Mesh \"c\" { point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, "
+    "0)]\n"
+    "int[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\nint[] cornerIndices = [0]\n"
+    "float[] cornerSharpnesses = [2] }\ndef \"w\" ( variants = { string v = \"a\" } prepend variantSets = \"v\" ) {\n"
+    "  variantSet \"v\" = { \"a\" { def \"m\" ( inherits = </c> prepend references = [</c>, @none.usda@] ) {\n"
+    "    float3 xformOp:translate.timeSamples = { 1: (1, 2, 3) } token[] xformOpOrder = [\"xformOp:translate\"] } } "
+    "}\n}\n"
+    "def Mesh \"n\" ( payload = </c> specializes = </c> ) { dictionary d = { int x = 1 } }\n";
+
 static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing(void **state) {
   (void)state;
   static const char pentagon[] = "OFF 5 1 0\n0 0 0\n2 0 0\n2 2 0\n1 1 0\n0 2 0\n5 0 1 2 3 4\n";
   static const struct {
     const char *name, *content;
-  } files[] = {{"a.off", pentagon}, {"a.obj", obj}, {"a.ply", ply}, {"a.stl", stl}, {"a.gltf", gltf}};
-  for (size_t i = 0; i < 5; i++) {
+  } files[] = {{"a.off", pentagon}, {"a.obj", obj}, {"a.ply", ply}, {"a.stl", stl}, {"a.gltf", gltf}, {"a.usda", usda}};
+  for (size_t i = 0; i < 6; i++) {
     qmat_status status = QMAT_ERROR_MEMORY;
     size_t granted = 0;
     for (; status != QMAT_OK; granted++) {
