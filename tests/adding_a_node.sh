@@ -31,7 +31,7 @@ edit=$(block 1 cmake)
 
 # The sources, with their times, so that only what changed is built again.
 cd "$source"
-for folder in core io nodes graphs tests examples; do
+for folder in cmake core io nodes graphs tests examples; do
   mkdir -p "$copy/$folder"
   cp -Rp "$folder/." "$copy/$folder/"
 done
