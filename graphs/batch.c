@@ -192,7 +192,8 @@ void qmat_asset_error(const qmat_asset *asset, char *text, size_t size) {
   else if (asset->signal)
     snprintf(text, size, "ended by signal %d (%s)", asset->signal, strsignal(asset->signal));
   else
-    snprintf(text, size, "exit code %d without a report", asset->exit_code);
+    snprintf(text, size, asset->exit_code < 0 ? "it ended without a result" : "exit code %d without a report",
+             asset->exit_code);
 }
 
 json_t *qmat_asset_json(const qmat_asset *asset) {

@@ -49,6 +49,14 @@ typedef void qmat_batch_observer(void *user, const qmat_batch *batch, const qmat
 qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, bool (*stop)(void),
                            qmat_batch_observer *observer, void *user);
 
+/* The same on a Slurm cluster: submits one job array, waits for it and collects what its tasks leave in `folder`, which
+ * all machines share, as they do the program, models, results and cache. `jobs` tasks at a time (0: as many as there is
+ * room for) of `threads` processors each. A task whose machine dies is started again by Slurm. Which partition, account
+ * or limit is taken is told to sbatch by its own environment (SBATCH_PARTITION, ...). QMAT_ERROR_DEPENDENCY: sbatch
+ * fails. QMAT_CANCELLED: `stop` said so, and the job is cancelled. */
+qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int jobs, int threads, const char *folder,
+                                 bool (*stop)(void), qmat_batch_observer *observer, void *user);
+
 /* An asset as a JSON object: input, result ("ok", "failed", "not run"), exit_code, seconds, nodes, hits, outputs,
  * summary, error. NULL when memory is short; the caller calls json_decref. */
 json_t *qmat_asset_json(const qmat_asset *asset);

@@ -17,9 +17,9 @@ typedef struct batch_call {
   qmat_context *context;
   qmat_invocation *invocation;
   const char *folder, *format, *input;  // --out, --format, and the graph's input that takes the model
-  char program[4096], reports[64];
+  char program[4096], reports[4096];
   int jobs, threads;
-  bool json, quiet;
+  bool json, quiet, slurm;
   size_t ended;
 } batch_call;
 
@@ -201,9 +201,16 @@ static qmat_status prepare(batch_call *call) {
     qmat_fail(context, QMAT_ERROR_IO, "the folder of the results cannot be made");
     return qmat_fail_at(context, call->folder, 0, 0);
   }
-  call->jobs = qmat_threads(context);
+  const char *engine = qmat_invocation_value(invocation, "engine");
+  call->slurm = engine && strcmp(engine, "slurm") == 0;
+  if (engine && !call->slurm && strcmp(engine, "local") != 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the engine is local or slurm, not '%s'", qmat_show(engine).text);
+    return qmat_fail_field(context, "--engine");
+  }
+  // A cluster has its own idea of how many fit.
+  call->jobs = call->slurm ? 0 : qmat_threads(context);
   qmat_status status = read_count(context, invocation, "jobs", 1024, &call->jobs);
-  call->threads = qmat_threads(context) / call->jobs > 0 ? qmat_threads(context) / call->jobs : 1;
+  call->threads = call->slurm || call->jobs > qmat_threads(context) ? 1 : qmat_threads(context) / call->jobs;
   if (status == QMAT_OK) status = read_count(context, invocation, "threads", 1024, &call->threads);
   if (status == QMAT_OK) status = find_input(call);
   if (status != QMAT_OK) return status;
@@ -215,7 +222,7 @@ static qmat_status prepare(batch_call *call) {
            temporary && *temporary ? temporary : "/tmp");
   if (!mkdtemp(call->reports)) {
     call->reports[0] = 0;
-    return qmat_fail(context, QMAT_ERROR_IO, "no folder for reports can be made in $TMPDIR or /tmp");
+    return qmat_fail(context, QMAT_ERROR_IO, "no folder for reports can be made");
   }
   return QMAT_OK;
 }
@@ -234,7 +241,11 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   if (status == QMAT_OK) status = qmat_batch_find(context, qmat_invocation_value(invocation, "inputs"), &batch);
   for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
   bool started = status == QMAT_OK;
-  if (started) status = qmat_batch_run(context, &batch, call.jobs, qmat_interrupted, on_asset, &call);
+  if (started && call.slurm)
+    status =
+        qmat_batch_run_slurm(context, &batch, call.jobs, call.threads, call.reports, qmat_interrupted, on_asset, &call);
+  else if (started)
+    status = qmat_batch_run(context, &batch, call.jobs, qmat_interrupted, on_asset, &call);
   size_t failed = 0;
   for (size_t i = 0; i < batch.count; i++) {
     failed += batch.assets[i].state == QMAT_ASSET_FAILED;
@@ -255,6 +266,7 @@ static const qmat_option options[] = {
     {"input", 0, "NAME", "The graph's input that takes the model; else the only one that is a file"},
     {"jobs", 0, "N", "How many assets at a time; else as many as there are processors"},
     {"threads", 0, "N", "Of each asset; else the processors are shared out"},
+    {"engine", 0, "local|slurm", "Run here, or as a job array of a Slurm cluster that shares folders and cache"},
     {"set", 0, "NAME=VALUE", "Set a parameter for all assets; may be repeated"},
     {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
     {"json", 0, NULL, "A line of JSON for each asset when it ends, instead of the table"},
