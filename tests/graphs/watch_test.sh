@@ -59,6 +59,7 @@ was() {
   [ "$(awk -v node="$1" '$1 == node { state = $3 } END { print state }' out.txt)" = "$2" ] || die "$3: $1 is not $2"
 }
 
+: >err.txt # it is looked into before the program has opened it
 "$qmat" watch graph.yaml >out.txt 2>err.txt &
 watching=$!
 runs 1 "the first"
