@@ -334,3 +334,13 @@ qmat_status qmat_complex_collapse(qmat_context *context, qmat_complex *complex, 
   complex->live_vertices--;
   return QMAT_OK;
 }
+
+uint32_t qmat_complex_find_triangle(const qmat_complex *complex, uint32_t a, uint32_t b, uint32_t c) {
+  size_t count;
+  const uint32_t *at = qmat_complex_triangles_at(complex, a, &count);
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *corners = &complex->triangles[3 * (size_t)at[i]];
+    if (corner_of(corners, b) < 3 && corner_of(corners, c) < 3) return at[i];
+  }
+  return QMAT_NONE;
+}

@@ -10,31 +10,31 @@
 typedef struct qmat_rows {
   uint32_t *items;
   size_t used, capacity;
-  size_t *starts; /* per row */
+  size_t *starts;           /* per row */
   uint32_t *counts, *rooms; /* per row: items held, items that fit in place */
 } qmat_rows;
 
-/* A medial mesh that can be changed by edge collapses: a simplicial complex of vertices, edges and triangles, in general
- * not a manifold. Ids never change; what a collapse removes is marked as dead. Spheres are in whatever frame the caller
- * chose. */
+/* A medial mesh that can be changed by edge collapses: a simplicial complex of vertices, edges and triangles, in
+ * general not a manifold. Ids never change; what a collapse removes is marked as dead. Spheres are in whatever frame
+ * the caller chose. */
 typedef struct qmat_complex {
   size_t vertex_count, edge_count, triangle_count; /* ids ever given */
   size_t live_vertices, live_edges, live_triangles;
-  double *spheres;             /* 4 per vertex */
-  uint32_t *edges;             /* 2 per edge */
-  uint32_t *edge_triangles;    /* per edge: how many live triangles it bounds */
-  uint32_t *triangles;         /* 3 per triangle */
-  uint32_t *triangle_edges;    /* 3 per triangle: the edge opposite corner k */
+  double *spheres;          /* 4 per vertex */
+  uint32_t *edges;          /* 2 per edge */
+  uint32_t *edge_triangles; /* per edge: how many live triangles it bounds */
+  uint32_t *triangles;      /* 3 per triangle */
+  uint32_t *triangle_edges; /* 3 per triangle: the edge opposite corner k */
   uint8_t *vertex_alive, *edge_alive, *triangle_alive;
   qmat_rows vertex_edges, vertex_triangles; /* the live edges and triangles at each vertex */
   /* Scratch of qmat_complex_preview. */
-  uint32_t *mark_of_vertex, *edge_to_vertex;    /* per vertex */
-  uint32_t *mark_of_edge, *triangle_at_edge;    /* per edge */
+  uint32_t *mark_of_vertex, *edge_to_vertex; /* per vertex */
+  uint32_t *mark_of_edge, *triangle_at_edge; /* per edge */
   uint32_t stamp;
 } qmat_complex;
 
-/* What the star of the merged vertex will be after edge (u, v) collapses: vertex `kept` stays, `removed` goes. Of a vertex
- * that only moves it is the star as it is: `edge` and `removed` are QMAT_NONE. */
+/* What the star of the merged vertex will be after edge (u, v) collapses: vertex `kept` stays, `removed` goes. Of a
+ * vertex that only moves it is the star as it is: `edge` and `removed` are QMAT_NONE. */
 typedef struct qmat_collapse {
   uint32_t edge, kept, removed;
   size_t neighbour_count, neighbour_capacity;
@@ -71,6 +71,9 @@ qmat_status qmat_complex_collapse(qmat_context *context, qmat_complex *complex, 
 
 /* The edge between two live vertices, or QMAT_NONE. Cost: linear in the smaller star. */
 uint32_t qmat_complex_find_edge(const qmat_complex *complex, uint32_t a, uint32_t b);
+
+/* The triangle of three live vertices, or QMAT_NONE. Cost: linear in the first one's star. */
+uint32_t qmat_complex_find_triangle(const qmat_complex *complex, uint32_t a, uint32_t b, uint32_t c);
 
 /* The live edges (triangles) at a vertex. */
 static inline const uint32_t *qmat_complex_edges_at(const qmat_complex *complex, uint32_t vertex, size_t *count) {

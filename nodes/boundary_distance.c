@@ -329,12 +329,14 @@ typedef struct search {
   const features *features;
   const qmat_surface *surface;
   const qmat_envelope *envelope;
+  double epsilon;
   double lo[2], target[2], smallest; /* either side, outside */
   bool last;                         /* nothing is split any more */
 } search;
 
 /* What a look at a patch says. */
 typedef struct finding {
+  double place[3];           /* where found[0] is attained, unless that is 0 */
   double found[2], bound[2]; /* either side, outside: an attained distance, and a bound of what is done with */
   int children;
   uint8_t sides; /* what the children are wanted for */
@@ -450,6 +452,7 @@ static void find(const search *s, bool is_cell, double middle[3], uint8_t sides,
   if (is_cell) move_to_sphere(s, middle);
   if (qmat_envelope_holds(s->envelope, middle, rounding)) return;
   result->found[0] = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
+  memcpy(result->place, middle, sizeof result->place);
   if ((sides & SIDES_OUT) && !qmat_surface_inside(s->surface, middle)) result->found[1] = result->found[0];
 }
 
@@ -481,7 +484,8 @@ static finding look_at(const search *s, const patch *p) {
     if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
     const bool inside = (sides & SIDES_OUT) && qmat_surface_inside(s->surface, middle);
     if (inside && d > reach) sides &= SIDES_EITHER;
-    if (d > s->lo[0] || ((sides & SIDES_OUT) && !inside && d > s->lo[1])) find(s, is_cell, middle, sides, &result);
+    if (d > minimum(s->lo[0], s->epsilon) || ((sides & SIDES_OUT) && !inside && d > s->lo[1]))
+      find(s, is_cell, middle, sides, &result);
     if (s->last || reach <= s->smallest) {
       for (int side = 0; side < 2; side++)
         if (sides >> side & 1) result.bound[side] = bound;
@@ -581,6 +585,19 @@ static void add_roots(const features *f, size_t feature, patch_list *list) {
 }
 
 /* One level: looks at every patch of `from` and puts the children into `to`. */
+static int add_far_point(qmat_boundary_distance *result, const double point[3]) {
+  if (qmat_grow((void **)&result->far_points, &result->far_capacity, result->far_count + 1, 3 * sizeof(double)))
+    return -1;
+  memcpy(&result->far_points[3 * result->far_count++], point, 3 * sizeof(double));
+  return 0;
+}
+
+void qmat_boundary_distance_uninit(qmat_boundary_distance *result) {
+  qmat_free(result->far_points);
+  result->far_points = NULL;
+  result->far_count = result->far_capacity = 0;
+}
+
 static qmat_status search_level(qmat_context *context, const search *s, const patch_list *from, patch_list *to,
                                 finding *findings, qmat_boundary_distance *result) {
   const int threads = qmat_threads(context);
@@ -601,6 +618,8 @@ static qmat_status search_level(qmat_context *context, const search *s, const pa
       bounds[side]->hi = maximum(bounds[side]->hi, findings[i].bound[side]);
     }
     to->count += (size_t)findings[i].children;
+    if (findings[i].found[0] > s->epsilon && add_far_point(result, findings[i].place))
+      return qmat_fail_memory(context, "the envelope's boundary");
   }
   if (qmat_grow((void **)&to->items, &to->capacity, to->count, sizeof *to->items))
     return qmat_fail_memory(context, "pieces of the envelope's boundary");
@@ -676,7 +695,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
   if (status == QMAT_OK && feature_count(&f) > UINT32_MAX)
     status = qmat_fail_memory(context, "the envelope's boundary");
   if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, sample_count, result);
-  search s = {.features = &f, .surface = surface, .envelope = envelope};
+  search s = {.features = &f, .surface = surface, .envelope = envelope, .epsilon = epsilon};
   if (status == QMAT_OK) status = search_pieces(context, &s, epsilon, tolerance, sample_count, result);
   result->either_side = closed_bounds(result->either_side);
   result->outside = closed_bounds(result->outside);

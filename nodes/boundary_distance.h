@@ -17,7 +17,11 @@ typedef struct qmat_boundary_distance {
   double largest, mean;    /* over the sampled points, to either side; 0 without one */
   size_t sample_count;     /* of the samples that lie on the boundary */
   size_t looks;            /* pieces of the boundary that were looked at */
+  size_t far_count, far_capacity;
+  double *far_points; /* 3 each: places of the boundary found farther than epsilon from the surface; see below */
 } qmat_boundary_distance;
+
+void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
 
 /* Measures the boundary of the union of the spheres, cones and slabs of `unit` (a sealed medial mesh's arrays in the
  * unit frame, of which `envelope` was made) against the surface, inside and outside of it alike.
@@ -35,8 +39,10 @@ typedef struct qmat_boundary_distance {
  * hi - lo is at most `tolerance` (a share of `epsilon` or of lo, the larger), and less where that decides whether hi is
  * at most `epsilon`; but hi may be five times the tolerated share of epsilon where the truth is less. Where two
  * primitives meet so that the boundary between them is undecided down to the smallest pieces, or where the work would
- * be too much, hi is higher, and still no point of the boundary is farther. `epsilon` > 0 and `tolerance` > 0; their
- * product is taken for 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+ * be too much, hi is higher, and still no point of the boundary is farther. Of the places that were found farther than
+ * epsilon only some are told, the farthest among them: free them with qmat_boundary_distance_uninit, also after a
+ * failure. `epsilon` > 0 and `tolerance` > 0; their product is taken for 1e-5 at least. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
                                            double tolerance, size_t sample_count, qmat_boundary_distance *result);

@@ -7,6 +7,7 @@
 
 #include "core/envelope.h"
 #include "core/medial_distance.h"
+#include "core/triangle.h"
 #include "core/vector.h"
 #include "nodes/inner_points.h"
 
@@ -218,47 +219,146 @@ static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, 
   }
 }
 
+static witness nearest_primitive(const qmat_envelope *envelope, const qmat_complex *complex, const double *p) {
+  size_t primitive;
+  witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
+  qmat_envelope_distance(envelope, p, &primitive);
+  const int count = qmat_envelope_primitive(envelope, primitive, w.vertices);
+  const double *s[3] = {NULL, NULL, NULL};
+  for (int k = 0; k < count; k++) s[k] = &complex->spheres[4 * (size_t)w.vertices[k]];
+  qmat_slab slab;
+  qmat_cone cone;
+  if (count == 3) {
+    qmat_slab_prepare(&slab, s[0], s[1], s[2]);
+    w.distance = qmat_slab_foot(&slab, p, w.weights);
+  } else if (count == 2) {
+    qmat_cone_prepare(&cone, s[0], s[1]);
+    w.distance = qmat_cone_foot(&cone, p, w.weights);
+  } else {
+    w.weights[0] = 1;
+    w.distance = qmat_sphere_distance(s[0], p);
+  }
+  for (int k = count; k < 3; k++) w.vertices[k] = QMAT_NONE;
+  return w;
+}
+
+static qmat_status envelope_of(qmat_context *context, const qmat_complex *complex, qmat_envelope **envelope) {
+  return qmat_envelope_new(context, complex->spheres, complex->vertex_count, complex->edges, complex->edge_count,
+                           complex->triangles, complex->triangle_count, envelope);
+}
+
 /* The same for many points: the nearest primitive of all. */
 static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double epsilon,
                                 qmat_control_points *control) {
   qmat_envelope *envelope;
-  qmat_status status = qmat_envelope_new(context, complex->spheres, complex->vertex_count, complex->edges,
-                                         complex->edge_count, complex->triangles, complex->triangle_count, &envelope);
+  const qmat_status status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
   for (size_t i = 0; i < control->count; i++) {
     if (!is_far(control, i, epsilon)) continue;
-    const double *p = &control->points[3 * i];
-    size_t primitive;
-    witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
-    qmat_envelope_distance(envelope, p, &primitive);
-    const int count = qmat_envelope_primitive(envelope, primitive, w.vertices);
-    const double *s[3] = {NULL, NULL, NULL};
-    for (int k = 0; k < count; k++) s[k] = &complex->spheres[4 * (size_t)w.vertices[k]];
-    qmat_slab slab;
-    qmat_cone cone;
-    if (count == 3) {
-      qmat_slab_prepare(&slab, s[0], s[1], s[2]);
-      w.distance = qmat_slab_foot(&slab, p, w.weights);
-    } else if (count == 2) {
-      qmat_cone_prepare(&cone, s[0], s[1]);
-      w.distance = qmat_cone_foot(&cone, p, w.weights);
-    } else {
-      w.weights[0] = 1;
-      w.distance = qmat_sphere_distance(s[0], p);
-    }
-    for (int k = count; k < 3; k++) w.vertices[k] = QMAT_NONE;
+    const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
     store(control, i, &w);
   }
   qmat_envelope_free(envelope);
   return QMAT_OK;
 }
 
+static qmat_status allocate(qmat_context *context, qmat_control_points *control) {
+  qmat_arena *arena = &context->arena;
+  control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
+  control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
+  control->inner_limits =
+      qmat_arena_calloc(arena, control->count - control->surface_count, sizeof *control->inner_limits);
+  if (!control->points || !control->witnesses || !control->weights || !control->distances || !control->inner_limits)
+    return qmat_fail_memory(context, "control points");
+  return QMAT_OK;
+}
+
+/* A place below the surface as deep as the wanted error, and the cube of a lattice that it lies in. */
+typedef struct {
+  uint64_t cube;
+  uint32_t facet;
+  double point[3];
+  witness witness;
+} shell_place;
+
+typedef struct {
+  size_t count;
+  shell_place *places;
+} shell_points;
+
+/* Of each cube with this share of epsilon for a side one place is taken. */
+static const double shell_share = 0.75;
+
+static int by_cube_and_facet(const void *left, const void *right) {
+  const shell_place *a = left, *b = right;
+  if (a->cube != b->cube) return a->cube < b->cube ? -1 : 1;
+  return a->facet < b->facet ? -1 : a->facet > b->facet;
+}
+
+static shell_place shell_place_below(const double *corners, const double *normal, uint32_t facet, double depth,
+                                     double side) {
+  shell_place place = {.facet = facet};
+  for (int k = 0; k < 3; k++) {
+    place.point[k] = corners[k] - depth * normal[k];
+    place.cube = place.cube << 21 | ((uint64_t)(int64_t)floor(place.point[k] / side + (1 << 20)) & 0x1fffff);
+  }
+  return place;
+}
+
+/* Places epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than epsilon.
+ * Only where the solid is so thick and the initial medial mesh holds them. */
+static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const answering *a, double epsilon,
+                              shell_points *shell) {
+  qmat_arena *arena = &context->arena;
+  const qmat_mesh *mesh = a->mesh;
+  const double *positions = qmat_surface_positions(surface);
+  const double spacing = epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
+  size_t capacity = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    capacity += grid_points(&g, spacing) + 1;
+  }
+  shell->places = qmat_arena_alloc(arena, capacity, sizeof *shell->places);
+  double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
+  if (!shell->places || !points) return qmat_fail_memory(context, "control points");
+  size_t count = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    double normal[3];
+    if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
+    const size_t on_grid = grid_points(&g, spacing);
+    fill_grid(&g, spacing, points);
+    for (int k = 0; k < 3; k++)
+      points[3 * on_grid + (size_t)k] = (g.corners[0][k] + g.corners[1][k] + g.corners[2][k]) / 3;
+    for (size_t i = 0; i <= on_grid; i++)
+      shell->places[count++] = shell_place_below(&points[3 * i], normal, (uint32_t)t, epsilon, side);
+  }
+  if (count) qsort(shell->places, count, sizeof *shell->places, by_cube_and_facet);
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (i == 0 || shell->places[i].cube != shell->places[i - 1].cube) shell->places[kept++] = shell->places[i];
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+  for (size_t i = 0; i < kept; i++) {
+    shell_place *place = &shell->places[i];
+    place->witness.distance = INFINITY;
+    if (!qmat_surface_inside(surface, place->point) ||
+        qmat_surface_distance(surface, place->point, (1 - 1e-6) * epsilon, NULL, NULL) < INFINITY)
+      continue;
+    look_around(a, place->point, &mesh->triangles[3 * (size_t)place->facet], 3, 0, &place->witness);
+  }
+  for (size_t i = 0; i < kept; i++)
+    if (shell->places[i].witness.distance <= 0) shell->places[shell->count++] = shell->places[i];
+  return QMAT_OK;
+}
+
 qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                     size_t most, const qmat_extra_points *extra, bool inside,
-                                     qmat_control_points *control) {
+                                     size_t most, bool inside, qmat_control_points *control) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
@@ -269,6 +369,8 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   if (!starts) return qmat_fail_memory(context, "control points");
   qmat_status status = find_answering(context, samples, medial, &a);
   if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
+  shell_points shell = {.count = 0};
+  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
   if (status != QMAT_OK) return status;
   for (;; control->spacing *= 1.25) {
     size_t added = 0;
@@ -277,16 +379,11 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       starts[t] = samples->count + added;
       added += grid_points(&g, control->spacing);
     }
-    control->surface_count = samples->count + added + extra->count;
+    control->surface_count = samples->count + added;
     if (added <= most) break;
   }
-  control->count = control->surface_count + inner.count;
-  control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
-  control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
-  control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
-  control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
-  if (!control->points || !control->witnesses || !control->weights || !control->distances)
-    return qmat_fail_memory(context, "control points");
+  control->count = control->surface_count + inner.count + shell.count;
+  if ((status = allocate(context, control)) != QMAT_OK) return status;
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, control->points);
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
@@ -308,23 +405,52 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       store(control, i, &best);
     }
   }
-  const size_t first_extra = control->surface_count - extra->count;
-  if (extra->count) memcpy(&control->points[3 * first_extra], extra->points, 3 * extra->count * sizeof(double));
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t i = 0; i < extra->count; i++) {
-    witness best;
-    look_around(&a, &extra->points[3 * i], &mesh->triangles[3 * (size_t)extra->facets[i]], 3, epsilon, &best);
-    store(control, first_extra + i, &best);
-  }
-  if (inner.count) memcpy(&control->points[3 * control->surface_count], inner.points, 3 * inner.count * sizeof(double));
-  control->inner_limits = inner.limits;
-  for (size_t i = 0; i < inner.count; i++) {
+  size_t next = control->surface_count;
+  for (size_t i = 0; i < inner.count; i++, next++) {
     const witness own = {inner.distances[i], {inner.spheres[i], QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-    store(control, control->surface_count + i, &own);
+    memcpy(&control->points[3 * next], &inner.points[3 * i], 3 * sizeof(double));
+    control->inner_limits[i] = inner.limits[i];
+    store(control, next, &own);
+  }
+  for (size_t i = 0; i < shell.count; i++, next++) {
+    memcpy(&control->points[3 * next], shell.places[i].point, 3 * sizeof(double));
+    store(control, next, &shell.places[i].witness);
   }
   const size_t far = count_far(control, epsilon);
   if (far == 0) return QMAT_OK;
   if (far * complex->vertex_count > most_sphere_looks) return ask_envelope(context, complex, epsilon, control);
   ask_all_spheres(context, complex, epsilon, control);
+  return QMAT_OK;
+}
+
+qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
+                                   qmat_control_points *control) {
+  *control =
+      (qmat_control_points){.count = extra->surface_count + extra->inner_count, .surface_count = extra->surface_count};
+  qmat_status status = allocate(context, control);
+  qmat_envelope *envelope;
+  if (status == QMAT_OK) status = envelope_of(context, complex, &envelope);
+  if (status != QMAT_OK) return status;
+  if (extra->surface_count) memcpy(control->points, extra->surface, 3 * extra->surface_count * sizeof *control->points);
+  if (extra->inner_count)
+    memcpy(&control->points[3 * extra->surface_count], extra->inner, 3 * extra->inner_count * sizeof *control->points);
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+  for (size_t i = 0; i < control->count; i++) {
+    const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
+    store(control, i, &w);
+  }
+  qmat_envelope_free(envelope);
+  size_t kept = extra->surface_count;
+  for (size_t i = kept; i < control->count; i++) {
+    if (!(control->distances[i] < 0)) continue;
+    memmove(&control->points[3 * kept], &control->points[3 * i], 3 * sizeof *control->points);
+    memmove(&control->witnesses[3 * kept], &control->witnesses[3 * i], 3 * sizeof *control->witnesses);
+    memmove(&control->weights[3 * kept], &control->weights[3 * i], 3 * sizeof *control->weights);
+    control->distances[kept] = control->distances[i];
+    control->inner_limits[kept - extra->surface_count] = fmax(0.5 * control->distances[i], -extra->held_depth);
+    kept++;
+  }
+  control->count = kept;
   return QMAT_OK;
 }

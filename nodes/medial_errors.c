@@ -2,7 +2,9 @@
 #include "nodes/medial_errors.h"
 
 #include <math.h>
+#include <string.h>
 
+#include "nodes/boundary_distance.h"
 #include "nodes/protrusion.h"
 
 /* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
@@ -50,11 +52,37 @@ qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
   for (size_t i = 0; i < point_count; i++)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
-  status = qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
+  status =
+      qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
   errors->surface_to_envelope = errors->cover.bound;
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "primitives measured");
   if (status == QMAT_OK)
     errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, threads);
   qmat_envelope_free(envelope);
   return status;
+}
+
+/* How closely the boundary is looked at for hollows, as a share of epsilon. */
+static const double hollow_tolerance = 0.05;
+
+qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                     double epsilon, qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  qmat_boundary_distance boundary;
+  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, hollow_tolerance, 0, &boundary);
+  qmat_envelope_free(envelope);
+  errors->hollow_count = 0;
+  errors->hollows = boundary.far_points;
+  for (size_t i = 0; i < boundary.far_count; i++)
+    if (qmat_surface_inside(surface, &boundary.far_points[3 * i]))
+      memmove(&errors->hollows[3 * errors->hollow_count++], &boundary.far_points[3 * i], 3 * sizeof(double));
+  return status;
+}
+
+void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
+  qmat_free(errors->hollows);
+  errors->hollows = NULL;
+  errors->hollow_count = 0;
 }

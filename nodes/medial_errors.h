@@ -9,15 +9,26 @@ typedef struct qmat_medial_errors {
   double surface_to_envelope; /* of F over the surface (eq. 9) */
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
   qmat_cover cover;           /* where the surface is farther than the threshold */
+  size_t hollow_count;
+  double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
 } qmat_medial_errors;
 
 /* Measures both by branch and bound, each to within `tolerance` (> 0) of the truth where that is above `enough`; below,
  * `enough` is the answer: a plateau of small errors would take looks without number to tell from its highest place.
  * `unit` is a medial mesh in the unit
  * frame, sealed or not; at the `point_count` points (3 doubles each, on the surface) a first look is taken; `threshold`
- * as in qmat_cover_measure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. */
+ * as in qmat_cover_measure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number.
+ */
 qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                        const double *points, size_t point_count, double tolerance, double enough,
                                        double threshold, qmat_medial_errors *errors);
+
+/* Finds places of the envelope's boundary that lie deeper than `epsilon` in the solid, if there are any (not all of
+ * them). QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                     double epsilon, qmat_medial_errors *errors);
+
+/* Frees the hollows. */
+void qmat_medial_errors_uninit(qmat_medial_errors *errors);
 
 #endif

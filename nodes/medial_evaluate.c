@@ -299,6 +299,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = count_spheres_outside(&e);
   if (status == QMAT_OK) status = count_degenerate(&e);
   if (status == QMAT_OK) status = make_report(&e, report);
+  qmat_boundary_distance_uninit(&e.boundary);
   if (status == QMAT_OK)
     outputs[0] = &report->base;
   else

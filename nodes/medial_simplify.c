@@ -12,15 +12,17 @@ typedef qmat_simplify_params medial_simplify_params;
 
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
  * is repeated, at most this often, with control points in the places found. */
-enum { MOST_ROUNDS = 4 };
+enum { MOST_ROUNDS = 6 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
   qmat_context *context;
   const medial_simplify_params *params;
   qmat_surface *surface;
-  qmat_control_points control;
-  qmat_simplification simplification;
+  qmat_control_points control; /* of `dense` */
+  qmat_simplification dense;   /* where each round starts */
+  qmat_control_points round_control;
+  qmat_simplification simplification; /* of the round */
 } simplifier;
 
 /* The reported errors are at most this share of epsilon above the true ones, but never below the second share. */
@@ -29,27 +31,55 @@ static const double error_tolerance = 0.01, least_reported = 0.5;
 /* What an unbounded run (epsilon 0) measures its errors against. */
 static const double default_epsilon = 0.01;
 
-static qmat_status measure(simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
+static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
-  return qmat_medial_errors_measure(s->context, s->surface, unit, s->control.points, s->control.surface_count,
-                                    tolerance, least_reported * epsilon, epsilon - tolerance, errors);
+  const qmat_status status =
+      qmat_medial_errors_measure(s->context, s->surface, unit, s->round_control.points, s->round_control.surface_count,
+                                 tolerance, least_reported * epsilon, epsilon - tolerance, errors);
+  if (status != QMAT_OK || s->params->epsilon == 0 || s->params->error == QMAT_ERROR_ONE_SIDED) return status;
+  return qmat_medial_hollows_find(s->context, s->surface, unit, epsilon, errors);
 }
 
-/* Sets one round up: everything that collapses change. */
-static qmat_status start(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
-                         const qmat_medial *medial, const qmat_extra_points *extra) {
-  qmat_simplification *simplification = &s->simplification;
-  *simplification = (qmat_simplification){.context = s->context, .surface = s->surface};
-  qmat_status status = qmat_complex_init(s->context, &simplification->complex, medial, state->spheres);
+static void swap_lattices(qmat_simplification *a, qmat_simplification *b) {
+  const qmat_depth_lattice lattice = a->protrusion.lattice;
+  a->protrusion.lattice = b->protrusion.lattice;
+  b->protrusion.lattice = lattice;
+}
+
+/* Collapses that keep to this share of the error are done once for all rounds, so that places found later are still
+ * within it, and so deep do those inside have to be in the envelope, as a share of epsilon. */
+static const double dense_share = 0.85, held_depth_share = 0.05;
+
+static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
+                                  const qmat_medial *medial) {
+  qmat_simplification *dense = &s->dense;
+  *dense = (qmat_simplification){.context = s->context, .surface = s->surface};
+  qmat_status status = qmat_complex_init(s->context, &dense->complex, medial, state->spheres);
   if (status == QMAT_OK)
-    status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &simplification->rules);
+    status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &dense->rules);
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : INFINITY;
   const bool inside = s->params->error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
-    status = qmat_control_points_make(s->context, s->surface, samples, medial, &simplification->complex, epsilon,
-                                      MOST_CONTROL_POINTS, extra, inside, &s->control);
-  if (status == QMAT_OK) status = qmat_simplification_init(simplification, &s->control, state->depths);
+    status = qmat_control_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
+                                      MOST_CONTROL_POINTS, inside, &s->control);
+  dense->rules.share = dense_share;
+  dense->rules.refits = 0;
+  if (status == QMAT_OK) status = qmat_simplification_init(dense, &s->control, state->depths);
+  return status == QMAT_OK ? qmat_simplification_run(dense) : status;
+}
+
+/* Collapses on from the dense part with all control points that are known by now. */
+static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra) {
+  qmat_simplification *round = &s->simplification;
+  *round = (qmat_simplification){.context = s->context, .surface = s->surface};
+  qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
+  if (status == QMAT_OK) status = qmat_simplification_resume(&s->dense, extra, &s->round_control, round);
+  if (status != QMAT_OK) return status;
+  /* What is known of depths is true in every round. */
+  swap_lattices(&s->dense, round);
+  status = qmat_simplification_run(round);
+  swap_lattices(&s->dense, round);
   return status;
 }
 
@@ -60,20 +90,20 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
     const char *name;
     size_t value;
   } counts[] = {
-      {"initial_spheres", run->complex.vertex_count},
+      {"initial_spheres", s->dense.complex.vertex_count},
       {"spheres", unit->sphere_count},
       {"edges", unit->edge_count},
       {"triangles", unit->triangle_count},
       {"rounds", (size_t)rounds},
       {"collapses", run->collapses},
       {"moves", run->moves},
-      {"control_points", s->control.count},
+      {"control_points", s->round_control.count},
       {"refused_by_surface", run->refused_by_surface},
       {"refused_by_coverage", run->refused_by_coverage},
       {"refused_by_protrusion", run->refused_by_protrusion},
       {"refused_by_protection", run->refused_by_protection},
       {"refused_by_topology", run->refused_by_topology},
-      {"surface_questions", run->protrusion.lattice.questions},
+      {"surface_questions", s->dense.protrusion.lattice.questions},
   };
   int bad = 0;
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
@@ -88,50 +118,56 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
-/* The places where the surface between the control points is too far from the envelope, added to those known. */
-static qmat_status add_extra_points(simplifier *s, const qmat_cover *cover, qmat_extra_points *extra) {
-  const size_t count = extra->count + cover->count;
-  double *points = qmat_arena_alloc(&s->context->arena, count, 3 * sizeof *points);
-  uint32_t *facets = qmat_arena_alloc(&s->context->arena, count, sizeof *facets);
-  if (!points || !facets) return qmat_fail_memory(s->context, "control points");
-  if (extra->count) {
-    memcpy(points, extra->points, 3 * extra->count * sizeof *points);
-    memcpy(facets, extra->facets, extra->count * sizeof *facets);
-  }
-  memcpy(points + 3 * extra->count, cover->points, 3 * cover->count * sizeof *points);
-  memcpy(facets + extra->count, cover->facets, cover->count * sizeof *facets);
-  *extra = (qmat_extra_points){count, points, facets};
+/* `added` points behind those known. */
+static qmat_status append(simplifier *s, const double **points, size_t *count, const double *added,
+                          size_t added_count) {
+  double *all = qmat_arena_alloc(&s->context->arena, *count + added_count, 3 * sizeof *all);
+  if (!all) return qmat_fail_memory(s->context, "control points");
+  if (*count) memcpy(all, *points, 3 * *count * sizeof *all);
+  if (added_count) memcpy(all + 3 * *count, added, 3 * added_count * sizeof *all);
+  *points = all;
+  *count += added_count;
   return QMAT_OK;
 }
 
-static double farthest_at_first(const qmat_control_points *control) {
-  double farthest = -INFINITY;
-  for (size_t i = 0; i < control->count; i++) farthest = fmax(farthest, control->distances[i]);
-  return farthest;
+/* Whether the initial medial mesh itself keeps within epsilon at all control points: what it leaves too far away, no
+ * round brings closer. */
+static bool starts_within(const simplifier *s, double epsilon) {
+  for (size_t i = 0; i < s->control.surface_count; i++)
+    if (!(s->control.distances[i] <= epsilon)) return false;
+  return true;
 }
 
-/* Rounds of collapses until the surface between the control points keeps within epsilon as they do. */
+/* Rounds of collapses until surface and envelope keep within epsilon of each other between the control points as they
+ * do at them: places where the surface is farther from the envelope, or the envelope has a notch or is hollow, join
+ * them. */
 static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                             const qmat_medial *initial, qmat_medial **medial, qmat_report *report) {
-  qmat_extra_points extra = {0};
   const double epsilon = s->params->epsilon;
-  for (int round = 1;; round++) {
+  qmat_extra_points extra = {.held_depth = held_depth_share * epsilon};
+  qmat_status status = collapse_dense(s, state, samples, initial);
+  for (int round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_medial *unit = *medial = qmat_medial_new();
-    qmat_status status =
-        unit ? start(s, state, samples, initial, &extra) : qmat_fail_memory(s->context, "the medial mesh");
-    if (status == QMAT_OK) status = qmat_simplification_run(&s->simplification);
+    if (!unit) return qmat_fail_memory(s->context, "the medial mesh");
+    status = run_round(s, state, &extra);
     if (status == QMAT_OK) status = qmat_simplification_extract(&s->simplification, unit);
     if (status == QMAT_OK) status = measure(s, unit, &errors);
-    if (status != QMAT_OK) return status;
-    /* What the initial medial mesh itself leaves too far away, no round brings closer. */
-    const bool repeat = epsilon > 0 && errors.surface_to_envelope > epsilon && errors.cover.count > 0 &&
-                        farthest_at_first(&s->control) <= epsilon && round < MOST_ROUNDS;
-    if (!repeat) return make_report(s, unit, &errors, round, report);
-    if ((status = add_extra_points(s, &errors.cover, &extra)) != QMAT_OK) return status;
+    const bool surface_is_far = errors.surface_to_envelope > epsilon && errors.cover.count > 0;
+    const bool repeat =
+        epsilon > 0 && round < MOST_ROUNDS && (surface_is_far || errors.hollow_count > 0) && starts_within(s, epsilon);
+    if (status == QMAT_OK && !repeat) status = make_report(s, unit, &errors, round, report);
+    if (status == QMAT_OK && repeat && surface_is_far)
+      status = append(s, &extra.surface, &extra.surface_count, errors.cover.points, errors.cover.count);
+    if (status == QMAT_OK && repeat)
+      status = append(s, &extra.inner, &extra.inner_count, errors.hollows, errors.hollow_count);
+    qmat_medial_errors_uninit(&errors);
+    if (status != QMAT_OK || !repeat) return status;
     qmat_value_release(&unit->base);
+    *medial = NULL;
     qmat_simplification_uninit(&s->simplification);
   }
+  return status;
 }
 
 static int set_count(json_t *root, const char *key, size_t count) {
@@ -220,6 +256,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     qmat_value_release(report ? &report->base : NULL);
   }
   qmat_simplification_uninit(&s.simplification);
+  qmat_simplification_uninit(&s.dense);
   qmat_surface_free(s.surface);
   return status;
 }

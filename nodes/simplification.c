@@ -144,24 +144,31 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
   const qmat_complex *c = &s->complex;
   s->control = control;
   s->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
-  s->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *s->quadrics);
-  /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
   double *limits = qmat_arena_alloc(&context->arena, control->count, sizeof *limits);
-  if (!s->quadrics || !limits) return qmat_fail_memory(context, "the simplification");
+  if (!limits) return qmat_fail_memory(context, "the simplification");
+  if (!s->quadrics) {
+    s->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *s->quadrics);
+    if (!s->quadrics) return qmat_fail_memory(context, "the simplification");
+    if (s->rules.published)
+      qmat_medial_quadrics_add_published(c, s->quadrics);
+    else
+      qmat_medial_quadrics_add(c, s->quadrics);
+  }
+  /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
+  const double limit = s->rules.share * s->rules.limit;
   for (size_t i = 0; i < control->count; i++)
-    limits[i] = i < control->surface_count ? fmax(s->rules.limit, control->distances[i])
+    limits[i] = i < control->surface_count ? fmax(limit, control->distances[i])
                                            : control->inner_limits[i - control->surface_count];
-  if (s->rules.published)
-    qmat_medial_quadrics_add_published(c, s->quadrics);
-  else
-    qmat_medial_quadrics_add(c, s->quadrics);
   qmat_status status = qmat_coverage_init(context, &s->coverage, control->count, control->points, limits,
                                           control->witnesses, control->weights, c->vertex_count);
   if (status == QMAT_OK) status = fill_heap(s);
   if (status != QMAT_OK) return status;
-  s->held = s->rules.limit;
-  const double limit = in_order(s) ? usual_limit : s->rules.limit;
-  status = qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths, is_two_sided(s) ? limit : INFINITY);
+  s->held = limit;
+  status = qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths,
+                                !is_two_sided(s) ? INFINITY
+                                : in_order(s)    ? usual_limit
+                                                 : s->rules.limit);
+  if (is_two_sided(s)) s->protrusion.limit = limit;
   if (status != QMAT_OK || !in_order(s)) return status;
   hold(s, LOWEST_LEVEL);
   return start_log(s);
@@ -559,4 +566,95 @@ qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_media
   const qmat_status status =
       qmat_medial_set_simplices(s->context, medial, edges, edge_count, triangles, triangle_count);
   return status == QMAT_OK ? set_regions(s, ids, medial) : status;
+}
+
+/* Control points of `from` and the further ones, those on the surface first; witnesses by their new ids. */
+static qmat_status join_control_points(const qmat_simplification *from, const uint32_t *ids,
+                                       const qmat_control_points *extra, qmat_control_points *joined) {
+  qmat_arena *arena = &from->context->arena;
+  const qmat_control_points *base = from->control;
+  *joined = (qmat_control_points){.count = base->count + extra->count,
+                                  .sample_count = base->sample_count,
+                                  .surface_count = base->surface_count + extra->surface_count,
+                                  .spacing = base->spacing};
+  joined->points = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->points);
+  joined->witnesses = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->witnesses);
+  joined->weights = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->weights);
+  joined->distances = qmat_arena_alloc(arena, joined->count, sizeof *joined->distances);
+  joined->inner_limits = qmat_arena_alloc(arena, joined->count - joined->surface_count, sizeof *joined->inner_limits);
+  if (!joined->points || !joined->witnesses || !joined->weights || !joined->distances || !joined->inner_limits)
+    return qmat_fail_memory(from->context, "control points");
+  for (size_t i = 0; i < joined->count; i++) {
+    /* [base, extra] on the surface, then [base, extra] inside */
+    const bool inside = i >= joined->surface_count;
+    const size_t place = inside ? i - joined->surface_count : i;
+    const size_t own = inside ? base->count - base->surface_count : base->surface_count;
+    const bool is_base = place < own;
+    const qmat_control_points *source = is_base ? base : extra;
+    const size_t j = (inside ? source->surface_count : 0) + (is_base ? place : place - own);
+    const uint32_t *witnesses = &(is_base ? from->coverage.witnesses : extra->witnesses)[3 * j];
+    memcpy(&joined->points[3 * i], &source->points[3 * j], 3 * sizeof *joined->points);
+    memcpy(&joined->weights[3 * i], &(is_base ? from->coverage.weights : extra->weights)[3 * j],
+           3 * sizeof *joined->weights);
+    for (size_t k = 0; k < 3; k++)
+      joined->witnesses[3 * i + k] = !is_base || witnesses[k] == QMAT_NONE ? witnesses[k] : ids[witnesses[k]];
+    joined->distances[i] = source->distances[j];
+    if (inside) joined->inner_limits[place] = source->inner_limits[j - source->surface_count];
+  }
+  return QMAT_OK;
+}
+
+/* The bounds of the protrusion of edges and triangles, where they say more than their corners do. */
+static void carry_bounds(const qmat_simplification *from, const uint32_t *ids, qmat_simplification *to) {
+  for (size_t e = 0; e < from->complex.edge_count; e++) {
+    if (!from->complex.edge_alive[e]) continue;
+    const uint32_t *ends = &from->complex.edges[2 * e];
+    const uint32_t edge = qmat_complex_find_edge(&to->complex, ids[ends[0]], ids[ends[1]]);
+    double *bound = &to->protrusion.edge_bounds[edge];
+    *bound = fmin(*bound, from->protrusion.edge_bounds[e]);
+  }
+  for (size_t t = 0; t < from->complex.triangle_count; t++) {
+    if (!from->complex.triangle_alive[t]) continue;
+    const uint32_t *corners = &from->complex.triangles[3 * t];
+    const uint32_t triangle =
+        qmat_complex_find_triangle(&to->complex, ids[corners[0]], ids[corners[1]], ids[corners[2]]);
+    double *bound = &to->protrusion.triangle_bounds[triangle];
+    *bound = fmin(*bound, from->protrusion.triangle_bounds[t]);
+  }
+}
+
+qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_extra_points *extra,
+                                       qmat_control_points *control, qmat_simplification *to) {
+  qmat_context *context = from->context;
+  qmat_arena *arena = &context->arena;
+  const qmat_complex *c = &from->complex;
+  uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
+  double *depths = qmat_arena_alloc(arena, c->live_vertices, sizeof *depths);
+  to->quadrics = qmat_arena_alloc(arena, c->live_vertices, sizeof *to->quadrics);
+  qmat_medial *left = qmat_medial_new();
+  qmat_control_points further;
+  qmat_status status = ids && depths && to->quadrics && left ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
+  if (status == QMAT_OK) status = qmat_simplification_extract(from, left);
+  if (status == QMAT_OK) status = qmat_complex_init(context, &to->complex, left, NULL);
+  qmat_value_release(left ? &left->base : NULL);
+  if (status == QMAT_OK) status = qmat_extra_points_make(context, &to->complex, extra, &further);
+  if (status != QMAT_OK) return status;
+  uint32_t next = 0;
+  for (size_t v = 0; v < c->vertex_count; v++) {
+    if (!c->vertex_alive[v]) continue;
+    ids[v] = next;
+    depths[next] = from->protrusion.depths[v];
+    to->quadrics[next++] = from->quadrics[v];
+  }
+  status = join_control_points(from, ids, &further, control);
+  if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);
+  if (status != QMAT_OK) return status;
+  carry_bounds(from, ids, to);
+  to->collapses = from->collapses;
+  to->refused_by_surface = from->refused_by_surface;
+  to->refused_by_coverage = from->refused_by_coverage;
+  to->refused_by_protrusion = from->refused_by_protrusion;
+  to->refused_by_protection = from->refused_by_protection;
+  to->refused_by_topology = from->refused_by_topology;
+  return QMAT_OK;
 }

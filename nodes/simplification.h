@@ -20,6 +20,7 @@ typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE }
 /* What collapses are allowed, and when they end. */
 typedef struct qmat_simplification_rules {
   double limit;     /* what both errors are held to at the control points, unit frame; INFINITY: nothing is held */
+  double share;     /* of the limit, how much of it collapses may use up: above 0, at most 1 */
   size_t vertices;  /* collapses end when so few are left; 0: never */
   double most_cost; /* or when the cheapest costs more; 0: never */
   double k;         /* of eq. 6 */
@@ -76,6 +77,12 @@ void qmat_simplification_uninit(qmat_simplification *simplification);
 
 /* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
 qmat_status qmat_simplification_run(qmat_simplification *simplification);
+
+/* Goes on in `to` where `from` stopped: what is left of the medial mesh, renumbered in its order, with the quadrics,
+ * bounds and witnesses that it has, and with `extra` places. `to` has context, surface and rules; `control` gets its
+ * control points and has to live as long. `from` stays as it is. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
+qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_extra_points *extra,
+                                       qmat_control_points *control, qmat_simplification *to);
 
 /* What is left, renumbered in the order of the initial medial mesh, still in the unit frame, with the samples that each
  * sphere answers for. `medial` is new and unsealed. QMAT_ERROR_MEMORY. */

@@ -103,6 +103,7 @@ static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mes
 qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *p, const qmat_mesh *mesh,
                                 const qmat_initial_medial *initial, qmat_simplification_rules *rules) {
   *rules = (qmat_simplification_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
+                                       .share = 1,
                                        .vertices = (size_t)p->vertices,
                                        .most_cost = p->most_cost,
                                        .k = p->k,
@@ -130,7 +131,6 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   *o = (qmat_ordered_collapses){.params = *params};
   apply_compatibility(&o->params);
   qmat_simplification *run = &o->simplification;
-  const qmat_extra_points none = {.count = 0};
   qmat_status status = qmat_simplify_prepare(context, &o->params, inputs, &o->surface, &o->initial);
   if (status != QMAT_OK) return status;
   run->context = context;
@@ -140,7 +140,7 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status == QMAT_OK)
     status =
         qmat_control_points_make(context, o->surface, samples, medial, &run->complex, usual_error, MOST_CONTROL_POINTS,
-                                 &none, run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
+                                 run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
   if (status == QMAT_OK) status = qmat_simplification_init(run, &o->control, o->initial.depths);
   return status == QMAT_OK ? qmat_simplification_run(run) : status;
 }

@@ -167,9 +167,8 @@ static void make_model(model *m, qmat_mesh *mesh, double epsilon, bool with_regi
   qmat_frame_spheres_to_unit(qmat_surface_frame(m->surface), medial->spheres, medial->sphere_count, spheres);
   assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
   qmat_free(spheres);
-  const qmat_extra_points none = {.count = 0};
   assert_int_equal(qmat_control_points_make(&m->context, m->surface, m->p.samples, medial, &m->complex, epsilon, 3000,
-                                            &none, true, &m->control),
+                                            true, &m->control),
                    QMAT_OK);
   m->limits = qmat_alloc(m->control.count, sizeof *m->limits);
   for (size_t i = 0; i < m->control.count; i++)
