@@ -291,7 +291,10 @@ typedef struct {
 } shell_points;
 
 /* Of each cube with this share of epsilon for a side one place is taken. */
-static const double shell_share = 0.75;
+static const double shell_share = 0.6;
+
+/* The shell's depth as a share of epsilon: the rest is for the envelope between its places. */
+static const double shell_depth = 0.98;
 
 static int by_cube_and_facet(const void *left, const void *right) {
   const shell_place *a = left, *b = right;
@@ -309,14 +312,14 @@ static shell_place shell_place_below(const double *corners, const double *normal
   return place;
 }
 
-/* Places epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than epsilon.
- * Only where the solid is so thick and the initial medial mesh holds them. */
+/* Places nearly epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than
+ * epsilon. Only where the solid is so thick and the initial medial mesh holds them. */
 static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const answering *a, double epsilon,
                               shell_points *shell) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = a->mesh;
   const double *positions = qmat_surface_positions(surface);
-  const double spacing = epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
+  const double spacing = epsilon, depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
   size_t capacity = 0;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
@@ -335,7 +338,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
     for (int k = 0; k < 3; k++)
       points[3 * on_grid + (size_t)k] = (g.corners[0][k] + g.corners[1][k] + g.corners[2][k]) / 3;
     for (size_t i = 0; i <= on_grid; i++)
-      shell->places[count++] = shell_place_below(&points[3 * i], normal, (uint32_t)t, epsilon, side);
+      shell->places[count++] = shell_place_below(&points[3 * i], normal, (uint32_t)t, depth, side);
   }
   if (count) qsort(shell->places, count, sizeof *shell->places, by_cube_and_facet);
   size_t kept = 0;
@@ -347,7 +350,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
     shell_place *place = &shell->places[i];
     place->witness.distance = INFINITY;
     if (!qmat_surface_inside(surface, place->point) ||
-        qmat_surface_distance(surface, place->point, (1 - 1e-6) * epsilon, NULL, NULL) < INFINITY)
+        qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
       continue;
     look_around(a, place->point, &mesh->triangles[3 * (size_t)place->facet], 3, 0, &place->witness);
   }
@@ -452,5 +455,33 @@ qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *co
     kept++;
   }
   control->count = kept;
+  return QMAT_OK;
+}
+
+qmat_status qmat_control_points_join(qmat_context *context, const qmat_control_points *base, const uint32_t *witnesses,
+                                     const double *weights, const uint32_t *ids, const qmat_control_points *extra,
+                                     qmat_control_points *joined) {
+  *joined = (qmat_control_points){.count = base->count + extra->count,
+                                  .sample_count = base->sample_count,
+                                  .surface_count = base->surface_count + extra->surface_count,
+                                  .spacing = base->spacing};
+  const qmat_status status = allocate(context, joined);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < joined->count; i++) {
+    const bool inside = i >= joined->surface_count;
+    const size_t place = inside ? i - joined->surface_count : i;
+    const size_t own = inside ? base->count - base->surface_count : base->surface_count;
+    const bool is_base = place < own;
+    const qmat_control_points *source = is_base ? base : extra;
+    const size_t j = (inside ? source->surface_count : 0) + (is_base ? place : place - own);
+    memcpy(&joined->points[3 * i], &source->points[3 * j], 3 * sizeof *joined->points);
+    memcpy(&joined->weights[3 * i], &(is_base ? weights : extra->weights)[3 * j], 3 * sizeof *joined->weights);
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t vertex = (is_base ? witnesses : extra->witnesses)[3 * j + k];
+      joined->witnesses[3 * i + k] = is_base && ids && vertex != QMAT_NONE ? ids[vertex] : vertex;
+    }
+    joined->distances[i] = source->distances[j];
+    if (inside) joined->inner_limits[place] = source->inner_limits[j - source->surface_count];
+  }
   return QMAT_OK;
 }

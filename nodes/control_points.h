@@ -43,4 +43,11 @@ typedef struct qmat_extra_points {
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
                                    qmat_control_points *control);
 
+/* The places of `base` with the witnesses and weights (3 per place) that they have by now, and those of `extra`; what
+ * is on the surface comes first. `ids` gives new numbers to the vertices that `witnesses` name; NULL: they keep theirs.
+ * QMAT_ERROR_MEMORY. */
+qmat_status qmat_control_points_join(qmat_context *context, const qmat_control_points *base, const uint32_t *witnesses,
+                                     const double *weights, const uint32_t *ids, const qmat_control_points *extra,
+                                     qmat_control_points *joined);
+
 #endif

@@ -75,6 +75,7 @@ qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *
   qmat_envelope_free(envelope);
   errors->hollow_count = 0;
   errors->hollows = boundary.far_points;
+  errors->deepest_hollow = boundary.far_count > 0 ? boundary.either_side.lo : 0;
   for (size_t i = 0; i < boundary.far_count; i++)
     if (qmat_surface_inside(surface, &boundary.far_points[3 * i]))
       memmove(&errors->hollows[3 * errors->hollow_count++], &boundary.far_points[3 * i], 3 * sizeof(double));

@@ -9,6 +9,7 @@ typedef struct qmat_medial_errors {
   double surface_to_envelope; /* of F over the surface (eq. 9) */
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
   qmat_cover cover;           /* where the surface is farther than the threshold */
+  double deepest_hollow;      /* that was found; 0: none */
   size_t hollow_count;
   double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
 } qmat_medial_errors;

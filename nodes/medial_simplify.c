@@ -49,10 +49,10 @@ static void swap_lattices(qmat_simplification *a, qmat_simplification *b) {
 
 /* Collapses that keep to this share of the error are done once for all rounds, so that places found later are still
  * within it, and so deep do those inside have to be in the envelope, as a share of epsilon. */
-static const double dense_share = 0.85, held_depth_share = 0.05;
+static const double dense_share = 0.9, held_depth_share = 0.05;
 
 static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
-                                  const qmat_medial *medial) {
+                                  const qmat_medial *medial, const qmat_extra_points *extra) {
   qmat_simplification *dense = &s->dense;
   *dense = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_complex_init(s->context, &dense->complex, medial, state->spheres);
@@ -63,6 +63,13 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   if (status == QMAT_OK)
     status = qmat_control_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
                                       MOST_CONTROL_POINTS, inside, &s->control);
+  if (extra->surface_count + extra->inner_count > 0) {
+    const qmat_control_points base = s->control;
+    qmat_control_points further;
+    if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &dense->complex, extra, &further);
+    if (status == QMAT_OK)
+      status = qmat_control_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->control);
+  }
   dense->rules.share = dense_share;
   dense->rules.refits = 0;
   if (status == QMAT_OK) status = qmat_simplification_init(dense, &s->control, state->depths);
@@ -138,34 +145,73 @@ static bool starts_within(const simplifier *s, double epsilon) {
   return true;
 }
 
+/* Whether the dense part keeps to the places of a round as well as is wanted of the result. */
+static bool dense_keeps(const simplifier *s, const qmat_extra_points *extra) {
+  const qmat_control_points *base = &s->control, *all = &s->round_control;
+  for (size_t i = base->surface_count; i < all->surface_count; i++)
+    if (!(all->distances[i] <= s->dense.rules.limit)) return false;
+  return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
+}
+
+/* A result so far, and how far surface and boundary of the envelope are apart where that is too far. */
+typedef struct {
+  qmat_medial *medial;
+  qmat_report *report;
+  double excess;
+} attempt;
+
+static void release(attempt *a) {
+  qmat_value_release(a->medial ? &a->medial->base : NULL);
+  qmat_value_release(a->report ? &a->report->base : NULL);
+  *a = (attempt){NULL, NULL, INFINITY};
+}
+
+static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra,
+                               int round, attempt *a, qmat_medial_errors *errors) {
+  *a = (attempt){qmat_medial_new(), qmat_report_new(), INFINITY};
+  qmat_status status = a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
+  if (status == QMAT_OK) status = run_round(s, state, extra);
+  if (status == QMAT_OK) status = qmat_simplification_extract(&s->simplification, a->medial);
+  if (status == QMAT_OK) status = measure(s, a->medial, errors);
+  if (status == QMAT_OK) status = make_report(s, a->medial, errors, round, a->report);
+  a->excess = fmax(errors->surface_to_envelope, errors->deepest_hollow);
+  qmat_simplification_uninit(&s->simplification);
+  return status;
+}
+
 /* Rounds of collapses until surface and envelope keep within epsilon of each other between the control points as they
  * do at them: places where the surface is farther from the envelope, or the envelope has a notch or is hollow, join
- * them. */
+ * them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
 static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
-                            const qmat_medial *initial, qmat_medial **medial, qmat_report *report) {
+                            const qmat_medial *initial, attempt *best) {
   const double epsilon = s->params->epsilon;
-  qmat_extra_points extra = {.held_depth = held_depth_share * epsilon};
-  qmat_status status = collapse_dense(s, state, samples, initial);
+  qmat_extra_points in_dense = {.held_depth = held_depth_share * epsilon}, extra = in_dense;
+  qmat_status status = collapse_dense(s, state, samples, initial, &in_dense);
   for (int round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
-    qmat_medial *unit = *medial = qmat_medial_new();
-    if (!unit) return qmat_fail_memory(s->context, "the medial mesh");
-    status = run_round(s, state, &extra);
-    if (status == QMAT_OK) status = qmat_simplification_extract(&s->simplification, unit);
-    if (status == QMAT_OK) status = measure(s, unit, &errors);
-    const bool surface_is_far = errors.surface_to_envelope > epsilon && errors.cover.count > 0;
-    const bool repeat =
-        epsilon > 0 && round < MOST_ROUNDS && (surface_is_far || errors.hollow_count > 0) && starts_within(s, epsilon);
-    if (status == QMAT_OK && !repeat) status = make_report(s, unit, &errors, round, report);
-    if (status == QMAT_OK && repeat && surface_is_far)
+    attempt a;
+    const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
+    status = run_attempt(s, state, &extra, round, &a, &errors);
+    const bool is_done = is_last || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
+    if (status == QMAT_OK && a.excess < best->excess) {
+      release(best);
+      *best = a;
+    } else {
+      release(&a);
+    }
+    if (status == QMAT_OK && !is_done && errors.surface_to_envelope > epsilon)
       status = append(s, &extra.surface, &extra.surface_count, errors.cover.points, errors.cover.count);
-    if (status == QMAT_OK && repeat)
+    if (status == QMAT_OK && !is_done)
       status = append(s, &extra.inner, &extra.inner_count, errors.hollows, errors.hollow_count);
     qmat_medial_errors_uninit(&errors);
-    if (status != QMAT_OK || !repeat) return status;
-    qmat_value_release(&unit->base);
-    *medial = NULL;
-    qmat_simplification_uninit(&s->simplification);
+    if (status != QMAT_OK || is_done) return status;
+    if (!again) continue;
+    status = append(s, &in_dense.surface, &in_dense.surface_count, extra.surface, extra.surface_count);
+    if (status == QMAT_OK) status = append(s, &in_dense.inner, &in_dense.inner_count, extra.inner, extra.inner_count);
+    extra = (qmat_extra_points){.held_depth = extra.held_depth};
+    qmat_simplification_uninit(&s->dense);
+    if (status == QMAT_OK) status = collapse_dense(s, state, samples, initial, &in_dense);
   }
   return status;
 }
@@ -238,22 +284,20 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
   simplifier s = {.context = context, .params = params};
   qmat_initial_medial state = {NULL, NULL, NULL};
-  qmat_medial *medial = NULL;
-  qmat_report *report = qmat_report_new();
-  qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
-  if (status == QMAT_OK) status = qmat_simplify_prepare(context, params, inputs, &s.surface, &state);
-  if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &medial, report);
+  attempt best = {NULL, NULL, INFINITY};
+  qmat_status status = qmat_simplify_prepare(context, params, inputs, &s.surface, &state);
+  if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) {
-    qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), medial->spheres, medial->sphere_count, medial->spheres);
-    status = qmat_value_seal(context, &medial->base);
+    double *spheres = best.medial->spheres;
+    qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), spheres, best.medial->sphere_count, spheres);
+    status = qmat_value_seal(context, &best.medial->base);
   }
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &best.report->base);
   if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
+    outputs[0] = &best.medial->base;
+    outputs[1] = &best.report->base;
   } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
+    release(&best);
   }
   qmat_simplification_uninit(&s.simplification);
   qmat_simplification_uninit(&s.dense);
@@ -333,10 +377,12 @@ const qmat_node qmat_node_medial_simplify = {
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
         "the edge. A collapse is done when its sphere and the midpoints of its edges lie inside the model and both "
         "errors stay below epsilon: from the surface to the envelope at the samples and a grid of control points, and "
-        "from the envelope of spheres, cones and slabs to the surface. Spheres of the initial medial mesh, shrunk by "
-        "epsilon, have to stay inside too, so that the envelope has no hollow. The largest distance from the surface "
-        "between the control points is bounded afterwards, and the collapses are repeated with points in the places "
-        "found where it is above epsilon. "
+        "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
+        "deep "
+        "stay inside the envelope, so that it has no hollow. When no edge is left, each is tried with a sphere that is "
+        "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
+        "places between where the surface is too far from the envelope, or a notch of it too deep; the collapses are "
+        "repeated with these. "
         "With on_exceed=raise both errors are held to a quarter of a percent of the diagonal first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "

@@ -328,19 +328,31 @@ static qmat_status commit(qmat_simplification *s, const double *sphere) {
   return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
 }
 
-/* The candidate of least error at the surface, fitted to it. */
-static qmat_status fit_candidate(qmat_simplification *s, const qmat_candidates *c, double *sphere, double *error) {
+/* A sphere whose sampled error is this many times what is held is not worth a test. */
+static const double worth_testing = 1.1;
+
+/* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
+ * look good as they are. */
+static qmat_status try_fitted(qmat_simplification *s, const qmat_candidates *c, double sphere[4], outcome *result) {
+  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
+  int least = 0;
   qmat_status status =
       qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
-  double least = INFINITY;
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
-    status = qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], error);
-    if (status != QMAT_OK || !(*error < least)) continue;
-    least = *error;
-    memcpy(sphere, c->spheres[i], 4 * sizeof *sphere);
+    status =
+        qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], &errors[i]);
+    if (errors[i] < errors[least]) least = i;
   }
-  if (status != QMAT_OK) return status;
-  return qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, error);
+  memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
+  if (status == QMAT_OK)
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, &error);
+  if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  for (int i = 0; i < c->count && status == QMAT_OK && *result != DONE; i++) {
+    if (!(errors[i] <= worth_testing * s->held)) continue;
+    memcpy(sphere, c->spheres[i], sizeof c->spheres[i]);
+    status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  }
+  return status;
 }
 
 /* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
@@ -365,7 +377,8 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   double asked;
   s->asked[edge] = INFINITY;
   const double *sphere = NULL;
-  for (int i = 0; i < c.count && status == QMAT_OK && *result != DONE; i++) {
+  const bool fits = s->fitting && !bound;
+  for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
     sphere = c.spheres[i];
     const size_t refused = s->refused_by_coverage;
     status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
@@ -373,10 +386,9 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
     if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
     exceeded |= *result == EXCEEDED;
   }
-  double fitted[4], error;
-  if (status == QMAT_OK && *result != DONE && s->fitting && !bound) {
-    status = fit_candidate(s, &c, fitted, &error);
-    if (status == QMAT_OK && error <= 1.1 * s->held) status = test_sphere(s, fitted, QMAT_NONE, result, &asked);
+  double fitted[4];
+  if (status == QMAT_OK && fits) {
+    status = try_fitted(s, &c, fitted, result);
     sphere = fitted;
   }
   if (status == QMAT_OK && *result == DONE) {
@@ -568,42 +580,6 @@ qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_media
   return status == QMAT_OK ? set_regions(s, ids, medial) : status;
 }
 
-/* Control points of `from` and the further ones, those on the surface first; witnesses by their new ids. */
-static qmat_status join_control_points(const qmat_simplification *from, const uint32_t *ids,
-                                       const qmat_control_points *extra, qmat_control_points *joined) {
-  qmat_arena *arena = &from->context->arena;
-  const qmat_control_points *base = from->control;
-  *joined = (qmat_control_points){.count = base->count + extra->count,
-                                  .sample_count = base->sample_count,
-                                  .surface_count = base->surface_count + extra->surface_count,
-                                  .spacing = base->spacing};
-  joined->points = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->points);
-  joined->witnesses = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->witnesses);
-  joined->weights = qmat_arena_alloc(arena, joined->count, 3 * sizeof *joined->weights);
-  joined->distances = qmat_arena_alloc(arena, joined->count, sizeof *joined->distances);
-  joined->inner_limits = qmat_arena_alloc(arena, joined->count - joined->surface_count, sizeof *joined->inner_limits);
-  if (!joined->points || !joined->witnesses || !joined->weights || !joined->distances || !joined->inner_limits)
-    return qmat_fail_memory(from->context, "control points");
-  for (size_t i = 0; i < joined->count; i++) {
-    /* [base, extra] on the surface, then [base, extra] inside */
-    const bool inside = i >= joined->surface_count;
-    const size_t place = inside ? i - joined->surface_count : i;
-    const size_t own = inside ? base->count - base->surface_count : base->surface_count;
-    const bool is_base = place < own;
-    const qmat_control_points *source = is_base ? base : extra;
-    const size_t j = (inside ? source->surface_count : 0) + (is_base ? place : place - own);
-    const uint32_t *witnesses = &(is_base ? from->coverage.witnesses : extra->witnesses)[3 * j];
-    memcpy(&joined->points[3 * i], &source->points[3 * j], 3 * sizeof *joined->points);
-    memcpy(&joined->weights[3 * i], &(is_base ? from->coverage.weights : extra->weights)[3 * j],
-           3 * sizeof *joined->weights);
-    for (size_t k = 0; k < 3; k++)
-      joined->witnesses[3 * i + k] = !is_base || witnesses[k] == QMAT_NONE ? witnesses[k] : ids[witnesses[k]];
-    joined->distances[i] = source->distances[j];
-    if (inside) joined->inner_limits[place] = source->inner_limits[j - source->surface_count];
-  }
-  return QMAT_OK;
-}
-
 /* The bounds of the protrusion of edges and triangles, where they say more than their corners do. */
 static void carry_bounds(const qmat_simplification *from, const uint32_t *ids, qmat_simplification *to) {
   for (size_t e = 0; e < from->complex.edge_count; e++) {
@@ -646,7 +622,8 @@ qmat_status qmat_simplification_resume(const qmat_simplification *from, const qm
     depths[next] = from->protrusion.depths[v];
     to->quadrics[next++] = from->quadrics[v];
   }
-  status = join_control_points(from, ids, &further, control);
+  status = qmat_control_points_join(context, from->control, from->coverage.witnesses, from->coverage.weights, ids,
+                                    &further, control);
   if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);
   if (status != QMAT_OK) return status;
   carry_bounds(from, ids, to);
