@@ -7,7 +7,8 @@
 #include "core/hash.h"
 
 enum { FIRST_CAPACITY = 1 << 14 };
-/* By this much more than it is far a node has to be deep to tell a neighbour's side: far more than a side is unsure by. */
+/* By this much more than it is far a node has to be deep to tell a neighbour's side: far more than a side is unsure by.
+ */
 static const double side_margin = 1e-6;
 /* 21 bits a coordinate; the offset keeps every key of the lattice above 0. */
 static const double reach = 2;
@@ -65,21 +66,24 @@ double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[
   return -qmat_surface_signed_distance(lattice->surface, point);
 }
 
-/* The depth at a node. A neighbour that is known tells how far to look, and the side of the surface
- * where it is deeper than it is far. */
+double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double point[3], double near, double distance) {
+  const double gap = distance * (1 + 1e-9) + side_margin;
+  const double depth = qmat_surface_distance(lattice->surface, point, fabs(near) + gap, NULL, NULL);
+  if (!(depth < INFINITY)) return qmat_depth_lattice_exact(lattice, point);
+  lattice->questions++;
+  const bool inside = fabs(near) > gap ? near > 0 : qmat_surface_inside(lattice->surface, point);
+  return inside ? depth : -depth;
+}
+
+/* The depth at a node; from a neighbour where one is known. */
 static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
-  const double gap = lattice->spacing * (1 + 1e-9) + side_margin;
+  static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};
   for (int k = 0; k < 3; k++)
     for (int sign = 0; sign < 2; sign++) {
-      const uint64_t along = (uint64_t)1 << (21 * k), neighbour = sign ? key + along : key - along;
+      const uint64_t neighbour = sign ? key + steps[k] : key - steps[k];
       const size_t slot = find_slot(lattice->keys, lattice->capacity, neighbour);
-      if (lattice->keys[slot] != neighbour) continue;
-      const double depth = lattice->depths[slot];
-      const double distance = qmat_surface_distance(lattice->surface, node, fabs(depth) + gap, NULL, NULL);
-      if (!(distance < INFINITY)) continue;
-      lattice->questions++;
-      const bool inside = fabs(depth) > gap ? depth > 0 : qmat_surface_inside(lattice->surface, node);
-      return inside ? distance : -distance;
+      if (lattice->keys[slot] == neighbour)
+        return qmat_depth_lattice_exact_near(lattice, node, lattice->depths[slot], lattice->spacing);
     }
   return qmat_depth_lattice_exact(lattice, node);
 }

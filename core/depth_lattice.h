@@ -29,4 +29,8 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
 /* The exact depth at `point`. */
 double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[3]);
 
+/* The same where a depth `near` is known `distance` away, as qmat_depth_lattice_near gives it: it tells how far to
+ * look, and often the side. */
+double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double point[3], double near, double distance);
+
 #endif

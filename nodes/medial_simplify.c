@@ -12,7 +12,7 @@ typedef qmat_simplify_params medial_simplify_params;
 
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
  * is repeated, at most this often, with control points in the places found. */
-enum { MOST_ROUNDS = 6 };
+enum { MOST_ROUNDS = 4 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
@@ -153,12 +153,15 @@ static bool dense_keeps(const simplifier *s, const qmat_extra_points *extra) {
   return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
 }
 
-/* A result so far, and how far surface and boundary of the envelope are apart where that is too far. */
+/* A result so far, and what is wrong with it: the largest distance found, epsilon at least, and a share of epsilon more
+ * where it has not the topology of the solid. */
 typedef struct {
   qmat_medial *medial;
   qmat_report *report;
-  double excess;
+  double fault;
 } attempt;
+
+static const double topology_fault = 0.05;
 
 static void release(attempt *a) {
   qmat_value_release(a->medial ? &a->medial->base : NULL);
@@ -174,7 +177,10 @@ static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, 
   if (status == QMAT_OK) status = qmat_simplification_extract(&s->simplification, a->medial);
   if (status == QMAT_OK) status = measure(s, a->medial, errors);
   if (status == QMAT_OK) status = make_report(s, a->medial, errors, round, a->report);
-  a->excess = fmax(errors->surface_to_envelope, errors->deepest_hollow);
+  const qmat_simplification *done = &s->simplification;
+  a->fault = fmax(fmax(errors->surface_to_envelope, errors->deepest_hollow), s->params->epsilon);
+  if (done->rules.has_target && done->euler != done->rules.target_euler)
+    a->fault += topology_fault * s->params->epsilon;
   qmat_simplification_uninit(&s->simplification);
   return status;
 }
@@ -194,7 +200,7 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     status = run_attempt(s, state, &extra, round, &a, &errors);
     const bool is_done = is_last || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    if (status == QMAT_OK && a.excess < best->excess) {
+    if (status == QMAT_OK && a.fault < best->fault) {
       release(best);
       *best = a;
     } else {

@@ -23,11 +23,11 @@ typedef struct piece {
   int count;
 } piece;
 
-/* The bound of h over a piece by the Lipschitz constant from one point of known depth: convex, so largest at a corner. */
+/* The bound of h over a piece by the Lipschitz constant from one point of known depth: convex, so largest at a corner.
+ */
 static double bound_from(const piece *p, const double *centre, double depth) {
   double bound = -INFINITY;
-  for (int j = 0; j < p->count; j++)
-    bound = maximum(bound, p->spheres[j][3] - depth + distance(p->spheres[j], centre));
+  for (int j = 0; j < p->count; j++) bound = maximum(bound, p->spheres[j][3] - depth + distance(p->spheres[j], centre));
   return bound;
 }
 
@@ -109,9 +109,9 @@ static bool search_piece(search *s, const piece *p, int level) {
   /* h over the piece is at most `farthest` less the depth at the centre: convex, so largest at a corner. */
   const bool last = p->count == 1 || level == DEEPEST;
   bool ask = true;
+  double near = 0, gap = 0;
   if (s->lattice) {
-    double gap;
-    const double near = qmat_depth_lattice_near(s->lattice, centre, &gap);
+    near = qmat_depth_lattice_near(s->lattice, centre, &gap);
     if (centre[3] - near - gap > s->limit) {
       s->found = centre[3] - near - gap;
       return false;
@@ -120,8 +120,8 @@ static bool search_piece(search *s, const piece *p, int level) {
     ask = size <= s->smallest || last;
   }
   if (ask) {
-    const double depth =
-        s->lattice ? qmat_depth_lattice_exact(s->lattice, centre) : -qmat_surface_signed_distance(s->surface, centre);
+    const double depth = s->lattice ? qmat_depth_lattice_exact_near(s->lattice, centre, near, gap)
+                                    : -qmat_surface_signed_distance(s->surface, centre);
     const double h = centre[3] - depth;
     s->found = maximum(s->found, h);
     if (h > s->limit) return false;
@@ -159,7 +159,8 @@ double qmat_protrusion_bound(const qmat_surface *surface, const double *const sp
   return maximum(s.bound, s.found);
 }
 
-/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away. */
+/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away.
+ */
 static const double lattice_share = 0.5, widest_spacing = 0.005;
 
 qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
@@ -210,9 +211,9 @@ bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex
   if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
     const double near = qmat_depth_lattice_near(&protrusion->lattice, sphere, &gap);
     depth = maximum(depth, near - gap);
+    if (!(depth > 0 && sphere[3] - depth <= protrusion->limit))
+      depth = qmat_depth_lattice_exact_near(&protrusion->lattice, sphere, near, gap);
   }
-  if (!(depth > 0 && sphere[3] - depth <= protrusion->limit))
-    depth = qmat_depth_lattice_exact(&protrusion->lattice, sphere);
   protrusion->sphere_depth = depth;
   return depth > 0 && sphere[3] - depth <= protrusion->limit;
 }
@@ -244,12 +245,11 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
                                  const qmat_collapse *collapse, const double sphere[4], bool *kept) {
   if (qmat_grow((void **)&protrusion->new_edge_bounds, &protrusion->new_edge_capacity, collapse->neighbour_count,
                 sizeof(double)) ||
-      qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity,
-                collapse->triangle_count, sizeof(double)))
+      qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity, collapse->triangle_count,
+                sizeof(double)))
     return qmat_fail_memory(context, "protrusion bounds");
   const double *old_kept = &complex->spheres[4 * (size_t)collapse->kept];
-  const double *old_removed =
-      collapse->removed == QMAT_NONE ? NULL : &complex->spheres[4 * (size_t)collapse->removed];
+  const double *old_removed = collapse->removed == QMAT_NONE ? NULL : &complex->spheres[4 * (size_t)collapse->removed];
   search s = {.lattice = &protrusion->lattice,
               .content = content_share * protrusion->limit,
               .limit = protrusion->limit,
@@ -294,8 +294,7 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
 void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse) {
   protrusion->depths[collapse->kept] = protrusion->sphere_depth;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
-    const uint32_t edge =
-        collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
+    const uint32_t edge = collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
     protrusion->edge_bounds[edge] = protrusion->new_edge_bounds[n];
   }
   for (size_t t = 0; t < collapse->triangle_count; t++) {
