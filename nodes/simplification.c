@@ -526,9 +526,13 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     s->fitting = true;
     if (i == 0) queue_all(s);
     status = collapse_edges(s, &ended);
-    if (status != QMAT_OK || ended || (i > 0 && s->collapses == collapses)) return status;
+    if (status != QMAT_OK || ended) return status;
+    if (i > 0 && s->collapses == collapses) break;
     if ((status = refit(s, &moved)) != QMAT_OK) return status;
   }
+  /* What is left of the error is made small for its own sake. */
+  size_t moved = 1;
+  for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++) status = refit(s, &moved);
   return status;
 }
 
