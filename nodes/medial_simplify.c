@@ -311,7 +311,6 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   return status;
 }
 
-static const char *const error_kinds[] = {"two_sided", "one_sided", NULL};
 static const char *const exceed_rules[] = {"skip", "stop", "raise", NULL};
 #define AT(field) offsetof(qmat_simplify_params, field)
 
@@ -333,13 +332,7 @@ static const qmat_param params[] = {
      .min = 0,
      .max = 4294967294.0,
      .offset = AT(vertices)},
-    {.name = "error",
-     .unit = "",
-     .doc = "What epsilon bounds: surface to envelope and envelope to surface, or the first alone as in the paper",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_ERROR_TWO_SIDED,
-     .choices = error_kinds,
-     .offset = AT(error)},
+    QMAT_ERROR_PARAM,
     {.name = "on_exceed",
      .unit = "",
      .doc = "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise what is held to it",
@@ -389,7 +382,7 @@ const qmat_node qmat_node_medial_simplify = {
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
         "places between where the surface is too far from the envelope, or a notch of it too deep; the collapses are "
         "repeated with these. "
-        "With on_exceed=raise both errors are held to a quarter of a percent of the diagonal first, "
+        "With on_exceed=raise both errors are held to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
         "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is held rises "

@@ -11,9 +11,6 @@
 
 enum { REPORT_EVERY = 256 };
 
-/* What depths are remembered for where the limit rises. */
-static const double usual_limit = 0.002;
-
 /* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
 static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
@@ -28,15 +25,13 @@ static bool is_two_sided(const qmat_simplification *s) {
   return s->rules.error == QMAT_ERROR_TWO_SIDED;
 }
 
-/* The lowest level is the largest that is not above a thousandth; above the highest nothing is held. Epsilon 1 % and
- * whatever is larger or smaller by a power of 2 are among them. */
-enum { LOWEST_LEVEL = -24, HIGHEST_LEVEL = 80, LEVELS_TO_A_DOUBLING = 12 };
+/* Levels by which what is held rises: twelve to each doubling of the finest. Beyond the whole model nothing is held. */
+enum { LEVELS_TO_A_DOUBLING = 12 };
 
-static double held_at(int level) {
-  if (level > HIGHEST_LEVEL) return INFINITY;
-  return ldexp(exp2((double)((level + 120) % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING),
-               (level + 120) / LEVELS_TO_A_DOUBLING - 10) *
-         (qmat_control_share * 0.01);
+static double held_at(const qmat_simplification *s, int level) {
+  const double part = exp2((double)(level % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING);
+  const double error = ldexp(part, level / LEVELS_TO_A_DOUBLING) * s->rules.finest;
+  return error <= 1 ? qmat_control_share * error : INFINITY;
 }
 
 /* Points that the initial medial mesh leaves farther away are kept from getting worse. An inner point that is deeper
@@ -44,7 +39,7 @@ static double held_at(int level) {
 static void hold(qmat_simplification *s, int level) {
   const qmat_control_points *control = s->control;
   s->level = level;
-  s->held = held_at(level);
+  s->held = held_at(s, level);
   for (size_t i = 0; i < control->surface_count; i++) s->coverage.limits[i] = fmax(s->held, control->distances[i]);
   for (size_t i = control->surface_count; i < control->count; i++)
     s->coverage.limits[i] = -control->distances[i] > s->held ? 0 : INFINITY;
@@ -53,7 +48,7 @@ static void hold(qmat_simplification *s, int level) {
 
 /* False where the next level is above the limit, or there is none. */
 static bool hold_next(qmat_simplification *s) {
-  if (s->level > HIGHEST_LEVEL || held_at(s->level + 1) > s->rules.limit) return false;
+  if (!(s->held < INFINITY) || held_at(s, s->level + 1) > s->rules.limit) return false;
   hold(s, s->level + 1);
   return true;
 }
@@ -166,11 +161,11 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
   s->held = limit;
   status = qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths,
                                 !is_two_sided(s) ? INFINITY
-                                : in_order(s)    ? usual_limit
+                                : in_order(s)    ? s->rules.finest
                                                  : s->rules.limit);
   if (is_two_sided(s)) s->protrusion.limit = limit;
   if (status != QMAT_OK || !in_order(s)) return status;
-  hold(s, LOWEST_LEVEL);
+  hold(s, 0);
   return start_log(s);
 }
 
@@ -512,7 +507,7 @@ static void queue_raised(qmat_simplification *s) {
 }
 
 qmat_status qmat_simplification_run(qmat_simplification *s) {
-  bool ended = false;
+  bool ended = s->held > s->rules.limit; /* where even the lowest level is above it */
   qmat_status status = collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
          hold_next(s)) {

@@ -21,6 +21,7 @@ typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE }
 typedef struct qmat_simplification_rules {
   double limit;     /* what both errors are held to at the control points, unit frame; INFINITY: nothing is held */
   double share;     /* of the limit, how much of it collapses may use up: above 0, at most 1 */
+  double finest;    /* what is held first where that rises, unit frame */
   size_t vertices;  /* collapses end when so few are left; 0: never */
   double most_cost; /* or when the cheapest costs more; 0: never */
   double k;         /* of eq. 6 */
@@ -40,7 +41,7 @@ typedef struct qmat_simplification_rules {
  * keeps both errors (sections 3.1.2, 3.3 and 3.4).
  *
  * With QMAT_EXCEED_SKIP the limit is what is held from the first collapse on. With the others the collapses are the
- * same for any limit and number of vertices, which only say where they end: what is held starts at a thousandth and
+ * same for any limit and number of vertices, which only say where they end: what is held starts at the finest and
  * rises, by twelve levels to each doubling, when the next collapse in the order of costs would exceed it (STOP), or
  * when every one would (RAISE). */
 typedef struct qmat_simplification {

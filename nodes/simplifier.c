@@ -6,13 +6,14 @@
 #include "core/surface.h"
 #include "core/thickness.h"
 
+const char *const qmat_error_choices[] = {"two_sided", "one_sided", NULL};
 const char *const qmat_cost_choices[] = {"slab", "hausdorff", "pmat", NULL};
 const char *const qmat_compat_choices[] = {"off", "qmat", NULL};
 const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
 
-/* The control points of collapses in order, which are there for any epsilon, are those of this one. */
-static const double usual_error = 0.005;
+/* The control points of collapses in order, which are there for any epsilon, are those of so many times the finest. */
+static const double control_error = 2;
 
 enum { MOST_CONTROL_POINTS = 600000 };
 
@@ -104,6 +105,7 @@ qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_param
                                 const qmat_initial_medial *initial, qmat_simplification_rules *rules) {
   *rules = (qmat_simplification_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
                                        .share = 1,
+                                       .finest = p->finest,
                                        .vertices = (size_t)p->vertices,
                                        .most_cost = p->most_cost,
                                        .k = p->k,
@@ -139,8 +141,8 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
     status =
-        qmat_control_points_make(context, o->surface, samples, medial, &run->complex, usual_error, MOST_CONTROL_POINTS,
-                                 run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
+        qmat_control_points_make(context, o->surface, samples, medial, &run->complex, control_error * o->params.finest,
+                                 MOST_CONTROL_POINTS, run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
   if (status == QMAT_OK) status = qmat_simplification_init(run, &o->control, o->initial.depths);
   return status == QMAT_OK ? qmat_simplification_run(run) : status;
 }

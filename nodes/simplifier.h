@@ -15,15 +15,24 @@ typedef struct qmat_simplify_params {
   double most_cost;
   int cost, compat; /* a qmat_cost_kind, a qmat_compatibility */
   int error, on_exceed, topology, protect;
+  double finest;
   double theta;
   double k;
   int64_t refits;
 } qmat_simplify_params;
 
-extern const char *const qmat_cost_choices[], *const qmat_compat_choices[], *const qmat_topology_choices[],
-                                                                                *const qmat_protect_choices[];
+extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *const qmat_compat_choices[],
+                                                                               *const qmat_topology_choices[],
+                                                                                   *const qmat_protect_choices[];
 
 /* The rows of the parameters that both nodes have. */
+#define QMAT_ERROR_PARAM                                                                                    \
+  {                                                                                                         \
+    .name = "error", .unit = "",                                                                            \
+    .doc = "What is held: surface to envelope and envelope to surface, or the first alone as in the paper", \
+    .type = QMAT_PARAM_ENUM, .default_number = QMAT_ERROR_TWO_SIDED, .choices = qmat_error_choices,         \
+    .offset = offsetof(qmat_simplify_params, error)                                                         \
+  }
 #define QMAT_COLLAPSE_PARAMS                                                                                      \
   {.name = "cost",                                                                                                \
    .unit = "",                                                                                                    \
@@ -34,6 +43,15 @@ extern const char *const qmat_cost_choices[], *const qmat_compat_choices[], *con
    .default_number = QMAT_COST_SLAB,                                                                              \
    .choices = qmat_cost_choices,                                                                                  \
    .offset = offsetof(qmat_simplify_params, cost)},                                                               \
+      {.name = "finest",                                                                                          \
+       .unit = "diagonal",                                                                                        \
+       .doc = "What both errors are held to first where that rises; finer levels take longer",                    \
+       .type = QMAT_PARAM_FLOAT,                                                                                  \
+       .default_number = 0.0025,                                                                                  \
+       .min = 1e-5,                                                                                               \
+       .max = 1,                                                                                                  \
+       .flags = QMAT_PARAM_RELATIVE,                                                                              \
+       .offset = offsetof(qmat_simplify_params, finest)},                                                         \
       {.name = "most_cost",                                                                                       \
        .unit = "1",                                                                                               \
        .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                            \

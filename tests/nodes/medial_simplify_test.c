@@ -389,7 +389,7 @@ static void test_stopping_at_epsilon_keeps_it_and_leaves_spheres_that_skipping_d
   bool more = false;
   for (size_t m = 0; m < COUNT(names); m++) {
     const pipeline *p = model(names[m]);
-    result stop = simplify(p, "epsilon=6% on_exceed=stop"), skip = simplify(p, "epsilon=6% on_exceed=skip");
+    result stop = simplify(p, "epsilon=6% finest=3% on_exceed=stop"), skip = simplify(p, "epsilon=6% on_exceed=skip");
     check_errors(p, &stop, 0.06, true);
     more |= stop.medial->sphere_count > skip.medial->sphere_count;
     release(&stop);

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.chain: every collapse of one run, for medial meshes of any number of spheres or any error. */
+#include <string.h>
+
+#include "nodes/libraries.h"
+#include "nodes/simplifier.h"
+
+static void *copy_of(const void *array, size_t count, size_t size) {
+  void *copy = qmat_alloc(count, size);
+  if (copy && count) memcpy(copy, array, count * size);
+  return copy;
+}
+
+static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapses *o, const qmat_medial *medial,
+                              qmat_chain *chain) {
+  const qmat_collapse_log *log = &o->simplification.log;
+  const qmat_frame *frame = qmat_surface_frame(o->surface);
+  chain->spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *chain->spheres);
+  chain->edges = copy_of(medial->edges, medial->edge_count, 2 * sizeof *chain->edges);
+  chain->triangles = copy_of(medial->triangles, medial->triangle_count, 3 * sizeof *chain->triangles);
+  chain->owners = copy_of(log->owners, o->control.sample_count, sizeof *chain->owners);
+  chain->ends = copy_of(log->ends, log->count, 2 * sizeof *chain->ends);
+  chain->merged = qmat_alloc(log->count, 4 * sizeof *chain->merged);
+  chain->errors = copy_of(log->errors, log->count, sizeof *chain->errors);
+  if (!chain->spheres || !chain->edges || !chain->triangles || !chain->owners || !chain->ends || !chain->merged ||
+      !chain->errors)
+    return qmat_fail_memory(context, "the chain");
+  chain->sphere_count = medial->sphere_count;
+  chain->edge_count = medial->edge_count;
+  chain->triangle_count = medial->triangle_count;
+  chain->sample_count = o->control.sample_count;
+  chain->collapse_count = log->count;
+  /* From the unit frame, as medial.simplify does it: to the same bytes. */
+  qmat_frame_spheres_to_model(frame, o->initial.spheres, medial->sphere_count, chain->spheres);
+  qmat_frame_spheres_to_model(frame, log->merged, log->count, chain->merged);
+  return qmat_value_seal(context, &chain->base);
+}
+
+static int set_count(json_t *root, const char *key, size_t count) {
+  return json_object_set_new(root, key, json_integer((json_int_t)count));
+}
+
+/* How many spheres are left at a few errors. */
+static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, qmat_report *report) {
+  static const struct {
+    const char *key;
+    double epsilon;
+  } levels[] = {{"spheres_at_0.25%", 0.0025},
+                {"spheres_at_0.5%", 0.005},
+                {"spheres_at_1%", 0.01},
+                {"spheres_at_2%", 0.02},
+                {"spheres_at_4%", 0.04}};
+  int bad = set_count(report->root, "initial_spheres", chain->sphere_count);
+  bad |= set_count(report->root, "collapses", chain->collapse_count);
+  for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)
+    bad |= set_count(report->root, levels[i].key, chain->sphere_count - qmat_chain_length(chain, 0, levels[i].epsilon));
+  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+}
+
+static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  qmat_simplify_params params = *(const qmat_simplify_params *)data;
+  qmat_ordered_collapses o = {.surface = NULL};
+  qmat_chain *chain = qmat_chain_new();
+  qmat_report *report = qmat_report_new();
+  params.on_exceed += QMAT_EXCEED_STOP; /* the choices here start there */
+  qmat_status status = chain && report ? QMAT_OK : qmat_fail_memory(context, "the chain");
+  if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, &params, inputs, &o);
+  if (status == QMAT_OK) status = fill_chain(context, &o, (const qmat_medial *)inputs[3], chain);
+  if (status == QMAT_OK) status = fill_report(context, chain, report);
+  if (status == QMAT_OK) {
+    outputs[0] = &chain->base;
+    outputs[1] = &report->base;
+  } else {
+    qmat_value_release(chain ? &chain->base : NULL);
+    qmat_value_release(report ? &report->base : NULL);
+  }
+  qmat_ordered_collapses_uninit(&o);
+  return status;
+}
+
+static const char *const exceed_choices[] = {"stop", "raise", NULL};
+
+static const qmat_param params[] = {
+    QMAT_ERROR_PARAM,
+    {.name = "on_exceed",
+     .unit = "",
+     .doc =
+         "When what is held rises: at the cheapest collapse that asks for it as in the paper, or when no other is left",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = QMAT_EXCEED_RAISE - QMAT_EXCEED_STOP,
+     .choices = exceed_choices,
+     .offset = offsetof(qmat_simplify_params, on_exceed)},
+    QMAT_COLLAPSE_PARAMS,
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
+    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
+    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "chain", .type = QMAT_CHAIN, .doc = "The initial medial mesh and its collapses, for medial.lod"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Spheres left at a few errors"},
+    {0},
+};
+
+static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
+
+const qmat_node qmat_node_medial_chain = {
+    .name = "medial.chain",
+    .version = 1,
+    .summary = "Collapses medial edges to the last and records how, for any level of detail",
+    .doc =
+        "Does what medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left, "
+        "and records for each collapse its edge, its sphere, and what both errors were held to, finest at the "
+        "start. medial.lod takes medial meshes of any number of spheres or any error out of it in milliseconds, "
+        "the same that medial.simplify makes with that bound. With compat=qmat nothing is held; the errors say "
+        "what would have had to be. With error=one_sided they are those from the surface to the envelope.",
+    .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
+    .params_size = sizeof(qmat_simplify_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .libraries = libraries,
+    .run = run,
+};

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.lod: one level of detail of a chain of collapses. */
+#include "core/node.h"
+#include "nodes/collapse_chain.h"
+
+typedef struct medial_lod_params {
+  int64_t vertices;
+  double epsilon;
+} medial_lod_params;
+
+static qmat_status fill_report(qmat_context *context, const medial_lod_params *params, const qmat_chain *chain,
+                               size_t collapses, const qmat_medial *medial, qmat_report *report) {
+  const struct {
+    const char *key;
+    size_t count;
+  } counts[] = {{"spheres", medial->sphere_count},
+                {"edges", medial->edge_count},
+                {"triangles", medial->triangle_count},
+                {"collapses", collapses}};
+  int bad = json_object_set_new(report->root, "epsilon", json_real(params->epsilon));
+  bad |= json_object_set_new(report->root, "held", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+    bad |= json_object_set_new(report->root, counts[i].key, json_integer((json_int_t)counts[i].count));
+  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+}
+
+static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const medial_lod_params *params = data;
+  const qmat_chain *chain = (const qmat_chain *)inputs[0];
+  if (chain->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    return qmat_fail_field(context, "chain");
+  }
+  qmat_medial *medial = qmat_medial_new();
+  qmat_report *report = qmat_report_new();
+  const size_t collapses = qmat_chain_length(chain, (size_t)params->vertices, params->epsilon);
+  qmat_status status = medial && report ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
+  if (status == QMAT_OK) status = qmat_chain_extract(context, chain, collapses, medial);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
+  if (status == QMAT_OK) status = fill_report(context, params, chain, collapses, medial, report);
+  if (status == QMAT_OK) {
+    outputs[0] = &medial->base;
+    outputs[1] = &report->base;
+  } else {
+    qmat_value_release(medial ? &medial->base : NULL);
+    qmat_value_release(report ? &report->base : NULL);
+  }
+  return status;
+}
+
+static const qmat_param params[] = {
+    {.name = "vertices",
+     .unit = "spheres",
+     .doc = "How many medial spheres are left at least; 0: any number",
+     .type = QMAT_PARAM_INT,
+     .default_number = 0,
+     .min = 0,
+     .max = 4294967294.0,
+     .offset = offsetof(medial_lod_params, vertices)},
+    {.name = "epsilon",
+     .unit = "diagonal",
+     .doc = "The largest distance between surface and envelope; 0: no bound",
+     .type = QMAT_PARAM_FLOAT,
+     .default_number = 0.01,
+     .min = 0,
+     .max = 1,
+     .flags = QMAT_PARAM_RELATIVE,
+     .offset = offsetof(medial_lod_params, epsilon)},
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "chain", .type = QMAT_CHAIN, .doc = "From medial.chain"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh of that level"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Its counts, and what both errors were held to"},
+    {0},
+};
+
+const qmat_node qmat_node_medial_lod = {
+    .name = "medial.lod",
+    .version = 1,
+    .summary = "Takes a medial mesh of any number of spheres or any error out of a chain",
+    .doc =
+        "The collapses of the chain are done up to the wanted number of spheres, or as long as both errors are "
+        "held to epsilon at the control points, of which 2.5 % are left to the surface between them; with both "
+        "parameters, what comes first. The medial mesh, with its responsible regions, is the one that "
+        "medial.simplify makes with the chain's parameters and that bound, to the byte. Epsilon below the "
+        "chain's finest gives the initial medial mesh. Takes milliseconds: time grows with the initial medial "
+        "mesh.",
+    .citation = "Section 3.3",
+    .params_size = sizeof(medial_lod_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .run = run,
+};
