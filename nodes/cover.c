@@ -80,7 +80,7 @@ qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surfac
                                qmat_cover *cover) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  const size_t count = mesh->triangle_count, slice = 1 << 14;
+  const size_t count = mesh->triangle_count, slice = 1 << 12;
   *cover = (qmat_cover){.found = known, .bound = known};
   cover->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *cover->points);
   cover->facets = qmat_arena_alloc(&context->arena, count, sizeof *cover->facets);

@@ -146,7 +146,7 @@ static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sph
 
 static qmat_status select_medial_vertices(delaunay *d) {
   qmat_context *context = d->context;
-  const size_t count = d->cells.count, slice = 1 << 15;
+  const size_t count = d->cells.count, slice = 1 << 11;
   d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);
   d->spheres = qmat_arena_alloc(&context->arena, count, 4 * sizeof *d->spheres);
   if (!d->kinds || !d->spheres) return qmat_fail_memory(context, "medial vertices");

@@ -31,7 +31,7 @@ static double depth_of(const qmat_surface *surface, const double *sphere) {
 
 static qmat_status measure_depths(qmat_context *context, const qmat_surface *surface, const double *spheres,
                                   size_t count, double *depths) {
-  const size_t slice = 1 << 15;
+  const size_t slice = 1 << 11;
   const int threads = qmat_threads(context);
   for (size_t first = 0; first < count; first += slice) {
     const qmat_status status = qmat_progress(context, 0, 0, "depths");
