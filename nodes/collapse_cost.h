@@ -20,10 +20,10 @@ double qmat_slab_cost(double error, double k, const double a[4], const double b[
  * equal radii, 0 for equal centres. */
 double qmat_pmat_cost(const double a[4], const double b[4]);
 
-/* Both ends of the edge of the newest preview, each with the largest F that the collapse to it leaves at the samples
- * which the ends answer for: those of the first `sample_count` control points. -INFINITY where there are none; of
- * equals the larger sphere comes first. QMAT_ERROR_MEMORY. Cost: samples times both stars. */
+/* The end of the edge of the newest preview to which a collapse leaves the least F at the points that both ends answer
+ * for, of the first `point_count` control points, with that F: the largest. -INFINITY where there are none; of equals
+ * the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
 qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
-                                      const qmat_collapse *collapse, size_t sample_count, qmat_candidates *candidates);
+                                      const qmat_collapse *collapse, size_t point_count, qmat_candidates *candidates);
 
 #endif

@@ -388,7 +388,7 @@ const qmat_node qmat_node_medial_simplify = {
         "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is held rises "
         "as soon as the cheapest collapse asks for it, as in the paper. Both have control points of their own, "
         "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
-        "leaves the samples of both ends nearest to the envelope, and that distance for the cost; pmat keeps the "
+        "leaves the surface around it nearest to the envelope, and that distance for the cost; pmat keeps the "
         "larger end, and the cost is the distance of the centres over the difference of the radii. With compat=qmat "
         "new spheres are the optimum wherever it lies, else the middle; its boundary terms are those of the public "
         "code (the virtual sphere of edges without slabs, which depends on the origin, is taken about the centre of "

@@ -59,7 +59,7 @@ static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_c
   } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
     const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
     if (status != QMAT_OK) return status;
-    return qmat_hausdorff_candidates(s->context, &s->coverage, &s->complex, &s->collapse, s->control->sample_count, c);
+    return qmat_hausdorff_candidates(s->context, &s->coverage, &s->complex, &s->collapse, s->control->surface_count, c);
   } else if (s->rules.published) {
     qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
   } else {
