@@ -44,8 +44,10 @@ qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, s
   if (!coverage->witnesses || !coverage->weights || !coverage->next || !coverage->previous || !coverage->heads ||
       !coverage->slot_counts || !coverage->marks)
     return qmat_fail_memory(context, "control points");
-  memcpy(coverage->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
-  memcpy(coverage->weights, weights, 3 * point_count * sizeof *weights);
+  if (point_count > 0) {
+    memcpy(coverage->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
+    memcpy(coverage->weights, weights, 3 * point_count * sizeof *weights);
+  }
   for (size_t v = 0; v < vertex_count; v++) coverage->heads[v] = QMAT_NONE;
   for (size_t slot = 0; slot < 3 * point_count; slot++)
     if (witnesses[slot] != QMAT_NONE) link_slot(coverage, (uint32_t)slot, witnesses[slot]);
