@@ -336,10 +336,11 @@ typedef struct search {
 
 /* What a look at a patch says. */
 typedef struct finding {
-  double place[3];           /* where found[0] is attained, unless that is 0 */
+  double place[3];           /* where found[0] is attained, unless that is 0, or what is undecided */
   double found[2], bound[2]; /* either side, outside: an attained distance, and a bound of what is done with */
   int children;
-  uint8_t sides; /* what the children are wanted for */
+  bool undecided; /* whether `place`, farther than epsilon, may or may not lie on the boundary */
+  uint8_t sides;  /* what the children are wanted for */
 } finding;
 
 /* How deep all points c + r n lie at least in the hull of the spheres a = (c, r) and b, for the unit vectors n within
@@ -489,6 +490,8 @@ static finding look_at(const search *s, const patch *p) {
     if (s->last || reach <= s->smallest) {
       for (int side = 0; side < 2; side++)
         if (sides >> side & 1) result.bound[side] = bound;
+      result.undecided = !(result.found[0] > s->epsilon) && d > s->epsilon;
+      if (result.undecided) memcpy(result.place, middle, sizeof result.place);
       return result;
     }
   } else if (is_off_boundary(s, is_cell, middle, reach)) {
@@ -618,7 +621,7 @@ static qmat_status search_level(qmat_context *context, const search *s, const pa
       bounds[side]->hi = maximum(bounds[side]->hi, findings[i].bound[side]);
     }
     to->count += (size_t)findings[i].children;
-    if (findings[i].found[0] > s->epsilon && add_far_point(result, findings[i].place))
+    if ((findings[i].found[0] > s->epsilon || findings[i].undecided) && add_far_point(result, findings[i].place))
       return qmat_fail_memory(context, "the envelope's boundary");
   }
   if (qmat_grow((void **)&to->items, &to->capacity, to->count, sizeof *to->items))

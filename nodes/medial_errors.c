@@ -73,9 +73,9 @@ qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *
   qmat_boundary_distance boundary;
   status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, hollow_tolerance, 0, &boundary);
   qmat_envelope_free(envelope);
+  errors->boundary_to_surface = boundary.either_side.hi;
   errors->hollow_count = 0;
   errors->hollows = boundary.far_points;
-  errors->deepest_hollow = boundary.far_count > 0 ? boundary.either_side.lo : 0;
   for (size_t i = 0; i < boundary.far_count; i++)
     if (qmat_surface_inside(surface, &boundary.far_points[3 * i]))
       memmove(&errors->hollows[3 * errors->hollow_count++], &boundary.far_points[3 * i], 3 * sizeof(double));

@@ -9,7 +9,7 @@ typedef struct qmat_medial_errors {
   double surface_to_envelope; /* of F over the surface (eq. 9) */
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
   qmat_cover cover;           /* where the surface is farther than the threshold */
-  double deepest_hollow;      /* that was found; 0: none */
+  double boundary_to_surface; /* of the distance of the envelope's boundary, on either side; 0: not measured */
   size_t hollow_count;
   double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
 } qmat_medial_errors;
@@ -24,8 +24,9 @@ qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface
                                        const double *points, size_t point_count, double tolerance, double enough,
                                        double threshold, qmat_medial_errors *errors);
 
-/* Finds places of the envelope's boundary that lie deeper than `epsilon` in the solid, if there are any (not all of
- * them). QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+/* Bounds how far the envelope's boundary is from the surface on either side, and where that may be more than `epsilon`
+ * finds places of it that lie so deep in the solid (not all of them). QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
+ * threads. */
 qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                      double epsilon, qmat_medial_errors *errors);
 

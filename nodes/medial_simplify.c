@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/node.h"
+#include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
 #include "nodes/simplifier.h"
@@ -11,8 +12,9 @@
 typedef qmat_simplify_params medial_simplify_params;
 
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
- * is repeated, at most this often, with control points in the places found. */
-enum { MOST_ROUNDS = 4 };
+ * is repeated, at most this often, with control points in the places found. Notches and voids of the envelope are
+ * filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
+enum { MOST_ROUNDS = 4, MOST_FILLINGS = 6 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
@@ -21,8 +23,10 @@ typedef struct {
   qmat_surface *surface;
   qmat_control_points control; /* of `dense` */
   qmat_simplification dense;   /* where each round starts */
-  qmat_control_points round_control;
-  qmat_simplification simplification; /* of the round */
+  /* Of the newest round, and of the one that it went on from. */
+  qmat_control_points round_controls[2];
+  qmat_simplification rounds[2];
+  int newest;
 } simplifier;
 
 /* The reported errors are at most this share of epsilon above the true ones, but never below the second share. */
@@ -34,11 +38,32 @@ static const double default_epsilon = 0.01;
 static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
+  const qmat_control_points *control = &s->round_controls[s->newest];
   const qmat_status status =
-      qmat_medial_errors_measure(s->context, s->surface, unit, s->round_control.points, s->round_control.surface_count,
+      qmat_medial_errors_measure(s->context, s->surface, unit, control->points, control->surface_count,
                                  tolerance, least_reported * epsilon, epsilon - tolerance, errors);
   if (status != QMAT_OK || s->params->epsilon == 0 || s->params->error == QMAT_ERROR_ONE_SIDED) return status;
   return qmat_medial_hollows_find(s->context, s->surface, unit, epsilon, errors);
+}
+
+/* Fills notches and voids of the envelope; `left` gets what is still found afterwards, `filled` how many spheres that
+ * took. */
+static qmat_status fill_hollows(const simplifier *s, const qmat_medial_errors *found, qmat_medial *unit,
+                                qmat_medial_errors *left, size_t *filled) {
+  const double epsilon = s->params->epsilon;
+  qmat_status status = QMAT_OK;
+  *left = *found;
+  *filled = 0;
+  for (int i = 0; i < MOST_FILLINGS && left->hollow_count > 0 && status == QMAT_OK; i++) {
+    size_t added;
+    status = qmat_hollows_fill(s->context, s->surface, left->hollows, left->hollow_count, epsilon, unit, &added,
+                               &left->envelope_to_surface);
+    if (status != QMAT_OK || added == 0) break;
+    *filled += added;
+    if (i > 0) qmat_medial_errors_uninit(left);
+    status = qmat_medial_hollows_find(s->context, s->surface, unit, epsilon, left);
+  }
+  return status;
 }
 
 static void swap_lattices(qmat_simplification *a, qmat_simplification *b) {
@@ -76,12 +101,16 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   return status == QMAT_OK ? qmat_simplification_run(dense) : status;
 }
 
-/* Collapses on from the dense part with all control points that are known by now. */
-static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra) {
-  qmat_simplification *round = &s->simplification;
+/* Collapses on from where `from` ended, of which `left` is what is left. */
+static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
+                             const qmat_medial *left, const qmat_extra_points *extra) {
+  s->newest = 1 - s->newest;
+  qmat_simplification *round = &s->rounds[s->newest];
+  qmat_simplification_uninit(round);
   *round = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
-  if (status == QMAT_OK) status = qmat_simplification_resume(&s->dense, extra, &s->round_control, round);
+  if (status == QMAT_OK)
+    status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
   swap_lattices(&s->dense, round);
@@ -91,8 +120,8 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
 }
 
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
-                               int rounds, qmat_report *report) {
-  const qmat_simplification *run = &s->simplification;
+                               int rounds, size_t filled, qmat_report *report) {
+  const qmat_simplification *run = &s->rounds[s->newest];
   const struct {
     const char *name;
     size_t value;
@@ -102,9 +131,10 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
       {"edges", unit->edge_count},
       {"triangles", unit->triangle_count},
       {"rounds", (size_t)rounds},
+      {"filled", filled},
       {"collapses", run->collapses},
       {"moves", run->moves},
-      {"control_points", s->round_control.count},
+      {"control_points", s->round_controls[s->newest].count},
       {"refused_by_surface", run->refused_by_surface},
       {"refused_by_coverage", run->refused_by_coverage},
       {"refused_by_protrusion", run->refused_by_protrusion},
@@ -147,7 +177,7 @@ static bool starts_within(const simplifier *s, double epsilon) {
 
 /* Whether the dense part keeps to the places of a round as well as is wanted of the result. */
 static bool dense_keeps(const simplifier *s, const qmat_extra_points *extra) {
-  const qmat_control_points *base = &s->control, *all = &s->round_control;
+  const qmat_control_points *base = &s->control, *all = &s->round_controls[s->newest];
   for (size_t i = base->surface_count; i < all->surface_count; i++)
     if (!(all->distances[i] <= s->dense.rules.limit)) return false;
   return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
@@ -159,6 +189,8 @@ typedef struct {
   qmat_medial *medial;
   qmat_report *report;
   double fault;
+  bool holds;    /* whether surface and envelope keep within epsilon of each other, as far as it was found */
+  size_t filled; /* how many spheres fill notches and voids */
 } attempt;
 
 static const double topology_fault = 0.05;
@@ -166,22 +198,60 @@ static const double topology_fault = 0.05;
 static void release(attempt *a) {
   qmat_value_release(a->medial ? &a->medial->base : NULL);
   qmat_value_release(a->report ? &a->report->base : NULL);
-  *a = (attempt){NULL, NULL, INFINITY};
+  *a = (attempt){.fault = INFINITY};
 }
 
-static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra,
-                               int round, attempt *a, qmat_medial_errors *errors) {
-  *a = (attempt){qmat_medial_new(), qmat_report_new(), INFINITY};
-  qmat_status status = a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
-  if (status == QMAT_OK) status = run_round(s, state, extra);
-  if (status == QMAT_OK) status = qmat_simplification_extract(&s->simplification, a->medial);
-  if (status == QMAT_OK) status = measure(s, a->medial, errors);
-  if (status == QMAT_OK) status = make_report(s, a->medial, errors, round, a->report);
-  const qmat_simplification *done = &s->simplification;
-  a->fault = fmax(fmax(errors->surface_to_envelope, errors->deepest_hollow), s->params->epsilon);
-  if (done->rules.has_target && done->euler != done->rules.target_euler)
-    a->fault += topology_fault * s->params->epsilon;
-  qmat_simplification_uninit(&s->simplification);
+static bool is_better(const attempt *a, const attempt *best) {
+  return a->fault < best->fault ||
+         (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
+}
+
+/* A round from where `from` ended, of which `left` is what is left; NULL: it is extracted. `found` are the errors
+ * before hollows are filled. */
+static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
+                               const qmat_medial *left, const qmat_extra_points *extra, int round, attempt *a,
+                               qmat_medial_errors *found) {
+  *a = (attempt){.medial = qmat_medial_new(), .report = qmat_report_new(), .fault = INFINITY};
+  *found = (qmat_medial_errors){.surface_to_envelope = 0};
+  qmat_medial *extracted = left ? NULL : qmat_medial_new();
+  qmat_status status =
+      a->medial && a->report && (left || extracted) ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
+  if (status == QMAT_OK && !left) status = qmat_simplification_extract(from, extracted);
+  if (status == QMAT_OK) status = run_round(s, state, from, left ? left : extracted, extra);
+  qmat_value_release(extracted ? &extracted->base : NULL);
+  const qmat_simplification *done = &s->rounds[s->newest];
+  if (status == QMAT_OK) status = qmat_simplification_extract(done, a->medial);
+  if (status == QMAT_OK) status = measure(s, a->medial, found);
+  qmat_medial_errors after = *found;
+  if (status == QMAT_OK) status = fill_hollows(s, found, a->medial, &after, &a->filled);
+  if (status == QMAT_OK) status = make_report(s, a->medial, &after, round, a->filled, a->report);
+  const double epsilon = s->params->epsilon;
+  a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
+  a->holds = a->fault == epsilon;
+  if (a->filled > 0) qmat_medial_errors_uninit(&after);
+  if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
+  return status;
+}
+
+/* Where hollows were filled, collapses go on from there, with their places held: what fills them may be a part of what
+ * was there before. */
+static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *state, int round,
+                                   const qmat_medial_errors *found, attempt *best) {
+  qmat_extra_points hollows = {.held_depth = held_depth_share * s->params->epsilon};
+  qmat_status status = append(s, &hollows.inner, &hollows.inner_count, found->hollows, found->hollow_count);
+  attempt a = {.fault = INFINITY};
+  qmat_medial_errors errors;
+  if (status == QMAT_OK)
+    status = run_attempt(s, state, &s->rounds[s->newest], best->medial, &hollows, round, &a, &errors);
+  else
+    return status;
+  qmat_medial_errors_uninit(&errors);
+  if (status == QMAT_OK && is_better(&a, best)) {
+    release(best);
+    *best = a;
+  } else {
+    release(&a);
+  }
   return status;
 }
 
@@ -194,13 +264,14 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
   qmat_extra_points in_dense = {.held_depth = held_depth_share * epsilon}, extra = in_dense;
   qmat_status status = collapse_dense(s, state, samples, initial, &in_dense);
   for (int round = 1; status == QMAT_OK; round++) {
-    qmat_medial_errors errors = {.surface_to_envelope = 0};
+    qmat_medial_errors errors;
     attempt a;
     const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
-    status = run_attempt(s, state, &extra, round, &a, &errors);
-    const bool is_done = is_last || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    status = run_attempt(s, state, &s->dense, NULL, &extra, round, &a, &errors);
+    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    if (status == QMAT_OK && a.fault < best->fault) {
+    if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a);
+    if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
       *best = a;
     } else {
@@ -290,7 +361,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
   simplifier s = {.context = context, .params = params};
   qmat_initial_medial state = {NULL, NULL, NULL};
-  attempt best = {NULL, NULL, INFINITY};
+  attempt best = {.fault = INFINITY};
   qmat_status status = qmat_simplify_prepare(context, params, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) {
@@ -305,7 +376,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   } else {
     release(&best);
   }
-  qmat_simplification_uninit(&s.simplification);
+  for (int i = 0; i < 2; i++) qmat_simplification_uninit(&s.rounds[i]);
   qmat_simplification_uninit(&s.dense);
   qmat_surface_free(s.surface);
   return status;
@@ -370,7 +441,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 2,
+    .version = 3,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -380,8 +451,9 @@ const qmat_node qmat_node_medial_simplify = {
         "deep "
         "stay inside the envelope, so that it has no hollow. When no edge is left, each is tried with a sphere that is "
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
-        "places between where the surface is too far from the envelope, or a notch of it too deep; the collapses are "
-        "repeated with these. "
+        "places between where the surface is too far from the envelope, and the collapses are repeated with these, and for "
+        "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
+        "on. "
         "With on_exceed=raise both errors are held to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "

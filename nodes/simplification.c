@@ -598,20 +598,18 @@ static void carry_bounds(const qmat_simplification *from, const uint32_t *ids, q
   }
 }
 
-qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_extra_points *extra,
-                                       qmat_control_points *control, qmat_simplification *to) {
+qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_medial *left,
+                                       const qmat_extra_points *extra, qmat_control_points *control,
+                                       qmat_simplification *to) {
   qmat_context *context = from->context;
   qmat_arena *arena = &context->arena;
   const qmat_complex *c = &from->complex;
   uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
-  double *depths = qmat_arena_alloc(arena, c->live_vertices, sizeof *depths);
-  to->quadrics = qmat_arena_alloc(arena, c->live_vertices, sizeof *to->quadrics);
-  qmat_medial *left = qmat_medial_new();
+  double *depths = qmat_arena_alloc(arena, left->sphere_count, sizeof *depths);
+  to->quadrics = qmat_arena_calloc(arena, left->sphere_count, sizeof *to->quadrics);
   qmat_control_points further;
-  qmat_status status = ids && depths && to->quadrics && left ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
-  if (status == QMAT_OK) status = qmat_simplification_extract(from, left);
+  qmat_status status = ids && depths && to->quadrics ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
   if (status == QMAT_OK) status = qmat_complex_init(context, &to->complex, left, NULL);
-  qmat_value_release(left ? &left->base : NULL);
   if (status == QMAT_OK) status = qmat_extra_points_make(context, &to->complex, extra, &further);
   if (status != QMAT_OK) return status;
   uint32_t next = 0;
@@ -621,6 +619,8 @@ qmat_status qmat_simplification_resume(const qmat_simplification *from, const qm
     depths[next] = from->protrusion.depths[v];
     to->quadrics[next++] = from->quadrics[v];
   }
+  for (size_t v = next; v < left->sphere_count; v++)
+    depths[v] = -qmat_surface_signed_distance(from->surface, &left->spheres[4 * v]);
   status = qmat_control_points_join(context, from->control, from->coverage.witnesses, from->coverage.weights, ids,
                                     &further, control);
   if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);

@@ -79,14 +79,16 @@ void qmat_simplification_uninit(qmat_simplification *simplification);
 /* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
 qmat_status qmat_simplification_run(qmat_simplification *simplification);
 
-/* Goes on in `to` where `from` stopped: what is left of the medial mesh, renumbered in its order, with the quadrics,
- * bounds and witnesses that it has, and with `extra` places. `to` has context, surface and rules; `control` gets its
- * control points and has to live as long. `from` stays as it is. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
-qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_extra_points *extra,
-                                       qmat_control_points *control, qmat_simplification *to);
-
 /* What is left, renumbered in the order of the initial medial mesh, still in the unit frame, with the samples that each
  * sphere answers for. `medial` is new and unsealed. QMAT_ERROR_MEMORY. */
 qmat_status qmat_simplification_extract(const qmat_simplification *simplification, qmat_medial *medial);
+
+/* Goes on in `to` where `from` stopped: with `left`, what qmat_simplification_extract gives of it, with the quadrics,
+ * bounds and witnesses that it has. Spheres may have been added behind it, joined by edges, and there may be `extra`
+ * places. `to` has context, surface and rules; `control` gets its control points and has to live as long. `from` stays
+ * as it is. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
+qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_medial *left,
+                                       const qmat_extra_points *extra, qmat_control_points *control,
+                                       qmat_simplification *to);
 
 #endif
