@@ -119,6 +119,14 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
   return status;
 }
 
+static int report_features(const qmat_simplification *run, json_t *root) {
+  const size_t left = qmat_crease_guard_left(&run->creases);
+  if (left == 0) return 0;
+  int bad = json_object_set_new(root, "features", json_integer((json_int_t)left));
+  bad |= json_object_set_new(root, "crease_error", json_real(qmat_crease_guard_error(&run->creases)));
+  return bad;
+}
+
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
                                int rounds, size_t filled, qmat_report *report) {
   const qmat_simplification *run = &s->rounds[s->newest];
@@ -145,6 +153,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   int bad = 0;
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value));
+  bad |= report_features(run, report->root);
   bad |= json_object_set_new(report->root, "euler_characteristic", json_integer((json_int_t)run->euler));
   if (run->rules.has_target)
     bad |= json_object_set_new(report->root, "euler_characteristic_of_solid",
@@ -312,6 +321,7 @@ static qmat_status report_in_order(qmat_context *context, const qmat_ordered_col
   bad |= set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
   bad |= set_count(root, "refused_by_protection", run->refused_by_protection);
   bad |= set_count(root, "refused_by_topology", run->refused_by_topology);
+  bad |= report_features(run, root);
   bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
   if (run->rules.has_target)
     bad |=
@@ -441,7 +451,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 3,
+    .version = 4,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -449,7 +459,9 @@ const qmat_node qmat_node_medial_simplify = {
         "errors stay below epsilon: from the surface to the envelope at the samples and a grid of control points, and "
         "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
         "deep "
-        "stay inside the envelope, so that it has no hollow. When no edge is left, each is tried with a sphere that is "
+        "stay inside the envelope, so that it has no hollow. Spheres of radius zero are sharp features: corners stay, "
+        "creases between them are thinned as polylines that keep within epsilon. When no edge is left, each is tried "
+        "with a sphere that is "
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
         "places between where the surface is too far from the envelope, and the collapses are repeated with these, and for "
         "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
@@ -464,7 +476,8 @@ const qmat_node qmat_node_medial_simplify = {
         "larger end, and the cost is the distance of the centres over the difference of the radii. With compat=qmat "
         "new spheres are the optimum wherever it lies, else the middle; its boundary terms are those of the public "
         "code (the virtual sphere of edges without slabs, which depends on the origin, is taken about the centre of "
-        "the bounding box), k is 1e-5, the topology is free, and there is no inside test and no bound.",
+        "the bounding box), k is 1e-5, the topology is free, no feature is kept, and there is no inside test and no "
+        "bound.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(medial_simplify_params),
     .params = params,

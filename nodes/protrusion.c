@@ -222,6 +222,7 @@ bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_comp
                                     const qmat_collapse *collapse, const double sphere[4]) {
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
+    if (sphere[3] == 0 && other[3] == 0) continue; /* a crease, which lies on the surface */
     const double half = 0.5 * distance(sphere, other);
     if (half < protrusion->sphere_depth || half < protrusion->depths[collapse->neighbours[n]]) continue;
     double middle[3], gap;

@@ -37,8 +37,8 @@ void qmat_protrusion_uninit(qmat_protrusion *protrusion);
 bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
                                  const qmat_collapse *collapse, const double sphere[4]);
 
-/* Whether the midpoint of every edge of the merged vertex lies inside the model (section 3.4). Call it after
- * qmat_protrusion_test_sphere. */
+/* Whether the midpoint of every edge of the merged vertex lies inside the model (section 3.4), but for edges of two
+ * spheres of radius zero, which are creases of its surface. Call it after qmat_protrusion_test_sphere. */
 bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_complex *complex,
                                     const qmat_collapse *collapse, const double sphere[4]);
 

@@ -68,11 +68,22 @@ static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_c
   return QMAT_OK;
 }
 
+/* What an edge at sharp features may collapse to, whatever is held; where there is nothing the candidates stay. */
+static void prefer_features(const qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
+  qmat_candidates allowed;
+  double asked;
+  if (s->rules.cost == QMAT_COST_SLAB &&
+      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &asked) &&
+      allowed.count > 0)
+    *c = allowed;
+}
+
 /* The cost of the best candidate. */
 static qmat_status set_cost(qmat_simplification *s, uint32_t edge) {
   qmat_candidates c;
   const qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
+  prefer_features(s, edge, &c);
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   const double *a = &s->complex.spheres[4 * (size_t)ends[0]], *b = &s->complex.spheres[4 * (size_t)ends[1]];
   const bool slab = s->rules.cost == QMAT_COST_SLAB;
@@ -148,6 +159,10 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
       qmat_medial_quadrics_add_published(c, s->quadrics);
     else
       qmat_medial_quadrics_add(c, s->quadrics);
+    if (s->rules.features == QMAT_FEATURES_SHARP) {
+      const qmat_status status = qmat_crease_guard_init(context, c, &s->creases);
+      if (status != QMAT_OK) return status;
+    }
   }
   /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
   const double limit = s->rules.share * s->rules.limit;
@@ -252,11 +267,19 @@ static bool is_inner(const qmat_simplification *s, size_t point) {
   return point >= s->control->surface_count;
 }
 
-/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may.
+/* Whether the newest preview merges into a sharp feature. */
+static bool merges_feature(const qmat_simplification *s) {
+  return qmat_crease_guard_is_feature(&s->creases, s->collapse.kept) ||
+         qmat_crease_guard_is_feature(&s->creases, s->collapse.removed);
+}
+
+/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may. A
+ * sharp feature lies on the surface.
  */
 static outcome test_inside(qmat_simplification *s, const double *sphere) {
-  const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere);
-  const bool inside = s->rules.published || s->protrusion.sphere_depth > 0;
+  const bool on_surface = merges_feature(s);
+  const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) || on_surface;
+  const bool inside = s->rules.published || on_surface || s->protrusion.sphere_depth > 0;
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
   if (!s->rules.published && !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere))
     return REFUSED;
@@ -320,6 +343,7 @@ static qmat_status commit(qmat_simplification *s, const double *sphere) {
   else
     s->protrusion.depths[s->collapse.kept] = s->protrusion.sphere_depth;
   qmat_coverage_commit(&s->coverage, &s->collapse);
+  qmat_crease_guard_commit(&s->creases, &s->complex, &s->collapse, sphere);
   return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
 }
 
@@ -356,8 +380,15 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   *result = REFUSED;
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
-  bool bound = false;
-  if (s->protecting && !apply_protection(s, edge, &c, &bound)) {
+  double asked;
+  bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, s->held, &c, &asked);
+  if (bound && c.count == 0) {
+    s->refused_by_protection++;
+    s->asked[edge] = asked;
+    if (asked < INFINITY) *result = EXCEEDED;
+    return QMAT_OK;
+  }
+  if (!bound && s->protecting && !apply_protection(s, edge, &c, &bound)) {
     s->refused_by_protection++;
     return QMAT_OK;
   }
@@ -369,8 +400,7 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
     return QMAT_OK;
   }
   bool exceeded = false;
-  double asked;
-  s->asked[edge] = INFINITY;
+  s->asked[edge] = bound ? asked : INFINITY;
   const double *sphere = NULL;
   const bool fits = s->fitting && !bound;
   for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
@@ -466,7 +496,9 @@ static const double least_gain = 0.02;
 static qmat_status refit(qmat_simplification *s, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
-    if (!s->complex.vertex_alive[v] || (s->protecting && is_protected(s, v))) continue;
+    if (!s->complex.vertex_alive[v] || (s->protecting && is_protected(s, v)) ||
+        qmat_crease_guard_is_feature(&s->creases, v))
+      continue;
     qmat_status status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
       status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
@@ -621,6 +653,8 @@ qmat_status qmat_simplification_resume(const qmat_simplification *from, const qm
   }
   for (size_t v = next; v < left->sphere_count; v++)
     depths[v] = -qmat_surface_signed_distance(from->surface, &left->spheres[4 * v]);
+  status = qmat_crease_guard_renumber(context, &from->creases, ids, left->sphere_count, &to->creases);
+  if (status != QMAT_OK) return status;
   status = qmat_control_points_join(context, from->control, from->coverage.witnesses, from->coverage.weights, ids,
                                     &further, control);
   if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);

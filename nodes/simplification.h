@@ -7,6 +7,7 @@
 #include "nodes/collapse_cost.h"
 #include "nodes/control_points.h"
 #include "nodes/coverage.h"
+#include "nodes/crease_guard.h"
 #include "nodes/edge_heap.h"
 #include "nodes/medial_quadrics.h"
 #include "nodes/protrusion.h"
@@ -15,6 +16,7 @@
 typedef enum { QMAT_ERROR_TWO_SIDED, QMAT_ERROR_ONE_SIDED } qmat_error_kind;
 typedef enum { QMAT_EXCEED_SKIP, QMAT_EXCEED_STOP, QMAT_EXCEED_RAISE } qmat_exceed_rule;
 typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_protection;
+typedef enum { QMAT_FEATURES_NONE, QMAT_FEATURES_SHARP } qmat_feature_rule;
 typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
 
 /* What collapses are allowed, and when they end. */
@@ -31,6 +33,7 @@ typedef struct qmat_simplification_rules {
   qmat_exceed_rule on_exceed;
   qmat_topology_policy topology;
   qmat_protection protect;
+  qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
   int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
   const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
   bool has_target;     /* whether the solid's Euler characteristic is known */
@@ -56,6 +59,7 @@ typedef struct qmat_simplification {
   qmat_protrusion protrusion;
   qmat_collapse collapse;
   qmat_sphere_fit fit;
+  qmat_crease_guard creases;
   double held;             /* what both errors are held to now; INFINITY: nothing is held */
   int level;               /* of it, where it rises */
   qmat_collapse_log log;   /* every collapse, where what is held rises */

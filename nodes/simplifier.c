@@ -11,6 +11,7 @@ const char *const qmat_cost_choices[] = {"slab", "hausdorff", "pmat", NULL};
 const char *const qmat_compat_choices[] = {"off", "qmat", NULL};
 const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
+const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
 /* The control points of collapses in order, which are there for any epsilon, are those of so many times the finest. */
 static const double control_error = 2;
@@ -52,6 +53,7 @@ static void apply_compatibility(qmat_simplify_params *p) {
   p->on_exceed = QMAT_EXCEED_STOP;
   p->topology = QMAT_TOPOLOGY_FREE;
   p->protect = QMAT_PROTECT_OFF;
+  p->features = QMAT_FEATURES_NONE;
 }
 
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,
@@ -115,6 +117,7 @@ qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_param
                                        .on_exceed = (qmat_exceed_rule)p->on_exceed,
                                        .topology = (qmat_topology_policy)p->topology,
                                        .protect = (qmat_protection)p->protect,
+                                       .features = (qmat_feature_rule)p->features,
                                        .refits = (int)p->refits,
                                        .thin = initial->thin,
                                        .has_target = mesh->closed && mesh->oriented};

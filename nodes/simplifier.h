@@ -14,7 +14,7 @@ typedef struct qmat_simplify_params {
   int64_t vertices;
   double most_cost;
   int cost, compat; /* a qmat_cost_kind, a qmat_compatibility */
-  int error, on_exceed, topology, protect;
+  int error, on_exceed, topology, protect, features;
   double finest;
   double theta;
   double k;
@@ -23,7 +23,8 @@ typedef struct qmat_simplify_params {
 
 extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *const qmat_compat_choices[],
                                                                                *const qmat_topology_choices[],
-                                                                                   *const qmat_protect_choices[];
+                                                                                   *const qmat_protect_choices[],
+                                                                                       *const qmat_feature_choices[];
 
 /* The rows of the parameters that both nodes have. */
 #define QMAT_ERROR_PARAM                                                                                    \
@@ -63,8 +64,8 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
       {.name = "compat",                                                                                          \
        .unit = "",                                                                                                \
        .doc =                                                                                                     \
-           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology and protect; the " \
-           "stop is vertices",                                                                                    \
+           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "     \
+           "features; the stop is vertices",                                                                      \
        .type = QMAT_PARAM_ENUM,                                                                                   \
        .default_number = QMAT_COMPAT_OFF,                                                                         \
        .choices = qmat_compat_choices,                                                                            \
@@ -85,6 +86,13 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
        .default_number = QMAT_PROTECT_OFF,                                                                        \
        .choices = qmat_protect_choices,                                                                           \
        .offset = offsetof(qmat_simplify_params, protect)},                                                        \
+      {.name = "features",                                                                                        \
+       .unit = "",                                                                                                \
+       .doc = "Spheres of radius zero, as medial.features makes them, are like others, or stay on their creases", \
+       .type = QMAT_PARAM_ENUM,                                                                                   \
+       .default_number = QMAT_FEATURES_SHARP,                                                                     \
+       .choices = qmat_feature_choices,                                                                           \
+       .offset = offsetof(qmat_simplify_params, features)},                                                       \
       {.name = "theta",                                                                                           \
        .unit = "mean thickness",                                                                                  \
        .doc =                                                                                                     \
