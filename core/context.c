@@ -86,6 +86,13 @@ qmat_status qmat_fail_hint(qmat_context *context, const char *format, ...) {
   return context->error.status;
 }
 
+qmat_status qmat_fail_within(qmat_context *context, const char *what) {
+  char text[sizeof context->error.message + 256];
+  snprintf(text, sizeof text, "%.200s: %s", what, context->error.message);
+  copy_text(context->error.message, sizeof context->error.message, text);
+  return context->error.status;
+}
+
 qmat_status qmat_fail_memory(qmat_context *context, const char *what) {
   return qmat_fail(context, QMAT_ERROR_MEMORY, "not enough memory for %s", what);
 }

@@ -71,6 +71,9 @@ qmat_status qmat_fail_element(qmat_context *context, const char *kind, int64_t e
 qmat_status qmat_fail_at(qmat_context *context, const char *file, int line, int column);
 qmat_status qmat_fail_hint(qmat_context *context, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Puts "what: " before the newest error's message: which of several things the error is of. */
+qmat_status qmat_fail_within(qmat_context *context, const char *what);
+
 /* QMAT_ERROR_MEMORY with the usual message; `what` names what did not fit ("samples"). */
 qmat_status qmat_fail_memory(qmat_context *context, const char *what);
 

@@ -361,15 +361,19 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
   return node->check != NULL ? node->check(context, params) : QMAT_OK;
 }
 
+static bool fits(const qmat_port *port, const qmat_value *value) {
+  return value->type == port->type || (port->list && qmat_value_item_type(value) == port->type);
+}
+
 static qmat_status check_inputs(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[]) {
   for (size_t i = 0; i < qmat_input_count(node); ++i) {
     const qmat_port *port = &node->inputs[i];
     const qmat_value *value = inputs[i];
     if (value == NULL && port->optional) continue;
-    if (value != NULL && value->sealed && value->type == port->type) continue;
+    if (value != NULL && value->sealed && fits(port, value)) continue;
     if (value == NULL) {
       qmat_fail(context, QMAT_ERROR_USAGE, "a %s must be given", qmat_value_type_name(port->type));
-    } else if (value->type != port->type) {
+    } else if (value->sealed && !fits(port, value)) {
       qmat_fail(context, QMAT_ERROR_USAGE, "a %s is given, not a %s", qmat_value_type_name(value->type),
                 qmat_value_type_name(port->type));
     } else {
@@ -382,7 +386,7 @@ static qmat_status check_inputs(qmat_context *context, const qmat_node *node, co
 
 static qmat_status check_outputs(qmat_context *context, const qmat_node *node, qmat_value *const outputs[]) {
   for (size_t i = 0; i < qmat_output_count(node); ++i) {
-    if (outputs[i] != NULL && outputs[i]->sealed && outputs[i]->type == node->outputs[i].type) continue;
+    if (outputs[i] != NULL && outputs[i]->sealed && fits(&node->outputs[i], outputs[i])) continue;
     qmat_fail(context, QMAT_ERROR_INTERNAL, "the node did not make its output '%s'", node->outputs[i].name);
     return qmat_fail_field(context, node->outputs[i].name);
   }

@@ -45,6 +45,9 @@ typedef struct qmat_port {
   qmat_value_type type;
   bool optional; /* an input that may stay unconnected: the node sees NULL */
   const char *doc;
+  /* An output that may be a list of this type; an input that takes a list whole. Where any other input is given a list,
+   * the node runs once for each of its values. */
+  bool list;
 } qmat_port;
 
 /* A library beneath whose version may change the bytes that a node makes. */

@@ -18,15 +18,17 @@ enum { FORM_VERSION = 1, JSON_FLAGS = JSON_SORT_KEYS | JSON_COMPACT | JSON_REAL_
 
 /* The numbers are part of the binary form. */
 typedef enum element {
-  ELEMENT_U32 = 2,    /* array of uint32_t */
-  ELEMENT_F64 = 3,    /* array of double */
-  ELEMENT_TEXT = 4,   /* char *, NUL-terminated */
-  ELEMENT_JSON = 5,   /* json_t *, an object */
-  ELEMENT_BOOL = 6,   /* bool, one byte 0 or 1 */
-  ELEMENT_ENUM = 7,   /* an enum, as u32 */
-  ELEMENT_SIZE = 8,   /* size_t that is no row's count, as u64 */
-  ELEMENT_PARTS = 9,  /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
-  ELEMENT_NUMBER = 10 /* one double */
+  ELEMENT_U32 = 2,     /* array of uint32_t */
+  ELEMENT_F64 = 3,     /* array of double */
+  ELEMENT_TEXT = 4,    /* char *, NUL-terminated */
+  ELEMENT_JSON = 5,    /* json_t *, an object */
+  ELEMENT_BOOL = 6,    /* bool, one byte 0 or 1 */
+  ELEMENT_ENUM = 7,    /* an enum, as u32 */
+  ELEMENT_SIZE = 8,    /* size_t that is no row's count, as u64 */
+  ELEMENT_PARTS = 9,   /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
+  ELEMENT_NUMBER = 10, /* one double */
+  ELEMENT_ITEMS = 11,  /* qmat_value * array: per value u64 size and its binary form */
+  ELEMENT_NAMES = 12   /* char * array: texts */
 } element;
 
 typedef struct row {
@@ -44,8 +46,13 @@ typedef struct row {
 #define END \
   { NULL, ELEMENT_U32, 0, 0, 0 }
 
-static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT), SCALAR(qmat_scene, format, TEXT),
-                                 SCALAR(qmat_scene, meters_per_unit, NUMBER), SCALAR(qmat_scene, is_z_up, BOOL), END};
+static const row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
+                                 SCALAR(qmat_scene, format, TEXT),
+                                 SCALAR(qmat_scene, meters_per_unit, NUMBER),
+                                 SCALAR(qmat_scene, is_z_up, BOOL),
+                                 ARRAY(qmat_scene, parts, PARTS, part_count, 1),
+                                 ARRAY(qmat_scene, meshes, U32, mesh_count, 1),
+                                 END};
 static const row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),
                                 ARRAY(qmat_mesh, triangles, U32, triangle_count, 3),
                                 SCALAR(qmat_mesh, closed, BOOL),
@@ -80,6 +87,8 @@ static const row chain_rows[] = {
     ARRAY(qmat_chain, errors, F64, collapse_count, 1),    END};
 static const row report_rows[] = {SCALAR(qmat_report, root, JSON), END};
 static const row file_rows[] = {SCALAR(qmat_file, format, TEXT), ARRAY(qmat_file, parts, PARTS, part_count, 1), END};
+static const row list_rows[] = {ARRAY(qmat_list, items, ITEMS, count, 1), ARRAY(qmat_list, names, NAMES, count, 1),
+                                END};
 
 static qmat_status check_scene(qmat_context *context, const qmat_value *value);
 static qmat_status check_mesh(qmat_context *context, const qmat_value *value);
@@ -89,6 +98,7 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value);
 static qmat_status check_chain(qmat_context *context, const qmat_value *value);
 static qmat_status check_report(qmat_context *context, const qmat_value *value);
 static qmat_status check_file(qmat_context *context, const qmat_value *value);
+static qmat_status check_list(qmat_context *context, const qmat_value *value);
 
 typedef struct value_type {
   const char *name;
@@ -106,6 +116,7 @@ static const value_type value_types[QMAT_VALUE_TYPE_COUNT] = {
     [QMAT_CHAIN] = {"chain", sizeof(qmat_chain), chain_rows, check_chain},
     [QMAT_REPORT] = {"report", sizeof(qmat_report), report_rows, check_report},
     [QMAT_FILE] = {"file", sizeof(qmat_file), file_rows, check_file},
+    [QMAT_LIST] = {"list", sizeof(qmat_list), list_rows, check_list},
 };
 
 _Static_assert(sizeof(double) == 8 && sizeof(qmat_domain) == 4, "the sizes that the binary form takes for granted");
@@ -127,6 +138,9 @@ static size_t element_size(element kind) {
       return 8;
     case ELEMENT_PARTS:
       return sizeof(qmat_file_part);
+    case ELEMENT_ITEMS:
+    case ELEMENT_NAMES:
+      return sizeof(void *);
     default:
       return 0;
   }
@@ -208,6 +222,32 @@ qmat_file *qmat_file_new(void) {
   return value_new(QMAT_FILE);
 }
 
+qmat_list *qmat_list_new(size_t count) {
+  qmat_list *list = value_new(QMAT_LIST);
+  if (list == NULL) return NULL;
+  list->items = qmat_calloc(count, sizeof *list->items);
+  list->names = qmat_calloc(count, sizeof *list->names);
+  if (list->items != NULL && list->names != NULL) {
+    list->count = count;
+    return list;
+  }
+  qmat_value_release(&list->base);
+  return NULL;
+}
+
+size_t qmat_value_count(const qmat_value *value) {
+  if (value == NULL) return 0;
+  return value->type == QMAT_LIST ? ((const qmat_list *)value)->count : 1;
+}
+
+const qmat_value *qmat_value_at(const qmat_value *value, size_t index) {
+  return value->type == QMAT_LIST ? ((const qmat_list *)value)->items[index] : value;
+}
+
+qmat_value_type qmat_value_item_type(const qmat_value *value) {
+  return qmat_value_at(value, 0)->type;
+}
+
 char *qmat_strdup(const char *text) {
   const size_t size = strlen(text) + 1;
   char *copy = qmat_alloc(size, 1);
@@ -237,6 +277,10 @@ void qmat_value_release(qmat_value *value) {
         qmat_free(parts[i].bytes);
       }
     }
+    for (size_t i = 0; r->element == ELEMENT_ITEMS && pointer != NULL && i < count_of(value, r); ++i)
+      qmat_value_release(((qmat_value **)pointer)[i]);
+    for (size_t i = 0; r->element == ELEMENT_NAMES && pointer != NULL && i < count_of(value, r); ++i)
+      qmat_free(((char **)pointer)[i]);
     qmat_free(pointer);
   }
   qmat_free(value);
@@ -329,6 +373,8 @@ static int put_json(const char *text, size_t size, void *to) {
   return 0;
 }
 
+static bool write_rows(sink *to, const qmat_value *value);
+
 /* The bytes of one row's content. False when the JSON cannot be written. */
 static bool write_content(sink *to, const qmat_value *value, const row *r) {
   const void *place = slot(value, r->offset);
@@ -367,6 +413,21 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
       }
       return true;
     }
+    case ELEMENT_ITEMS: {
+      qmat_value *const *items = pointer_of(value, r);
+      for (size_t i = 0; i < count_of(value, r); ++i) {
+        sink size = {0};
+        if (!write_rows(&size, items[i])) return false;
+        put_u64(to, size.used);
+        if (!write_rows(to, items[i])) return false;
+      }
+      return true;
+    }
+    case ELEMENT_NAMES: {
+      char *const *names = pointer_of(value, r);
+      for (size_t i = 0; i < count_of(value, r); ++i) put_text(to, names[i]);
+      return true;
+    }
   }
   return false;
 }
@@ -394,6 +455,11 @@ size_t qmat_value_bytes(const qmat_value *value) {
     if (r->element == ELEMENT_PARTS) {
       const qmat_file_part *parts = pointer_of(value, r);
       for (size_t i = 0; i < count_of(value, r); ++i) bytes += parts[i].size;
+    } else if (r->element == ELEMENT_ITEMS || r->element == ELEMENT_NAMES) {
+      for (size_t i = 0; r->element == ELEMENT_ITEMS && i < count_of(value, r); ++i) {
+        const qmat_value *item = ((qmat_value *const *)pointer_of(value, r))[i];
+        if (item != NULL) bytes += qmat_value_bytes(item);
+      }
     } else {
       sink size = {0};
       write_content(&size, value, r);
@@ -441,6 +507,11 @@ static qmat_status check_rows(qmat_context *context, const qmat_value *value) {
     if (count > SIZE_MAX / (8 * r->components * element_size(r->element)) || (count > 0 && pointer == NULL)) {
       qmat_fail(context, QMAT_ERROR_INTERNAL, "a %s counts %zu %s but holds none", type, count, r->name);
       return qmat_fail_field(context, r->name);
+    }
+    for (size_t i = 0; (r->element == ELEMENT_ITEMS || r->element == ELEMENT_NAMES) && i < count; ++i) {
+      if (((void *const *)pointer)[i] != NULL) continue;
+      qmat_fail(context, QMAT_ERROR_INTERNAL, "an item of a list is missing or has no name");
+      return qmat_fail_element(context, "item", (int64_t)i);
     }
     if (r->element != ELEMENT_PARTS) continue;
     const qmat_file_part *parts = pointer;
@@ -527,13 +598,62 @@ static qmat_status check_utf8(qmat_context *context, const char *text, const cha
   return qmat_fail(context, QMAT_ERROR_FORMAT, "the %s is not valid UTF-8", what);
 }
 
+bool qmat_is_part_name(const char *name) {
+  if (strchr(name, '\\') != NULL || strlen(name) > 255) return false;
+  for (const char *step = name;; ++step) {
+    const size_t length = strcspn(step, "/");
+    if (length == 0 || (length == 1 && step[0] == '.') || (length == 2 && step[0] == '.' && step[1] == '.'))
+      return false;
+    step += length;
+    if (*step == '\0') return true;
+  }
+}
+
+static int compare_part_names(const void *a, const void *b) {
+  const qmat_file_part *first = *(const qmat_file_part *const *)a, *second = *(const qmat_file_part *const *)b;
+  const int order = strcmp(first->name, second->name);
+  return order != 0 ? order : (first > second) - (first < second); /* equal names: by their place in the file */
+}
+
+/* The main part has no name, the others have different ones. */
+static qmat_status check_parts(qmat_context *context, const qmat_file_part *parts, size_t part_count) {
+  for (size_t i = 0; i < part_count; ++i) {
+    const char *name = parts[i].name;
+    const qmat_status status = check_utf8(context, name, "name");
+    if (status != QMAT_OK) return fail_element(context, "part", i);
+    if ((name[0] == '\0') != (i == 0)) {
+      qmat_fail(context, QMAT_ERROR_FORMAT, i == 0 ? "the main part has a name of its own" : "it has no name");
+      return fail_element(context, "part", i);
+    }
+    if (i > 0 && !qmat_is_part_name(name)) {
+      qmat_fail(context, QMAT_ERROR_FORMAT, "its name '%s' is no path below the main part's folder", name);
+      return fail_element(context, "part", i);
+    }
+  }
+  const qmat_file_part **sorted = qmat_alloc(part_count, sizeof *sorted);
+  if (sorted == NULL) return qmat_fail_memory(context, "the names of a file's parts");
+  for (size_t i = 0; i < part_count; ++i) sorted[i] = &parts[i];
+  qsort(sorted, part_count, sizeof *sorted, compare_part_names);
+  size_t repeated = SIZE_MAX;
+  for (size_t i = 1; i < part_count; ++i) {
+    const size_t part = (size_t)(sorted[i] - parts);
+    if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && part < repeated) repeated = part;
+  }
+  qmat_free(sorted);
+  if (repeated == SIZE_MAX) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_FORMAT, "the name '%s' was given before", parts[repeated].name);
+  return fail_element(context, "part", repeated);
+}
+
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   const qmat_scene *scene = (const qmat_scene *)value;
   const qmat_status status = check_utf8(context, scene->name, "name of the scene");
   if (status == QMAT_OK && !(scene->meters_per_unit >= 0 && isfinite(scene->meters_per_unit))) {
     return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the unit of the scene is no length");
   }
-  return status != QMAT_OK ? status : check_utf8(context, scene->format, "format of the scene");
+  if (status != QMAT_OK) return status;
+  const qmat_status of_format = check_utf8(context, scene->format, "format of the scene");
+  return of_format != QMAT_OK ? of_format : check_parts(context, scene->parts, scene->part_count);
 }
 
 /* Every id of an array is below `count`; names the first group of `components` that is not. */
@@ -821,42 +941,25 @@ static qmat_status check_report(qmat_context *context, const qmat_value *value) 
   return qmat_fail(context, QMAT_ERROR_INTERNAL, "the root of a report is not a JSON object");
 }
 
-static int compare_part_names(const void *a, const void *b) {
-  const qmat_file_part *first = *(const qmat_file_part *const *)a, *second = *(const qmat_file_part *const *)b;
-  const int order = strcmp(first->name, second->name);
-  return order != 0 ? order : (first > second) - (first < second); /* equal names: by their place in the file */
-}
-
 static qmat_status check_file(qmat_context *context, const qmat_value *value) {
   const qmat_file *file = (const qmat_file *)value;
   if (file->part_count == 0) return qmat_fail(context, QMAT_ERROR_INTERNAL, "a file has no main part");
-  for (size_t i = 0; i < file->part_count; ++i) {
-    const char *name = file->parts[i].name;
-    const qmat_status status = check_utf8(context, name, "name");
-    if (status != QMAT_OK) return fail_element(context, "part", i);
-    if ((name[0] == '\0') != (i == 0)) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, i == 0 ? "the main part has a name of its own" : "it has no name");
-      return fail_element(context, "part", i);
+  return check_parts(context, file->parts, file->part_count);
+}
+
+static qmat_status check_list(qmat_context *context, const qmat_value *value) {
+  const qmat_list *list = (const qmat_list *)value;
+  if (list->count < 2)
+    return qmat_fail(context, QMAT_ERROR_INTERNAL, "a list has %zu items, not two or more", list->count);
+  for (size_t i = 0; i < list->count; ++i) {
+    const qmat_value *item = list->items[i];
+    if (!item->sealed || item->type == QMAT_LIST || item->type != list->items[0]->type) {
+      qmat_fail(context, QMAT_ERROR_INTERNAL, "it is a list, not sealed, or not of the type of the others");
+      return fail_element(context, "item", i);
     }
-    /* A name must not lead out of the folder that the main part is written to. */
-    if (strpbrk(name, "/\\") != NULL || strcmp(name, ".") == 0 || strcmp(name, "..") == 0 || strlen(name) > 255) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, "its name '%s' is not a plain file name", name);
-      return fail_element(context, "part", i);
-    }
+    if (check_utf8(context, list->names[i], "name") != QMAT_OK) return fail_element(context, "item", i);
   }
-  const qmat_file_part **sorted = qmat_alloc(file->part_count, sizeof *sorted);
-  if (sorted == NULL) return qmat_fail_memory(context, "the names of a file's parts");
-  for (size_t i = 0; i < file->part_count; ++i) sorted[i] = &file->parts[i];
-  qsort(sorted, file->part_count, sizeof *sorted, compare_part_names);
-  size_t repeated = SIZE_MAX;
-  for (size_t i = 1; i < file->part_count; ++i) {
-    const size_t part = (size_t)(sorted[i] - file->parts);
-    if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && part < repeated) repeated = part;
-  }
-  qmat_free(sorted);
-  if (repeated == SIZE_MAX) return QMAT_OK;
-  qmat_fail(context, QMAT_ERROR_FORMAT, "the name '%s' was given before", file->parts[repeated].name);
-  return fail_element(context, "part", repeated);
+  return QMAT_OK;
 }
 
 /* Reading the binary form. */
@@ -975,6 +1078,50 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   return QMAT_OK;
 }
 
+/* Grows an array of pointers that is owned by a list by one. */
+static void **add_pointer(qmat_value *value, const row *r, size_t *capacity, size_t count) {
+  void *array = pointer_of(value, r);
+  if (qmat_grow(&array, capacity, count + 1, sizeof(void *)) != 0) return NULL;
+  set_pointer(value, r, array);
+  ((void **)array)[count] = NULL;
+  return (void **)array + count;
+}
+
+static qmat_status read_items(qmat_context *context, reader *from, qmat_value *value, const row *r) {
+  size_t *count = mutable_slot(value, r->count_offset), capacity = 0;
+  while (from->used < from->size) {
+    uint64_t size;
+    const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
+    if (bytes == NULL) return fail_form(context, from, "an item is longer than what is left");
+    /* Lists hold no lists, which also bounds the depth. */
+    static const uint8_t list_start[] = {4, 0, 0, 0, 'l', 'i', 's', 't'};
+    if (size >= 16 && memcmp(bytes + 8, list_start, sizeof list_start) == 0)
+      return fail_form(context, from, "an item is a list");
+    void **place = add_pointer(value, r, &capacity, *count);
+    if (place == NULL) return qmat_fail_memory(context, "the items of a list");
+    qmat_value *item;
+    const qmat_status status = qmat_value_deserialize(context, bytes, (size_t)size, &item);
+    if (status != QMAT_OK) return status;
+    *place = item;
+    ++*count;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status read_names(qmat_context *context, reader *from, qmat_value *value, const row *r) {
+  const size_t count = count_of(value, r);
+  char **names = qmat_calloc(count, sizeof *names);
+  if (names == NULL) return qmat_fail_memory(context, "the names of a list");
+  set_pointer(value, r, names);
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t size;
+    if (!take_u32(from, &size)) return fail_form(context, from, "there are fewer names than items");
+    const qmat_status status = take_string(context, from, size, &names[i]);
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
 static qmat_status read_json(qmat_context *context, reader *from, qmat_value *value, const row *r) {
   json_error_t error;
   const uint8_t *bytes = take(from, from->size);
@@ -1003,6 +1150,10 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
       return read_json(context, from, value, r);
     case ELEMENT_PARTS:
       return read_parts(context, from, value, r);
+    case ELEMENT_ITEMS:
+      return read_items(context, from, value, r);
+    case ELEMENT_NAMES:
+      return read_names(context, from, value, r);
     case ELEMENT_BOOL:
       byte = take(from, 1);
       if (byte == NULL || *byte > 1) return fail_form(context, from, "a flag is neither 0 nor 1");

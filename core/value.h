@@ -25,6 +25,7 @@ typedef enum qmat_value_type {
   QMAT_CHAIN,
   QMAT_REPORT,
   QMAT_FILE,
+  QMAT_LIST,
   QMAT_VALUE_TYPE_COUNT
 } qmat_value_type;
 
@@ -35,13 +36,24 @@ typedef struct qmat_value {
   qmat_digest digest; /* of the content; set by qmat_value_seal */
 } qmat_value;
 
-/* Where a value came from, and its name. */
+/* The bytes of a file, or of one that it refers to. */
+typedef struct qmat_file_part {
+  char *name; /* "" for the main part, whose name the user chooses; else what qmat_is_part_name takes */
+  size_t size;
+  uint8_t *bytes;
+} qmat_file_part;
+
+/* Where a value came from, and its name; of glTF the whole asset, so that it can be handed on. */
 typedef struct qmat_scene {
   qmat_value base;
   char *name;             /* NUL-terminated UTF-8: the file's base name without its ending */
   char *format;           /* "off", "obj", "ply", "stl", "gltf", "glb", "ma", "usd" */
   double meters_per_unit; /* of the model's unit of length; 0: not known */
   bool is_z_up;           /* else y is up, or it is not known */
+  size_t part_count;      /* 0: the asset is not kept */
+  qmat_file_part *parts;  /* the file as it was read, then those beside it that it refers to */
+  size_t mesh_count;      /* 0: all meshes were placed as one */
+  uint32_t *meshes;       /* mesh_count: the asset's meshes that were read, each in its own space */
 } qmat_scene;
 
 /* How a surface of a cage is subdivided, and what its border does: as USD says it. */
@@ -145,18 +157,21 @@ typedef struct qmat_report {
 } qmat_report;
 
 /* A finished file in memory: the main part first, then the files it refers to by relative name. */
-typedef struct qmat_file_part {
-  char *name; /* "" for the main part, whose name the user chooses; else a relative name without directories */
-  size_t size;
-  uint8_t *bytes;
-} qmat_file_part;
-
 typedef struct qmat_file {
   qmat_value base;
   char *format; /* "glb", "gltf", "ma", "ply", "usda", "usdz" */
   size_t part_count;
   qmat_file_part *parts;
 } qmat_file;
+
+/* Values of one type, and what each is of: the meshes of a scene, and all that is made of each of them. Two at least: a
+ * list of one is the value itself. */
+typedef struct qmat_list {
+  qmat_value base;
+  size_t count;
+  qmat_value **items; /* sealed, owned */
+  char **names;       /* count: UTF-8; need not differ */
+} qmat_list;
 
 /* Makes an empty, unsealed value of one reference; NULL when memory is short. Fill it with qmat_alloc'd arrays and
  * strings, which it then owns, and seal it. A report starts with an empty JSON object. */
@@ -168,6 +183,18 @@ qmat_medial *qmat_medial_new(void);
 qmat_chain *qmat_chain_new(void);
 qmat_report *qmat_report_new(void);
 qmat_file *qmat_file_new(void);
+/* A list of `count` items and names, all NULL; fill both. */
+qmat_list *qmat_list_new(size_t count);
+
+/* The values that `value` stands for: those of a list, or itself; NULL has none. `index` is below the count. */
+size_t qmat_value_count(const qmat_value *value);
+const qmat_value *qmat_value_at(const qmat_value *value, size_t index);
+/* The type of those values. */
+qmat_value_type qmat_value_item_type(const qmat_value *value);
+
+/* Whether `name` is a relative path that leads to a file below its folder: no "..", no "." and nothing empty in it, no
+ * backslash, at most 255 bytes. */
+bool qmat_is_part_name(const char *name);
 
 /* A copy of `text` that a value can own (qmat_free frees it); NULL when memory is short. */
 char *qmat_strdup(const char *text);

@@ -5,6 +5,7 @@
 #include "graphs/built_in.h"
 #include "graphs/command.h"
 #include "graphs/node_json.h"
+#include "io/model.h"
 
 // The first input of the built-in graph is the argument, the others are options: one of each name.
 static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
@@ -34,9 +35,21 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   return status;
 }
 
+// Whether a file is to be saved that can hold a medial mesh for each mesh of a scene.
+static bool saves_scene(const qmat_invocation *invocation) {
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    if (strcmp(invocation->given[i].name, "output") != 0) continue;
+    const qmat_format format = qmat_format_of_name(invocation->given[i].value);
+    if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
+  }
+  return false;
+}
+
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
   qmat_graph *graph = &invocation->graph;
   qmat_status status = qmat_graph_set_named(context, graph, graph->inputs[0].name, invocation->arguments[0]);
+  // The other formats hold one medial mesh, so that the meshes of a scene are taken as one.
+  if (status == QMAT_OK && !saves_scene(invocation)) status = qmat_graph_assign(context, graph, "model.mesh=merged");
   // Whoever asks for a number of spheres wants that number, whatever the distance.
   if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
       !qmat_invocation_value(invocation, "epsilon"))
@@ -62,7 +75,10 @@ const qmat_command qmat_command_mat = {
     .summary = "Describe a model by medial spheres, cones and slabs",
     .doc =
         "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
-        "0, which means no bound on the distance. Every other parameter is reached by --set; 'qmat nodes' lists the "
+        "0, which means no bound on the distance. A glTF scene that is saved as glTF goes on with all that is in it, "
+        "and "
+        "each of its meshes gains a medial mesh; for other formats its meshes are taken as one (model.mesh=merged). "
+        "Every other parameter is reached by --set; 'qmat nodes' lists the "
         "nodes and 'qmat node NAME' their parameters.",
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,

@@ -49,6 +49,11 @@ const char *const *qmat_value_count_names(qmat_value_type type) {
 
 void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
   counts[0] = counts[1] = counts[2] = 0;
+  for (size_t i = 0; value->type == QMAT_LIST && i < qmat_value_count(value); i++) {
+    size_t of_item[3];
+    qmat_value_counts(qmat_value_at(value, i), of_item);
+    for (int k = 0; k < 3; k++) counts[k] += of_item[k];
+  }
   switch (value->type) {
     case QMAT_MESH:
       counts[0] = ((const qmat_mesh *)value)->vertex_count;
@@ -75,6 +80,35 @@ void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
     default:
       break;
   }
+}
+
+// Adds a report's warnings to a list, with what each is of.
+static bool add_warnings(json_t *all, const char *name, const json_t *report) {
+  const json_t *own = json_object_get(report, "warnings");
+  for (size_t i = 0; i < json_array_size(own); i++) {
+    const char *text = json_string_value(json_array_get(own, i));
+    if (text && json_array_append_new(all, json_sprintf("%s: %s", name, text)) != 0) return false;
+  }
+  return true;
+}
+
+json_t *qmat_report_json(const qmat_value *report) {
+  if (report->type != QMAT_LIST) return json_incref(((const qmat_report *)report)->root);
+  const qmat_list *list = (const qmat_list *)report;
+  json_t *all = json_array(), *warnings = json_array(), *root = json_object();
+  bool done = all && warnings && root;
+  for (size_t i = 0; i < list->count && done; i++) {
+    json_t *one = ((const qmat_report *)list->items[i])->root;
+    done = json_array_append_new(all, json_pack("{s:s, s:O}", "name", list->names[i], "report", one)) == 0 &&
+           add_warnings(warnings, list->names[i], one);
+  }
+  done = done && json_object_set(root, "meshes", all) == 0;
+  if (json_array_size(warnings) > 0) done = done && json_object_set(root, "warnings", warnings) == 0;
+  json_decref(all);
+  json_decref(warnings);
+  if (done) return root;
+  json_decref(root);
+  return NULL;
 }
 
 /* ---- paths ---- */
@@ -490,9 +524,9 @@ static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *
     slot->digest = made->digest = slot->value->digest;
     slot->known = true;
     made->bytes = qmat_value_bytes(slot->value);
+    made->items = qmat_value_count(slot->value);
     qmat_value_counts(slot->value, made->counts);
-    if (slot->value->type == QMAT_REPORT && !step->report)
-      step->report = json_incref(((const qmat_report *)slot->value)->root);
+    if (type->outputs[port].type == QMAT_REPORT && !step->report) step->report = qmat_report_json(slot->value);
   }
   step->done = true;
   step->state = QMAT_STEP_RUN;
@@ -527,6 +561,112 @@ static void tell_done(const executor *executor, size_t index) {
   if (observer && observer->done) observer->done(observer->user, executor->run, index);
 }
 
+// Finds how many values the lists have that a node cannot take whole; 0: none is given.
+static qmat_status count_lifted(qmat_context *context, const qmat_node *type, const qmat_value *const *inputs,
+                                size_t *count, const qmat_list **first) {
+  *count = 0;
+  *first = NULL;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (!inputs[port] || inputs[port]->type != QMAT_LIST || type->inputs[port].list) continue;
+    const size_t here = qmat_value_count(inputs[port]);
+    if (*count > 0 && here != *count) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "a list of %zu is given beside one of %zu", here, *count);
+      return qmat_fail_field(context, type->inputs[port].name);
+    }
+    if (*count == 0) *first = (const qmat_list *)inputs[port];
+    *count = here;
+  }
+  return QMAT_OK;
+}
+
+// A run of one step: `step` with value `item` of each list that it is given. Its outputs' slots come first.
+static qmat_status plan_item(qmat_context *context, const qmat_run *run, const qmat_run_step *step,
+                             const qmat_value *const *inputs, size_t item, qmat_run *one) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  const size_t output_count = qmat_output_count(type), input_count = qmat_input_count(type);
+  *one = (qmat_run){.graph = run->graph, .cache = run->cache, .bypass = run->bypass};
+  one->steps = qmat_calloc(1, sizeof *one->steps);
+  one->slots = qmat_calloc(output_count + input_count, sizeof *one->slots);
+  if (!one->steps || !one->slots) return qmat_fail_memory(context, "plan");
+  qmat_run_step *own = &one->steps[0];
+  *own = (qmat_run_step){.node = step->node, .format = step->format, .forced = step->forced};
+  one->step_count = 1;
+  one->slot_count = output_count + input_count;
+  own->inputs = qmat_calloc(input_count, sizeof *own->inputs);
+  own->made = qmat_calloc(output_count, sizeof *own->made);
+  own->params = qmat_alloc(type->params_size, 1);
+  if (!own->inputs || !own->made || !own->params) return qmat_fail_memory(context, "plan");
+  if (type->params_size > 0) memcpy(own->params, step->params, type->params_size);
+  for (size_t port = 0; port < output_count; port++) one->slots[port].kept = true;
+  for (size_t port = 0; port < input_count; port++) {
+    own->inputs[port] = SIZE_MAX;
+    if (!inputs[port]) continue;
+    const qmat_value *value = type->inputs[port].list ? inputs[port] : qmat_value_at(inputs[port], item);
+    own->inputs[port] = output_count + port;
+    one->slots[output_count + port] = (qmat_run_slot){
+        .value = qmat_value_retain(value), .digest = value->digest, .known = true, .step = SIZE_MAX, .kept = true};
+  }
+  return QMAT_OK;
+}
+
+// Runs a step for one value of each list, or takes what the cache has of that.
+static qmat_status run_item(executor *outer, size_t index, const qmat_value *const *inputs, size_t item,
+                            qmat_list **outputs) {
+  qmat_run_step *step = &outer->run->steps[index];
+  const size_t output_count = qmat_output_count(outer->run->graph->nodes[step->node].type);
+  qmat_run one;
+  executor executor = {.context = outer->context, .run = &one};
+  qmat_status status = plan_item(outer->context, outer->run, step, inputs, item, &one);
+  if (status == QMAT_OK) {
+    if (qmat_run_look_up(&one, 0)) {
+      step->lifted_hits++;
+    } else {
+      status = run_step(&executor, 0);
+    }
+  }
+  for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
+    status = need_value(&executor, port);
+    outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
+  }
+  if (executor.unsteady) outer->unsteady = true;
+  qmat_run_uninit(&one);
+  return status;
+}
+
+// Runs a step once for each value of the lists that it is given; what it makes are lists of the same names.
+static qmat_status run_lifted(executor *executor, size_t index, const qmat_value *const *inputs, const qmat_list *first,
+                              qmat_value **outputs) {
+  qmat_context *context = executor->context;
+  qmat_run_step *step = &executor->run->steps[index];
+  const size_t output_count = qmat_output_count(executor->run->graph->nodes[step->node].type);
+  qmat_list **lists = qmat_calloc(output_count, sizeof *lists);
+  qmat_status status = lists ? QMAT_OK : qmat_fail_memory(context, "values");
+  step->lifted = first->count;
+  step->lifted_hits = 0;
+  for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
+    lists[port] = qmat_list_new(first->count);
+    for (size_t i = 0; lists[port] && i < first->count; i++) {
+      lists[port]->names[i] = qmat_strdup(first->names[i]);
+      if (!lists[port]->names[i]) status = qmat_fail_memory(context, "values");
+    }
+    if (!lists[port]) status = qmat_fail_memory(context, "values");
+  }
+  for (size_t i = 0; i < first->count && status == QMAT_OK; i++) {
+    status = run_item(executor, index, inputs, i, lists);
+    if (status != QMAT_OK && status != QMAT_CANCELLED) qmat_fail_within(context, first->names[i]);
+  }
+  for (size_t port = 0; port < output_count && status == QMAT_OK; port++)
+    status = qmat_value_seal(context, &lists[port]->base);
+  for (size_t port = 0; lists && port < output_count; port++) {
+    if (status == QMAT_OK)
+      outputs[port] = &lists[port]->base;
+    else if (lists[port])
+      qmat_value_release(&lists[port]->base);
+  }
+  qmat_free(lists);
+  return status;
+}
+
 static qmat_status run_step(executor *executor, size_t index) {
   qmat_context *context = executor->context;
   qmat_run *run = executor->run;
@@ -545,13 +685,21 @@ static qmat_status run_step(executor *executor, size_t index) {
   if (status != QMAT_OK) goto cleanup;
   context->node_id = node->id;
   context->node_type = node->type->name;
+  size_t lifted;
+  const qmat_list *first_list;
+  status = count_lifted(context, node->type, inputs, &lifted, &first_list);
+  if (status != QMAT_OK) goto cleanup;
   tell_started(executor, index);
-  context->file_read = qmat_step_note_read;
-  context->file_read_user = &reads;
   double start = now();
-  status = qmat_node_run(context, node->type, step->params, inputs, outputs);
+  if (lifted > 0) {
+    status = run_lifted(executor, index, inputs, first_list, outputs);
+  } else {
+    context->file_read = qmat_step_note_read;
+    context->file_read_user = &reads;
+    status = qmat_node_run(context, node->type, step->params, inputs, outputs);
+    context->file_read = NULL;
+  }
   step->seconds = now() - start;
-  context->file_read = NULL;
   if (status != QMAT_OK) goto cleanup;
   if (!take_outputs(run, step, outputs)) {
     executor->unsteady = true;
@@ -717,14 +865,20 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
   const qmat_value *value = run->slots[file->slot].value;
   // Inside a group the first main part has no name, which stands for the path given to the saver.
   const char *main_name = group->count == 0 ? "" : file->path + qmat_folder_length(file->path);
-  if (value->type == QMAT_REPORT) {
-    *text = qmat_json_text(((const qmat_report *)value)->root, JSON_INDENT(2) | JSON_SORT_KEYS, NULL);
+  if (qmat_value_item_type(value) == QMAT_REPORT) {
+    json_t *root = qmat_report_json(value);
+    *text = root ? qmat_json_text(root, JSON_INDENT(2) | JSON_SORT_KEYS, NULL) : NULL;
+    json_decref(root);
     if (!*text) return qmat_fail_memory(context, "report");
     size_t size = strlen(*text);
     (*text)[size] = '\n';  // takes the place of the terminating zero
     file->bytes = size + 1;
     qmat_status status = digest_bytes(context, *text, file->bytes, &file->sha256);
     return status == QMAT_OK ? add_part(context, group, main_name, *text, file->bytes) : status;
+  }
+  if (value->type == QMAT_LIST) {
+    return qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' is %zu files, one for each mesh, and has one path",
+                     run->graph->outputs[file->output].name, qmat_value_count(value));
   }
   const qmat_file *made = (const qmat_file *)value;
   qmat_status status = QMAT_OK;
@@ -793,6 +947,25 @@ static bool take_number(const json_t *report, const char *key, double *number) {
   return true;
 }
 
+// Takes one report into the summary; false when it lacks a number.
+static bool summarise_report(const json_t *report, qmat_run_summary *summary) {
+  double spheres, epsilon, out, in;
+  if (!take_number(report, "spheres", &spheres) || !(spheres >= 0 && spheres < 0x1p53) ||
+      !take_number(report, "epsilon", &epsilon) || !take_number(report, "surface_to_envelope", &out) ||
+      !take_number(report, "envelope_to_surface", &in))
+    return false;
+  const json_t *certified = json_object_get(report, "certified");
+  const bool first = summary->meshes++ == 0;
+  summary->spheres += (uint64_t)spheres;
+  summary->epsilon = epsilon;
+  if (first || out > summary->surface_to_envelope) summary->surface_to_envelope = out;
+  if (first || in > summary->envelope_to_surface) summary->envelope_to_surface = in;
+  summary->evaluated = (first || summary->evaluated) && json_is_boolean(certified);
+  summary->certified = (first || summary->certified) && json_is_true(certified);
+  summary->estimate = summary->estimate || json_is_true(json_object_get(report, "estimate"));
+  return true;
+}
+
 bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
   for (size_t i = run->step_count; i-- > 0;) {
     const qmat_run_step *step = &run->steps[i];
@@ -803,18 +976,12 @@ bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
     for (size_t port = 0; port < qmat_input_count(type); port++)
       if (type->inputs[port].type == QMAT_MEDIAL) medial = true;
     if (!step->done || !medial || !step->report) continue;
-    double spheres;
     *summary = (qmat_run_summary){.step = i, .triangles = step->mesh_triangles};
-    if (take_number(step->report, "spheres", &spheres) && spheres >= 0 && spheres < 0x1p53 &&
-        take_number(step->report, "epsilon", &summary->epsilon) &&
-        take_number(step->report, "surface_to_envelope", &summary->surface_to_envelope) &&
-        take_number(step->report, "envelope_to_surface", &summary->envelope_to_surface)) {
-      summary->spheres = (uint64_t)spheres;
-      summary->evaluated = json_is_boolean(json_object_get(step->report, "certified"));
-      summary->certified = json_is_true(json_object_get(step->report, "certified"));
-      summary->estimate = json_is_true(json_object_get(step->report, "estimate"));
-      return true;
-    }
+    const json_t *meshes = json_object_get(step->report, "meshes");
+    bool whole = meshes || summarise_report(step->report, summary);
+    for (size_t k = 0; k < json_array_size(meshes) && whole; k++)
+      whole = summarise_report(json_object_get(json_array_get(meshes, k), "report"), summary);
+    if (whole) return true;
   }
   return false;
 }

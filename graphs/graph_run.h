@@ -55,6 +55,7 @@ const char *qmat_step_state_name(qmat_step_state state);
 typedef struct qmat_run_made {
   qmat_digest digest;
   size_t bytes;
+  size_t items;       /* 1; of a list as many as it has */
   uint64_t blob_size; /* of its binary form; 0: it is in no cache */
   size_t counts[3];   /* see qmat_value_counts */
 } qmat_run_made;
@@ -75,7 +76,9 @@ typedef struct qmat_run_step {
   qmat_digest first_key; /* of those that are known before it has run: without the files beside its own */
   double seconds;
   qmat_run_made *made;   /* per output port */
-  json_t *report;        /* root of its first report output; NULL: it makes none */
+  json_t *report;        /* of its first report output, see qmat_report_json; NULL: it makes none */
+  size_t lifted;         /* the values of the lists that it ran for, one by one; 0: it ran once, or not at all */
+  size_t lifted_hits;    /* for so many of them the cache had the result */
   size_t mesh_triangles; /* of its first mesh input; 0: none */
 } qmat_run_step;
 
@@ -137,7 +140,9 @@ bool qmat_same_file(const char *a, const char *b);
  * error. QMAT_ERROR_USAGE, QMAT_ERROR_IO. */
 qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path);
 
-/* Runs the steps one after another; a value is released when its last reader is done. No output is written. With a
+/* Runs the steps one after another; a value is released when its last reader is done. No output is written. A node that
+ * is given lists at inputs which do not take them whole runs once for each of their values, and its outputs are lists;
+ * each such run has a cache key of its own. QMAT_ERROR_USAGE: lists of different lengths. With a
  * cache, a step whose result is known is not run, and its values are loaded only where a node that does run, an output
  * file or a want needs them. Returns the first failing node's status; QMAT_CANCELLED when the context's progress
  * function asks to stop. Once per plan. */
@@ -155,17 +160,23 @@ const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port);
 /* Frees what the run holds. Works on a zeroed and on a failed run. */
 void qmat_run_uninit(qmat_run *run);
 
+/* The root of a report; of a list of reports an object whose list "meshes" has an object for each, with its "name" and
+ * "report", and whose list "warnings" has those of all, where there are any. NULL when memory is short; the caller
+ * calls json_decref. */
+json_t *qmat_report_json(const qmat_value *report);
+
 /* The names of what a value of this type counts ("spheres", "cones", "slabs"), in the plural, ended by NULL. */
 const char *const *qmat_value_count_names(qmat_value_type type);
-/* The counts under those names. */
+/* The counts under those names; of a list their sums. */
 void qmat_value_counts(const qmat_value *value, size_t counts[3]);
 
 /* In how far the spheres that a step made describe its mesh. Fractions are of the bounding-box diagonal. */
 typedef struct qmat_run_summary {
   size_t step;
   uint64_t spheres;
-  size_t triangles; /* of the mesh that they describe; 0: not known */
-  double epsilon, surface_to_envelope, envelope_to_surface;
+  size_t triangles;                                         /* of the mesh that they describe; 0: not known */
+  size_t meshes;                                            /* that they describe, each within its own diagonal */
+  double epsilon, surface_to_envelope, envelope_to_surface; /* of several meshes the largest */
   bool evaluated; /* by a node that tells whether the errors are certified; the second is then of the boundary */
   bool certified, estimate;
 } qmat_run_summary;

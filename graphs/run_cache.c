@@ -141,9 +141,12 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   const json_t *counts = json_object_get(output, "counts");
   json_int_t size = json_integer_value(json_object_get(output, "blob"));
   json_int_t bytes = json_integer_value(json_object_get(output, "bytes"));
-  if (!name || strcmp(name, port->name) != 0 || !type || strcmp(type, qmat_value_type_name(port->type)) != 0 || !hex ||
+  json_int_t items = json_integer_value(json_object_get(output, "items"));
+  const char *expected = qmat_value_type_name(items > 1 ? QMAT_LIST : port->type);
+  if (!name || strcmp(name, port->name) != 0 || !type || strcmp(type, expected) != 0 || !hex ||
       !qmat_digest_parse(hex, &made->digest) || size <= 0 || bytes < 0)
     return false;
+  made->items = items > 1 ? (size_t)items : 1;
   made->blob_size = (uint64_t)size;
   made->bytes = (size_t)bytes;
   for (size_t i = 0; i < 3; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
@@ -177,7 +180,7 @@ static bool take_record(qmat_run *run, size_t index, const json_t *record) {
     if (type->outputs[port].type != QMAT_REPORT) continue;
     qmat_value *value = qmat_run_load(run, index, port);
     if (!value) return false;
-    step->report = json_incref(((qmat_report *)value)->root);
+    step->report = qmat_report_json(value);
     run->slots[step->first_slot + port].value = value;
   }
   for (size_t port = 0; port < qmat_output_count(type); port++) {
@@ -214,7 +217,7 @@ bool qmat_run_look_up(qmat_run *run, size_t index) {
 qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
   const qmat_run_step *step = &run->steps[index];
   const qmat_run_made *made = &step->made[port];
-  qmat_value_type type = type_of(run, step)->outputs[port].type;
+  qmat_value_type type = made->items > 1 ? QMAT_LIST : type_of(run, step)->outputs[port].type;
   return run->cache ? qmat_cache_value(run->cache, &made->digest, made->blob_size, type) : NULL;
 }
 
@@ -291,6 +294,8 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
                                qmat_value_type_name(value->type), "digest", hex, "blob", (json_int_t)made->blob_size,
                                "bytes", (json_int_t)made->bytes, "counts", (json_int_t)made->counts[0],
                                (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
+    if (output && made->items > 1)
+      done = json_object_set_new(output, "items", json_integer((json_int_t)made->items)) == 0 && done;
     done = json_array_append_new(outputs, output) == 0 && done;
   }
   if (done) return outputs;

@@ -34,6 +34,7 @@ static json_t *digest_json(const qmat_digest *digest) {
 static json_t *output_json(const qmat_port *port, const qmat_run_made *made) {
   json_t *output = json_object();
   json_object_set_new(output, "type", json_string(qmat_value_type_name(port->type)));
+  if (made->items > 1) json_object_set_new(output, "items", json_integer((json_int_t)made->items));
   json_object_set_new(output, "digest", digest_json(&made->digest));
   json_object_set_new(output, "bytes", json_integer((json_int_t)made->bytes));
   const char *const *names = qmat_value_count_names(port->type);
@@ -55,6 +56,10 @@ static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
   if (run->cache) json_object_set_new(json, "cache", json_string(qmat_step_state_name(step->state)));
   if (step->keyed) json_object_set_new(json, "key", digest_json(&step->key));
   json_object_set_new(json, "seconds", json_real(step->seconds));
+  if (step->lifted > 0) {
+    json_object_set_new(json, "runs", json_integer((json_int_t)(step->lifted - step->lifted_hits)));
+    json_object_set_new(json, "hits", json_integer((json_int_t)step->lifted_hits));
+  }
   json_object_set_new(json, "params", params);
   json_object_set_new(json, "outputs", outputs);
   if (step->report) json_object_set(json, "report", step->report);
@@ -126,6 +131,7 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
     json_object_set_new(brief, "node", json_string(run->graph->nodes[run->steps[summary.step].node].id));
     json_object_set_new(brief, "spheres", json_integer((json_int_t)summary.spheres));
     json_object_set_new(brief, "triangles", json_integer((json_int_t)summary.triangles));
+    if (summary.meshes > 1) json_object_set_new(brief, "meshes", json_integer((json_int_t)summary.meshes));
     json_object_set_new(brief, "epsilon", json_real(summary.epsilon));
     json_object_set_new(brief, "surface_to_envelope", json_real(summary.surface_to_envelope));
     json_object_set_new(brief, "envelope_to_surface", json_real(summary.envelope_to_surface));
@@ -259,13 +265,17 @@ void qmat_format_bound(double fraction, char *text) {
 }
 
 void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size) {
-  char spheres[32], triangles[32], out[48], in[48], model[64] = "the model";
+  char spheres[32], triangles[32], out[48], in[48], model[96] = "the model";
   qmat_format_count(summary->spheres, spheres);
   qmat_format_count(summary->triangles, triangles);
   qmat_format_bound(summary->surface_to_envelope, out);
   qmat_format_bound(summary->envelope_to_surface, in);
   if (summary->triangles > 0)
     snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
+  if (summary->meshes > 1) {
+    const size_t used = strlen(model);
+    snprintf(model + used, sizeof model - used, " of %zu meshes", summary->meshes);
+  }
   bool one = summary->spheres == 1;
   const char *between =
       summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
@@ -277,9 +287,10 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
   else if (summary->evaluated && summary->epsilon > 0)
     proof = " (not certified)";
   snprintf(text, size,
-           "%s: %s sphere%s describe%s %s; no surface point is farther than %s of the diagonal from the envelope, and "
+           "%s: %s sphere%s describe%s %s; no surface point is farther than %s of the %s from the envelope, and "
            "%s %s%s%s.",
-           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out, between, in, end, proof);
+           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out,
+           summary->meshes > 1 ? "mesh's diagonal" : "diagonal", between, in, end, proof);
 }
 
 // "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted.

@@ -554,6 +554,7 @@ qmat_status qmat_writer_to_file(qmat_context *context, qmat_writer *writer, cons
 typedef struct saved_part {
   char *final, *temporary; /* paths; temporary is NULL until the file is made, and again once it is renamed */
   bool replaces;           /* there was a file before */
+  bool is_there;           /* with the same bytes: it stays as it is */
   bool renamed;
 } saved_part;
 
@@ -581,6 +582,36 @@ static qmat_status check_target(qmat_context *context, saved_part *part) {
   if (access(part->final, W_OK) != 0) return fail_file(context, part->final, "cannot write the file", errno);
   part->replaces = true;
   return QMAT_OK;
+}
+
+/* Whether the file `path` holds these bytes. */
+static bool holds(const char *path, const qmat_file_part *part) {
+  FILE *file = fopen(path, "rbe");
+  if (!file) return false;
+  uint8_t chunk[16384];
+  size_t at = 0, read;
+  bool same = true;
+  while (same && (read = fread(chunk, 1, sizeof chunk, file)) > 0) {
+    same = read <= part->size - at && memcmp(chunk, part->bytes + at, read) == 0;
+    at += read;
+  }
+  same = same && at == part->size && !ferror(file);
+  fclose(file);
+  return same;
+}
+
+/* Makes the folders that a side part's name leads through, below the first `folder_length` bytes of its path. */
+static qmat_status make_folders(qmat_context *context, const char *final, size_t folder_length) {
+  char *path = qmat_strdup(final);
+  qmat_status status = path ? QMAT_OK : qmat_fail_memory(context, "the names of output files");
+  for (char *slash = path ? strchr(path + folder_length, '/') : NULL; slash && status == QMAT_OK;
+       slash = strchr(slash + 1, '/')) {
+    *slash = '\0';
+    if (mkdir(path, 0777) != 0 && errno != EEXIST) status = fail_file(context, path, "cannot make the folder", errno);
+    *slash = '/';
+  }
+  qmat_free(path);
+  return status;
 }
 
 /* Makes a new file next to the target. Not mkstemp, which would leave the result readable by its owner alone. */
@@ -636,8 +667,8 @@ static qmat_status check_part_names(qmat_context *context, const qmat_file *file
   }
   for (size_t i = 1; i < file->part_count; i++) {
     const char *name = file->parts[i].name;
-    bool bad = name[0] == '\0' || strchr(name, '/') || strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
-    if (bad) return qmat_fail(context, QMAT_ERROR_INTERNAL, "'%s' is no name for a part of a file", name);
+    if (!qmat_is_part_name(name))
+      return qmat_fail(context, QMAT_ERROR_INTERNAL, "'%s' is no name for a part of a file", name);
     bool taken = strcmp(name, main_name) == 0;
     for (size_t j = 1; j < i && !taken; j++) taken = strcmp(name, file->parts[j].name) == 0;
     if (taken) {
@@ -662,13 +693,19 @@ qmat_status qmat_file_save(qmat_context *context, const qmat_file *file, const c
   if (!parts) return qmat_fail_memory(context, "the names of the output files");
   for (size_t i = 0; i < file->part_count && status == QMAT_OK; i++) {
     parts[i].final = i == 0 ? qmat_strdup(path) : join(path, folder_length, file->parts[i].name);
-    status = parts[i].final ? check_target(context, &parts[i]) : qmat_fail_memory(context, "the names of output files");
+    status = parts[i].final ? QMAT_OK : qmat_fail_memory(context, "the names of output files");
+    parts[i].is_there = status == QMAT_OK && i > 0 && holds(parts[i].final, &file->parts[i]);
+    if (status == QMAT_OK && !parts[i].is_there) status = check_target(context, &parts[i]);
   }
   for (size_t i = 0; i < file->part_count && status == QMAT_OK; i++) {
+    if (parts[i].is_there) continue;
     status = write_part(context, &file->parts[i], path, folder_length, &parts[i]);
   }
   /* Backwards: the main part, which names the others, appears last. */
   for (size_t i = file->part_count; i-- > 0 && status == QMAT_OK;) {
+    if (parts[i].is_there) continue;
+    if (i > 0) status = make_folders(context, parts[i].final, folder_length);
+    if (status != QMAT_OK) break;
     if (rename(parts[i].temporary, parts[i].final) != 0) {
       status = fail_file(context, parts[i].final, "cannot write the file", errno);
       break;

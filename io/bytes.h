@@ -131,7 +131,8 @@ qmat_status qmat_writer_to_part(qmat_context *context, qmat_writer *writer, qmat
  * `format` is "ma", "ply", ...; the caller releases `*file`, which is NULL on failure. QMAT_ERROR_MEMORY. */
 qmat_status qmat_writer_to_file(qmat_context *context, qmat_writer *writer, const char *format, qmat_file **file);
 
-/* Saves every part: the main part as `path`, the others under their names in the same folder. All are written to
+/* Saves every part: the main part as `path`, the others under their names in the same folder, in folders below it where
+ * their names say so; a side part that is there with the same bytes already stays as it is. All are written to
  * temporary files there and flushed to the disk before the first one is renamed; side parts first, the main part last.
  * A failure before the renames leaves nothing behind and what was there untouched. Existing files keep their
  * permissions. QMAT_ERROR_IO names the file. */

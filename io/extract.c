@@ -1,37 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/extract.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "io/base64.h"
 #include "io/draco.h"
+#include "io/gltf_asset.h"
 #include "io/ma.h"
 #include "io/model.h"
 #include "io/usd_medial.h"
-
-/* The JSON of a glTF asset, binary or text; NULL with the error recorded. */
-static json_t *read_gltf_json(qmat_context *context, const qmat_bytes *bytes, const char *path) {
-  qmat_byte_reader reader = {.bytes = bytes->data, .size = bytes->size, .at = 12};
-  const char *text = (const char *)bytes->data;
-  size_t length = bytes->size;
-  if (qmat_format_of_bytes(bytes) == QMAT_FORMAT_GLB) {
-    length = qmat_take_u32(&reader);
-    const uint32_t kind = qmat_take_u32(&reader);
-    text = (const char *)qmat_take_bytes(&reader, length);
-    if (!text || kind != 0x4E4F534A) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, "the GLB does not begin with its JSON");
-      qmat_fail_at(context, path, 0, 0);
-      return NULL;
-    }
-  }
-  json_error_t error;
-  json_t *root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
-  if (!root) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "%s", error.text);
-    qmat_fail_at(context, path, error.line > 0 ? error.line : 0, error.column > 0 ? error.column : 0);
-  }
-  return root;
-}
 
 static qmat_status take_facts(qmat_context *context, const json_t *extras, json_t *facts) {
   const char *key;
@@ -44,39 +22,62 @@ static qmat_status take_facts(qmat_context *context, const json_t *extras, json_
   return QMAT_OK;
 }
 
+/* Whether a node is called `name`, or has that number and no node is called so. */
+static bool is_called(const json_t *nodes, size_t index, const char *name) {
+  const char *own = json_string_value(json_object_get(json_array_get(nodes, index), "name"));
+  if (own && strcmp(own, name) == 0) return true;
+  char number[24];
+  snprintf(number, sizeof number, "%zu", index);
+  if (strcmp(number, name) != 0) return false;
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const char *other = json_string_value(json_object_get(json_array_get(nodes, i), "name"));
+    if (other && strcmp(other, name) == 0) return false;
+  }
+  return true;
+}
+
+static const json_t *data_of(const json_t *node) {
+  const json_t *data = json_object_get(json_object_get(node, "extras"), "qmat_data");
+  return json_is_string(data) ? data : NULL;
+}
+
 static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                              qmat_medial **medial, json_t *facts) {
-  json_t *root = read_gltf_json(context, bytes, path);
-  if (!root) return context->error.status;
-  const json_t *nodes = json_object_get(root, "nodes"), *found = NULL;
-  size_t carriers = 0, index = 0;
+  qmat_gltf_asset asset;
+  qmat_status status = qmat_gltf_asset_init(context, bytes->data, bytes->size, path, &asset);
+  const json_t *nodes = json_object_get(asset.root, "nodes"), *found = NULL;
+  size_t carriers = 0, different = 0, index = 0;
   for (size_t i = 0; i < json_array_size(nodes); i++) {
-    const json_t *node = json_array_get(nodes, i), *extras = json_object_get(node, "extras");
-    const char *node_name = json_string_value(json_object_get(node, "name"));
-    if (!json_is_string(json_object_get(extras, "qmat_data"))) continue;
+    const json_t *node = json_array_get(nodes, i), *data = data_of(node);
+    if (!data) continue;
     carriers++;
-    if (found || (name && (!node_name || strcmp(name, node_name) != 0))) continue;
-    found = extras;
+    if (name && !is_called(nodes, i, name)) continue;
+    /* Nodes that share a mesh share its medial mesh. */
+    different += !found || !json_equal((json_t *)(uintptr_t)data_of(found), (json_t *)(uintptr_t)data);
+    if (found) continue;
+    found = node;
     index = i;
   }
-  qmat_status status = QMAT_OK;
   uint8_t *blob = NULL;
   size_t size = 0;
-  if (!found) {
+  if (status == QMAT_OK && !found) {
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY,
                        carriers > 0 ? "no node of this name has a medial mesh" : "no node has a medial mesh");
-  } else if (!name && carriers > 1) {
+    qmat_fail_at(context, path, 0, 0);
+  } else if (status == QMAT_OK && different > 1) {
     status = qmat_fail(context, QMAT_ERROR_USAGE, "%zu nodes have a medial mesh: one has to be named", carriers);
-  } else {
-    const json_t *data = json_object_get(found, "qmat_data");
+    qmat_fail_at(context, path, 0, 0);
+    qmat_fail_hint(context, "by its name or its number; qmat info lists them");
+  } else if (status == QMAT_OK) {
+    const json_t *data = data_of(found);
     status = qmat_base64_decode(context, json_string_value(data), json_string_length(data), &blob, &size);
     if (status == QMAT_OK) status = qmat_draco_decode_medial(context, blob, size, medial);
     if (status != QMAT_OK) qmat_fail_element(context, "node", (int64_t)index);
-    if (status == QMAT_OK) status = take_facts(context, found, facts);
+    if (status == QMAT_OK) status = take_facts(context, json_object_get(found, "extras"), facts);
+    if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
   }
-  if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
   qmat_free(blob);
-  json_decref(root);
+  qmat_gltf_asset_uninit(&asset);
   return status;
 }
 

@@ -30,4 +30,20 @@ qmat_status qmat_gltf_read(qmat_context *context, const char *path, qmat_soup *s
 qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path, qmat_soup *soup,
                             json_t *report);
 
+/* Meshes of an asset, each in its own space. A zeroed one is empty and valid. */
+typedef struct qmat_gltf_meshes {
+  size_t count;
+  uint32_t *ids;    /* count: their numbers in the asset, rising */
+  qmat_soup *soups; /* count */
+} qmat_gltf_meshes;
+
+/* The surfaces of the meshes that `choice` stands for (see qmat_gltf_choose_meshes), as they are stored: no transform
+ * of a node is applied, skins are in bind pose, morph targets have the mesh's own weights. With "all", meshes without a
+ * triangle are left out, unless none has one. `root` is the asset's whole JSON; `report` gains what it does in
+ * qmat_gltf_read, but for the meshes placed and skinned. Otherwise as qmat_gltf_parse; free `meshes` also after a
+ * failure. */
+qmat_status qmat_gltf_parse_meshes(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
+                                   const json_t *root, const char *choice, qmat_gltf_meshes *meshes, json_t *report);
+void qmat_gltf_meshes_uninit(qmat_gltf_meshes *meshes);
+
 #endif

@@ -9,6 +9,7 @@
 
 #include "core/arena.h"
 #include "io/base64.h"
+#include "io/gltf_asset.h"
 
 #define MOST_BUFFERS 4096
 /* An accessor without a buffer view stands for zeros that no byte pays for. Morph targets use it, with as many as the
@@ -32,8 +33,7 @@ typedef struct checker {
   const char *path;
   qmat_gltf_document *document;
   json_t *root;
-  const uint8_t *chunk; /* the GLB's binary chunk, or NULL */
-  size_t chunk_size;
+  qmat_gltf_asset asset;
   accessor *accessors;
   view *views;
 } checker;
@@ -163,59 +163,6 @@ static void keep_keys(json_t *object, const char *const keys[]) {
   }
 }
 
-/* ---- the container ---- */
-
-static uint32_t u32_at(const uint8_t *bytes) {
-  return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
-}
-
-/* Finds the JSON text and the binary chunk. */
-static qmat_status open_container(checker *check, const uint8_t *bytes, size_t size, const char **text,
-                                  size_t *length) {
-  *text = (const char *)bytes;
-  *length = size;
-  if (size < 4 || memcmp(bytes, "glTF", 4) != 0) return QMAT_OK;
-  if (size < 20) return fail(check, NULL, 0, "the file ends within the GLB header");
-  if (u32_at(bytes + 4) != 2) return fail(check, NULL, 0, "GLB version %u is not supported; 2 is", u32_at(bytes + 4));
-  size_t end = u32_at(bytes + 8);
-  if (end > size) return fail(check, NULL, 0, "the GLB header promises %zu bytes, the file has %zu", end, size);
-  size_t at = 12;
-  for (size_t chunk = 0; at < end; chunk++) {
-    if (end - at < 8) return fail(check, "chunk", chunk, "the GLB ends within a chunk's header");
-    size_t chunk_size = u32_at(bytes + at);
-    uint32_t type = u32_at(bytes + at + 4);
-    at += 8;
-    if (chunk_size > end - at) {
-      return fail(check, "chunk", chunk, "has %zu bytes, but the GLB ends after %zu", chunk_size, end - at);
-    }
-    if (chunk == 0 && type != 0x4E4F534A) return fail(check, "chunk", 0, "the first chunk of a GLB must be JSON");
-    if (chunk == 0) {
-      *text = (const char *)bytes + at;
-      *length = chunk_size;
-    } else if (chunk == 1 && type == 0x004E4942) {
-      check->chunk = bytes + at;
-      check->chunk_size = chunk_size;
-    }
-    at += chunk_size;
-  }
-  if (*text == (const char *)bytes) return fail(check, NULL, 0, "the GLB has no JSON chunk");
-  while (*length > 0 && (*text)[*length - 1] == '\0') (*length)--; /* some writers pad with zeros */
-  return QMAT_OK;
-}
-
-static qmat_status parse_json(checker *check, const char *text, size_t length) {
-  json_error_t error;
-  check->root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
-  if (!check->root) {
-    if (json_error_code(&error) == json_error_out_of_memory) return fail_memory(check);
-    qmat_fail(check->context, QMAT_ERROR_FORMAT, "the JSON is damaged: %s", error.text);
-    return qmat_fail_at(check->context, check->path, error.line > 0 ? error.line : 0,
-                        error.column > 0 ? error.column : 0);
-  }
-  if (!json_is_object(check->root)) return fail(check, NULL, 0, "the JSON is not an object");
-  return QMAT_OK;
-}
-
 /* ---- the asset and its extensions ---- */
 
 static bool geometry_is_safe_with(const char *extension) {
@@ -289,54 +236,6 @@ static qmat_status check_asset(const checker *check) {
 
 /* ---- buffers ---- */
 
-static int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-char *qmat_gltf_relative_path(const char *uri, size_t length) {
-  char *path = qmat_alloc(length + 1, 1);
-  if (!path) return NULL;
-  size_t used = 0;
-  bool sound = length > 0;
-  for (size_t i = 0; i < length && sound; i++) {
-    char c = uri[i];
-    if (c == '?' || c == '#' || (c == ':' && memchr(uri, '/', i) == NULL)) sound = false; /* a query, or a scheme */
-    if (c == '%') {
-      int high = i + 1 < length ? hex_digit(uri[i + 1]) : -1, low = i + 2 < length ? hex_digit(uri[i + 2]) : -1;
-      if (high < 0 || low < 0) sound = false;
-      c = (char)(high * 16 + low);
-      i += 2;
-    }
-    if (c == '\0' || c == '\\') sound = false;
-    path[used++] = c;
-  }
-  path[used] = '\0';
-  if (path[0] == '/') sound = false;
-  for (const char *part = path; sound && *part;) {
-    size_t part_length = strcspn(part, "/");
-    if (part_length == 2 && part[0] == '.' && part[1] == '.') sound = false;
-    part += part_length;
-    if (*part == '/') part++;
-  }
-  if (sound && used > 0 && path[used - 1] != '/') return path;
-  qmat_free(path);
-  return NULL;
-}
-
-/* The path of a file that stands beside the asset; NULL when memory is short. */
-static char *beside(const char *asset, const char *name) {
-  const char *slash = strrchr(asset, '/');
-  size_t folder = slash ? (size_t)(slash - asset) + 1 : 0, length = strlen(name);
-  char *path = qmat_alloc(folder + length + 1, 1);
-  if (!path) return NULL;
-  memcpy(path, asset, folder);
-  memcpy(path + folder, name, length + 1);
-  return path;
-}
-
 static qmat_status load_external(const checker *check, size_t index, const char *uri, size_t uri_length) {
   qmat_gltf_buffer *buffer = &check->document->buffers[index];
   const json_t *all = json_object_get(check->root, "buffers");
@@ -352,7 +251,7 @@ static qmat_status load_external(const checker *check, size_t index, const char 
   if (!name) {
     return fail(check, "buffer", index, "its uri \"%.100s\" is not a relative path inside the asset's folder", uri);
   }
-  char *path = beside(check->path, name);
+  char *path = qmat_gltf_beside(check->path, name);
   qmat_status status = path ? qmat_bytes_read_file(check->context, path, &buffer->file) : fail_memory(check);
   if (status != QMAT_OK && path) qmat_fail_element(check->context, "buffer", (int64_t)index);
   buffer->bytes = buffer->file.data;
@@ -393,9 +292,9 @@ static qmat_status load_buffers(const checker *check) {
     if (status != QMAT_OK) return status;
     if (uri && !json_is_string(uri)) return fail(check, "buffer", i, "uri must be a string");
     if (!uri) {
-      if (i > 0 || !check->chunk) return fail(check, "buffer", i, "has no uri, and there is no GLB chunk for it");
-      buffer->bytes = check->chunk;
-      buffer->size = check->chunk_size;
+      if (i > 0 || !check->asset.chunk) return fail(check, "buffer", i, "has no uri, and there is no GLB chunk for it");
+      buffer->bytes = check->asset.chunk;
+      buffer->size = check->asset.chunk_size;
     } else if (strncmp(json_string_value(uri), "data:", 5) == 0) {
       status = load_data_uri(check, i, json_string_value(uri), json_string_length(uri));
     } else {
@@ -969,12 +868,10 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
                                           {"scenes", "scene"}};
   *document = (qmat_gltf_document){0};
   checker check = {.context = context, .path = path, .document = document};
-  const char *text = NULL;
-  size_t length = 0;
   document->extensions_ignored = json_array();
   qmat_status status = document->extensions_ignored ? QMAT_OK : fail_memory(&check);
-  if (status == QMAT_OK) status = open_container(&check, bytes, size, &text, &length);
-  if (status == QMAT_OK) status = parse_json(&check, text, length);
+  if (status == QMAT_OK) status = qmat_gltf_asset_init(context, bytes, size, path, &check.asset);
+  check.root = check.asset.root;
   if (status == QMAT_OK) status = check_asset(&check);
   for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++) {
     status = check_root_array(&check, arrays[i][0], arrays[i][1]);
@@ -988,7 +885,7 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
   if (status == QMAT_OK) status = write_reduced(&check);
   qmat_free(check.views);
   qmat_free(check.accessors);
-  json_decref(check.root);
+  qmat_gltf_asset_uninit(&check.asset);
   return status;
 }
 

@@ -45,9 +45,4 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
 
 void qmat_gltf_document_uninit(qmat_gltf_document *document);
 
-/* The name of an external file that the `length` characters of a URI stand for, below the asset's folder: percent
- * signs decoded, blanks kept. NULL when it is not a relative path that stays inside that folder; the caller frees it
- * with qmat_free. */
-char *qmat_gltf_relative_path(const char *uri, size_t length);
-
 #endif

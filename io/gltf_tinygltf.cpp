@@ -187,6 +187,25 @@ class Reader {
     }
   }
 
+  void read_meshes(const uint32_t *meshes, size_t count) {
+    for (which_ = 0; which_ < count; which_++) {
+      must(qmat_progress(context_, which_, count, "meshes"));
+      const qmat_tinygltf::Mesh &mesh = model_.meshes[meshes[which_]];
+      for (const qmat_tinygltf::Primitive &primitive : mesh.primitives) {
+        if (primitive.attributes.empty()) {
+          counts_->primitives_skipped++;
+          continue;
+        }
+        counts_->primitives_read++;
+        const std::unique_ptr<Shape> shape = read_shape(primitive);
+        check_room(shape->positions.size() / 3, shape->corners.size() / 3);
+        world_ = shape->positions;
+        add_targets(primitive, mesh.weights, world_);
+        emit(*shape);
+      }
+    }
+  }
+
  private:
   /* World transforms of all nodes, also of those outside the scene: joints may be there. */
   void find_globals() {
@@ -468,7 +487,7 @@ class Reader {
       for (size_t i = 0; i + 2 < turned_.size(); i += 3) std::swap(turned_[i + 1], turned_[i + 2]);
       corners = &turned_;
     }
-    must(sink_(user_, world_.data(), world_.size() / 3, corners->data(), corners->size() / 3));
+    must(sink_(user_, which_, world_.data(), world_.size() / 3, corners->data(), corners->size() / 3));
     vertices_ += world_.size() / 3;
     triangles_ += corners->size() / 3;
   }
@@ -482,6 +501,7 @@ class Reader {
   qmat_gltf_counts *counts_;
   std::vector<Matrix> globals_;
   std::vector<std::vector<std::unique_ptr<Shape>>> shapes_; /* by mesh and primitive, read when first placed */
+  size_t which_ = 0;                                        /* of the meshes that were asked for */
   std::vector<double> world_;
   std::vector<uint32_t> turned_;
   bool turn_ = false; /* whether the placed triangles change their side */
@@ -491,8 +511,8 @@ class Reader {
 }  // namespace
 
 qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t text_length,
-                                const qmat_gltf_bytes *buffers, size_t most, qmat_gltf_sink *sink, void *user,
-                                qmat_gltf_counts *counts) {
+                                const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes,
+                                size_t mesh_count, qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts) {
   *counts = {};
   try {
     if (text_length > std::numeric_limits<unsigned int>::max()) return qmat_fail_memory(context, "the JSON of a glTF");
@@ -502,7 +522,12 @@ qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t 
     if (!loader.LoadASCIIFromString(&model, &errors, &warnings, text, static_cast<unsigned int>(text_length), "")) {
       return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "tinygltf: %s", errors.c_str());
     }
-    Reader(context, model, buffers, most, sink, user, counts).read_scene();
+    Reader reader(context, model, buffers, most, sink, user, counts);
+    if (meshes) {
+      reader.read_meshes(meshes, mesh_count);
+    } else {
+      reader.read_scene();
+    }
     return QMAT_OK;
   } catch (const Failed &failed) {
     return failed.status;

@@ -10,8 +10,10 @@
 #include "io/base64.h"
 #include "io/bytes.h"
 #include "io/draco.h"
+#include "io/gltf_asset.h"
 
 #define NORMAL_BITS 10
+#define DRACO_EXTENSION "KHR_draco_mesh_compression"
 #define DATA_URI "data:application/octet-stream;base64,"
 
 enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126, ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
@@ -80,7 +82,13 @@ static bool set_count(json_t *object, const char *key, size_t count) {
   return set(object, key, json_integer((json_int_t)count));
 }
 
-/* The node's extras; NULL when memory is short. */
+/* An error of what qmat_data decodes to: no point of the solid moves by more than the loss. */
+static double with_loss(double error, const medial_text *text, const qmat_gltf_options *options) {
+  return options->diagonal > 0 ? nextafter(error + nextafter(text->loss / options->diagonal, INFINITY), INFINITY)
+                               : error;
+}
+
+/* What is said of the medial mesh; NULL when memory is short. */
 static json_t *make_extras(const qmat_medial *medial, const medial_text *text, const qmat_gltf_options *options) {
   json_t *extras = json_object();
   bool done =
@@ -91,8 +99,9 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
   const struct {
     const char *key;
     double value;
-  } errors[] = {
-      {"qmat_epsilon", options->epsilon}, {"qmat_error_out", options->error_out}, {"qmat_error_in", options->error_in}};
+  } errors[] = {{"qmat_epsilon", options->epsilon},
+                {"qmat_error_out", with_loss(options->error_out, text, options)},
+                {"qmat_error_in", with_loss(options->error_in, text, options)}};
   bool any = false;
   for (size_t i = 0; i < sizeof errors / sizeof *errors && done; i++) {
     if (!isfinite(errors[i].value)) continue;
@@ -101,7 +110,9 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
   }
   if (any) done = done && set(extras, "qmat_error_unit", json_string("diagonal"));
   if (options->certified != QMAT_CERTIFICATE_UNKNOWN) {
-    done = done && set(extras, "qmat_certified", json_boolean(options->certified == QMAT_CERTIFICATE_YES));
+    const bool within =
+        options->diagonal == 0 || (errors[1].value <= options->epsilon && errors[2].value <= options->epsilon);
+    done = done && set(extras, "qmat_certified", json_boolean(within && options->certified == QMAT_CERTIFICATE_YES));
   }
   done = done && set(extras, "qmat_quantisation", json_real(text->loss)) &&
          set(extras, "qmat_quantisation_unit", json_string("model")) &&
@@ -176,14 +187,14 @@ typedef struct skin_data {
   bool compressed, wide;           /* 32-bit indices */
   uint32_t position_id, normal_id; /* Draco's */
   size_t sizes[3];                 /* of the buffer views: positions, normals, indices; or Draco's data */
-  qmat_writer buffer;
 } skin_data;
 
 static void pad(qmat_writer *writer, uint8_t with) {
   while (!writer->failed && writer->size % 4 != 0) qmat_put_u8(writer, with);
 }
 
-static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, skin_data *data) {
+static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, skin_data *data,
+                           qmat_writer *buffer) {
   size_t count = 3 * skin->vertex_count;
   data->vertex_count = skin->vertex_count;
   data->index_count = 3 * skin->triangle_count;
@@ -193,14 +204,14 @@ static void put_plain_skin(const qmat_mesh *skin, const float *positions, const 
   for (size_t i = 0; i < count; i++) {
     data->min[i % 3] = fminf(data->min[i % 3], positions[i]);
     data->max[i % 3] = fmaxf(data->max[i % 3], positions[i]);
-    qmat_put_f32(&data->buffer, positions[i]);
+    qmat_put_f32(buffer, positions[i]);
   }
-  for (size_t i = 0; i < count; i++) qmat_put_f32(&data->buffer, normals[i]);
+  for (size_t i = 0; i < count; i++) qmat_put_f32(buffer, normals[i]);
   for (size_t i = 0; i < data->index_count; i++) {
     if (data->wide) {
-      qmat_put_u32(&data->buffer, skin->triangles[i]);
+      qmat_put_u32(buffer, skin->triangles[i]);
     } else {
-      qmat_put_u16(&data->buffer, (uint16_t)skin->triangles[i]);
+      qmat_put_u16(buffer, (uint16_t)skin->triangles[i]);
     }
   }
   data->sizes[0] = data->sizes[1] = count * sizeof(float);
@@ -208,7 +219,7 @@ static void put_plain_skin(const qmat_mesh *skin, const float *positions, const 
 }
 
 static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, const float *positions,
-                                  const float *normals, double allowed, skin_data *data) {
+                                  const float *normals, double allowed, skin_data *data, qmat_writer *buffer) {
   double range = 0;
   float low[3], high[3];
   for (int k = 0; k < 3; k++) low[k] = high[k] = positions[k];
@@ -231,13 +242,13 @@ static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, 
   memcpy(data->min, packed.min, sizeof data->min);
   memcpy(data->max, packed.max, sizeof data->max);
   data->sizes[0] = packed.size;
-  qmat_put_bytes(&data->buffer, packed.bytes, packed.size);
+  qmat_put_bytes(buffer, packed.bytes, packed.size);
   qmat_draco_skin_uninit(&packed);
   return QMAT_OK;
 }
 
 static qmat_status make_skin(qmat_context *context, const qmat_mesh *skin, const qmat_gltf_options *options,
-                             skin_data *data) {
+                             skin_data *data, qmat_writer *buffer) {
   float *positions = qmat_alloc(skin->vertex_count, 3 * sizeof *positions);
   float *normals = qmat_alloc(skin->vertex_count, 3 * sizeof *normals);
   double *sums = qmat_calloc(skin->vertex_count, 3 * sizeof *sums);
@@ -246,12 +257,12 @@ static qmat_status make_skin(qmat_context *context, const qmat_mesh *skin, const
   if (status == QMAT_OK) {
     area_normals(skin, sums, normals);
     if (options->compress_skin) {
-      status = put_draco_skin(context, skin, positions, normals, options->quantisation, data);
+      status = put_draco_skin(context, skin, positions, normals, options->quantisation, data, buffer);
     } else {
-      put_plain_skin(skin, positions, normals, data);
+      put_plain_skin(skin, positions, normals, data, buffer);
     }
-    pad(&data->buffer, 0);
-    if (status == QMAT_OK && data->buffer.failed) status = qmat_fail_memory(context, "the skin");
+    pad(buffer, 0);
+    if (status == QMAT_OK && buffer->failed) status = qmat_fail_memory(context, "the skin");
   }
   qmat_free(sums);
   qmat_free(normals);
@@ -263,7 +274,64 @@ static qmat_status make_skin(qmat_context *context, const qmat_mesh *skin, const
 
 /* NULL is carried through json_pack, which fails on it and frees the rest, so that one check at the end is enough. */
 
-static json_t *make_accessors(const skin_data *data) {
+/* An asset on its way: new, or one that was read. */
+typedef struct document {
+  json_t *root;
+  bool binary;
+  qmat_gltf_asset asset; /* that was read; else empty */
+  qmat_writer data;      /* what is added to its buffers */
+  bool in_chunk;         /* that goes into the GLB's chunk, not into a buffer with a URI */
+  size_t data_start;     /* behind the bytes of the asset's own chunk, 0: in another buffer */
+  json_int_t buffer;     /* the number of the buffer */
+  json_int_t material;   /* of skins; -1: there is none yet */
+} document;
+
+/* root[key] as an array, made when it is not there; NULL when memory is short or it is something else. */
+static json_t *array_of(json_t *object, const char *key) {
+  json_t *array = json_object_get(object, key);
+  if (!array && set(object, key, json_array())) array = json_object_get(object, key);
+  return json_is_array(array) ? array : NULL;
+}
+
+/* Adds a member to root[key] and tells its number; false when memory is short. Takes the member over. */
+static bool add(json_t *root, const char *key, json_t *member, json_int_t *number) {
+  json_t *array = array_of(root, key);
+  if (number) *number = (json_int_t)json_array_size(array);
+  if (array && member) return json_array_append_new(array, member) == 0;
+  json_decref(member);
+  return false;
+}
+
+/* Adds a name to a list of extensions that does not have it yet. */
+static bool add_extension(json_t *root, const char *key, const char *name) {
+  const json_t *names = json_object_get(root, key);
+  for (size_t i = 0; i < json_array_size(names); i++) {
+    const char *other = json_string_value(json_array_get(names, i));
+    if (other && strcmp(other, name) == 0) return true;
+  }
+  return add(root, key, json_string(name), NULL);
+}
+
+/* Adds the buffer views of a skin whose data start at `offset`; `*first` is the number of the first. */
+static bool add_views(document *document, const skin_data *data, size_t offset, json_int_t *first) {
+  static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
+  for (int i = 0; i < (data->compressed ? 1 : 3); i++) {
+    json_int_t number;
+    json_t *view = json_pack("{s:I, s:I, s:I}", "buffer", document->buffer, "byteOffset", (json_int_t)offset,
+                             "byteLength", (json_int_t)data->sizes[i]);
+    if (view && !data->compressed && !set(view, "target", json_integer(targets[i]))) {
+      json_decref(view);
+      view = NULL;
+    }
+    if (!add(document->root, "bufferViews", view, &number)) return false;
+    if (i == 0) *first = number;
+    offset += data->sizes[i];
+  }
+  return true;
+}
+
+/* Adds positions, normals and indices, in this order. */
+static bool add_accessors(json_t *root, const skin_data *data, json_int_t first_view, json_int_t *first) {
   json_t *position =
       json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", FLOAT, "count",
                 (json_int_t)data->vertex_count, "type", "VEC3", "min", (double)data->min[0], (double)data->min[1],
@@ -273,175 +341,302 @@ static json_t *make_accessors(const skin_data *data) {
   json_t *indices = json_pack("{s:i, s:I, s:s}", "componentType", data->wide ? UNSIGNED_INT : UNSIGNED_SHORT, "count",
                               (json_int_t)data->index_count, "type", "SCALAR");
   json_t *accessors[3] = {position, normal, indices};
-  for (int i = 0; i < 3 && !data->compressed; i++) {
-    if (accessors[i] && !set(accessors[i], "bufferView", json_integer(i))) {
-      json_decref(accessors[i]);
-      accessors[i] = NULL;
-    }
-  }
-  return json_pack("[o,o,o]", accessors[0], accessors[1], accessors[2]);
-}
-
-static json_t *make_views(const skin_data *data) {
-  if (data->compressed) return json_pack("[{s:i, s:I}]", "buffer", 0, "byteLength", (json_int_t)data->sizes[0]);
-  static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
-  json_t *views = json_array();
-  size_t offset = 0;
-  for (int i = 0; i < 3 && views; i++) {
-    json_t *view = json_pack("{s:i, s:I, s:I, s:i}", "buffer", 0, "byteOffset", (json_int_t)offset, "byteLength",
-                             (json_int_t)data->sizes[i], "target", targets[i]);
-    if (!view || json_array_append_new(views, view) != 0) {
-      json_decref(views);
-      return NULL;
-    }
-    offset += data->sizes[i];
-  }
-  return views;
-}
-
-static json_t *make_mesh(const skin_data *data) {
-  json_t *primitive =
-      json_pack("{s:{s:i, s:i}, s:i, s:i}", "attributes", "POSITION", 0, "NORMAL", 1, "indices", 2, "material", 0);
-  if (primitive && data->compressed) {
-    json_t *extension =
-        json_pack("{s:{s:i, s:{s:I, s:I}}}", "KHR_draco_mesh_compression", "bufferView", 0, "attributes", "POSITION",
-                  (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
-    if (!set(primitive, "extensions", extension)) {
-      json_decref(primitive);
-      return NULL;
-    }
-  }
-  return json_pack("{s:[o]}", "primitives", primitive);
-}
-
-/* Adds everything that a skin needs. `uri` is the buffer's, or NULL for the GLB's chunk. */
-static bool add_skin(json_t *root, json_t *node, const skin_data *data, const char *name, const char *uri) {
-  json_t *mesh = make_mesh(data);
-  if (mesh && name && !set(mesh, "name", json_string(name))) {
-    json_decref(mesh);
-    return false;
-  }
-  json_t *material = json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}}", "name", "skin", "pbrMetallicRoughness",
-                               "baseColorFactor", 0.75, 0.72, 0.65, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.6);
-  json_t *buffer = json_pack("{s:I}", "byteLength", (json_int_t)data->buffer.size);
-  bool done = set(node, "mesh", json_integer(0));
-  if (buffer && uri) done = set(buffer, "uri", json_string(uri)) && done;
-  done = set(root, "meshes", json_pack("[o]", mesh)) && done;
-  done = set(root, "materials", json_pack("[o]", material)) && done;
-  done = set(root, "accessors", make_accessors(data)) && done;
-  done = set(root, "bufferViews", make_views(data)) && done;
-  done = set(root, "buffers", json_pack("[o]", buffer)) && done;
-  if (data->compressed) {
-    done = set(root, "extensionsUsed", json_pack("[s]", "KHR_draco_mesh_compression")) && done;
-    done = set(root, "extensionsRequired", json_pack("[s]", "KHR_draco_mesh_compression")) && done;
+  bool done = true;
+  for (int i = 0; i < 3; i++) {
+    json_int_t number;
+    if (accessors[i] && !data->compressed) done = set(accessors[i], "bufferView", json_integer(first_view + i)) && done;
+    done = add(root, "accessors", accessors[i], &number) && done;
+    if (i == 0) *first = number;
   }
   return done;
 }
 
-/* The bytes of `data` as a data URI; NULL when memory is short. */
-static char *data_uri(const qmat_writer *data) {
-  char *base64 = qmat_base64_encode(data->bytes, data->size);
-  char *uri = base64 ? qmat_alloc(strlen(base64) + sizeof DATA_URI, 1) : NULL;
-  if (uri) {
-    memcpy(uri, DATA_URI, sizeof DATA_URI - 1);
-    strcpy(uri + sizeof DATA_URI - 1, base64);
+static bool add_material(document *document) {
+  if (document->material >= 0) return true;
+  json_t *material = json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}}", "name", "skin", "pbrMetallicRoughness",
+                               "baseColorFactor", 0.75, 0.72, 0.65, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.6);
+  return add(document->root, "materials", material, &document->material);
+}
+
+/* Adds everything that a skin needs; `name` may be NULL. */
+static bool add_skin(document *document, const skin_data *data, size_t offset, const char *name, bool mark,
+                     json_int_t *mesh_number) {
+  json_int_t view = 0, accessor = 0;
+  json_t *root = document->root;
+  if (!add_material(document) || !add_views(document, data, offset, &view) ||
+      !add_accessors(root, data, view, &accessor))
+    return false;
+  json_t *primitive = json_pack("{s:{s:I, s:I}, s:I, s:I}", "attributes", "POSITION", accessor, "NORMAL", accessor + 1,
+                                "indices", accessor + 2, "material", document->material);
+  bool done = true;
+  if (primitive && data->compressed) {
+    json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", DRACO_EXTENSION, "bufferView", view, "attributes",
+                                  "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
+    done = set(primitive, "extensions", extension) && add_extension(root, "extensionsUsed", DRACO_EXTENSION) &&
+           add_extension(root, "extensionsRequired", DRACO_EXTENSION);
   }
+  json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
+  if (mesh && name) done = set(mesh, "name", json_string(name)) && done;
+  if (mesh && mark) done = set(mesh, "extras", json_pack("{s:b}", QMAT_GLTF_SKIN_MARK, 1)) && done;
+  return add(root, "meshes", mesh, mesh_number) && done;
+}
+
+/* The bytes of `data` as a data URI; NULL when memory is short. */
+static json_t *data_uri(const uint8_t *bytes, size_t size) {
+  char *base64 = qmat_base64_encode(bytes, size);
+  json_t *uri = base64 ? json_sprintf("%s%s", DATA_URI, base64) : NULL;
   qmat_free(base64);
   return uri;
 }
 
-/* The whole document; NULL when memory is short. */
-static json_t *make_root(const qmat_medial *medial, const medial_text *text, const skin_data *skin,
-                         const qmat_gltf_options *options) {
+/* ---- what is added to nodes ---- */
+
+/* Sets the extras, in place of those that an earlier run left. */
+static bool set_extras(json_t *node, const json_t *extras) {
+  json_t *own = json_object_get(node, "extras");
+  const char *key;
+  json_t *value;
+  void *next;
+  if (!own) { /* json_copy would lose keys in a shortage of memory and say nothing */
+    own = json_object();
+    if (!set(node, "extras", own)) return false;
+  }
+  json_object_foreach_safe(own, next, key, value) {
+    if (strncmp(key, "qmat_", 5) == 0) json_object_del(own, key);
+  }
+  return json_object_update(own, (json_t *)(uintptr_t)extras) == 0;
+}
+
+/* Adds a child to a node, which is named so that people find it. */
+static bool add_child(json_t *root, json_t *node, json_t *child, const char *what) {
+  const char *name = json_string_value(json_object_get(node, "name"));
+  json_int_t number;
+  bool done = child && (!name || set(child, "name", json_sprintf("%s %s", name, what)));
+  done = add(root, "nodes", child, &number) && done;
+  return done && add(node, "children", json_integer(number), NULL);
+}
+
+/* Puts a medial mesh, and its skin, on every node that carries the mesh. */
+static bool add_to_carriers(document *document, json_int_t mesh, const json_t *extras, json_int_t skin) {
+  json_t *nodes = json_object_get(document->root, "nodes");
+  const size_t count = json_array_size(nodes);
+  bool done = true;
+  for (size_t i = 0; i < count && done; i++) {
+    json_t *node = json_array_get(nodes, i), *own = json_object_get(node, "extras");
+    const json_t *carried = json_object_get(node, "mesh");
+    if (!json_is_number(carried) || json_number_value(carried) != (double)mesh) continue;
+    if (own && !json_is_object(own)) {
+      done = add_child(document->root, node, json_pack("{s:O}", "extras", extras), "medial mesh");
+    } else {
+      done = set_extras(node, extras);
+    }
+    if (done && skin >= 0) done = add_child(document->root, node, json_pack("{s:I}", "mesh", skin), "skin");
+  }
+  return done;
+}
+
+/* A node of its own for the one medial mesh of all: of a new asset its first, else one that is added to its scene. */
+static bool add_node(json_t *root, const json_t *extras, json_int_t skin, const char *name) {
+  json_t *node = json_object();
+  bool done = node != NULL;
+  if (name) done = done && set(node, "name", json_string(name));
+  if (skin >= 0) done = done && set(node, "mesh", json_integer(skin));
+  done = done && set_extras(node, extras);
+  json_int_t number;
+  if (!add(root, "nodes", node, &number) || !done) return false;
+  const json_t *scenes = json_object_get(root, "scenes"), *chosen = json_object_get(root, "scene");
+  json_t *scene = json_array_get(scenes, json_is_number(chosen) ? (size_t)json_number_value(chosen) : 0);
+  return !scene || add(scene, "nodes", json_integer(number), NULL); /* without scenes every root is shown */
+}
+
+/* ---- the document ---- */
+
+static qmat_status open_document(qmat_context *context, const qmat_scene *scene, bool binary, document *document) {
+  document->binary = document->in_chunk = binary;
+  document->material = -1;
+  if (!scene) {
+    document->root = json_pack("{s:{s:s, s:s}, s:i, s:[{}]}", "asset", "version", "2.0", "generator",
+                               "qmat " QMAT_VERSION, "scene", 0, "scenes");
+    return document->root ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+  }
+  const qmat_file_part *main_part = &scene->parts[0];
+  qmat_status status = qmat_gltf_asset_init(context, main_part->bytes, main_part->size, scene->name, &document->asset);
+  if (status != QMAT_OK) return status;
+  document->root = json_incref(document->asset.root);
+  const json_t *buffers = json_object_get(document->root, "buffers");
+  const bool has_chunk =
+      document->asset.chunk && json_array_size(buffers) > 0 && !json_object_get(json_array_get(buffers, 0), "uri");
+  if (has_chunk) {
+    document->data_start = (document->asset.chunk_size + 3) / 4 * 4;
+  } else {
+    document->buffer = (json_int_t)json_array_size(buffers);
+    document->in_chunk = binary && document->buffer == 0 && !document->asset.chunk;
+  }
+  return QMAT_OK;
+}
+
+static void close_document(document *document) {
+  qmat_writer_uninit(&document->data);
+  json_decref(document->root);
+  qmat_gltf_asset_uninit(&document->asset);
+}
+
+/* Adds one medial mesh and its skin. */
+static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, size_t index,
+                              const qmat_gltf_addition *addition, document *document) {
+  const qmat_gltf_options *options = &addition->options;
   /* A file's name need not be UTF-8, JSON must. */
   const char *name = options->name && options->name[0] && qmat_is_utf8(options->name) ? options->name : NULL;
-  char *uri = skin && !options->binary ? data_uri(&skin->buffer) : NULL;
-  json_t *node = json_object();
-  json_t *root = json_pack("{s:{s:s, s:s}, s:i, s:[{s:[i]}]}", "asset", "version", "2.0", "generator",
-                           "qmat " QMAT_VERSION, "scene", 0, "scenes", "nodes", 0);
-  bool done = node && root && (!skin || options->binary || uri);
-  if (done && name) done = set(node, "name", json_string(name));
-  if (done && skin) done = add_skin(root, node, skin, name, uri);
-  if (done) done = set(node, "extras", make_extras(medial, text, options));
-  if (done) done = set(root, "nodes", json_pack("[O]", node));
-  qmat_free(uri);
-  json_decref(node);
-  if (done) return root;
-  json_decref(root);
-  return NULL;
+  const bool has_skin = addition->skin && addition->skin->triangle_count > 0;
+  const bool of_mesh = scene && scene->mesh_count > 0;
+  const size_t offset = document->data_start + document->data.size;
+  medial_text text = {0};
+  skin_data data = {0};
+  json_int_t skin = -1;
+  qmat_status status = make_medial_text(context, addition->medial, options, &text);
+  if (status == QMAT_OK && has_skin) status = make_skin(context, addition->skin, options, &data, &document->data);
+  json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, options) : NULL;
+  bool done = extras && (!has_skin || add_skin(document, &data, offset, name, scene != NULL, &skin));
+  if (done && of_mesh) {
+    done = add_to_carriers(document, scene->meshes[index], extras, skin);
+  } else if (done) {
+    done = add_node(document->root, extras, skin, name);
+  }
+  if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
+  json_decref(extras);
+  qmat_free(text.base64);
+  return status;
+}
+
+/* Says in the JSON where the data are that were added, or that were in a chunk which the file will not have. */
+static bool place_data(const document *document) {
+  const size_t size = document->data.size;
+  json_t *buffers = json_object_get(document->root, "buffers"), *first = json_array_get(buffers, 0);
+  if (document->data_start > 0) { /* behind what the GLB's chunk has */
+    if (size > 0 && !set(first, "byteLength", json_integer((json_int_t)(document->data_start + size)))) return false;
+    if (document->binary) return true;
+    qmat_writer all = {0};
+    qmat_put_bytes(&all, document->asset.chunk, document->asset.chunk_size);
+    pad(&all, 0);
+    qmat_put_bytes(&all, document->data.bytes, size);
+    const bool done = !all.failed && set(first, "uri", data_uri(all.bytes, all.size));
+    qmat_writer_uninit(&all);
+    return done;
+  }
+  if (size == 0) return true;
+  json_t *buffer = json_pack("{s:I}", "byteLength", (json_int_t)size);
+  bool done = buffer != NULL;
+  if (done && !document->in_chunk) done = set(buffer, "uri", data_uri(document->data.bytes, size));
+  return add(document->root, "buffers", buffer, NULL) && done;
 }
 
 /* ---- the file ---- */
 
-static qmat_status put_file(qmat_context *context, const json_t *root, const skin_data *skin, bool binary,
-                            qmat_writer *out) {
-  size_t flags = JSON_REAL_PRECISION(17) | (binary ? JSON_COMPACT : JSON_INDENT(2));
-  char *json = qmat_json_text(root, flags, NULL);
-  if (!json) return qmat_fail_memory(context, "a glTF file");
-  if (!binary) {
-    qmat_put_text(out, json);
-    qmat_put_u8(out, '\n');
-  } else {
-    size_t json_size = (strlen(json) + 3) / 4 * 4;
-    uint64_t total = 12 + 8 + json_size + (skin ? 8 + skin->buffer.size : 0);
-    if (total > UINT32_MAX) {
-      qmat_free(json);
-      return qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes is beyond the format's 4 GiB",
-                       (unsigned long long)total);
-    }
-    qmat_put_text(out, "glTF");
-    qmat_put_u32(out, 2);
-    qmat_put_u32(out, (uint32_t)total);
-    qmat_put_u32(out, (uint32_t)json_size);
-    qmat_put_text(out, "JSON");
-    qmat_put_text(out, json);
-    pad(out, ' ');
-    if (skin) {
-      qmat_put_u32(out, (uint32_t)skin->buffer.size);
-      qmat_put_bytes(out, "BIN", 4);
-      qmat_put_bytes(out, skin->buffer.bytes, skin->buffer.size);
-    }
+static void put_chunk_head(qmat_writer *out, size_t size, const char *type) {
+  qmat_put_u32(out, (uint32_t)size);
+  qmat_put_bytes(out, type, 4);
+}
+
+static qmat_status put_glb(qmat_context *context, const document *document, const char *json, qmat_writer *out) {
+  const qmat_gltf_asset *asset = &document->asset;
+  const bool data_is_chunk = document->data.size > 0 && document->in_chunk;
+  const size_t json_size = (strlen(json) + 3) / 4 * 4, kept = asset->chunk ? (asset->chunk_size + 3) / 4 * 4 : 0;
+  const size_t chunk_size = kept + (data_is_chunk ? document->data.size : 0);
+  const bool has_chunk = asset->chunk || data_is_chunk;
+  const uint64_t total = 12 + 8 + (uint64_t)json_size + (has_chunk ? 8 + chunk_size : 0) + asset->more_size;
+  if (total > UINT32_MAX) {
+    return qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes is beyond the format's 4 GiB",
+                     (unsigned long long)total);
   }
-  qmat_free(json);
+  qmat_put_text(out, "glTF");
+  qmat_put_u32(out, 2);
+  qmat_put_u32(out, (uint32_t)total);
+  put_chunk_head(out, json_size, "JSON");
+  qmat_put_text(out, json);
+  pad(out, ' ');
+  if (has_chunk) {
+    put_chunk_head(out, chunk_size, "BIN");
+    if (asset->chunk) qmat_put_bytes(out, asset->chunk, asset->chunk_size);
+    pad(out, 0);
+    if (data_is_chunk) qmat_put_bytes(out, document->data.bytes, document->data.size);
+  }
+  if (asset->more_size > 0) qmat_put_bytes(out, asset->more, asset->more_size);
   return QMAT_OK;
 }
 
-qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
-                            const qmat_gltf_options *options, qmat_file **file) {
-  *file = NULL;
-  bool has_skin = skin && skin->triangle_count > 0;
-  medial_text text = {0};
-  skin_data data = {0};
-  json_t *root = NULL;
+static qmat_status put_file(qmat_context *context, const document *document, qmat_writer *out) {
+  size_t flags = JSON_REAL_PRECISION(17) | (document->binary ? JSON_COMPACT : JSON_INDENT(2));
+  char *json = qmat_json_text(document->root, flags, NULL);
+  if (!json) return qmat_fail_memory(context, "a glTF file");
+  qmat_status status = QMAT_OK;
+  if (document->binary) {
+    status = put_glb(context, document, json, out);
+  } else {
+    qmat_put_text(out, json);
+    qmat_put_u8(out, '\n');
+  }
+  qmat_free(json);
+  return status;
+}
+
+/* Parts of their own for the files that the asset refers to. */
+static bool copy_parts(const qmat_scene *scene, qmat_file *file) {
+  for (size_t i = 1; scene && i < scene->part_count; i++) {
+    const qmat_file_part *part = &scene->parts[i];
+    file->parts[i] = (qmat_file_part){.name = qmat_strdup(part->name), .bytes = qmat_alloc(part->size, 1)};
+    if (!file->parts[i].name || !file->parts[i].bytes) return false;
+    memcpy(file->parts[i].bytes, part->bytes, part->size);
+    file->parts[i].size = part->size;
+  }
+  return true;
+}
+
+static qmat_status make_file(qmat_context *context, const qmat_scene *scene, const document *document,
+                             qmat_file **file) {
+  const size_t part_count = scene ? scene->part_count : 1;
   qmat_writer out = {0};
-  qmat_file *made = NULL;
-  qmat_status status = make_medial_text(context, medial, options, &text);
-  if (status == QMAT_OK && has_skin) status = make_skin(context, skin, options, &data);
-  if (status != QMAT_OK) goto done;
-  root = make_root(medial, &text, has_skin ? &data : NULL, options);
-  made = qmat_file_new();
+  qmat_file *made = qmat_file_new();
   if (made) {
-    made->format = qmat_strdup(options->binary ? "glb" : "gltf");
-    made->parts = qmat_calloc(1, sizeof *made->parts);
+    made->format = qmat_strdup(document->binary ? "glb" : "gltf");
+    made->parts = qmat_calloc(part_count, sizeof *made->parts);
+    if (made->parts) made->part_count = part_count;
   }
-  if (!root || !made || !made->format || !made->parts) {
+  qmat_status status = QMAT_OK;
+  if (!made || !made->format || !made->parts || !copy_parts(scene, made))
     status = qmat_fail_memory(context, "a glTF file");
-    goto done;
-  }
-  made->part_count = 1;
-  status = put_file(context, root, has_skin ? &data : NULL, options->binary, &out);
+  if (status == QMAT_OK) status = put_file(context, document, &out);
   if (status == QMAT_OK) status = qmat_writer_to_part(context, &out, made, 0, "");
   if (status == QMAT_OK) status = qmat_value_seal(context, &made->base);
   if (status == QMAT_OK) {
     *file = made;
-    made = NULL;
+  } else if (made) {
+    qmat_value_release(&made->base);
   }
-
-done:
-  if (made) qmat_value_release(&made->base);
   qmat_writer_uninit(&out);
-  json_decref(root);
-  qmat_writer_uninit(&data.buffer);
-  qmat_free(text.base64);
   return status;
+}
+
+/* `scene` NULL: an asset of its own. */
+static qmat_status write_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                  size_t count, qmat_file **file) {
+  document document = {0};
+  *file = NULL;
+  qmat_status status = open_document(context, scene, additions[0].options.binary, &document);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = add_medial(context, scene, i, &additions[i], &document);
+  if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");
+  if (status == QMAT_OK) status = make_file(context, scene, &document, file);
+  close_document(&document);
+  return status;
+}
+
+qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
+                            const qmat_gltf_options *options, qmat_file **file) {
+  const qmat_gltf_addition addition = {.medial = medial, .skin = skin, .options = *options};
+  return write_document(context, NULL, &addition, 1, file);
+}
+
+qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                             size_t count, qmat_file **file) {
+  return write_document(context, scene, additions, count, file);
 }

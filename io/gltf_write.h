@@ -16,9 +16,10 @@ typedef struct qmat_gltf_options {
   int radius_bits;     /* the same */
   double quantisation; /* what quantisation may move the solid by, model units; used where bits are 0 */
   const char *name;    /* of the node and the mesh, UTF-8; NULL or "": none */
-  double epsilon;      /* written as they are, in units of the diagonal; NAN: not known */
-  double error_out;    /* surface to envelope */
-  double error_in;     /* envelope to surface */
+  double diagonal;     /* the unit of what follows, in model units; 0: not known, and quantisation is not added */
+  double epsilon;      /* NAN: not known; so are the next two */
+  double error_out;    /* surface to envelope, before quantisation */
+  double error_in;     /* envelope to surface, the same */
   qmat_certificate certified;
 } qmat_gltf_options;
 
@@ -30,11 +31,11 @@ typedef struct qmat_gltf_options {
  *      qmat_data         base64 of what qmat_draco_encode_medial makes
  *      qmat_data_format  "draco"
  *      qmat_vertices, qmat_edges, qmat_triangles     counts of the medial mesh
- *      qmat_epsilon, qmat_error_out, qmat_error_in   as in the options; missing when not known
- *      qmat_error_unit   "diagonal"; with them
- *      qmat_certified    missing when not known
- *      qmat_quantisation the largest |dc| + |dr| of a sphere of `medial` against the one decoded from qmat_data
- *      qmat_quantisation_unit  "model"
+ *      qmat_epsilon      as in the options; missing when not known
+ *      qmat_error_out, qmat_error_in   of what qmat_data decodes to: those of the options and qmat_quantisation,
+ * rounded up; missing when not known qmat_error_unit   "diagonal"; with them qmat_certified    that both are at most
+ * qmat_epsilon, where the options say so before quantisation; missing when not known qmat_quantisation the largest |dc|
+ * + |dr| of a sphere of `medial` against the one decoded from qmat_data qmat_quantisation_unit  "model"
  *      qmat_position_bits, qmat_radius_bits
  *      qmat_frame        "node": spheres are in the node's local space, like the skin
  * Chosen bits are raised until the measured error is within options->quantisation or single precision ends; with
@@ -44,5 +45,23 @@ typedef struct qmat_gltf_options {
  * QMAT_ERROR_DEPENDENCY. One thread; the same bytes for the same input. Cost: linear. */
 qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                             const qmat_gltf_options *options, qmat_file **file);
+
+/* A medial mesh that is to be added to a scene. */
+typedef struct qmat_gltf_addition {
+  const qmat_medial *medial;
+  const qmat_mesh *skin; /* to be added as a mesh; NULL: none */
+  qmat_gltf_options options;
+} qmat_gltf_addition;
+
+/* Makes the glTF asset that `scene` keeps anew, with medial meshes added and all else as it was: the JSON gains keys
+ * and members at the end of arrays, and no byte of a buffer changes. `additions` are one for each mesh of the scene
+ * (scene->mesh_count), in the space of that mesh, or one of all of them, in world space. Every node that carries the
+ * mesh gains the extras above; where it has extras that are no object, a child that has them is added to it. What an
+ * earlier run left there is replaced. The one medial mesh of all is carried by a node that is added to the scene. A
+ * skin becomes a child of each of these nodes (the mesh of the node that was added for it), with its data behind those
+ * of the GLB's binary chunk, else in a buffer of its own. The options' `binary` is the same for all. Files that the
+ * asset refers to are further parts of `*file`. Otherwise as qmat_gltf_write. */
+qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                             size_t count, qmat_file **file);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "io/gltf.h"
+#include "io/gltf_asset.h"
 #include "io/ma.h"
 #include "io/mesh_formats.h"
 #include "io/usd_scene.h"
@@ -179,16 +180,97 @@ static void set_units(qmat_scene *scene, qmat_format format, const json_t *repor
   scene->is_z_up = up && up[0] == 'Z';
 }
 
-qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
-                            qmat_scene **scene, qmat_mesh **mesh, qmat_report **report) {
+static qmat_status read_whole(qmat_context *context, qmat_format format, const char *path, const qmat_bytes *bytes,
+                              const qmat_read_options *options, qmat_value **mesh, json_t *report) {
+  qmat_soup soup = {0};
+  qmat_mesh *made = NULL;
+  qmat_status status = read_surface(context, format, path, bytes, &soup, report);
+  if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made, report);
+  qmat_soup_uninit(&soup);
+  *mesh = made ? &made->base : NULL;
+  return status;
+}
+
+/* What the report says of a mesh before it is made: a member of its list "meshes". NULL when memory is short. */
+static json_t *add_mesh_report(json_t *report, const json_t *root, const char *name, uint32_t id) {
+  json_t *of_mesh = json_pack("{s:s, s:I, s:I}", "name", name, "mesh", (json_int_t)id, "nodes",
+                              (json_int_t)qmat_gltf_mesh_carriers(root, id));
+  return json_array_append_new(json_object_get(report, "meshes"), of_mesh) == 0 ? of_mesh : NULL;
+}
+
+/* The meshes that were read as one value. */
+static qmat_status make_meshes(qmat_context *context, const char *path, const json_t *root, qmat_gltf_meshes *from,
+                               const qmat_read_options *options, qmat_value **mesh, json_t *report) {
+  qmat_mesh *made = NULL;
+  qmat_status status = QMAT_OK;
+  if (from->count == 1) {
+    status = qmat_soup_to_mesh(context, &from->soups[0], path, options, &made, report);
+    *mesh = made ? &made->base : NULL;
+    return status;
+  }
+  qmat_list *list = qmat_list_new(from->count);
+  if (!list || json_object_set_new(report, "meshes", json_array()) != 0)
+    status = qmat_fail_memory(context, "the meshes of a scene");
+  for (size_t i = 0; i < from->count && status == QMAT_OK; i++) {
+    list->names[i] = qmat_gltf_mesh_name(root, from->ids[i]);
+    json_t *of_mesh = list->names[i] ? add_mesh_report(report, root, list->names[i], from->ids[i]) : NULL;
+    if (!of_mesh) {
+      status = qmat_fail_memory(context, "the meshes of a scene");
+      break;
+    }
+    made = NULL;
+    status = qmat_soup_to_mesh(context, &from->soups[i], path, options, &made, of_mesh);
+    qmat_soup_uninit(&from->soups[i]);
+    list->items[i] = made ? &made->base : NULL;
+    if (status != QMAT_OK) qmat_fail_within(context, list->names[i]);
+  }
+  if (status == QMAT_OK) status = qmat_value_seal(context, &list->base);
+  if (status == QMAT_OK) {
+    *mesh = &list->base;
+  } else if (list) {
+    qmat_value_release(&list->base);
+  }
+  return status;
+}
+
+static qmat_status read_gltf(qmat_context *context, qmat_format format, const char *path, const qmat_bytes *bytes,
+                             const qmat_read_options *options, const char *choice, qmat_scene *scene, qmat_value **mesh,
+                             json_t *report) {
+  qmat_gltf_asset asset = {0};
+  qmat_gltf_meshes meshes = {0};
+  json_t *warnings = json_array();
+  const bool merged = strcmp(choice, "merged") == 0;
+  qmat_status status = warnings ? QMAT_OK : qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK) status = qmat_gltf_asset_init(context, bytes->data, bytes->size, path, &asset);
+  if (status == QMAT_OK && merged) {
+    status = read_whole(context, format, path, bytes, options, mesh, report);
+  } else if (status == QMAT_OK) {
+    status = qmat_gltf_parse_meshes(context, bytes->data, bytes->size, path, asset.root, choice, &meshes, report);
+    if (status == QMAT_OK) status = make_meshes(context, path, asset.root, &meshes, options, mesh, report);
+    if (status == QMAT_OK) {
+      scene->mesh_count = meshes.count;
+      scene->meshes = meshes.ids;
+      meshes.ids = NULL;
+    }
+  }
+  if (status == QMAT_OK) status = qmat_gltf_keep(context, asset.root, bytes->data, bytes->size, path, scene, warnings);
+  if (status == QMAT_OK && json_array_size(warnings) > 0 && json_object_set(report, "warnings", warnings) != 0)
+    status = qmat_fail_memory(context, "the report");
+  json_decref(warnings);
+  qmat_gltf_meshes_uninit(&meshes);
+  qmat_gltf_asset_uninit(&asset);
+  return status;
+}
+
+qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, const qmat_read_options *options,
+                                   const char *choice, qmat_scene **scene, qmat_value **mesh, qmat_report **report) {
   *scene = NULL;
   *mesh = NULL;
   *report = NULL;
   qmat_scene *made_scene = NULL;
-  qmat_mesh *made_mesh = NULL;
+  qmat_value *made_mesh = NULL;
   qmat_report *made_report = NULL;
   qmat_bytes bytes = {0};
-  qmat_soup soup = {0};
   qmat_format format = QMAT_FORMAT_UNKNOWN;
   qmat_status status = qmat_bytes_read_file(context, path, &bytes);
   if (status == QMAT_OK) status = qmat_format_choose(context, path, &bytes, &format);
@@ -201,17 +283,22 @@ qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_
     status = qmat_fail_memory(context, "the report");
     goto done;
   }
-  status = read_surface(context, format, path, &bytes, &soup, made_report->root);
-  qmat_bytes_uninit(&bytes);
-  if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made_mesh, made_report->root);
-  qmat_soup_uninit(&soup);
+  if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) {
+    status = read_gltf(context, format, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
+  } else if (strcmp(choice, "all") != 0 && strcmp(choice, "merged") != 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "meshes are chosen of glTF only; %s is read as a whole",
+              formats[format].title);
+    qmat_fail_at(context, path, 0, 0);
+    status = qmat_fail_field(context, "mesh");
+  } else {
+    status = read_whole(context, format, path, &bytes, options, &made_mesh, made_report->root);
+  }
   if (status == QMAT_OK) set_units(made_scene, format, made_report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_scene->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_report->base);
 
 done:
   qmat_bytes_uninit(&bytes);
-  qmat_soup_uninit(&soup);
   if (status == QMAT_OK) {
     *scene = made_scene;
     *mesh = made_mesh;
@@ -219,8 +306,16 @@ done:
     return QMAT_OK;
   }
   if (made_scene) qmat_value_release(&made_scene->base);
-  if (made_mesh) qmat_value_release(&made_mesh->base);
+  qmat_value_release(made_mesh);
   if (made_report) qmat_value_release(&made_report->base);
+  return status;
+}
+
+qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
+                            qmat_scene **scene, qmat_mesh **mesh, qmat_report **report) {
+  qmat_value *made = NULL;
+  const qmat_status status = qmat_model_read_meshes(context, path, options, "merged", scene, &made, report);
+  *mesh = (qmat_mesh *)made;
   return status;
 }
 

@@ -43,6 +43,15 @@ char *qmat_model_name(const char *path);
 qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_read_options *options,
                             qmat_scene **scene, qmat_mesh **mesh, qmat_report **report);
 
+/* The same, mesh by mesh where the file is glTF: `choice` is "merged" (as qmat_model_read has it), or what
+ * qmat_gltf_choose_meshes takes; of other formats, "all" and "merged" are both the whole surface. `*mesh` is a mesh or,
+ * of several, a list of them with their names, each in its own space. The scene keeps a glTF asset with the files that
+ * it refers to, and which of its meshes these are. Of several meshes the report has a list "meshes", each with its
+ * "name", its number "mesh", the number of "nodes" that carry it, and what qmat_soup_to_mesh reports; "warnings" names
+ * files that are not copied. QMAT_ERROR_USAGE for a choice that is none. */
+qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, const qmat_read_options *options,
+                                   const char *choice, qmat_scene **scene, qmat_value **mesh, qmat_report **report);
+
 /* Reads the medial mesh in the .ma file `path`; otherwise as qmat_model_read. */
 qmat_status qmat_medial_read(qmat_context *context, const char *path, qmat_medial **medial);
 

@@ -244,6 +244,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
     const char *key;
     double value;
   } lengths[] = {
+      {"diagonal", qmat_surface_frame(e->surface)->diagonal},
       {"epsilon", e->params->epsilon},
       {"surface_to_envelope", e->surface_to_envelope.hi},
       {"surface_to_envelope_at_least", e->surface_to_envelope.lo},

@@ -12,12 +12,14 @@
 /* Quantisation spends this part of epsilon at most; without a report epsilon is taken for this part of the diagonal. */
 #define PART_OF_EPSILON 0.05
 #define USUAL_EPSILON 1e-3
+/* So little of the diagonal is near what single precision can tell apart: quantisation is not asked to do better. */
+#define LEAST_QUANTISATION 1e-6
 
 typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMAT_USDA, FORMAT_USDZ } file_format;
 
 typedef struct scene_write_params {
   int format; /* a file_format */
-  bool draco;
+  bool draco, skin_beside;
   int64_t position_bits, radius_bits;
 } scene_write_params;
 
@@ -50,25 +52,63 @@ static qmat_certificate certificate_of(const qmat_report *report) {
   return json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
 }
 
+/* What is to be written of one medial mesh. */
+static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_medial *medial,
+                                      const qmat_mesh *skin, const qmat_report *report, const char *name) {
+  const double epsilon = reported(report, "epsilon"), told = reported(report, "diagonal");
+  const double diagonal = told > 0 ? told : diagonal_of(medial);
+  qmat_gltf_addition addition = {
+      .medial = medial,
+      .skin = skin,
+      .options =
+          {
+              .binary = params->format == FORMAT_GLB,
+              .compress_skin = params->draco,
+              .position_bits = (int)params->position_bits,
+              .radius_bits = (int)params->radius_bits,
+              .name = name,
+              .diagonal = diagonal,
+              .epsilon = epsilon,
+              .error_out = reported(report, "surface_to_envelope"),
+              .error_in = reported(report, "envelope_to_surface"),
+              .certified = certificate_of(report),
+          },
+  };
+  qmat_gltf_options *options = &addition.options;
+  double quantisation = PART_OF_EPSILON * (epsilon > 0 ? epsilon : USUAL_EPSILON);
+  /* What is certified shall stay so. */
+  const double left = epsilon - fmax(options->error_out, options->error_in);
+  if (options->certified == QMAT_CERTIFICATE_YES && left < quantisation)
+    quantisation = fmax(0.99 * left, LEAST_QUANTISATION);
+  options->quantisation = quantisation * diagonal;
+  return addition;
+}
+
+/* All inputs of one mesh, or lists of one length. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  const qmat_medial *medial = (const qmat_medial *)inputs[IN_MEDIAL];
-  const qmat_report *report = (const qmat_report *)inputs[IN_REPORT];
-  double epsilon = reported(report, "epsilon");
-  qmat_gltf_options options = {
-      .binary = params->format == FORMAT_GLB,
-      .compress_skin = params->draco,
-      .position_bits = (int)params->position_bits,
-      .radius_bits = (int)params->radius_bits,
-      .quantisation = PART_OF_EPSILON * (epsilon > 0 ? epsilon : USUAL_EPSILON) * diagonal_of(medial),
-      .name = scene ? scene->name : NULL,
-      .epsilon = epsilon,
-      .error_out = reported(report, "surface_to_envelope"),
-      .error_in = reported(report, "envelope_to_surface"),
-      .certified = certificate_of(report),
-  };
-  return qmat_gltf_write(context, medial, (const qmat_mesh *)inputs[IN_SKIN], &options, file);
+  const bool kept = scene && scene->part_count > 0;
+  const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
+               expected = kept && scene->mesh_count > 0 ? scene->mesh_count : 1;
+  if (count != expected) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes are given for %zu meshes", count, expected);
+    return qmat_fail_field(context, "medial");
+  }
+  qmat_gltf_addition *additions = qmat_calloc(count, sizeof *additions);
+  if (!additions) return qmat_fail_memory(context, "a glTF file");
+  for (size_t i = 0; i < count; i++) {
+    const bool shows = !kept || params->skin_beside;
+    additions[i] = addition_of(params, (const qmat_medial *)qmat_value_at(inputs[IN_MEDIAL], i),
+                               shows && inputs[IN_SKIN] ? (const qmat_mesh *)qmat_value_at(inputs[IN_SKIN], i) : NULL,
+                               inputs[IN_REPORT] ? (const qmat_report *)qmat_value_at(inputs[IN_REPORT], i) : NULL,
+                               scene ? scene->name : NULL);
+  }
+  const qmat_status status =
+      kept ? qmat_gltf_enrich(context, scene, additions, count, file)
+           : qmat_gltf_write(context, additions[0].medial, additions[0].skin, &additions[0].options, file);
+  qmat_free(additions);
+  return status;
 }
 
 static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
@@ -89,15 +129,39 @@ static qmat_status write_usd(qmat_context *context, const scene_write_params *pa
                         file);
 }
 
+/* What goes with a list of medial meshes is a list, too, of as many. */
+static qmat_status check_lists(qmat_context *context, const qmat_value *const inputs[]) {
+  static const int others[] = {IN_SKIN, IN_REPORT};
+  static const char *const names[] = {"skin", "report"};
+  const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
+  for (size_t i = 0; i < 2; i++) {
+    const size_t of_other = qmat_value_count(inputs[others[i]]);
+    if (of_other == 0 || of_other == count) continue;
+    qmat_fail(context, QMAT_ERROR_USAGE, "%zu are given for %zu medial meshes", of_other, count);
+    return qmat_fail_field(context, names[i]);
+  }
+  for (size_t i = 0; i < count; i++) {
+    if (((const qmat_medial *)qmat_value_at(inputs[IN_MEDIAL], i))->sphere_count > 0) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    if (count > 1) qmat_fail_within(context, ((const qmat_list *)inputs[IN_MEDIAL])->names[i]);
+    return qmat_fail_field(context, "medial");
+  }
+  return QMAT_OK;
+}
+
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const scene_write_params *params = data;
   const qmat_medial *medial = (const qmat_medial *)inputs[IN_MEDIAL];
+  const bool is_gltf = params->format == FORMAT_GLB || params->format == FORMAT_GLTF;
   qmat_file *file = NULL;
-  qmat_status status;
-  if (medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
-    return qmat_fail_field(context, "medial");
+  qmat_status status = check_lists(context, inputs);
+  if (status != QMAT_OK) return status;
+  if (!is_gltf && qmat_value_count(inputs[IN_MEDIAL]) > 1) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the format holds one medial mesh, and there are %zu",
+              qmat_value_count(inputs[IN_MEDIAL]));
+    qmat_fail_field(context, "medial");
+    return qmat_fail_hint(context, "choose one by scene.read's parameter mesh, or set that to merged");
   }
   switch ((file_format)params->format) {
     case FORMAT_MA:
@@ -134,6 +198,11 @@ static const qmat_param params[] = {
      .doc = "Compress the skin too: smaller, but some engines refuse the file or show nothing (glb and gltf)",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, draco)},
+    {.name = "skin_beside",
+     .unit = "",
+     .doc = "Add the skin to a glTF scene that is handed on, as a mesh beside the one that it describes",
+     .type = QMAT_PARAM_BOOL,
+     .offset = offsetof(scene_write_params, skin_beside)},
     {.name = "position_bits",
      .unit = "bits",
      .doc = "Quantisation of the spheres' centres (glb and gltf); 0 takes what epsilon asks for",
@@ -152,10 +221,21 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "scene", .type = QMAT_SCENE, .optional = true, .doc = "Where the model came from: names the node; its unit (usda and usdz)"},
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh"},
-    {.name = "skin", .type = QMAT_MESH, .optional = true, .doc = "The surface that viewers show (not ma and ply)"},
-    {.name = "report", .type = QMAT_REPORT, .optional = true, .doc = "From medial.evaluate or medial.simplify: epsilon and the errors"},
+    {.name = "scene",
+     .type = QMAT_SCENE,
+     .optional = true,
+     .doc = "Where the model came from: a glTF scene to hand on; else its name, and its unit (usda and usdz)"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh, or one for each mesh of the scene", .list = true},
+    {.name = "skin",
+     .type = QMAT_MESH,
+     .optional = true,
+     .doc = "The surface that viewers show (not ma and ply)",
+     .list = true},
+    {.name = "report",
+     .type = QMAT_REPORT,
+     .optional = true,
+     .doc = "From medial.evaluate or medial.simplify: epsilon and the errors",
+     .list = true},
     {0},
 };
 
@@ -168,17 +248,23 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 1,
-    .summary = "Makes a file of a medial mesh and its skin",
+    .version = 2,
+    .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
-        "glb and gltf hold the skin as an ordinary mesh, so that every client shows something, and the medial mesh as "
-        "a Draco blob in base64, in the extras of the same node, where clients keep it (qmat_data; triangles first, "
-        "then "
+        "A scene that scene.read took from glTF goes on as glb or gltf with all that is in it: each mesh's medial mesh "
+        "is added to the extras of the nodes that carry it (a child of the node has them where its extras are no "
+        "object), in that mesh's own space; one of all meshes merged gets a node of its own. Nothing else changes: the "
+        "JSON only gains keys and members, buffers stay byte for byte, files that the asset refers to are written "
+        "beside the new one. skin_beside adds the skins as meshes. Of any other scene glb and gltf are made anew, and "
+        "hold the skin as an ordinary mesh, so that every client shows something. The medial mesh is "
+        "a Draco blob in base64, in the extras of a node, where clients keep it (qmat_data; triangles first, then "
         "edges on no triangle as (i, j, j), then lone spheres as (i, i, i); the order of spheres is kept). Without "
         "bits given, quantisation moves the solid by at most 5 % of the report's epsilon, or of 0.1 % of the diagonal "
-        "without a report; the measured move is in the extras as qmat_quantisation, in model units. The report's "
-        "epsilon, surface_to_envelope, envelope_to_surface and certified go into the extras as they are: "
-        "qmat_epsilon, qmat_error_out and qmat_error_in are fractions of the diagonal, before quantisation. usda and "
+        "without a report, and by no more than what a certified error has left to epsilon; the measured move is in the "
+        "extras as qmat_quantisation, in model units. qmat_epsilon, qmat_error_out and qmat_error_in are fractions of "
+        "the diagonal: the report's epsilon, and its surface_to_envelope and envelope_to_surface with the measured "
+        "move added, so that they hold for what qmat_data decodes to; qmat_certified says that the report is certified "
+        "and both still are within epsilon. usda and "
         "usdz hold the skin as a Mesh, and as guides the spheres as Points, the edges as BasisCurves and the triangles "
         "as a Mesh, all with primvars:radius in single precision, and the same facts in the prim's customData. ma and "
         "ply hold the medial mesh alone, unquantised. draco and the bits apply to glb and gltf only.",

@@ -121,6 +121,20 @@ static qmat_file *file_example(void) {
   return file;
 }
 
+/* Of two fields. */
+static qmat_list *list_example(void) {
+  qmat_context context = {0};
+  qmat_list *list = qmat_list_new(2);
+  assert_non_null(list);
+  list->names[0] = qmat_strdup("K\xc3\xb6rper");
+  list->names[1] = qmat_strdup("");
+  for (size_t i = 0; i < 2; ++i) {
+    list->items[i] = &field_example()->base;
+    assert_int_equal(qmat_value_seal(&context, list->items[i]), QMAT_OK);
+  }
+  return list;
+}
+
 static qmat_value *example_of(qmat_value_type type) {
   switch (type) {
     case QMAT_SCENE:
@@ -139,6 +153,8 @@ static qmat_value *example_of(qmat_value_type type) {
       return &report_example()->base;
     case QMAT_FILE:
       return &file_example()->base;
+    case QMAT_LIST:
+      return &list_example()->base;
     default:
       return NULL;
   }
@@ -176,7 +192,7 @@ static void test_new_values_are_empty_and_can_be_released_at_once(void **state) 
   (void)state;
   qmat_value *values[] = {&qmat_scene_new()->base,   &qmat_mesh_new()->base,   &qmat_field_new()->base,
                           &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_chain_new()->base,
-                          &qmat_report_new()->base,  &qmat_file_new()->base};
+                          &qmat_report_new()->base,  &qmat_file_new()->base,   &qmat_list_new(0)->base};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
     assert_non_null(values[type]);
     assert_int_equal(values[type]->type, type);
@@ -216,7 +232,8 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              [QMAT_CHAIN] = 16 * 8 + 8 * 4 + 3 * 4 + 3 * 4 + 4 * 4 + 8 * 8 + 2 * 8,
                              [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
-                             [QMAT_FILE] = 4 + 8};
+                             [QMAT_FILE] = 4 + 8,
+                             [QMAT_LIST] = 2 * (3 * 8 + 10)};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
     qmat_value *value = example_of((qmat_value_type)type);
     assert_int_equal(qmat_value_bytes(value), expected[type]);
@@ -670,14 +687,14 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error falls");
 }
 
-static void test_part_names_stay_in_one_folder_and_are_unique(void **state) {
+static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
   (void)state;
-  const char *const bad[] = {"a/b", "/etc", "..", ".", "a\\b", "../x"};
+  const char *const bad[] = {"/etc", "..", ".", "a\\b", "../x", "a/../../b", "a//b", "a/", "./a"};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     qmat_file *file = file_example();
     set_part_name(file, 2, bad[i]);
     char line[128];
-    snprintf(line, sizeof line, "part 2: its name '%s' is not a plain file name", bad[i]);
+    snprintf(line, sizeof line, "part 2: its name '%s' is no path below the main part's folder", bad[i]);
     assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, line);
   }
   qmat_file *file = file_example();
@@ -935,6 +952,53 @@ static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing
   assert_null(copy);
 }
 
+static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_list *list = list_example();
+  assert_sealed(&context, &list->base);
+  assert_int_equal(qmat_value_count(&list->base), 2);
+  assert_ptr_equal(qmat_value_at(&list->base, 1), list->items[1]);
+  assert_int_equal(qmat_value_item_type(&list->base), QMAT_FIELD);
+  assert_int_equal(qmat_value_count(list->items[0]), 1);
+  assert_ptr_equal(qmat_value_at(list->items[0], 0), list->items[0]);
+  assert_int_equal(qmat_value_count(NULL), 0);
+
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *value;
+  assert_int_equal(qmat_value_serialize(&context, &list->base, &bytes, &size), QMAT_OK);
+  for (size_t cut = 0; cut < size; ++cut) {
+    uint8_t *part = copy_of(bytes, cut); /* to the byte, so that reading beyond is noticed */
+    assert_int_equal(qmat_value_deserialize(&context, part, cut, &value), QMAT_ERROR_FORMAT);
+    qmat_free(part);
+  }
+  qmat_free(bytes);
+
+  qmat_list *lists = qmat_list_new(2);
+  lists->items[0] = qmat_value_retain(&list->base);
+  lists->items[1] = qmat_value_retain(&list->base);
+  lists->names[0] = qmat_strdup("a");
+  lists->names[1] = qmat_strdup("b");
+  assert_not_sealed(&lists->base, QMAT_ERROR_INTERNAL,
+                    "item 0: it is a list, not sealed, or not of the type of the others");
+  qmat_list *mixed = qmat_list_new(2);
+  mixed->items[0] = qmat_value_retain(list->items[0]);
+  mixed->items[1] = &mesh_example()->base;
+  mixed->names[0] = qmat_strdup("a");
+  mixed->names[1] = qmat_strdup("b");
+  assert_sealed(&context, mixed->items[1]);
+  assert_not_sealed(&mixed->base, QMAT_ERROR_INTERNAL,
+                    "item 1: it is a list, not sealed, or not of the type of the others");
+  qmat_list *one = qmat_list_new(1);
+  one->items[0] = qmat_value_retain(list->items[0]);
+  one->names[0] = qmat_strdup("a");
+  assert_not_sealed(&one->base, QMAT_ERROR_INTERNAL, "a list has 1 items, not two or more");
+  qmat_list *holes = qmat_list_new(2);
+  assert_not_sealed(&holes->base, QMAT_ERROR_INTERNAL, "item 0: an item of a list is missing or has no name");
+  qmat_value_release(&list->base);
+}
+
 static void test_copied_texts_are_equal_and_apart(void **state) {
   (void)state;
   const char *text = "caf\xc3\xa9";
@@ -969,7 +1033,7 @@ int main(void) {
       cmocka_unit_test(test_bad_medial_meshes_name_the_first_bad_element),
       cmocka_unit_test(test_bad_regions_are_refused),
       cmocka_unit_test(test_bad_chains_name_the_first_bad_element),
-      cmocka_unit_test(test_part_names_stay_in_one_folder_and_are_unique),
+      cmocka_unit_test(test_part_names_stay_below_the_folder_and_are_unique),
       cmocka_unit_test(test_cut_bytes_are_refused_at_every_length),
       cmocka_unit_test(test_bytes_after_the_last_row_are_refused),
       cmocka_unit_test(test_spoilt_bytes_give_an_error_or_what_they_say),
@@ -979,6 +1043,7 @@ int main(void) {
       cmocka_unit_test(test_references_are_counted_across_threads),
       cmocka_unit_test(test_counts_beyond_32_bits_are_refused_before_the_arrays_are_read),
       cmocka_unit_test(test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing),
+      cmocka_unit_test(test_a_list_has_items_of_one_type_and_stands_for_them),
       cmocka_unit_test(test_copied_texts_are_equal_and_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

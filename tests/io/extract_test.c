@@ -104,6 +104,16 @@ static void test_of_several_one_has_to_be_named(void **state) {
   json_t *second = json_deep_copy(json_array_get(nodes, 0));
   json_object_set_new(second, "name", json_string("second"));
   json_array_append_new(nodes, second);
+  assert_int_equal(extract_json(&context, root, NULL, &read, NULL), QMAT_OK); /* both carry the same one */
+  qmat_value_release(&read->base);
+  qmat_medial *other = example_medial(3);
+  json_t *other_root = write_gltf(other);
+  json_object_set(second, "extras", extras_of(other_root, 0));
+  assert_int_equal(extract_json(&context, root, "1", &read, NULL), QMAT_OK); /* by its number */
+  assert_int_equal(read->sphere_count, 3);
+  qmat_value_release(&read->base);
+  json_decref(other_root);
+  qmat_value_release(&other->base);
   assert_fails(root, NULL, QMAT_ERROR_USAGE, "2 nodes have a medial mesh: one has to be named");
   assert_fails(root, "third", QMAT_ERROR_GEOMETRY, "no node of this name has a medial mesh");
   assert_int_equal(extract_json(&context, root, "second", &read, NULL), QMAT_OK);

@@ -246,6 +246,17 @@ static void save_model(const qmat_model *model, const char *path) {
   assert_int_equal(fclose(file), 0);
 }
 
+/* That report twice. */
+static qmat_value *list_of(const qmat_value *report) {
+  qmat_list *list = qmat_list_new(2);
+  assert_non_null(list);
+  for (size_t i = 0; i < 2; i++) {
+    list->items[i] = qmat_value_retain(report);
+    list->names[i] = qmat_strdup("a report");
+  }
+  return &list->base;
+}
+
 static void make_solid(world to, const qmat_model *model) {
   qmat_value **values = made.values[to];
   save_model(model, made.files[0]);
@@ -260,6 +271,7 @@ static void make_solid(world to, const qmat_model *model) {
   values[QMAT_MEDIAL] = simple;
   seal(values[QMAT_CHAIN] = chain_of((const qmat_medial *)simple));
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
+  seal(values[QMAT_LIST] = list_of(values[QMAT_REPORT]));
   print_message("%s: %zu facets, %zu samples, %zu medial spheres\n", world_names[to],
                 ((const qmat_mesh *)values[QMAT_MESH])->triangle_count,
                 ((const qmat_samples *)values[QMAT_SAMPLES])->count,
@@ -323,6 +335,7 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
   file->parts = qmat_calloc(1, sizeof *file->parts);
   file->parts[0].name = qmat_strdup("");
   values[QMAT_FILE] = &file->base;
+  values[QMAT_LIST] = list_of(values[QMAT_REPORT]);
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) seal(values[type]);
 }
 

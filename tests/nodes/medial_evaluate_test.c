@@ -407,6 +407,10 @@ static void test_scale_and_place_change_nothing_but_rounding(void **state) {
   json_t *value;
   json_object_foreach(a->root, key, value) {
     const json_t *other = json_object_get(b->root, key);
+    if (strcmp(key, "diagonal") == 0) {
+      assert_near(json_real_value(other), 1000 * json_real_value(value), 1e-9);
+      continue;
+    }
     /* Rounding may turn a look at a piece into one at its parts: the bounds stay as close as they promise. */
     if (json_is_real(value)) assert_near(json_real_value(other), json_real_value(value), 1e-4);
     if (json_is_boolean(value)) assert_int_equal(json_is_true(other), json_is_true(value));

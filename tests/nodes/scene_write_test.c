@@ -104,16 +104,20 @@ static json_t *extra(json_t *root, const char *key) {
   return json_object_get(json_object_get(node_of(root), "extras"), key);
 }
 
-static void test_the_report_goes_into_the_extras_as_it_is(void **state) {
+static void test_the_report_goes_into_the_extras_with_what_quantisation_adds(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
-  qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:i}", "epsilon", 0.02, "surface_to_envelope",
-                                              0.011, "envelope_to_surface", 0.013, "certified", 1, "spheres", 3));
+  qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:i, s:f}", "epsilon", 0.02,
+                                              "surface_to_envelope", 0.011, "envelope_to_surface", 0.013, "certified",
+                                              1, "spheres", 3, "diagonal", 8.0));
   qmat_file *file = must_write(medial, (wiring){.report = report}, NULL);
   json_t *root = glb_root(file);
   assert_near(json_real_value(extra(root, "qmat_epsilon")), 0.02, 0);
-  assert_near(json_real_value(extra(root, "qmat_error_out")), 0.011, 0);
-  assert_near(json_real_value(extra(root, "qmat_error_in")), 0.013, 0);
+  const double moved = json_real_value(extra(root, "qmat_quantisation")) / 8;
+  assert_true(moved > 0);
+  assert_near(json_real_value(extra(root, "qmat_error_out")), 0.011 + moved, 1e-15);
+  assert_near(json_real_value(extra(root, "qmat_error_in")), 0.013 + moved, 1e-15);
+  assert_true(json_real_value(extra(root, "qmat_error_in")) >= 0.013 + moved);
   assert_true(json_is_true(extra(root, "qmat_certified")));
   assert_int_equal(json_integer_value(extra(root, "qmat_vertices")), 3);
   assert_null(extra(root, "spheres"));
@@ -127,10 +131,34 @@ static void test_the_report_goes_into_the_extras_as_it_is(void **state) {
   assert_null(extra(root, "qmat_epsilon"));
   assert_null(extra(root, "qmat_error_in"));
   assert_null(extra(root, "qmat_certified"));
-  assert_near(json_real_value(extra(root, "qmat_error_out")), 0.011, 0);
+  assert_true(json_real_value(extra(root, "qmat_error_out")) > 0.011); /* the spheres' diagonal stands in */
   json_decref(root);
   qmat_value_release(&file->base);
   qmat_value_release(&report->base);
+  qmat_value_release(&medial->base);
+}
+
+static void test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough(void **state) {
+  (void)state;
+  static const struct {
+    double error; /* of epsilon 0.02 */
+    bool stays;
+    const char *position_bits;
+  } cases[] = {{0.01, true, "0"}, {0.01999, true, "0"}, {0.02 - 1e-12, false, "0"}, {0.0199, false, "6"}};
+  qmat_medial *medial = make_medial();
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:f}", "epsilon", 0.02, "surface_to_envelope",
+                                                0.001, "envelope_to_surface", cases[i].error, "certified", 1,
+                                                "diagonal", 6.7));
+    const char *const settings[][2] = {{"position_bits", cases[i].position_bits}, {NULL, NULL}};
+    qmat_file *file = must_write(medial, (wiring){.report = report}, settings);
+    json_t *root = glb_root(file);
+    assert_true(json_is_true(extra(root, "qmat_certified")) == cases[i].stays);
+    assert_true((json_real_value(extra(root, "qmat_error_in")) <= 0.02) == cases[i].stays);
+    json_decref(root);
+    qmat_value_release(&file->base);
+    qmat_value_release(&report->base);
+  }
   qmat_value_release(&medial->base);
 }
 
@@ -282,7 +310,8 @@ static void test_the_same_inputs_give_the_same_bytes(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_the_report_goes_into_the_extras_as_it_is),
+      cmocka_unit_test(test_the_report_goes_into_the_extras_with_what_quantisation_adds),
+      cmocka_unit_test(test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough),
       cmocka_unit_test(test_quantisation_spends_a_twentieth_of_epsilon_at_most),
       cmocka_unit_test(test_scene_and_skin_name_and_show_the_node),
       cmocka_unit_test(test_each_format_is_made),
