@@ -57,6 +57,7 @@ static const row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3
                                 ARRAY(qmat_mesh, triangles, U32, triangle_count, 3),
                                 SCALAR(qmat_mesh, closed, BOOL),
                                 SCALAR(qmat_mesh, oriented, BOOL),
+                                SCALAR(qmat_mesh, deviation, NUMBER),
                                 ARRAY(qmat_mesh, cage.surface_faces, U32, cage.surface_count, 1),
                                 ARRAY(qmat_mesh, cage.schemes, U32, cage.surface_count, 1),
                                 ARRAY(qmat_mesh, cage.boundaries, U32, cage.surface_count, 1),

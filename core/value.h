@@ -9,6 +9,7 @@
 
 #include <jansson.h>
 
+#include "core/cage.h"
 #include "core/context.h"
 #include "core/digest.h"
 
@@ -56,39 +57,6 @@ typedef struct qmat_scene {
   uint32_t *meshes;       /* mesh_count: the asset's meshes that were read, each in its own space */
 } qmat_scene;
 
-/* How a surface of a cage is subdivided, and what its border does: as USD says it. */
-typedef enum qmat_scheme {
-  QMAT_SCHEME_NONE,
-  QMAT_SCHEME_CATMULL_CLARK,
-  QMAT_SCHEME_LOOP,
-  QMAT_SCHEME_BILINEAR,
-  QMAT_SCHEME_COUNT
-} qmat_scheme;
-
-typedef enum qmat_boundary {
-  QMAT_BOUNDARY_NONE,            /* faces at the border are left out */
-  QMAT_BOUNDARY_EDGE,            /* the border is a smooth curve */
-  QMAT_BOUNDARY_EDGE_AND_CORNER, /* the same, and vertices of one face are corners */
-  QMAT_BOUNDARY_COUNT
-} qmat_boundary;
-
-/* The polygons that triangles were made of, where some of them are control cages of subdivision surfaces: one surface
- * after the other, each a run of faces with vertices of its own. Sharpness 0 is smooth, from 10 on it is infinite. */
-typedef struct qmat_cage {
-  size_t surface_count, vertex_count, face_count, corner_count, hole_count, crease_count, sharp_count;
-  uint32_t *surface_faces;  /* surface_count: how many faces it has */
-  uint32_t *schemes;        /* surface_count: a qmat_scheme */
-  uint32_t *boundaries;     /* surface_count: a qmat_boundary */
-  double *positions;        /* 3 * vertex_count: x y z */
-  uint32_t *face_sizes;     /* face_count: how many corners it has */
-  uint32_t *corners;        /* corner_count: vertices of the faces, one face after the other */
-  uint32_t *holes;          /* hole_count: faces that are not part of the surface, but shape it */
-  uint32_t *creases;        /* 2 * crease_count: the vertices of a sharp edge */
-  double *crease_sharpness; /* crease_count */
-  uint32_t *sharp_vertices; /* sharp_count */
-  double *vertex_sharpness; /* sharp_count */
-} qmat_cage;
-
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. */
 typedef struct qmat_mesh {
   qmat_value base;
@@ -97,6 +65,7 @@ typedef struct qmat_mesh {
   uint32_t *triangles; /* 3 * triangle_count */
   bool closed;         /* every edge lies on two triangles (an even number, where surfaces touch) */
   bool oriented;       /* both triangles at every edge agree on its side */
+  double deviation;    /* how far they are from the surface that they stand for, in model units: 0, they are it */
   qmat_cage cage;      /* empty where nothing is to be subdivided */
 } qmat_mesh;
 

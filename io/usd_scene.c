@@ -504,12 +504,8 @@ static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inheri
     return QMAT_ERROR_GEOMETRY;
   }
   r->elements += elements;
-  if (mesh.scheme != QMAT_SCHEME_NONE) {
-    r->cages++;
-    status = qmat_usd_warn(r->context, r->stage, prim,
-                           "the control cage of a subdivision surface is taken as it is, not its limit");
-  }
-  if (status == QMAT_OK && qmat_usd_prim_has_relationship(prim, "skel:skeleton")) {
+  if (mesh.scheme != QMAT_SCHEME_NONE) r->cages++;
+  if (qmat_usd_prim_has_relationship(prim, "skel:skeleton")) {
     status = qmat_usd_warn(r->context, r->stage, prim, "its skeleton is left out: it stands as it was modelled");
   }
   r->meshes++;

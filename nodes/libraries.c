@@ -4,6 +4,8 @@
 #include <embree3/rtcore.h>
 #include <stdio.h>
 
+#include "nodes/subdivision_osd.h"
+
 static void describe_cgal(char *text, size_t size) {
   snprintf(text, size, "%s", QMAT_CGAL_VERSION);
 }
@@ -14,6 +16,10 @@ static void describe_draco(char *text, size_t size) {
 
 static void describe_tinygltf(char *text, size_t size) {
   snprintf(text, size, "%s", QMAT_TINYGLTF_VERSION);
+}
+
+static void describe_opensubdiv(char *text, size_t size) {
+  snprintf(text, size, "%s", qmat_opensubdiv_version());
 }
 
 /* The kernels that Embree chooses on this processor, by its own rules: it does not tell. */
@@ -46,4 +52,5 @@ static void describe_embree(char *text, size_t size) {
 const qmat_library qmat_library_cgal = {.name = "CGAL", .describe = describe_cgal};
 const qmat_library qmat_library_draco = {.name = "Draco", .describe = describe_draco};
 const qmat_library qmat_library_embree = {.name = "Embree", .describe = describe_embree};
+const qmat_library qmat_library_opensubdiv = {.name = "OpenSubdiv", .describe = describe_opensubdiv};
 const qmat_library qmat_library_tinygltf = {.name = "tinygltf", .describe = describe_tinygltf};

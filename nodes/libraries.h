@@ -7,6 +7,7 @@
 /* The libraries that nodes name in their descriptors. Embree is that of the running process, with the widest
  * instruction set that it uses on this processor; the others are those that the program was built with, since they are
  * headers or keep their version there. */
-extern const qmat_library qmat_library_cgal, qmat_library_draco, qmat_library_embree, qmat_library_tinygltf;
+extern const qmat_library qmat_library_cgal, qmat_library_draco, qmat_library_embree, qmat_library_opensubdiv,
+    qmat_library_tinygltf;
 
 #endif

@@ -2,6 +2,7 @@
 /* medial.chain: every collapse of one run, for medial meshes of any number of spheres or any error. */
 #include <string.h>
 
+#include "nodes/collapse_chain.h"
 #include "nodes/libraries.h"
 #include "nodes/simplifier.h"
 
@@ -11,8 +12,8 @@ static void *copy_of(const void *array, size_t count, size_t size) {
   return copy;
 }
 
-static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapses *o, const qmat_medial *medial,
-                              qmat_chain *chain) {
+static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapses *o, double deviation,
+                              const qmat_medial *medial, qmat_chain *chain) {
   const qmat_collapse_log *log = &o->simplification.log;
   const qmat_frame *frame = qmat_surface_frame(o->surface);
   chain->spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *chain->spheres);
@@ -30,6 +31,8 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->triangle_count = medial->triangle_count;
   chain->sample_count = o->control.sample_count;
   chain->collapse_count = log->count;
+  /* What takes part of an epsilon here, leaves that part there. */
+  for (size_t i = 0; i < log->count; i++) chain->errors[i] += qmat_control_share * deviation;
   /* From the unit frame, as medial.simplify does it: to the same bytes. */
   qmat_frame_spheres_to_model(frame, o->initial.spheres, medial->sphere_count, chain->spheres);
   qmat_frame_spheres_to_model(frame, log->merged, log->count, chain->merged);
@@ -65,8 +68,11 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_report *report = qmat_report_new();
   params.on_exceed += QMAT_EXCEED_STOP; /* the choices here start there */
   qmat_status status = chain && report ? QMAT_OK : qmat_fail_memory(context, "the chain");
+  double deviation = 0;
+  if (status == QMAT_OK)
+    status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &params, &deviation);
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, &params, inputs, &o);
-  if (status == QMAT_OK) status = fill_chain(context, &o, (const qmat_medial *)inputs[3], chain);
+  if (status == QMAT_OK) status = fill_chain(context, &o, deviation, (const qmat_medial *)inputs[3], chain);
   if (status == QMAT_OK) status = fill_report(context, chain, report);
   if (status == QMAT_OK) {
     outputs[0] = &chain->base;

@@ -34,7 +34,8 @@ enum { MOST_SEARCHES = 4 };
 typedef struct evaluation {
   qmat_context *context;
   const medial_evaluate_params *params;
-  double epsilon; /* of the bounds: never 0 */
+  double epsilon;   /* of the bounds: never 0 */
+  double deviation; /* of the mesh, in diagonals */
   qmat_surface *surface;
   qmat_envelope *envelope;
   qmat_medial unit; /* the medial mesh in the unit frame; the spheres are in the arena */
@@ -54,6 +55,8 @@ static qmat_status prepare(evaluation *e, const qmat_mesh *mesh, const qmat_medi
   }
   qmat_status status = qmat_surface_new(context, mesh, &e->surface);
   if (status != QMAT_OK) return status;
+  e->deviation = mesh->deviation / qmat_surface_frame(e->surface)->diagonal;
+  if (e->deviation < e->epsilon) e->epsilon -= e->deviation;
   e->unit = *medial;
   e->unit.spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof(double));
   if (!e->unit.spheres) return qmat_fail_memory(context, "the medial mesh");
@@ -240,24 +243,26 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
                                          "voids_of_solid"};
   const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
   const qmat_boundary_distance *b = &e->boundary;
+  const double surface_to_envelope = e->surface_to_envelope.hi + e->deviation,
+               envelope_to_surface = b->either_side.hi + e->deviation;
   const struct {
     const char *key;
     double value;
   } lengths[] = {
       {"diagonal", qmat_surface_frame(e->surface)->diagonal},
       {"epsilon", e->params->epsilon},
-      {"surface_to_envelope", e->surface_to_envelope.hi},
-      {"surface_to_envelope_at_least", e->surface_to_envelope.lo},
+      {"surface_to_envelope", surface_to_envelope},
+      {"surface_to_envelope_at_least", fmax(e->surface_to_envelope.lo - e->deviation, 0)},
       {"surface_to_envelope_sampled", e->largest_gap},
       {"surface_to_envelope_mean", e->mean_gap},
       {"surface_buried_sampled", e->deepest},
       {"surface_offset_mean", e->mean_offset},
-      {"envelope_to_surface", b->either_side.hi},
-      {"envelope_to_surface_at_least", b->either_side.lo},
+      {"envelope_to_surface", envelope_to_surface},
+      {"envelope_to_surface_at_least", fmax(b->either_side.lo - e->deviation, 0)},
       {"envelope_to_surface_sampled", b->largest},
       {"envelope_to_surface_mean", b->mean},
-      {"envelope_out_of_solid", b->outside.hi},
-      {"envelope_out_of_solid_at_least", b->outside.lo},
+      {"envelope_out_of_solid", b->outside.hi + e->deviation},
+      {"envelope_out_of_solid_at_least", fmax(b->outside.lo - e->deviation, 0)},
   };
   const struct {
     const char *key;
@@ -270,13 +275,14 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
       {"samples_of_envelope", b->sample_count},    {"pieces_of_envelope", b->looks},
   };
   const bool solid = mesh->closed && mesh->oriented;
-  const bool within = e->surface_to_envelope.hi <= e->params->epsilon && b->either_side.hi <= e->params->epsilon;
+  const bool within = surface_to_envelope <= e->params->epsilon && envelope_to_surface <= e->params->epsilon;
   int bad = json_object_set_new(report->root, "certified", json_boolean(solid && within));
   bad |= json_object_set_new(report->root, "estimate", json_boolean(!solid));
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
     bad |= json_object_set_new(report->root, lengths[i].key, json_real(lengths[i].value));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= set_count(report->root, counts[i].key, (int64_t)counts[i].value);
+  if (e->deviation > 0) bad |= json_object_set_new(report->root, "deviation", json_real(e->deviation));
   bad |= set_topology(report->root, &e->topology, true, of_medial);
   bad |= set_topology(report->root, &e->solid_topology, false, of_solid);
   return bad ? qmat_fail_memory(e->context, "the report") : qmat_value_seal(e->context, &report->base);
@@ -352,7 +358,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 1,
+    .version = 2,
     .summary = "Proves how far a medial mesh and a surface are apart",
     .doc =
         "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
@@ -365,7 +371,9 @@ const qmat_node qmat_node_medial_evaluate = {
         "and envelope_to_surface together bound the two-sided distance between the surface and the envelope's "
         "boundary but for surface that lies deep within the envelope, in a gap that it fills: "
         "surface_buried_sampled shows how deep. certified says that the surface is closed and oriented and that "
-        "both are at most epsilon; of other surfaces all is an estimate. Loops and voids are Betti numbers over "
+        "both are at most epsilon; of other surfaces all is an estimate. The deviation of a mesh that stands for a "
+        "subdivision surface (mesh.subdivide) is part of all bounds, which then are towards the limit surface, as sure "
+        "as the deviation is. Loops and voids are Betti numbers over "
         "Z/2 of the medial mesh and of the solid; they are missing where the surface has no inside or an edge of "
         "more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",

@@ -19,7 +19,8 @@ enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
   qmat_context *context;
-  const medial_simplify_params *params;
+  const medial_simplify_params *params; /* with what the mesh's deviation leaves of epsilon */
+  double epsilon, deviation;            /* what is asked for, and the deviation, in diagonals */
   qmat_surface *surface;
   qmat_control_points control; /* of `dense` */
   qmat_simplification dense;   /* where each round starts */
@@ -127,6 +128,14 @@ static int report_features(const qmat_simplification *run, json_t *root) {
   return bad;
 }
 
+/* Errors towards the surface that the mesh stands for. */
+static int report_errors(json_t *root, double epsilon, double deviation, const qmat_medial_errors *errors) {
+  int bad = json_object_set_new(root, "epsilon", json_real(epsilon));
+  bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors->surface_to_envelope + deviation));
+  bad |= json_object_set_new(root, "envelope_to_surface", json_real(errors->envelope_to_surface + deviation));
+  return bad;
+}
+
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
                                int rounds, size_t filled, qmat_report *report) {
   const qmat_simplification *run = &s->rounds[s->newest];
@@ -158,9 +167,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   if (run->rules.has_target)
     bad |= json_object_set_new(report->root, "euler_characteristic_of_solid",
                                json_integer((json_int_t)run->rules.target_euler));
-  bad |= json_object_set_new(report->root, "epsilon", json_real(s->params->epsilon));
-  bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(errors->surface_to_envelope));
-  bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(errors->envelope_to_surface));
+  bad |= report_errors(report->root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
@@ -306,8 +313,9 @@ static int set_count(json_t *root, const char *key, size_t count) {
   return json_object_set_new(root, key, json_integer((json_int_t)count));
 }
 
-static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, const qmat_medial *unit,
-                                   const qmat_medial_errors *errors, qmat_report *report) {
+static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, double epsilon,
+                                   double deviation, const qmat_medial *unit, const qmat_medial_errors *errors,
+                                   qmat_report *report) {
   const qmat_simplification *run = &o->simplification;
   json_t *root = report->root;
   int bad = set_count(root, "initial_spheres", run->complex.vertex_count);
@@ -326,16 +334,14 @@ static qmat_status report_in_order(qmat_context *context, const qmat_ordered_col
   if (run->rules.has_target)
     bad |=
         json_object_set_new(root, "euler_characteristic_of_solid", json_integer((json_int_t)run->rules.target_euler));
-  bad |= json_object_set_new(root, "epsilon", json_real(o->params.epsilon));
   bad |= json_object_set_new(root, "held", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
-  bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors->surface_to_envelope));
-  bad |= json_object_set_new(root, "envelope_to_surface", json_real(errors->envelope_to_surface));
+  bad |= report_errors(root, epsilon, deviation, errors);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 /* Collapses that are the same for every epsilon: in a single round, without fitting spheres. */
-static qmat_status run_in_order(qmat_context *context, const medial_simplify_params *params,
-                                const qmat_value *const inputs[], qmat_value *outputs[]) {
+static qmat_status run_in_order(qmat_context *context, const medial_simplify_params *params, double epsilon,
+                                double deviation, const qmat_value *const inputs[], qmat_value *outputs[]) {
   qmat_ordered_collapses o = {.surface = NULL};
   qmat_medial *medial = qmat_medial_new();
   qmat_report *report = qmat_report_new();
@@ -343,11 +349,12 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, params, inputs, &o);
   if (status == QMAT_OK) status = qmat_simplification_extract(&o.simplification, medial);
   qmat_medial_errors errors = {.surface_to_envelope = 0};
-  const double epsilon = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
+  const double bound = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
   if (status == QMAT_OK)
     status = qmat_medial_errors_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
-                                        error_tolerance * epsilon, least_reported * epsilon, INFINITY, &errors);
-  if (status == QMAT_OK) status = report_in_order(context, &o, medial, &errors, report);
+                                        error_tolerance * bound, least_reported * bound, INFINITY, &errors);
+  if (status == QMAT_OK)
+    status = report_in_order(context, &o, o.params.epsilon > 0 ? epsilon : 0, deviation, medial, &errors, report);
   if (status == QMAT_OK) {
     qmat_frame_spheres_to_model(qmat_surface_frame(o.surface), medial->spheres, medial->sphere_count, medial->spheres);
     status = qmat_value_seal(context, &medial->base);
@@ -366,13 +373,18 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
-  if (qmat_simplify_in_order(params)) return run_in_order(context, params, inputs, outputs);
+  medial_simplify_params held = *(const medial_simplify_params *)params;
+  const double epsilon = held.epsilon;
+  double deviation;
+  qmat_status status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &held, &deviation);
+  if (status != QMAT_OK) return status;
+  if (qmat_simplify_in_order(&held)) return run_in_order(context, &held, epsilon, deviation, inputs, outputs);
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
-  simplifier s = {.context = context, .params = params};
+  simplifier s = {.context = context, .params = &held, .epsilon = epsilon, .deviation = deviation};
   qmat_initial_medial state = {NULL, NULL, NULL};
   attempt best = {.fault = INFINITY};
-  qmat_status status = qmat_simplify_prepare(context, params, inputs, &s.surface, &state);
+  status = qmat_simplify_prepare(context, &held, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) {
     double *spheres = best.medial->spheres;
@@ -451,7 +463,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 4,
+    .version = 5,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -465,7 +477,8 @@ const qmat_node qmat_node_medial_simplify = {
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
         "places between where the surface is too far from the envelope, and the collapses are repeated with these, and for "
         "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
-        "on. "
+        "on. Of a mesh that only stands for a surface (mesh.subdivide), the deviation is taken from epsilon and added to "
+        "the errors of the report. "
         "With on_exceed=raise both errors are held to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "

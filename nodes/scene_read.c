@@ -66,7 +66,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 3,
+    .version = 4,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF scene",
     .doc =
         "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "
@@ -78,7 +78,8 @@ const qmat_node qmat_node_scene_read = {
         "once, however many those are. Meshes that no node carries, and those without triangles, are left out. Nodes "
         "that take a mesh then run once for each. merged places all meshes as one surface in world space, skins in the "
         "pose that their joints stand in. Of USD all meshes are placed as one; USD layers are composed from the files "
-        "beside them, and the report's warnings say what was left out.",
+        "beside them, and the report's warnings say what was left out. Subdivision surfaces are "
+        "placed as their control cages, which mesh.subdivide takes to the limit.",
     .citation = "",
     .params_size = sizeof(scene_read_params),
     .params = params,

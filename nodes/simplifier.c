@@ -56,6 +56,23 @@ static void apply_compatibility(qmat_simplify_params *p) {
   p->features = QMAT_FEATURES_NONE;
 }
 
+qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
+                                          double *deviation) {
+  *deviation = 0;
+  if (mesh->deviation == 0) return QMAT_OK;
+  qmat_frame frame;
+  const qmat_status status = qmat_frame_of_mesh(context, mesh, &frame);
+  if (status != QMAT_OK) return status;
+  *deviation = mesh->deviation / frame.diagonal;
+  if (params->epsilon == 0 || params->compat == QMAT_COMPAT_QMAT) return QMAT_OK;
+  params->epsilon -= *deviation;
+  if (params->epsilon > 0) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "the mesh may be %.2g of the diagonal from the surface that it stands for",
+            *deviation);
+  qmat_fail_field(context, "epsilon");
+  return qmat_fail_hint(context, "a higher level of mesh.subdivide, or a larger epsilon");
+}
+
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,
                                   const qmat_value *const inputs[], qmat_surface **surface,
                                   qmat_initial_medial *initial) {

@@ -115,6 +115,11 @@ typedef struct qmat_initial_medial {
   uint8_t *thin;   /* per sample: whether it lies on a thin part */
 } qmat_initial_medial;
 
+/* Leaves of `params->epsilon` what the mesh's deviation does not take; `*deviation` gets that, in diagonals.
+ * QMAT_ERROR_GEOMETRY names epsilon where nothing is left. */
+qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
+                                          double *deviation);
+
 /* Reads the inputs of both nodes (mesh, thickness, samples, medial, in that order). `*surface` is new, also after some
  * failures; the caller frees it. QMAT_ERROR_GEOMETRY names what does not belong together; QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED. All threads. */

@@ -145,7 +145,7 @@ holds "the same bytes from mat and run, .ma" cmp box.ma again.ma
 expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 2%
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
 expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 2%
-holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 9
+holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 10
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
 # A number of spheres alone means no bound on the distance.

@@ -653,8 +653,13 @@ static void test_defaults_pass_the_check_and_run(void **state) {
     qmat_context context = {0};
     if (qmat_params_check(&context, run.node, run.params) != QMAT_OK || execute(&context, &run) != QMAT_OK)
       fail_msg("%s: %s", run.node->name, context.error.message);
-    for (size_t port = 0; port < qmat_output_count(run.node); port++)
-      assert_int_equal(run.outputs[port]->references, 1);
+    for (size_t port = 0; port < qmat_output_count(run.node); port++) {
+      // An input that is handed on has the references of its owners too.
+      bool is_input = false;
+      for (size_t k = 0; k < qmat_input_count(run.node); k++)
+        is_input = is_input || run.inputs[k] == run.outputs[port];
+      if (!is_input) assert_int_equal(run.outputs[port]->references, 1);
+    }
     qmat_context_uninit(&context);
     subject_uninit(&run);
   }
