@@ -58,6 +58,8 @@ OFF
 4 2 3 7 6
 4 3 0 4 7
 END
+# So few samples, and spheres, that a run takes no second, with sanitizers neither.
+coarse="--set samples.spacing=10%"
 
 # Commands and options.
 expect 2 "no command is given" "$qmat"
@@ -119,7 +121,7 @@ expect 2 "would overwrite" "$qmat" mat box.off -o box.glb --report box.off
 holds "the model is untouched" cmp -s box.off box.ma
 rm box.ma
 
-expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.ma --epsilon 2% --report report.json --threads 1
+expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.ma --epsilon 5% $coarse --report report.json --threads 1
 holds "both files" test -s box.glb -a -s box.ma
 expect 0 "a medial mesh of" "$qmat" info box.glb
 expect 0 "triangles: 12" "$qmat" info box.off
@@ -132,19 +134,20 @@ expect 2 "known endings" "$qmat" extract box.glb -o back.off
 expect 2 "would overwrite" "$qmat" extract box.ma -o ./box.ma
 expect 1 "OFF does not carry" "$qmat" extract box.off -o back.ma
 expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
-expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5%
+expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5% $coarse
 expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
 holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
 holds "the report names both" test "$(grep -c '"sha256"' report.json)" -eq 2
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
-  --set epsilon=2% -o again.glb --threads 2
-expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --set epsilon=0.02 -o asset=again.ma
+  --set epsilon=5% $coarse -o again.glb --threads 2
+expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --set epsilon=0.05 $coarse \
+  -o asset=again.ma
 holds "the same bytes from mat and run" cmp box.glb again.glb
 holds "the same bytes from mat and run, .ma" cmp box.ma again.ma
-expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 2%
+expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 5% $coarse
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
-expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 2%
+expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 5% $coarse
 holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 10
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
@@ -181,7 +184,7 @@ holds "no file after a signal" test ! -e torus.glb
 
 # A locale with a decimal comma changes nothing.
 if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; then
-  expect 0 "" env LOCPATH="$work/locale" LC_ALL=de_DE.UTF-8 "$qmat" mat box.off -o comma.glb --epsilon 0.02 \
+  expect 0 "" env LOCPATH="$work/locale" LC_ALL=de_DE.UTF-8 "$qmat" mat box.off -o comma.glb --epsilon 0.05 $coarse \
     --report comma.json
   holds "the same bytes under de_DE" cmp box.glb comma.glb
 fi
