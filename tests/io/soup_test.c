@@ -316,7 +316,7 @@ static void test_what_is_no_surface_is_refused(void **state) {
 static void test_coordinates_near_the_largest_double_do_no_harm(void **state) {
   (void)state;
   double huge[24];
-  for (int i = 0; i < 24; i++) huge[i] = cube[i] ? 1.7e308 : -1.7e308;
+  for (int i = 0; i < 24; i++) huge[i] = cube[i] != 0 ? 1.7e308 : -1.7e308;
   int facets[30];
   memcpy(facets, cube_facets, sizeof facets);
   for (int k = 0; k < 4; k++) facets[k] = cube_facets[3 - k];
