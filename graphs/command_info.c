@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "core/node.h"
 #include "graphs/command.h"
@@ -29,34 +30,19 @@ static void print_object(const json_t *object) {
   }
 }
 
-static double diagonal_of(const qmat_mesh *mesh) {
-  double square = 0;
-  for (size_t axis = 0; axis < 3; axis++) {
-    double low = INFINITY, high = -INFINITY;
-    for (size_t v = 0; v < mesh->vertex_count; v++) {
-      low = fmin(low, mesh->positions[3 * v + axis]);
-      high = fmax(high, mesh->positions[3 * v + axis]);
-    }
-    if (high > low) square += (high - low) * (high - low);
-  }
-  return sqrt(square);
-}
-
 static double number_of(const json_t *object, const char *key) {
   const json_t *value = json_object_get(object, key);
   return json_is_number(value) ? json_number_value(value) : (double)NAN;
 }
 
-// Whether what the file states is refuted: the error is larger for certain, also with what quantisation added.
-static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured, double diagonal) {
+// Whether what the file states is refuted: the error is larger for certain.
+static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured) {
   const struct {
     const char *title, *stated, *most, *least;
   } rows[] = {
       {"surface to envelope", "qmat_error_out", "surface_to_envelope", "surface_to_envelope_at_least"},
       {"envelope to surface", "qmat_error_in", "envelope_to_surface", "envelope_to_surface_at_least"},
   };
-  double quantisation = number_of(facts, "qmat_quantisation") / diagonal;
-  if (!(quantisation >= 0)) quantisation = 0;
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < 2; i++) {
     const double stated = number_of(facts, rows[i].stated), least = number_of(measured, rows[i].least);
@@ -65,8 +51,8 @@ static qmat_status compare(qmat_context *context, const json_t *facts, const jso
       printf("; the file states none\n");
       continue;
     }
-    const bool holds = !(least > stated + quantisation);
-    printf("; stated %.6g, and %.2g for quantisation: %s\n", stated, quantisation, holds ? "not refuted" : "REFUTED");
+    const bool holds = !(least > stated);
+    printf("; stated %.6g: %s\n", stated, holds ? "not refuted" : "REFUTED");
     if (!holds) {
       status =
           qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states", rows[i].title);
@@ -75,32 +61,90 @@ static qmat_status compare(qmat_context *context, const json_t *facts, const jso
   return status;
 }
 
-static qmat_status check_against(qmat_context *context, const char *path, const qmat_medial *medial,
-                                 const json_t *facts) {
+// `mesh` is the number of the mesh that the medial mesh describes, where the model is glTF, too; else "merged".
+static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
+                                 const qmat_medial *medial, const json_t *facts) {
   const qmat_node *node = qmat_node_find("medial.evaluate");
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
   qmat_scene *scene;
-  qmat_mesh *mesh;
+  qmat_value *mesh;
   qmat_report *read;
   qmat_value *output = NULL;
   void *params = qmat_calloc(1, node->params_size);
   if (!params) return qmat_fail_memory(context, "parameters");
   qmat_params_default(node, params);
-  qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &read);
+  qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
   if (status == QMAT_OK) {
-    const qmat_value *inputs[] = {&mesh->base, &medial->base};
+    const qmat_value *inputs[] = {mesh, &medial->base};
     status = qmat_node_run(context, node, params, inputs, &output);
     if (status == QMAT_OK) {
       printf("against %s\n", path);
-      status = compare(context, facts, ((const qmat_report *)output)->root, diagonal_of(mesh));
+      status = compare(context, facts, ((const qmat_report *)output)->root);
       if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
     }
     qmat_value_release(output);
     qmat_value_release(&scene->base);
-    qmat_value_release(&mesh->base);
+    qmat_value_release(mesh);
     qmat_value_release(&read->base);
   }
   qmat_free(params);
+  return status;
+}
+
+// Prints what the file carries: the medial mesh of node `name`, or the only one. `carrier` (NULL: not known) tells
+// which mesh it is of.
+static qmat_status print_medial(qmat_context *context, const char *path, const char *name, const json_t *carrier,
+                                const char *against) {
+  qmat_medial *medial;
+  json_t *facts = json_object();
+  if (!facts) return qmat_fail_memory(context, "facts");
+  qmat_status status = qmat_medial_extract(context, path, name, &medial, facts);
+  if (status == QMAT_OK) {
+    printf("%s: a medial mesh of %zu spheres, %zu cones, %zu slabs", path, medial->sphere_count, medial->edge_count,
+           medial->triangle_count);
+    if (name) printf(" on node %s", qmat_show(name).text);
+    printf("\n");
+    print_object(facts);
+    if (against) {
+      const json_t *mesh = json_object_get(carrier, "mesh");
+      const qmat_format format = qmat_format_of_name(against);
+      const bool by_mesh = mesh && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF);
+      char number[24] = "merged";
+      if (by_mesh) snprintf(number, sizeof number, "%lld", (long long)json_integer_value(mesh));
+      status = check_against(context, against, number, medial, facts);
+    }
+    qmat_value_release(&medial->base);
+  }
+  json_decref(facts);
+  return status;
+}
+
+// The one of that node, or all.
+static qmat_status print_medials(qmat_context *context, const char *path, const char *name, const char *against) {
+  json_t *carriers = qmat_medial_carriers(context, path);
+  if (!carriers) return context->error.status;
+  const size_t count = json_array_size(carriers);
+  qmat_status status = QMAT_OK;
+  if (name || count < 2) {
+    const json_t *carrier = count == 1 ? json_array_get(carriers, 0) : NULL;
+    for (size_t i = 0; i < count && name; i++) {
+      const json_t *other = json_array_get(carriers, i);
+      if (strcmp(json_string_value(json_object_get(other, "node")), name) == 0) carrier = other;
+    }
+    status = print_medial(context, path, name, carrier, against);
+  }
+  for (size_t i = 0; !name && count >= 2 && i < count; i++) {
+    const json_t *carrier = json_array_get(carriers, i);
+    const qmat_error before = context->error;
+    const qmat_status of_one =
+        print_medial(context, path, json_string_value(json_object_get(carrier, "node")), carrier, against);
+    // The first error is told; the others are looked at all the same.
+    if (status != QMAT_OK)
+      context->error = before;
+    else
+      status = of_one;
+  }
+  json_decref(carriers);
   return status;
 }
 
@@ -110,9 +154,6 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_scene *scene;
   qmat_mesh *mesh;
   qmat_report *report;
-  qmat_medial *medial = NULL;
-  json_t *facts = json_object();
-  if (!facts) return qmat_fail_memory(context, "facts");
   qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &report);
   const bool has_surface = status == QMAT_OK;
   if (has_surface) {
@@ -123,20 +164,14 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_value_release(&report->base);
   }
   const qmat_error first = context->error;
-  qmat_status carried = qmat_medial_extract(context, path, qmat_invocation_value(invocation, "node"), &medial, facts);
+  const qmat_status carried = print_medials(context, path, qmat_invocation_value(invocation, "node"), against);
   if (carried == QMAT_OK) {
     status = QMAT_OK;
-    printf("%s: a medial mesh of %zu spheres, %zu cones, %zu slabs\n", path, medial->sphere_count, medial->edge_count,
-           medial->triangle_count);
-    print_object(facts);
-    if (against) status = check_against(context, against, medial, facts);
-    qmat_value_release(&medial->base);
   } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
     status = carried;  // it has one that cannot be told apart or read, or should have one
   } else if (!has_surface) {
     context->error = first;
   }
-  json_decref(facts);
   return status;
 }
 
@@ -151,9 +186,10 @@ const qmat_command qmat_command_info = {
     .arguments = "FILE",
     .summary = "Tell what a model's file holds",
     .doc =
-        "Prints what reading the file finds: counts, units, what was left out. Of a file that carries a medial mesh, "
-        "its counts and what the file says of it. With --against, its errors are bounded anew, and the exit code is 1 "
-        "where one is for certain larger than stated.",
+        "Prints what reading the file finds: counts, units, what was left out. Of a file that carries medial "
+        "meshes, the counts of each and what the file says of it. With --against, its errors are bounded anew, and the "
+        "exit code is 1 where one is for certain larger than stated; where both files are glTF, each is compared with "
+        "the mesh of the number that its node carries, in that mesh's own space.",
     .options = options,
     .least = 1,
     .most = 1,

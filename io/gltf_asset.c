@@ -155,16 +155,17 @@ char *qmat_gltf_mesh_name(const json_t *root, size_t mesh) {
   return qmat_strdup(text);
 }
 
-/* The number of a node's mesh, also when written 3.0; -1: it carries none. */
-static int64_t mesh_of(const json_t *node) {
+int64_t qmat_gltf_mesh_of(const json_t *node) {
   const json_t *mesh = json_object_get(node, "mesh");
-  return json_is_number(mesh) ? (int64_t)json_number_value(mesh) : -1;
+  const double number = json_is_number(mesh) ? json_number_value(mesh) : -1;
+  return number >= 0 && number < UINT32_MAX ? (int64_t)number : -1;
 }
 
 size_t qmat_gltf_mesh_carriers(const json_t *root, size_t mesh) {
   const json_t *nodes = json_object_get(root, "nodes");
   size_t count = 0;
-  for (size_t i = 0; i < json_array_size(nodes); i++) count += mesh_of(json_array_get(nodes, i)) == (int64_t)mesh;
+  for (size_t i = 0; i < json_array_size(nodes); i++)
+    count += qmat_gltf_mesh_of(json_array_get(nodes, i)) == (int64_t)mesh;
   return count;
 }
 
@@ -196,8 +197,9 @@ static bool find_mesh(const json_t *meshes, const char *choice, size_t *mesh, si
   return *mesh < count;
 }
 
-static bool is_skin(const json_t *mesh) {
-  return json_is_true(json_object_get(json_object_get(mesh, "extras"), QMAT_GLTF_SKIN_MARK));
+bool qmat_gltf_is_skin(const json_t *root, size_t mesh) {
+  const json_t *object = json_array_get(json_object_get(root, "meshes"), mesh);
+  return json_is_true(json_object_get(json_object_get(object, "extras"), QMAT_GLTF_SKIN_MARK));
 }
 
 qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, const char *path, const char *choice,
@@ -210,7 +212,7 @@ qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, c
   *meshes = NULL;
   *count = 0;
   for (size_t i = 0; i < json_array_size(nodes) && status == QMAT_OK; i++) {
-    const int64_t mesh = mesh_of(json_array_get(nodes, i));
+    const int64_t mesh = qmat_gltf_mesh_of(json_array_get(nodes, i));
     if (mesh >= 0 && (uint64_t)mesh < mesh_count) carried[mesh] = 1;
   }
   if (status == QMAT_OK && strcmp(choice, "all") != 0) {
@@ -222,7 +224,7 @@ qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, c
     }
   } else if (status == QMAT_OK) {
     for (size_t i = 0; i < mesh_count; i++)
-      if (carried[i] && !is_skin(json_array_get(array, i))) chosen[(*count)++] = (uint32_t)i;
+      if (carried[i] && !qmat_gltf_is_skin(root, i)) chosen[(*count)++] = (uint32_t)i;
     if (*count == 0) {
       status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "no node of the scene carries a mesh");
       qmat_fail_at(context, path, 0, 0);

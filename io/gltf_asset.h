@@ -42,6 +42,12 @@ char *qmat_gltf_beside(const char *asset, const char *name);
 /* The name of a mesh, or "mesh 3" where it has none; NULL when memory is short. qmat_free frees it. */
 char *qmat_gltf_mesh_name(const json_t *root, size_t mesh);
 
+/* The number of the mesh that a node carries, also when written 3.0; -1: none. */
+int64_t qmat_gltf_mesh_of(const json_t *node);
+
+/* Whether a mesh is a skin that qmat added to the asset. */
+bool qmat_gltf_is_skin(const json_t *root, size_t mesh);
+
 /* How many nodes carry that mesh. */
 size_t qmat_gltf_mesh_carriers(const json_t *root, size_t mesh);
 

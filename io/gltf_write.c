@@ -423,8 +423,7 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
   bool done = true;
   for (size_t i = 0; i < count && done; i++) {
     json_t *node = json_array_get(nodes, i), *own = json_object_get(node, "extras");
-    const json_t *carried = json_object_get(node, "mesh");
-    if (!json_is_number(carried) || json_number_value(carried) != (double)mesh) continue;
+    if (qmat_gltf_mesh_of(node) != mesh) continue;
     if (own && !json_is_object(own)) {
       done = add_child(document->root, node, json_pack("{s:O}", "extras", extras), "medial mesh");
     } else {

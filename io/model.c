@@ -233,6 +233,22 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const js
   return status;
 }
 
+/* Tells of nodes whose extras cannot take a medial mesh. */
+static qmat_status warn_of_extras(qmat_context *context, const json_t *root, const qmat_gltf_meshes *meshes,
+                                  json_t *warnings) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *node = json_array_get(nodes, i), *extras = json_object_get(node, "extras");
+    const int64_t mesh = qmat_gltf_mesh_of(node);
+    bool chosen = false;
+    for (size_t k = 0; k < meshes->count && !chosen; k++) chosen = mesh == (int64_t)meshes->ids[k];
+    if (!chosen || !extras || json_is_object(extras)) continue;
+    json_t *text = json_sprintf("node %zu has extras that are no object: a child of it takes the medial mesh", i);
+    if (json_array_append_new(warnings, text) != 0) return qmat_fail_memory(context, "the report");
+  }
+  return QMAT_OK;
+}
+
 static qmat_status read_gltf(qmat_context *context, qmat_format format, const char *path, const qmat_bytes *bytes,
                              const qmat_read_options *options, const char *choice, qmat_scene *scene, qmat_value **mesh,
                              json_t *report) {
@@ -247,6 +263,7 @@ static qmat_status read_gltf(qmat_context *context, qmat_format format, const ch
   } else if (status == QMAT_OK) {
     status = qmat_gltf_parse_meshes(context, bytes->data, bytes->size, path, asset.root, choice, &meshes, report);
     if (status == QMAT_OK) status = make_meshes(context, path, asset.root, &meshes, options, mesh, report);
+    if (status == QMAT_OK) status = warn_of_extras(context, asset.root, &meshes, warnings);
     if (status == QMAT_OK) {
       scene->mesh_count = meshes.count;
       scene->meshes = meshes.ids;

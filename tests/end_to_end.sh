@@ -231,6 +231,44 @@ misused "an unknown option" "did you mean '--epsilon'?" mat $model -o out.ma --e
 misused "an unknown command" "did you mean 'mat'?" mta $model -o out.ma
 misused "an unknown parameter" "did you mean 'epsilon'?" mat $model -o out.ma --set simple.epsilom=1%
 
+# A glTF scene comes back with all that is in it; each mesh has a medial mesh of its own, on all of its nodes.
+mkdir scene scene/out
+cat >scene/in.gltf <<END
+{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2]}],"extensionsUsed":["ACME_glow"],
+"nodes":[{"mesh":0,"name":"left","translation":[-5,0,0],"extras":{"kept":[1,2.5,"three"]}},{"mesh":0,"name":"right"},
+{"mesh":1,"name":"long","extensions":{"ACME_glow":{"much":0.25}}}],"images":[{"uri":"picture.png"}],
+"meshes":[{"name":"cube","primitives":[{"attributes":{"POSITION":0},"indices":1}]},
+{"name":"bar","primitives":[{"attributes":{"POSITION":2},"indices":1}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":8,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},
+{"bufferView":1,"componentType":5123,"count":36,"type":"SCALAR"},
+{"bufferView":2,"componentType":5126,"count":8,"type":"VEC3","min":[0,0,0],"max":[3,1,1]}],
+"bufferViews":[{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":72},
+{"buffer":0,"byteOffset":168,"byteLength":96}],"buffers":[{"byteLength":264,"uri":"data:application/octet-stream;base64,\
+AAAAAAAAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAIA/AACAPwAAAAAAAAAAAACAPwAAAAAAAIA/AACAPwAAgD8AAA\
+AAAACAPwAAgD8AAIA/AAABAAMAAAADAAIABAAGAAcABAAHAAUAAAAEAAUAAAAFAAEAAgADAAcAAgAHAAYAAAACAAYAAAAGAAQAAQAFAAcAAQAH\
+AAMAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAIA/AABAQAAAAAAAAAAAAABAQAAAAAAAAIA/AABAQAAAgD\
+8AAAAAAABAQAAAgD8AAIA/\
+"}]}
+END
+echo "a picture" >scene/picture.png
+holds "a scene: mat" qmat mat scene/in.gltf -o scene/out/scene.gltf --epsilon 10% --threads 1
+holds "a scene: its files are beside it" cmp scene/picture.png scene/out/picture.png
+holds "a scene: unknown extensions stay" grep -q '"much": 0.25' scene/out/scene.gltf
+holds "a scene: a medial mesh on each node" test "$(grep -c '"qmat_data"' scene/out/scene.gltf)" -eq 3
+holds "a scene: one by name" qmat extract scene/out/scene.gltf --node long -o long.ma
+holds "a scene: one of an instance" qmat extract scene/out/scene.gltf --node left -o left.ma
+holds "a scene: one of another instance" qmat extract scene/out/scene.gltf --node right -o right.ma
+holds "a scene: both are the same" cmp left.ma right.ma
+holds "a scene: its errors hold" qmat info scene/out/scene.gltf --against scene/in.gltf
+holds "a scene: mat with 3 threads" qmat mat scene/in.gltf -o scene/out/again.gltf --epsilon 10% --threads 3
+holds "a scene: the same bytes with 3 threads" cmp scene/out/scene.gltf scene/out/again.gltf
+holds "a scene: one of its meshes" qmat mat scene/in.gltf -o bar.ma --epsilon 10% --set model.mesh=bar
+if qmat mat scene/in.gltf -o all.ma --epsilon 10% --set model.mesh=all >said.txt 2>complaints.txt; then
+  fail "a scene: several medial meshes in a format of one"
+else
+  holds "a scene: several do not fit where one does" grep -q 'holds one medial mesh, and there are 2' complaints.txt
+fi
+
 # ---- Real models ----
 
 if [ -d "$data/surfaces" ]; then

@@ -129,7 +129,62 @@ static const qmat_node test_pair = {.name = "test.pair",
                                     .outputs = number_outputs,
                                     .run = pair_run};
 
-static const qmat_node *const counted_table[] = {&test_mesh, &test_pair, &test_read_file, &test_scale};
+/* The bytes of a file one by one: a list, or the one that there is. */
+static qmat_status split_run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                             qmat_value *outputs[]) {
+  (void)inputs;
+  qmat_bytes bytes = {0};
+  qmat_status status = qmat_bytes_read_file(context, ((const path_params *)data)->path, &bytes);
+  if (status != QMAT_OK) return status;
+  if (bytes.size == 1) {
+    status = test_report(context, bytes.data[0], &outputs[0]);
+  } else {
+    qmat_list *list = qmat_list_new(bytes.size);
+    assert_non_null(list);
+    for (size_t i = 0; i < bytes.size; i++) {
+      char name[2] = {(char)bytes.data[i], 0};
+      list->names[i] = qmat_strdup(name);
+      test_ok(context, test_report(context, bytes.data[i], &list->items[i]));
+    }
+    outputs[0] = &list->base;
+    status = qmat_value_seal(context, &list->base);
+  }
+  qmat_bytes_uninit(&bytes);
+  return status;
+}
+
+static const qmat_port split_outputs[] = {{.name = "number", .type = QMAT_REPORT, .doc = "Bytes", .list = true}, {0}};
+static const qmat_node test_split = {.name = "test.split",
+                                     .version = 1,
+                                     .summary = "The bytes of a file",
+                                     .doc = "",
+                                     .citation = "",
+                                     .params_size = sizeof(path_params),
+                                     .params = mesh_rows,
+                                     .outputs = split_outputs,
+                                     .run = split_run};
+
+/* Takes a list whole. */
+static qmat_status sum_run(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                           qmat_value *outputs[]) {
+  (void)params;
+  double sum = 0;
+  for (size_t i = 0; i < qmat_value_count(inputs[0]); i++) sum += test_value(qmat_value_at(inputs[0], i));
+  return test_report(context, sum, &outputs[0]);
+}
+
+static const qmat_port sum_inputs[] = {{.name = "number", .type = QMAT_REPORT, .doc = "Some", .list = true}, {0}};
+static const qmat_node test_sum = {.name = "test.sum",
+                                   .version = 1,
+                                   .summary = "Their sum",
+                                   .doc = "",
+                                   .citation = "",
+                                   .inputs = sum_inputs,
+                                   .outputs = number_outputs,
+                                   .run = sum_run};
+
+static const qmat_node *const counted_table[] = {&test_add,   &test_mesh,  &test_pair, &test_read_file,
+                                                 &test_scale, &test_split, &test_sum};
 static const qmat_registry counted = {counted_table, sizeof counted_table / sizeof *counted_table};
 
 /* ---- one run after another on one cache ---- */
@@ -370,6 +425,93 @@ static void test_forced_nodes_run_and_are_the_same(void **state) {
   assert_string_equal(f->states, "sss");
   assert_string_equal(f->warning, "");
   assert_int_equal(ran.read + ran.scale, 6);
+}
+
+/* Splits the model, doubles each byte, and adds them up; `rest` are further nodes. */
+static qmat_status run_split(fixture *f, const char *rest, qmat_context *context, double *sum, size_t *lifted,
+                             size_t *hits) {
+  char text[1024];
+  snprintf(text, sizeof text,
+           "qmat: 1\nnodes:\n"
+           "  split: { type: test.split, params: { path: %s } }\n"
+           "  scale: { type: test.scale, params: { factor: 2 }, in: { number: split.number } }\n"
+           "  sum:   { type: test.sum, in: { number: scale.number } }\n%s"
+           "outputs: { sum: %s }\n",
+           f->model, rest, *rest ? "add.sum" : "sum.number");
+  qmat_graph graph;
+  qmat_cache cache;
+  qmat_run run = {0};
+  test_ok(context, qmat_graph_read_text(context, &counted, "g.yaml", text, strlen(text), &graph));
+  open_cache(f, &cache);
+  const qmat_run_port want = {graph.node_count - 1, 0};
+  const qmat_run_options options = {.wants = &want, .want_count = 1, .cache = &cache};
+  test_ok(context, qmat_run_plan(context, &graph, &options, &run));
+  const qmat_status status = qmat_run_execute(context, &run, NULL);
+  if (status == QMAT_OK) {
+    *sum = test_value(qmat_run_value(&run, want.node, 0));
+    *lifted = run.steps[1].lifted;
+    *hits = run.steps[1].lifted_hits;
+    for (size_t i = 0; i < 3; i++) f->states[i] = qmat_step_state_name(run.steps[i].state)[0];
+    f->states[3] = 0;
+  }
+  qmat_run_uninit(&run);
+  qmat_graph_uninit(&graph);
+  qmat_cache_close(&cache);
+  return status;
+}
+
+static void test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_one_stays(void **state) {
+  fixture *f = *state;
+  qmat_context context = {0};
+  double sum;
+  size_t lifted, hits;
+  put_file(f->model, "abcd");
+  test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
+  assert_true(sum == 2 * ('a' + 'b' + 'c' + 'd'));
+  assert_string_equal(f->states, "rrr");
+  assert_int_equal(ran.scale, 4);
+  assert_int_equal(lifted, 4);
+  assert_int_equal(hits, 0);
+
+  test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
+  assert_true(sum == 2 * ('a' + 'b' + 'c' + 'd'));
+  assert_string_equal(f->states, "hhh");
+  assert_int_equal(ran.scale, 4);
+
+  put_file(f->model, "abXd");
+  test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
+  assert_true(sum == 2 * ('a' + 'b' + 'X' + 'd'));
+  assert_int_equal(ran.scale, 5);
+  assert_int_equal(hits, 3);
+
+  put_file(f->model, "b"); /* a list of one is the value, so what it made in the list is known, too */
+  test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
+  assert_true(sum == 2 * 'b');
+  assert_int_equal(ran.scale, 5);
+  assert_int_equal(lifted, 0);
+  qmat_context_uninit(&context);
+}
+
+static void test_lists_of_different_lengths_do_not_go_together(void **state) {
+  fixture *f = *state;
+  qmat_context context = {0};
+  char rest[480], other[80];
+  double sum;
+  size_t lifted, hits;
+  put_file(f->model, "abcd");
+  snprintf(other, sizeof other, "%s/other", f->folder);
+  put_file(other, "abc");
+  snprintf(rest, sizeof rest,
+           "  three: { type: test.split, params: { path: %s } }\n"
+           "  both:  { type: test.add, in: { first: scale.number, second: three.number } }\n"
+           "  all:   { type: test.sum, in: { number: both.sum } }\n"
+           "  add:   { type: test.add, in: { first: all.number, second: sum.number } }\n",
+           other);
+  assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "a list of 3 is given beside one of 4");
+  assert_string_equal(context.error.node_id, "both");
+  assert_string_equal(context.error.field, "second");
+  qmat_context_uninit(&context);
 }
 
 static void test_a_node_that_breaks_its_promise_is_named(void **state) {
@@ -893,6 +1035,8 @@ int main(void) {
       CASE(test_another_folder_hits_and_another_name_misses),
       CASE(test_side_files_count),
       CASE(test_forced_nodes_run_and_are_the_same),
+      CASE(test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_one_stays),
+      CASE(test_lists_of_different_lengths_do_not_go_together),
       CASE(test_a_node_that_breaks_its_promise_is_named),
       CASE(test_a_damaged_blob_is_a_miss),
       CASE(test_a_blob_that_is_gone_is_a_miss),
