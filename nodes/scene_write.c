@@ -84,6 +84,12 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
   return addition;
 }
 
+/* Of a mesh among several its own, else the scene's; NULL: none. */
+static const char *name_of(const qmat_scene *scene, const qmat_value *medial, size_t index) {
+  if (medial->type == QMAT_LIST) return ((const qmat_list *)medial)->names[index];
+  return scene ? scene->name : NULL;
+}
+
 /* All inputs of one mesh, or lists of one length. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               qmat_file **file) {
@@ -102,7 +108,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
     additions[i] = addition_of(params, (const qmat_medial *)qmat_value_at(inputs[IN_MEDIAL], i),
                                shows && inputs[IN_SKIN] ? (const qmat_mesh *)qmat_value_at(inputs[IN_SKIN], i) : NULL,
                                inputs[IN_REPORT] ? (const qmat_report *)qmat_value_at(inputs[IN_REPORT], i) : NULL,
-                               scene ? scene->name : NULL);
+                               name_of(scene, inputs[IN_MEDIAL], i));
   }
   const qmat_status status =
       kept ? qmat_gltf_enrich(context, scene, additions, count, file)
