@@ -75,6 +75,14 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
   return inside ? depth : -depth;
 }
 
+double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
+                                      double depth) {
+  const double gap = distance * (1 + 1e-9) + side_margin;
+  if (!(near > gap && depth < near + gap)) return qmat_depth_lattice_exact_near(lattice, point, near, distance);
+  lattice->questions++;
+  return qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
+}
+
 /* The depth at a node; from a neighbour where one is known. */
 static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
   static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};

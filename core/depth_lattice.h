@@ -33,4 +33,8 @@ double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[
  * look, and often the side. */
 double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double point[3], double near, double distance);
 
+/* The same, but INFINITY where it is known to be more than `depth`: quicker there. */
+double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
+                                      double depth);
+
 #endif

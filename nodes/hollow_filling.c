@@ -59,7 +59,7 @@ static bool is_held(const double *spheres, size_t count, const double *place) {
 
 /* Finds the sphere at a place and what to join it to. False: none keeps within epsilon. */
 static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_t count, const double *place,
-                       double depth, double epsilon, double sphere[4], uint32_t *neighbour, double *protrusion) {
+                       double depth, double epsilon, double sphere[4], uint32_t *neighbour) {
   uint32_t nearest[MOST_NEIGHBOURS];
   const size_t found = find_nearest(spheres, count, place, nearest);
   memcpy(sphere, place, 3 * sizeof *place);
@@ -68,8 +68,8 @@ static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_
     for (size_t n = 0; n < found; n++) {
       const double *const ends[2] = {sphere, &spheres[4 * (size_t)nearest[n]]};
       *neighbour = nearest[n];
-      *protrusion = qmat_protrusion_bound(surface, ends, 2, enough_share * epsilon, tolerance_share * epsilon);
-      if (*protrusion <= epsilon) return true;
+      if (qmat_protrusion_bound(surface, ends, 2, enough_share * epsilon, tolerance_share * epsilon) <= epsilon)
+        return true;
     }
   }
   return false;
@@ -115,7 +115,7 @@ static qmat_status extend(qmat_context *context, qmat_medial *medial, const doub
 }
 
 qmat_status qmat_hollows_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
-                              double epsilon, qmat_medial *medial, size_t *added, double *envelope_to_surface) {
+                              double epsilon, qmat_medial *medial, size_t *added) {
   const size_t before = medial->sphere_count;
   *added = 0;
   hollow *hollows = qmat_arena_alloc(&context->arena, count, sizeof *hollows);
@@ -125,19 +125,13 @@ qmat_status qmat_hollows_fill(qmat_context *context, const qmat_surface *surface
   if (before) memcpy(spheres, medial->spheres, 4 * before * sizeof *spheres);
   for (size_t i = 0; i < count; i++) hollows[i] = (hollow){-qmat_surface_signed_distance(surface, &places[3 * i]), i};
   if (count) qsort(hollows, count, sizeof *hollows, compare_depths);
-  double largest = *envelope_to_surface;
   for (size_t i = 0; i < count; i++) {
     const double *place = &places[3 * hollows[i].place];
-    double *sphere = &spheres[4 * (before + *added)], protrusion;
+    double *sphere = &spheres[4 * (before + *added)];
     if (!(hollows[i].depth > 0) || is_held(&spheres[4 * before], *added, place)) continue;
-    if (!fit_sphere(surface, spheres, before + *added, place, hollows[i].depth, epsilon, sphere, &neighbours[*added],
-                    &protrusion))
-      continue;
-    largest = fmax(largest, protrusion);
-    ++*added;
+    if (fit_sphere(surface, spheres, before + *added, place, hollows[i].depth, epsilon, sphere, &neighbours[*added]))
+      ++*added;
   }
   if (*added == 0) return QMAT_OK;
-  const qmat_status status = extend(context, medial, spheres, neighbours, *added);
-  if (status == QMAT_OK) *envelope_to_surface = largest;
-  return status;
+  return extend(context, medial, spheres, neighbours, *added);
 }

@@ -41,9 +41,9 @@ static double largest_protrusion(const qmat_surface *surface, const qmat_medial 
   return largest;
 }
 
-qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                       const double *points, size_t point_count, double tolerance, double enough,
-                                       double threshold, qmat_medial_errors *errors) {
+qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                      const double *points, size_t point_count, double tolerance, double enough,
+                                      double threshold, qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
@@ -55,23 +55,30 @@ qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface
   status =
       qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
   errors->surface_to_envelope = errors->cover.bound;
-  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "primitives measured");
-  if (status == QMAT_OK)
-    errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, threads);
   qmat_envelope_free(envelope);
   return status;
 }
 
-/* How closely the boundary is looked at for hollows, as a share of epsilon. */
-static const double hollow_tolerance = 0.05;
+qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                           double tolerance, double enough, qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, qmat_threads(context));
+  qmat_envelope_free(envelope);
+  return qmat_progress(context, 0, 0, "primitives measured");
+}
 
-qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                     double epsilon, qmat_medial_errors *errors) {
+/* How closely the boundary is looked at, as a share of epsilon. */
+static const double boundary_tolerance = 0.15;
+
+qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                         double epsilon, qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   qmat_boundary_distance boundary;
-  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, hollow_tolerance, 0, &boundary);
+  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, 0, &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->hollow_count = 0;

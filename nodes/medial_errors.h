@@ -14,21 +14,25 @@ typedef struct qmat_medial_errors {
   double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
 } qmat_medial_errors;
 
-/* Measures both by branch and bound, each to within `tolerance` (> 0) of the truth where that is above `enough`; below,
- * `enough` is the answer: a plateau of small errors would take looks without number to tell from its highest place.
- * `unit` is a medial mesh in the unit
- * frame, sealed or not; at the `point_count` points (3 doubles each, on the surface) a first look is taken; `threshold`
- * as in qmat_cover_measure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number.
- */
-qmat_status qmat_medial_errors_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                       const double *points, size_t point_count, double tolerance, double enough,
-                                       double threshold, qmat_medial_errors *errors);
+/* `unit` is a medial mesh in the unit frame, sealed or not. Each measures by branch and bound on all threads, and its
+ * answer does not depend on their number. QMAT_ERROR_MEMORY, QMAT_CANCELLED. */
 
-/* Bounds how far the envelope's boundary is from the surface on either side, and where that may be more than `epsilon`
- * finds places of it that lie so deep in the solid (not all of them). QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
- * threads. */
-qmat_status qmat_medial_hollows_find(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                     double epsilon, qmat_medial_errors *errors);
+/* The surface's distance to the envelope, to within `tolerance` (> 0) of the truth where that is above `enough`; below,
+ * `enough` is the answer: a plateau of small errors would take looks without number to tell from its highest place. A
+ * first look is taken at the `point_count` points (3 doubles each, on the surface); `threshold` as in
+ * qmat_cover_measure. */
+qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                      const double *points, size_t point_count, double tolerance, double enough,
+                                      double threshold, qmat_medial_errors *errors);
+
+/* What spheres, cones and slabs leave the solid by, likewise. */
+qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                           double tolerance, double enough, qmat_medial_errors *errors);
+
+/* How far the envelope's boundary is from the surface on either side, closely enough to tell whether that is more than
+ * `epsilon`; and where it may be, some of the places of it that lie so deep in the solid. */
+qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                         double epsilon, qmat_medial_errors *errors);
 
 /* Frees the hollows. */
 void qmat_medial_errors_uninit(qmat_medial_errors *errors);

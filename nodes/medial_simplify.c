@@ -30,7 +30,8 @@ typedef struct {
   int newest;
 } simplifier;
 
-/* The reported errors are at most this share of epsilon above the true ones, but never below the second share. */
+/* The reported distance from surface to envelope is at most this share of epsilon above the true one, but never below
+ * the second share; that from envelope to surface is a bound that is only as close as it has to be. */
 static const double error_tolerance = 0.01, least_reported = 0.5;
 
 /* What an unbounded run (epsilon 0) measures its errors against. */
@@ -40,11 +41,18 @@ static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_me
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
   const qmat_control_points *control = &s->round_controls[s->newest];
-  const qmat_status status =
-      qmat_medial_errors_measure(s->context, s->surface, unit, control->points, control->surface_count,
-                                 tolerance, least_reported * epsilon, epsilon - tolerance, errors);
-  if (status != QMAT_OK || s->params->epsilon == 0 || s->params->error == QMAT_ERROR_ONE_SIDED) return status;
-  return qmat_medial_hollows_find(s->context, s->surface, unit, epsilon, errors);
+  qmat_status status =
+      qmat_medial_cover_measure(s->context, s->surface, unit, control->points, control->surface_count, tolerance,
+                                least_reported * epsilon, epsilon - tolerance, errors);
+  if (status != QMAT_OK) return status;
+  const bool two_sided = s->params->epsilon > 0 && s->params->error == QMAT_ERROR_TWO_SIDED;
+  const qmat_simplification *round = &s->rounds[s->newest];
+  if (two_sided) errors->envelope_to_surface = qmat_protrusion_largest_bound(&round->protrusion, &round->complex);
+  if (!two_sided || errors->envelope_to_surface > epsilon)
+    status = qmat_medial_protrusion_measure(s->context, s->surface, unit, tolerance, least_reported * epsilon, errors);
+  return status == QMAT_OK && two_sided
+             ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
+             : status;
 }
 
 /* Fills notches and voids of the envelope; `left` gets what is still found afterwards, `filled` how many spheres that
@@ -57,12 +65,12 @@ static qmat_status fill_hollows(const simplifier *s, const qmat_medial_errors *f
   *filled = 0;
   for (int i = 0; i < MOST_FILLINGS && left->hollow_count > 0 && status == QMAT_OK; i++) {
     size_t added;
-    status = qmat_hollows_fill(s->context, s->surface, left->hollows, left->hollow_count, epsilon, unit, &added,
-                               &left->envelope_to_surface);
+    status = qmat_hollows_fill(s->context, s->surface, left->hollows, left->hollow_count, epsilon, unit, &added);
     if (status != QMAT_OK || added == 0) break;
     *filled += added;
+    left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
-    status = qmat_medial_hollows_find(s->context, s->surface, unit, epsilon, left);
+    status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
   return status;
 }
@@ -217,6 +225,9 @@ static void release(attempt *a) {
   *a = (attempt){.fault = INFINITY};
 }
 
+/* Where more than this share of the spheres fill hollows, another round does with fewer. */
+static const double most_filled = 0.05;
+
 static bool is_better(const attempt *a, const attempt *best) {
   return a->fault < best->fault ||
          (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
@@ -284,7 +295,9 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     attempt a;
     const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
     status = run_attempt(s, state, &s->dense, NULL, &extra, round, &a, &errors);
-    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    const bool is_good = a.holds && (double)a.filled <= most_filled * (double)a.medial->sphere_count;
+    const bool is_done =
+        is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
     if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
@@ -351,8 +364,11 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double bound = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
   if (status == QMAT_OK)
-    status = qmat_medial_errors_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
-                                        error_tolerance * bound, least_reported * bound, INFINITY, &errors);
+    status = qmat_medial_cover_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
+                                       error_tolerance * bound, least_reported * bound, INFINITY, &errors);
+  if (status == QMAT_OK)
+    status = qmat_medial_protrusion_measure(context, o.surface, medial, error_tolerance * bound,
+                                            least_reported * bound, &errors);
   if (status == QMAT_OK)
     status = report_in_order(context, &o, o.params.epsilon > 0 ? epsilon : 0, deviation, medial, &errors, report);
   if (status == QMAT_OK) {

@@ -120,8 +120,13 @@ static bool search_piece(search *s, const piece *p, int level) {
     ask = size <= s->smallest || last;
   }
   if (ask) {
-    const double depth = s->lattice ? qmat_depth_lattice_exact_near(s->lattice, centre, near, gap)
-                                    : -qmat_surface_signed_distance(s->surface, centre);
+    const double depth =
+        s->lattice ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
+                   : -qmat_surface_signed_distance(s->surface, centre);
+    if (depth == INFINITY) { /* deeper than that */
+      s->bound = maximum(s->bound, s->content);
+      return true;
+    }
     const double h = centre[3] - depth;
     s->found = maximum(s->found, h);
     if (h > s->limit) return false;
@@ -303,4 +308,15 @@ void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *co
         collapse->kept_triangles[t] != QMAT_NONE ? collapse->kept_triangles[t] : collapse->removed_triangles[t];
     protrusion->triangle_bounds[triangle] = protrusion->new_triangle_bounds[t];
   }
+}
+
+double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex) {
+  double largest = 0;
+  for (size_t v = 0; v < complex->vertex_count; v++)
+    if (complex->vertex_alive[v]) largest = maximum(largest, complex->spheres[4 * v + 3] - protrusion->depths[v]);
+  for (size_t e = 0; e < complex->edge_count; e++)
+    if (complex->edge_alive[e]) largest = maximum(largest, protrusion->edge_bounds[e]);
+  for (size_t t = 0; t < complex->triangle_count; t++)
+    if (complex->triangle_alive[t]) largest = maximum(largest, protrusion->triangle_bounds[t]);
+  return largest;
 }

@@ -50,6 +50,9 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
 /* Takes the newest successful test over: call it before the complex changes. */
 void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse);
 
+/* An upper bound of h over all spheres, edges and triangles that are left of the complex. */
+double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex);
+
 /* An upper bound of h over a primitive of `count` (1, 2 or 3) spheres (4 doubles each): the largest h itself to within
  * `tolerance`, unless it is below `enough`, which is then the answer. Branch and bound; thread-safe. */
 double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,

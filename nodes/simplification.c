@@ -100,7 +100,10 @@ static qmat_status fill_heap(qmat_simplification *s) {
   s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
   s->stale = qmat_arena_alloc(&s->context->arena, count, sizeof *s->stale);
   s->asked = qmat_arena_alloc(&s->context->arena, count, sizeof *s->asked);
-  if (!s->failed_points || !s->stale || !s->asked) return qmat_fail_memory(s->context, "the heap of edges");
+  s->fitted_errors = qmat_arena_calloc(&s->context->arena, count, sizeof *s->fitted_errors);
+  s->settled = qmat_arena_calloc(&s->context->arena, s->complex.vertex_count, sizeof *s->settled);
+  if (!s->failed_points || !s->stale || !s->asked || !s->fitted_errors || !s->settled)
+    return qmat_fail_memory(s->context, "the heap of edges");
   qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
   if (status != QMAT_OK) return status;
   for (size_t e = 0; e < count; e++) {
@@ -352,7 +355,8 @@ static const double worth_testing = 1.1;
 
 /* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
  * look good as they are. */
-static qmat_status try_fitted(qmat_simplification *s, const qmat_candidates *c, double sphere[4], outcome *result) {
+static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
+                              outcome *result) {
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
   int least = 0;
   qmat_status status =
@@ -365,6 +369,7 @@ static qmat_status try_fitted(qmat_simplification *s, const qmat_candidates *c, 
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   if (status == QMAT_OK)
     status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, &error);
+  s->fitted_errors[edge] = error;
   if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
   for (int i = 0; i < c->count && status == QMAT_OK && *result != DONE; i++) {
     if (!(errors[i] <= worth_testing * s->held)) continue;
@@ -413,7 +418,7 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   }
   double fitted[4];
   if (status == QMAT_OK && fits) {
-    status = try_fitted(s, &c, fitted, result);
+    status = try_fitted(s, edge, &c, fitted, result);
     sphere = fitted;
   }
   if (status == QMAT_OK && *result == DONE) {
@@ -422,6 +427,16 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   }
   if (exceeded) *result = EXCEEDED;
   return status;
+}
+
+/* An edge whose fitted sphere had this many times the error that is held is not tried again for a sphere nearby that
+ * moves, only for one that goes. */
+static const double worth_another_fit = 2;
+
+static void queue_again(qmat_simplification *s, uint32_t edge) {
+  if (s->heap.places[edge] != QMAT_NONE) return;
+  if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > worth_another_fit * s->held) return;
+  qmat_edge_heap_update(&s->heap, edge);
 }
 
 /* New costs around the merged vertex, and another chance for the refused edges of its neighbours. */
@@ -438,13 +453,14 @@ static void update_neighbourhood(qmat_simplification *s) {
   const uint32_t *at = qmat_complex_edges_at(&s->complex, c->kept, &count);
   for (size_t i = 0; i < count; i++) {
     s->stale[at[i]] = 1;
-    if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
+    queue_again(s, at[i]);
   }
+  s->settled[c->kept] = 0;
   if (!s->fitting) return; /* all get another chance then */
   for (size_t n = 0; n < c->neighbour_count; n++) {
+    s->settled[c->neighbours[n]] = 0;
     at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
-    for (size_t i = 0; i < count; i++)
-      if (s->heap.places[at[i]] == QMAT_NONE) qmat_edge_heap_update(&s->heap, at[i]);
+    for (size_t i = 0; i < count; i++) queue_again(s, at[i]);
   }
 }
 
@@ -492,13 +508,15 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
 /* A move has to gain at least this share of the error. */
 static const double least_gain = 0.02;
 
-/* Fits every sphere to the surface where that lowers its largest error. */
+/* Fits every sphere to the surface where that lowers its largest error; not those that did not move and whose
+ * neighbours have not moved since. */
 static qmat_status refit(qmat_simplification *s, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
-    if (!s->complex.vertex_alive[v] || (s->protecting && is_protected(s, v)) ||
+    if (!s->complex.vertex_alive[v] || s->settled[v] || (s->protecting && is_protected(s, v)) ||
         qmat_crease_guard_is_feature(&s->creases, v))
       continue;
+    s->settled[v] = 1;
     qmat_status status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
       status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);

@@ -66,6 +66,8 @@ typedef struct qmat_simplification {
   uint32_t *failed_points; /* per edge: the control point that refused it, or QMAT_NONE */
   double *asked;           /* per edge: no less has to be held for it to collapse, as far as is known */
   uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
+  double *fitted_errors;   /* per edge: of the sphere that was fitted last */
+  uint8_t *settled;        /* per vertex: whether a fit did not move it, and nothing has moved around it since */
   bool protecting, fitting;
   int64_t euler; /* of the medial mesh */
   size_t collapses, moves, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
