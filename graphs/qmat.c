@@ -377,6 +377,11 @@ static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type t
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not asked for before the run", port);
     return qmat_fail_hint(context, "qmat_job_want");
   }
+  if ((*value)->type == QMAT_LIST) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has %zu values, one for each mesh of the scene", port,
+              qmat_value_count(*value));
+    return qmat_fail_hint(context, "choose a mesh by scene.read's parameter mesh, or set that to merged");
+  }
   if ((*value)->type != type)
     return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name((*value)->type),
                      qmat_value_type_name(type));

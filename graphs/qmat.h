@@ -113,7 +113,8 @@ QMAT_API qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress 
 
 /* ---- results ---- */
 /* Pointers stay valid until the next run of the job or its end. Each call fails with QMAT_RESULT_USAGE when the port
- * was not asked for before the run, or holds another type of value. */
+ * was not asked for before the run, holds another type of value, or holds one for each of several meshes of a glTF
+ * scene: "model.mesh=NAME" chooses one of them, "model.mesh=merged" takes them as one. */
 
 /* A medial mesh. */
 typedef struct qmat_medial_view {
