@@ -118,8 +118,7 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
   qmat_simplification_uninit(round);
   *round = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
-  if (status == QMAT_OK)
-    status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
+  if (status == QMAT_OK) status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
   swap_lattices(&s->dense, round);
@@ -229,8 +228,7 @@ static void release(attempt *a) {
 static const double most_filled = 0.05;
 
 static bool is_better(const attempt *a, const attempt *best) {
-  return a->fault < best->fault ||
-         (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
+  return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
 }
 
 /* A round from where `from` ended, of which `left` is what is left; NULL: it is extracted. `found` are the errors
@@ -488,10 +486,12 @@ const qmat_node qmat_node_medial_simplify = {
         "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
         "deep "
         "stay inside the envelope, so that it has no hollow. Spheres of radius zero are sharp features: corners stay, "
-        "creases between them are thinned as polylines that keep within epsilon. When no edge is left, each is tried "
+        "creases between them are thinned as polylines that keep within a share of epsilon. When no edge is left, each "
+        "is tried "
         "with a sphere that is "
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
-        "places between where the surface is too far from the envelope, and the collapses are repeated with these, and for "
+        "places between where the surface is too far from the envelope, and the collapses are repeated with these, and "
+        "for "
         "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
         "on. Of a mesh that only stands for a surface (mesh.subdivide), the deviation is taken from epsilon and added to "
         "the errors of the report. "

@@ -386,7 +386,9 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
   double asked;
-  bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, s->held, &c, &asked);
+  const double share = s->rules.crease_share;
+  bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->held, &c, &asked);
+  asked /= share;
   if (bound && c.count == 0) {
     s->refused_by_protection++;
     s->asked[edge] = asked;

@@ -34,6 +34,7 @@ typedef struct qmat_simplification_rules {
   qmat_topology_policy topology;
   qmat_protection protect;
   qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
+  double crease_share;        /* of what is held, how far points of a crease may be from what is left of it: above 0 */
   int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
   const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
   bool has_target;     /* whether the solid's Euler characteristic is known */

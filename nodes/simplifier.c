@@ -135,6 +135,7 @@ qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_param
                                        .topology = (qmat_topology_policy)p->topology,
                                        .protect = (qmat_protection)p->protect,
                                        .features = (qmat_feature_rule)p->features,
+                                       .crease_share = p->crease,
                                        .refits = (int)p->refits,
                                        .thin = initial->thin,
                                        .has_target = mesh->closed && mesh->oriented};

@@ -16,6 +16,7 @@ typedef struct qmat_simplify_params {
   int cost, compat; /* a qmat_cost_kind, a qmat_compatibility */
   int error, on_exceed, topology, protect, features;
   double finest;
+  double crease;
   double theta;
   double k;
   int64_t refits;
@@ -93,6 +94,14 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
        .default_number = QMAT_FEATURES_SHARP,                                                                     \
        .choices = qmat_feature_choices,                                                                           \
        .offset = offsetof(qmat_simplify_params, features)},                                                       \
+      {.name = "crease",                                                                                          \
+       .unit = "epsilon",                                                                                         \
+       .doc = "How far the points of a crease may be from what is left of it, as a share of what is held",        \
+       .type = QMAT_PARAM_FLOAT,                                                                                  \
+       .default_number = 0.25,                                                                                    \
+       .min = 0.01,                                                                                               \
+       .max = 1,                                                                                                  \
+       .offset = offsetof(qmat_simplify_params, crease)},                                                         \
       {.name = "theta",                                                                                           \
        .unit = "mean thickness",                                                                                  \
        .doc =                                                                                                     \
