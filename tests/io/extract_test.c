@@ -6,6 +6,7 @@
 #include "core/json_text.h"
 #include "io/gltf_write.h"
 #include "io/ma.h"
+#include "io/usd_write.h"
 #include "tests/io/files.h"
 #include "tests/io/medial_examples.h"
 
@@ -86,6 +87,77 @@ static void test_what_was_written_comes_back_with_its_facts(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* How many spheres lie on no edge, and edges on no triangle. */
+static void count_loose(const qmat_medial *medial, size_t *spheres, size_t *edges) {
+  *spheres = *edges = 0;
+  for (uint32_t i = 0; i < medial->sphere_count; i++) {
+    bool used = false;
+    for (size_t k = 0; k < 2 * medial->edge_count; k++) used = used || medial->edges[k] == i;
+    *spheres += !used;
+  }
+  for (size_t e = 0; e < medial->edge_count; e++) {
+    bool used = false;
+    for (size_t t = 0; t < medial->triangle_count; t++) {
+      int ends = 0;
+      for (size_t k = 0; k < 6; k++) ends += medial->triangles[3 * t + k / 2] == medial->edges[2 * e + k % 2];
+      used = used || ends == 2;
+    }
+    *edges += !used;
+  }
+}
+
+/* The largest move of a centre and its radius together, in long double: what qmat_quantisation states. */
+static double largest_move(const qmat_medial *a, const qmat_medial *b) {
+  long double largest = 0;
+  for (size_t i = 0; i < a->sphere_count; i++) {
+    const double *p = a->spheres + 4 * i, *q = b->spheres + 4 * i;
+    const long double x = (long double)p[0] - q[0], y = (long double)p[1] - q[1], z = (long double)p[2] - q[2];
+    largest = fmaxl(largest, sqrtl(x * x + y * y + z * z) + fabsl((long double)p[3] - q[3]));
+  }
+  return (double)largest;
+}
+
+static void test_every_form_gives_back_what_was_written_within_what_it_states(void **state) {
+  (void)state;
+  static const char *const names[] = {"a.glb", "a.gltf", "a.usda", "a.usdz"};
+  static const size_t counts[] = {1, 3, 200};
+  for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+    qmat_medial *medial = example_medial(counts[c]);
+    size_t loose_spheres, loose_edges;
+    count_loose(medial, &loose_spheres, &loose_edges);
+    if (counts[c] == 200) assert_true(loose_spheres > 0 && loose_edges > 0 && medial->triangle_count > 0);
+    for (size_t form = 0; form < 4; form++) {
+      qmat_context context = {0};
+      const qmat_gltf_options gltf = {.binary = form == 0, .quantisation = 1e-4, .epsilon = 0.01};
+      const qmat_usd_options usd = {.package = form == 3, .epsilon = 0.01};
+      qmat_file *file;
+      qmat_medial *read;
+      json_t *facts = json_object();
+      assert_int_equal(form < 2 ? qmat_gltf_write(&context, medial, NULL, &gltf, &file)
+                                : qmat_usd_write(&context, medial, NULL, &usd, &file),
+                       QMAT_OK);
+      const qmat_file_part *part = file->parts;
+      if (extract_from(&context, names[form], part->bytes, part->size, NULL, &read, facts) != QMAT_OK)
+        fail_msg("%s: %s", names[form], context.error.message);
+      assert_int_equal(read->sphere_count, medial->sphere_count);
+      assert_int_equal(read->edge_count, medial->edge_count);
+      assert_int_equal(read->triangle_count, medial->triangle_count);
+      if (medial->edge_count > 0)
+        assert_memory_equal(read->edges, medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
+      if (medial->triangle_count > 0)
+        assert_memory_equal(read->triangles, medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
+      const double stated = json_number_value(json_object_get(facts, "qmat_quantisation"));
+      assert_true(stated > 0 && stated <= 1e-4);
+      assert_true(largest_move(medial, read) <= stated * (1 + 1e-12));
+      qmat_value_release(&read->base);
+      qmat_value_release(&file->base);
+      json_decref(facts);
+      qmat_context_uninit(&context);
+    }
+    qmat_value_release(&medial->base);
+  }
+}
+
 static void assert_fails(const json_t *root, const char *name, qmat_status expected, const char *message) {
   qmat_context context = {0};
   qmat_medial *read;
@@ -150,6 +222,7 @@ static void test_broken_data_and_wrong_counts_are_errors(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_what_was_written_comes_back_with_its_facts),
+      cmocka_unit_test(test_every_form_gives_back_what_was_written_within_what_it_states),
       cmocka_unit_test(test_of_several_one_has_to_be_named),
       cmocka_unit_test(test_broken_data_and_wrong_counts_are_errors),
   };
