@@ -5,6 +5,7 @@
 #include <yaml.h>
 
 #include "graphs/command.h"
+#include "nodes/subdivision_osd.h"
 
 // What reads and computes is part of what makes a result, so a bug report needs it. The versions of libraries without
 // a function that tells it are those that the program was built with.
@@ -12,9 +13,9 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   (void)context;
   printf("qmat %s\n", QMAT_VERSION);
   if (!qmat_invocation_value(invocation, "verbose")) return QMAT_OK;
-  printf("CGAL %s\nEmbree %s\nDraco %s\njansson %s\nlibyaml %s\n%s\ncompiler %s\n", QMAT_CGAL_VERSION,
-         QMAT_EMBREE_VERSION, QMAT_DRACO_VERSION, jansson_version_str(), yaml_get_version_string(),
-         OpenSSL_version(OPENSSL_VERSION), __VERSION__);
+  printf("CGAL %s\nEmbree %s\nDraco %s\nOpenSubdiv %s\njansson %s\nlibyaml %s\n%s\ncompiler %s\n", QMAT_CGAL_VERSION,
+         QMAT_EMBREE_VERSION, QMAT_DRACO_VERSION, qmat_opensubdiv_version(), jansson_version_str(),
+         yaml_get_version_string(), OpenSSL_version(OPENSSL_VERSION), __VERSION__);
   return QMAT_OK;
 }
 

@@ -149,6 +149,16 @@ expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 5% $coarse
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
 expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 5% $coarse
 holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 10
+cat >cage.usda <<'END'
+#usda 1.0
+def Mesh "cage" {
+  point3f[] points = [(-1, -1, -1), (1, -1, -1), (-1, 1, -1), (1, 1, -1), (-1, -1, 1), (1, -1, 1), (-1, 1, 1), (1, 1, 1)]
+  int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]
+  int[] faceVertexIndices = [0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5]
+}
+END
+expect 0 "(certified)" "$qmat" mat cage.usda -o cage.ma --epsilon 4% --report cage.json
+holds "the cage is taken to its limit" grep -q '"deviation": 0.00' cage.json
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
 # A number of spheres alone means no bound on the distance.

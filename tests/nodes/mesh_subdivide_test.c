@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/node.h"
+#include "tests/nodes/pipeline.h"
 #include "tests/shapes.h"
 
 extern const qmat_node qmat_node_mesh_subdivide;
@@ -637,6 +638,87 @@ static void test_creases_along_no_edge_are_told(void **state) {
   release(&r);
 }
 
+/* ---- what the mesh carries along ---- */
+
+/* A box of diagonal 3 that stands for a surface as far away as that share of it. */
+static qmat_mesh *box_with_deviation(double share) {
+  qmat_mesh *box = shape_box(1, 2, 2);
+  box->deviation = 3 * share;
+  return shape_seal(box);
+}
+
+/* The bounds of medial.evaluate grow by the deviation on both sides, and what was certified no longer is. */
+static void test_bounds_are_towards_the_surface_that_the_mesh_stands_for(void **state) {
+  (void)state;
+  qmat_mesh *plain = box_with_deviation(0), *deviating = box_with_deviation(0.125);
+  qmat_medial *ball = qmat_medial_new();
+  ball->sphere_count = 1;
+  ball->spheres = qmat_alloc(4, sizeof *ball->spheres);
+  memcpy(ball->spheres, (const double[]){0.5, 1, 1, 0.5}, 4 * sizeof(double));
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &ball->base), QMAT_OK);
+  qmat_value *outputs[2];
+  pipeline_must_run(0, "medial.evaluate", "epsilon=40% tolerance=0.01",
+                    (const qmat_value *[]){&plain->base, &ball->base}, &outputs[0]);
+  pipeline_must_run(0, "medial.evaluate", "epsilon=40% tolerance=0.01",
+                    (const qmat_value *[]){&deviating->base, &ball->base}, &outputs[1]);
+  const qmat_report *without = (const qmat_report *)outputs[0], *with = (const qmat_report *)outputs[1];
+  /* From a corner to the ball: sqrt(0.25 + 1 + 1) - 0.5 = 1, a third of the diagonal. */
+  assert_near(pipeline_number(without, "surface_to_envelope"), 1.0 / 3, 0.005);
+  assert_near(pipeline_number(with, "surface_to_envelope"), 1.0 / 3 + 0.125, 0.005);
+  assert_near(pipeline_number(with, "surface_to_envelope_at_least"), 1.0 / 3 - 0.125, 0.005);
+  assert_near(pipeline_number(with, "envelope_to_surface"), pipeline_number(without, "envelope_to_surface") + 0.125,
+              0.005);
+  assert_near(pipeline_number(with, "deviation"), 0.125, 0);
+  assert_true(json_is_true(json_object_get(without->root, "certified")));
+  assert_true(json_is_false(json_object_get(with->root, "certified")));
+  assert_null(json_object_get(without->root, "deviation"));
+  for (int i = 0; i < 2; i++) qmat_value_release(outputs[i]);
+  qmat_value_release(&ball->base);
+  qmat_value_release(&plain->base);
+  qmat_value_release(&deviating->base);
+}
+
+/* With a deviation of 1/128 and an epsilon of 4/128, collapses are those of 3/128, and errors are 1/128 more. */
+static void test_collapses_leave_the_deviation_of_epsilon(void **state) {
+  (void)state;
+  pipeline plain = {0}, deviating = {0};
+  pipeline_make(&plain, box_with_deviation(0), "spacing=8% n_f=0", "");
+  pipeline_make(&deviating, box_with_deviation(0.0078125), "spacing=8% n_f=0", "");
+  static const char *const rules[] = {"skip", "raise"};
+  const qmat_value *in_plain[] = {&plain.mesh->base, &plain.thickness->base, &plain.samples->base, &plain.medial->base};
+  const qmat_value *in_deviating[] = {&deviating.mesh->base, &deviating.thickness->base, &deviating.samples->base,
+                                      &deviating.medial->base};
+  qmat_value *made[2], *expected[2];
+  for (int i = 0; i < 2; i++) {
+    char params[64];
+    snprintf(params, sizeof params, "on_exceed=%s epsilon=0.0234375", rules[i]);
+    pipeline_must_run(0, "medial.simplify", params, in_plain, expected);
+    snprintf(params, sizeof params, "on_exceed=%s epsilon=0.03125", rules[i]);
+    pipeline_must_run(0, "medial.simplify", params, in_deviating, made);
+    assert_memory_equal(&made[0]->digest, &expected[0]->digest, sizeof(qmat_digest));
+    const qmat_report *with = (const qmat_report *)made[1], *without = (const qmat_report *)expected[1];
+    assert_near(pipeline_number(with, "epsilon"), 0.03125, 0);
+    static const char *const errors[] = {"surface_to_envelope", "envelope_to_surface"};
+    for (int k = 0; k < 2; k++)
+      assert_near(pipeline_number(with, errors[k]), pipeline_number(without, errors[k]) + 0.0078125, 1e-15);
+    if (i == 1) { /* the same out of a chain */
+      qmat_value *chain[2], *level[2];
+      pipeline_must_run(0, "medial.chain", "on_exceed=raise", in_deviating, chain);
+      pipeline_must_run(0, "medial.lod", "epsilon=0.03125", (const qmat_value *[]){chain[0]}, level);
+      assert_memory_equal(&level[0]->digest, &made[0]->digest, sizeof(qmat_digest));
+      for (int k = 0; k < 2; k++) qmat_value_release(chain[k]), qmat_value_release(level[k]);
+    }
+    for (int k = 0; k < 2; k++) qmat_value_release(made[k]), qmat_value_release(expected[k]);
+  }
+  qmat_context context = {0};
+  assert_int_equal(pipeline_run(&context, "medial.simplify", "epsilon=0.0078125", in_deviating, made),
+                   QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.field, "epsilon");
+  pipeline_free(&plain);
+  pipeline_free(&deviating);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_cube_goes_to_the_limit_points_of_catmull_clark),
@@ -660,6 +742,8 @@ int main(void) {
       cmocka_unit_test(test_levels_that_take_too_much_are_errors),
       cmocka_unit_test(test_edges_of_three_faces_do_not_crash),
       cmocka_unit_test(test_creases_along_no_edge_are_told),
+      cmocka_unit_test(test_bounds_are_towards_the_surface_that_the_mesh_stands_for),
+      cmocka_unit_test(test_collapses_leave_the_deviation_of_epsilon),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
