@@ -3,11 +3,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/medial_build.h"
 #include "core/node.h"
 #include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
 #include "nodes/simplifier.h"
+#include "nodes/topology.h"
 
 typedef qmat_simplify_params medial_simplify_params;
 
@@ -280,6 +282,74 @@ static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *sta
   return status;
 }
 
+static int set_count(json_t *root, const char *key, size_t count) {
+  return json_object_set_new(root, key, json_integer((json_int_t)count));
+}
+
+/* Takes a triangle away, not its edges. */
+static qmat_status remove_triangle(qmat_context *context, qmat_medial *medial, size_t triangle) {
+  uint32_t *rest = qmat_arena_alloc(&context->arena, medial->triangle_count, 3 * sizeof *rest);
+  if (!rest) return qmat_fail_memory(context, "the medial mesh");
+  memcpy(rest, medial->triangles, 3 * triangle * sizeof *rest);
+  memcpy(rest + 3 * triangle, medial->triangles + 3 * (triangle + 1),
+         3 * (medial->triangle_count - triangle - 1) * sizeof *rest);
+  return qmat_medial_set_simplices(context, medial, medial->edges, medial->edge_count, rest,
+                                   medial->triangle_count - 1);
+}
+
+static qmat_status restore_triangle(qmat_context *context, qmat_medial *medial, const uint32_t corners[3]) {
+  uint32_t *all = qmat_arena_alloc(&context->arena, medial->triangle_count + 1, 3 * sizeof *all);
+  if (!all) return qmat_fail_memory(context, "the medial mesh");
+  memcpy(all, medial->triangles, 3 * medial->triangle_count * sizeof *all);
+  memcpy(all + 3 * medial->triangle_count, corners, 3 * sizeof *all);
+  return qmat_medial_set_simplices(context, medial, medial->edges, medial->edge_count, all,
+                                   medial->triangle_count + 1);
+}
+
+/* At most so many walls of a void are tried. */
+enum { MOST_WALLS = 12 };
+
+/* Opens a void of the medial mesh that the solid has not: takes the first wall away without which the errors still
+ * keep within epsilon. `*opened`: whether there was one. */
+static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened) {
+  const double epsilon = s->params->epsilon;
+  uint32_t *walls;
+  size_t count;
+  *opened = false;
+  qmat_status status = qmat_topology_find_walls(s->context, unit, &walls, &count);
+  for (size_t i = 0; i < count && i < MOST_WALLS && status == QMAT_OK && !*opened; i++) {
+    uint32_t corners[3];
+    memcpy(corners, &unit->triangles[3 * (size_t)walls[i]], sizeof corners);
+    qmat_medial_errors errors = {.surface_to_envelope = 0};
+    status = remove_triangle(s->context, unit, walls[i]);
+    if (status == QMAT_OK) status = measure(s, unit, &errors);
+    *opened = errors.surface_to_envelope <= epsilon && errors.boundary_to_surface <= epsilon;
+    qmat_medial_errors_uninit(&errors);
+    if (status == QMAT_OK && !*opened) status = restore_triangle(s->context, unit, corners);
+  }
+  return status;
+}
+
+/* Opens voids of a result that keeps within epsilon until there is none that the solid has not. */
+static qmat_status open_voids(simplifier *s, attempt *a) {
+  const qmat_simplification_rules *rules = &s->dense.rules;
+  if (!a->holds || !rules->has_target || rules->topology == QMAT_TOPOLOGY_FREE) return QMAT_OK;
+  bool opened = true;
+  while (opened) {
+    qmat_topology topology;
+    qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
+    if (status != QMAT_OK || !topology.known || topology.voids == 0 || topology.euler <= rules->target_euler)
+      return status;
+    status = open_void(s, a->medial, &opened);
+    if (status != QMAT_OK) return status;
+    const size_t triangles = a->medial->triangle_count;
+    if (opened && (set_count(a->report->root, "triangles", triangles) ||
+                   json_object_set_new(a->report->root, "euler_characteristic", json_integer(topology.euler - 1))))
+      return qmat_fail_memory(s->context, "the report");
+  }
+  return QMAT_OK;
+}
+
 /* Rounds of collapses until surface and envelope keep within epsilon of each other between the control points as they
  * do at them: places where the surface is farther from the envelope, or the envelope has a notch or is hollow, join
  * them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
@@ -318,10 +388,6 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     if (status == QMAT_OK) status = collapse_dense(s, state, samples, initial, &in_dense);
   }
   return status;
-}
-
-static int set_count(json_t *root, const char *key, size_t count) {
-  return json_object_set_new(root, key, json_integer((json_int_t)count));
 }
 
 static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, double epsilon,
@@ -400,6 +466,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   attempt best = {.fault = INFINITY};
   status = qmat_simplify_prepare(context, &held, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
+  if (status == QMAT_OK) status = open_voids(&s, &best);
   if (status == QMAT_OK) {
     double *spheres = best.medial->spheres;
     qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), spheres, best.medial->sphere_count, spheres);

@@ -210,6 +210,21 @@ static qmat_status count_voids(qmat_context *context, const qmat_medial *medial,
   return status;
 }
 
+qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *medial, uint32_t **walls,
+                                     size_t *count) {
+  sides s;
+  size_t left;
+  qmat_status status = find_sides(context, medial, &s);
+  if (status == QMAT_OK) status = remove_free(context, &s, &left);
+  if (status != QMAT_OK) return status;
+  *walls = qmat_arena_alloc(&context->arena, left, sizeof **walls);
+  if (!*walls) return qmat_fail_memory(context, "the topology");
+  *count = 0;
+  for (size_t t = 0; t < medial->triangle_count; t++)
+    if (!s.removed[t]) (*walls)[(*count)++] = (uint32_t)t;
+  return QMAT_OK;
+}
+
 qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *medial, qmat_topology *topology) {
   *topology = (qmat_topology){.known = true, .components = medial->sphere_count};
   topology->euler = (int64_t)medial->sphere_count - (int64_t)medial->edge_count + (int64_t)medial->triangle_count;

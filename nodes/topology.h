@@ -19,6 +19,11 @@ typedef struct qmat_topology {
  * for that. QMAT_ERROR_MEMORY. */
 qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *medial, qmat_topology *topology);
 
+/* The triangles that are left when those at free edges are removed, again and again: the walls of voids, and what only
+ * leads from one to another. `*walls`: `*count` triangles in their order, in the context's arena. QMAT_ERROR_MEMORY.
+ * Linear but for finding edges. */
+qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *medial, uint32_t **walls, size_t *count);
+
 /* Of the solid within a closed and oriented surface: outward shells bound its components, inward ones its voids, and
  * the genus of either counts its loops. Shells that do not separate inside from outside (swallowed by another, or
  * without volume) are left out; shells that cross count as apart. Nothing is known of an open surface, nor of one with

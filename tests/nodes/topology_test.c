@@ -65,6 +65,25 @@ static void test_small_complexes_by_hand(void **state) {
   check_complex(5, NULL, 0, fan, 3, 1, 0, 0);
 }
 
+/* A hollow tetrahedron with a strip of two slabs at one of its sides: the strip is none of its walls. */
+static void test_walls_of_a_void_by_hand(void **state) {
+  (void)state;
+  static const uint32_t triangles[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 2, 3, 4, 3, 4, 5};
+  qmat_medial *medial = complex_of(6, NULL, 0, triangles, 6);
+  qmat_context context = {0};
+  uint32_t *walls;
+  size_t count;
+  assert_int_equal(qmat_topology_find_walls(&context, medial, &walls, &count), QMAT_OK);
+  assert_int_equal(count, 4);
+  for (size_t i = 0; i < 4; i++) assert_true(medial->triangles[3 * walls[i] + 2] <= 3);
+  qmat_value_release(&medial->base);
+  medial = complex_of(4, NULL, 0, triangles, 3); /* open: nothing is left */
+  assert_int_equal(qmat_topology_find_walls(&context, medial, &walls, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_hollows_that_share_a_side_are_two(void **state) {
   (void)state;
   /* Tetrahedra over and under the triangle 0 1 2: their edges in common lie on three triangles. */
@@ -234,6 +253,7 @@ static void test_nothing_is_said_of_open_and_branching_surfaces(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_small_complexes_by_hand),
+      cmocka_unit_test(test_walls_of_a_void_by_hand),
       cmocka_unit_test(test_hollows_that_share_a_side_are_two),
       cmocka_unit_test(test_surfaces_without_a_side_are_told_over_z2),
       cmocka_unit_test(test_random_complexes_have_the_rank_of_full_elimination),
