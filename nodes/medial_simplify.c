@@ -333,7 +333,7 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened) {
 /* Opens voids of a result that keeps within epsilon until there is none that the solid has not. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
   const qmat_simplification_rules *rules = &s->dense.rules;
-  if (!a->holds || !rules->has_target || rules->topology == QMAT_TOPOLOGY_FREE) return QMAT_OK;
+  if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
   bool opened = true;
   while (opened) {
     qmat_topology topology;
