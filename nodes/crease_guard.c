@@ -18,6 +18,7 @@ static qmat_status find_features(qmat_context *context, const qmat_complex *comp
   if (!guard->features) return qmat_fail_memory(context, "sharp features");
   for (size_t v = 0; v < complex->vertex_count; v++)
     guard->features[v] = complex->spheres[4 * v + 3] == 0 ? (uint32_t)guard->feature_count++ : QMAT_NONE;
+  guard->left = guard->feature_count;
   if (guard->feature_count == 0) {
     guard->features = NULL;
     return QMAT_OK;
@@ -162,6 +163,7 @@ static void drop(qmat_crease_guard *g, uint32_t feature) {
   g->next[g->previous[place]] = g->next[place];
   g->previous[g->next[place]] = g->previous[place];
   g->vertices[feature] = QMAT_NONE;
+  g->left--;
 }
 
 void qmat_crease_guard_commit(qmat_crease_guard *g, const qmat_complex *complex, const qmat_collapse *collapse,
@@ -186,12 +188,6 @@ void qmat_crease_guard_commit(qmat_crease_guard *g, const qmat_complex *complex,
   g->features[removed] = QMAT_NONE;
   g->features[kept] = stays;
   g->vertices[stays] = kept;
-}
-
-size_t qmat_crease_guard_left(const qmat_crease_guard *guard) {
-  size_t left = 0;
-  for (size_t f = 0; f < guard->feature_count; f++) left += guard->vertices[f] != QMAT_NONE;
-  return left;
 }
 
 double qmat_crease_guard_error(const qmat_crease_guard *guard) {

@@ -13,7 +13,7 @@
  *
  * The arrays live in the context's arena. Zeroed, it guards nothing. */
 typedef struct qmat_crease_guard {
-  size_t feature_count;
+  size_t feature_count, left;   /* at first, and now */
   uint32_t *features;           /* per vertex of the complex: its feature, or QMAT_NONE; NULL: there is none */
   uint32_t *vertices;           /* per feature: the vertex whose sphere it is, or QMAT_NONE when it is gone */
   const double *points;         /* 3 per feature */
@@ -46,9 +46,6 @@ bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_compl
 /* Follows a collapse to `sphere`, one of those that were left: call it before the complex changes. */
 void qmat_crease_guard_commit(qmat_crease_guard *guard, const qmat_complex *complex, const qmat_collapse *collapse,
                               const double sphere[4]);
-
-/* How many features are left. */
-size_t qmat_crease_guard_left(const qmat_crease_guard *guard);
 
 /* The largest distance of a point of the initial creases to the cones that are left of its crease. */
 double qmat_crease_guard_error(const qmat_crease_guard *guard);

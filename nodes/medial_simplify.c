@@ -130,7 +130,7 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
 }
 
 static int report_features(const qmat_simplification *run, json_t *root) {
-  const size_t left = qmat_crease_guard_left(&run->creases);
+  const size_t left = run->creases.left;
   if (left == 0) return 0;
   int bad = json_object_set_new(root, "features", json_integer((json_int_t)left));
   bad |= json_object_set_new(root, "crease_error", json_real(qmat_crease_guard_error(&run->creases)));

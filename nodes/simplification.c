@@ -247,7 +247,7 @@ static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
 
 /* A guarded medial mesh's Euler characteristic may be off by one for every so many spheres: tears and voids of the
  * dense initial one come in pairs, which could never close one by one, and the fewer spheres are left the less is
- * forgiven. */
+ * forgiven. Sharp features are left however few the others are. */
 enum { SPHERES_PER_FAULT = 128 };
 
 static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
@@ -257,7 +257,7 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
   if (s->rules.topology == QMAT_TOPOLOGY_FREE || !s->rules.has_target) return true;
   const int64_t before = llabs(s->euler - s->rules.target_euler);
   const int64_t after = llabs(s->euler + *change - s->rules.target_euler);
-  return after <= before || after <= (int64_t)s->complex.live_vertices / SPHERES_PER_FAULT;
+  return after <= before || after <= (int64_t)(s->complex.live_vertices - s->creases.left) / SPHERES_PER_FAULT;
 }
 
 typedef enum { DONE, REFUSED, EXCEEDED } outcome;

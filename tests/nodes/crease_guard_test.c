@@ -89,7 +89,7 @@ static void test_a_crease_keeps_its_corners_and_bumps(void **state) {
   (void)state;
   guarded g;
   guarded_init(&g, crease_spheres, 7, crease_edges, COUNT(crease_edges) / 2);
-  assert_int_equal(qmat_crease_guard_left(&g.guard), 4);
+  assert_int_equal(g.guard.left, 4);
   assert_near(qmat_crease_guard_error(&g.guard), 0, 0);
   bool bound;
   double asked;
@@ -114,11 +114,11 @@ static void test_points_that_are_gone_still_count(void **state) {
   collapse_to(&g, 1, 4, 1); /* the inner sphere's number may stay; the feature is the same */
   collapse_to(&g, 1, 2, 1);
   const uint32_t left = g.complex.vertex_alive[1] ? 1 : 2;
-  assert_int_equal(qmat_crease_guard_left(&g.guard), 3);
+  assert_int_equal(g.guard.left, 3);
   assert_near(qmat_crease_guard_error(&g.guard), 0.05 / sqrt(1.0025), ROUNDING);
   check_edge(&g, 0, left, 0.09, false, false, 0.1);
   collapse_to(&g, 0, left, 0);
-  assert_int_equal(qmat_crease_guard_left(&g.guard), 2);
+  assert_int_equal(g.guard.left, 2);
   assert_near(qmat_crease_guard_error(&g.guard), 0.1, ROUNDING);
   const uint32_t first = g.complex.vertex_alive[0] ? 0 : left;
   check_edge(&g, first, 3, INFINITY, false, false, INFINITY); /* two corners */
@@ -169,7 +169,7 @@ static void test_a_loop_keeps_three_points(void **state) {
       any = true;
     }
   }
-  assert_int_equal(qmat_crease_guard_left(&g.guard), 3);
+  assert_int_equal(g.guard.left, 3);
   assert_int_equal(g.complex.live_vertices, 3);
   assert_in_range((int)(1e6 * qmat_crease_guard_error(&g.guard)), 500000, 1900000);
   guarded_uninit(&g);
@@ -184,7 +184,7 @@ static void test_new_numbers_keep_the_features(void **state) {
   for (uint32_t v = 0; v < 7; v++) ids[v] = g.complex.vertex_alive[v] ? next++ : QMAT_NONE;
   qmat_crease_guard other;
   assert_int_equal(qmat_crease_guard_renumber(&g.context, &g.guard, ids, next + 2, &other), QMAT_OK);
-  assert_int_equal(qmat_crease_guard_left(&other), 3);
+  assert_int_equal(other.left, 3);
   for (uint32_t v = 0; v < 7; v++)
     if (ids[v] != QMAT_NONE)
       assert_int_equal(qmat_crease_guard_is_feature(&other, ids[v]), qmat_crease_guard_is_feature(&g.guard, v));
@@ -203,7 +203,7 @@ static void test_without_spheres_of_radius_zero_nothing_is_guarded(void **state)
   double asked;
   restrict_edge(&g, 0, 1, 1, &bound, &asked);
   assert_false(bound);
-  assert_int_equal(qmat_crease_guard_left(&g.guard), 0);
+  assert_int_equal(g.guard.left, 0);
   guarded_uninit(&g);
 }
 
