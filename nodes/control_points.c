@@ -163,8 +163,8 @@ static void take_star(const qmat_complex *complex, const double *point, uint32_t
  * and when those are farther than the second part it asks the whole medial mesh. */
 static const double content_with_sphere = 0.5, content_with_star = 0.9;
 
-/* About a second of looks at single spheres: more far points than that are worth a search structure. */
-static const size_t most_sphere_looks = 1000000000;
+/* About a tenth of a second of looks at single spheres: more far points than that are worth a search structure. */
+static const size_t most_sphere_looks = 100000000;
 
 static void store(qmat_control_points *control, size_t i, const witness *w) {
   memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
@@ -193,30 +193,42 @@ static size_t count_far(const qmat_control_points *control, double epsilon) {
   return far;
 }
 
-/* For the points that the regions leave far from their spheres: the primitives at the spheres that are nearest of all,
- * within epsilon. Cheaper than a search structure over a dense medial mesh while the points are few. */
-static void ask_all_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
-                            qmat_control_points *control) {
+/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it. */
+static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
+  double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
+  for (size_t e = 0; e < complex->edge_count && reaches; e++) {
+    const uint32_t *ends = &complex->edges[2 * e];
+    const double *a = &complex->spheres[4 * (size_t)ends[0]], *b = &complex->spheres[4 * (size_t)ends[1]];
+    const double reach = qmat_point_distance(a, b) + fabs(a[3] - b[3]);
+    for (int k = 0; k < 2; k++) reaches[ends[k]] = qmat_larger(reaches[ends[k]], reach);
+  }
+  return reaches;
+}
+
+/* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
+ * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
+static qmat_status ask_all_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
+                                   qmat_control_points *control) {
   const int threads = qmat_threads(context);
-  const double reach = epsilon < INFINITY ? epsilon : 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1024)
+  const double *reaches = find_reaches(context, complex);
+  if (!reaches) return qmat_fail_memory(context, "control points");
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
   for (size_t i = 0; i < control->count; i++) {
     if (!is_far(control, i, epsilon)) continue;
     const double *p = &control->points[3 * i];
     witness best = {.distance = control->distances[i]};
     memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
     memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
-    double least = INFINITY;
-    for (size_t v = 0; v < complex->vertex_count; v++)
-      least = fmin(least, qmat_sphere_distance(&complex->spheres[4 * v], p));
     for (size_t v = 0; v < complex->vertex_count; v++) {
       const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
-      if (!(f <= least + reach)) continue;
       if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-      take_star(complex, p, (uint32_t)v, &best);
     }
+    for (size_t v = 0; v < complex->vertex_count; v++)
+      if (qmat_sphere_distance(&complex->spheres[4 * v], p) - reaches[v] < best.distance)
+        take_star(complex, p, (uint32_t)v, &best);
     store(control, i, &best);
   }
+  return QMAT_OK;
 }
 
 static witness nearest_primitive(const qmat_envelope *envelope, const qmat_complex *complex, const double *p) {
@@ -422,8 +434,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   const size_t far = count_far(control, epsilon);
   if (far == 0) return QMAT_OK;
   if (far * complex->vertex_count > most_sphere_looks) return ask_envelope(context, complex, epsilon, control);
-  ask_all_spheres(context, complex, epsilon, control);
-  return QMAT_OK;
+  return ask_all_spheres(context, complex, epsilon, control);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,

@@ -302,6 +302,7 @@ holds "what is broken is set aside" test $? -eq 0
 used_bytes() {
   find "$XDG_CACHE_HOME/qmat/ac" "$XDG_CACHE_HOME/qmat/cas" -type f -exec cat {} + | wc -c
 }
+"$qmat" run "$graph" --set model=torus.off --set samples.spacing=2% -o torus.glb >out.txt 2>err.txt
 limit=$(($(used_bytes) / 2))
 "$qmat" cache gc --cache-size $limit >out.txt 2>err.txt
 used=$(used_bytes)

@@ -683,8 +683,8 @@ static void test_bounds_are_towards_the_surface_that_the_mesh_stands_for(void **
 static void test_collapses_leave_the_deviation_of_epsilon(void **state) {
   (void)state;
   pipeline plain = {0}, deviating = {0};
-  pipeline_make(&plain, box_with_deviation(0), "spacing=8% n_f=0", "");
-  pipeline_make(&deviating, box_with_deviation(0.0078125), "spacing=8% n_f=0", "");
+  pipeline_make(&plain, box_with_deviation(0), "spacing=20% n_f=0", "");
+  pipeline_make(&deviating, box_with_deviation(0.0078125), "spacing=20% n_f=0", "");
   static const char *const rules[] = {"skip", "raise"};
   const qmat_value *in_plain[] = {&plain.mesh->base, &plain.thickness->base, &plain.samples->base, &plain.medial->base};
   const qmat_value *in_deviating[] = {&deviating.mesh->base, &deviating.thickness->base, &deviating.samples->base,
@@ -692,9 +692,9 @@ static void test_collapses_leave_the_deviation_of_epsilon(void **state) {
   qmat_value *made[2], *expected[2];
   for (int i = 0; i < 2; i++) {
     char params[64];
-    snprintf(params, sizeof params, "on_exceed=%s epsilon=0.0234375", rules[i]);
+    snprintf(params, sizeof params, "on_exceed=%s finest=0.01 epsilon=0.0234375", rules[i]);
     pipeline_must_run(0, "medial.simplify", params, in_plain, expected);
-    snprintf(params, sizeof params, "on_exceed=%s epsilon=0.03125", rules[i]);
+    snprintf(params, sizeof params, "on_exceed=%s finest=0.01 epsilon=0.03125", rules[i]);
     pipeline_must_run(0, "medial.simplify", params, in_deviating, made);
     assert_memory_equal(&made[0]->digest, &expected[0]->digest, sizeof(qmat_digest));
     const qmat_report *with = (const qmat_report *)made[1], *without = (const qmat_report *)expected[1];
@@ -704,7 +704,7 @@ static void test_collapses_leave_the_deviation_of_epsilon(void **state) {
       assert_near(pipeline_number(with, errors[k]), pipeline_number(without, errors[k]) + 0.0078125, 1e-15);
     if (i == 1) { /* the same out of a chain */
       qmat_value *chain[2], *level[2];
-      pipeline_must_run(0, "medial.chain", "on_exceed=raise", in_deviating, chain);
+      pipeline_must_run(0, "medial.chain", "on_exceed=raise finest=0.01", in_deviating, chain);
       pipeline_must_run(0, "medial.lod", "epsilon=0.03125", (const qmat_value *[]){chain[0]}, level);
       assert_memory_equal(&level[0]->digest, &made[0]->digest, sizeof(qmat_digest));
       for (int k = 0; k < 2; k++) qmat_value_release(chain[k]), qmat_value_release(level[k]);
