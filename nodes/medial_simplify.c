@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/medial_build.h"
 #include "core/node.h"
 #include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
@@ -72,6 +71,8 @@ static qmat_status fill_hollows(const simplifier *s, const qmat_medial_errors *f
     *filled += added;
     left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
+    left->hollows = NULL; /* those of `found` stay its own */
+    left->hollow_count = 0;
     status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
   return status;
@@ -145,38 +146,41 @@ static int report_errors(json_t *root, double epsilon, double deviation, const q
   return bad;
 }
 
+static int set_count(json_t *root, const char *key, size_t count) {
+  return json_object_set_new(root, key, json_integer((json_int_t)count));
+}
+
+/* What is reported of any run, and of what it has left. */
+static int report_run(json_t *root, const qmat_simplification *run, size_t initial_spheres, const qmat_medial *unit) {
+  int bad = set_count(root, "initial_spheres", initial_spheres);
+  bad |= set_count(root, "spheres", unit->sphere_count);
+  bad |= set_count(root, "edges", unit->edge_count);
+  bad |= set_count(root, "triangles", unit->triangle_count);
+  bad |= set_count(root, "collapses", run->collapses);
+  bad |= set_count(root, "control_points", run->control->count);
+  bad |= set_count(root, "refused_by_surface", run->refused_by_surface);
+  bad |= set_count(root, "refused_by_coverage", run->refused_by_coverage);
+  bad |= set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
+  bad |= set_count(root, "refused_by_protection", run->refused_by_protection);
+  bad |= set_count(root, "refused_by_topology", run->refused_by_topology);
+  bad |= report_features(run, root);
+  bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
+  if (run->rules.has_target)
+    bad |=
+        json_object_set_new(root, "euler_characteristic_of_solid", json_integer((json_int_t)run->rules.target_euler));
+  return bad;
+}
+
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
                                int rounds, size_t filled, qmat_report *report) {
   const qmat_simplification *run = &s->rounds[s->newest];
-  const struct {
-    const char *name;
-    size_t value;
-  } counts[] = {
-      {"initial_spheres", s->dense.complex.vertex_count},
-      {"spheres", unit->sphere_count},
-      {"edges", unit->edge_count},
-      {"triangles", unit->triangle_count},
-      {"rounds", (size_t)rounds},
-      {"filled", filled},
-      {"collapses", run->collapses},
-      {"moves", run->moves},
-      {"control_points", s->round_controls[s->newest].count},
-      {"refused_by_surface", run->refused_by_surface},
-      {"refused_by_coverage", run->refused_by_coverage},
-      {"refused_by_protrusion", run->refused_by_protrusion},
-      {"refused_by_protection", run->refused_by_protection},
-      {"refused_by_topology", run->refused_by_topology},
-      {"surface_questions", s->dense.protrusion.lattice.questions},
-  };
-  int bad = 0;
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value));
-  bad |= report_features(run, report->root);
-  bad |= json_object_set_new(report->root, "euler_characteristic", json_integer((json_int_t)run->euler));
-  if (run->rules.has_target)
-    bad |= json_object_set_new(report->root, "euler_characteristic_of_solid",
-                               json_integer((json_int_t)run->rules.target_euler));
-  bad |= report_errors(report->root, s->epsilon, s->deviation, errors);
+  json_t *root = report->root;
+  int bad = report_run(root, run, s->dense.complex.vertex_count, unit);
+  bad |= set_count(root, "rounds", (size_t)rounds);
+  bad |= set_count(root, "filled", filled);
+  bad |= set_count(root, "moves", run->moves);
+  bad |= set_count(root, "surface_questions", s->dense.protrusion.lattice.questions);
+  bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
@@ -254,7 +258,7 @@ static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, 
   if (status == QMAT_OK) status = make_report(s, a->medial, &after, round, a->filled, a->report);
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
-  a->holds = a->fault == epsilon;
+  a->holds = status == QMAT_OK && a->fault == epsilon;
   if (a->filled > 0) qmat_medial_errors_uninit(&after);
   if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
   return status;
@@ -266,12 +270,10 @@ static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *sta
                                    const qmat_medial_errors *found, attempt *best) {
   qmat_extra_points hollows = {.held_depth = held_depth_share * s->params->epsilon};
   qmat_status status = append(s, &hollows.inner, &hollows.inner_count, found->hollows, found->hollow_count);
-  attempt a = {.fault = INFINITY};
+  if (status != QMAT_OK) return status;
+  attempt a;
   qmat_medial_errors errors;
-  if (status == QMAT_OK)
-    status = run_attempt(s, state, &s->rounds[s->newest], best->medial, &hollows, round, &a, &errors);
-  else
-    return status;
+  status = run_attempt(s, state, &s->rounds[s->newest], best->medial, &hollows, round, &a, &errors);
   qmat_medial_errors_uninit(&errors);
   if (status == QMAT_OK && is_better(&a, best)) {
     release(best);
@@ -282,36 +284,24 @@ static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *sta
   return status;
 }
 
-static int set_count(json_t *root, const char *key, size_t count) {
-  return json_object_set_new(root, key, json_integer((json_int_t)count));
+/* Takes a triangle away, not its edges; the order of the others stays. */
+static void remove_triangle(qmat_medial *medial, size_t triangle) {
+  uint32_t *row = &medial->triangles[3 * triangle];
+  memmove(row, row + 3, 3 * (--medial->triangle_count - triangle) * sizeof *row);
 }
 
-/* Takes a triangle away, not its edges. */
-static qmat_status remove_triangle(qmat_context *context, qmat_medial *medial, size_t triangle) {
-  uint32_t *rest = qmat_arena_alloc(&context->arena, medial->triangle_count, 3 * sizeof *rest);
-  if (!rest) return qmat_fail_memory(context, "the medial mesh");
-  memcpy(rest, medial->triangles, 3 * triangle * sizeof *rest);
-  memcpy(rest + 3 * triangle, medial->triangles + 3 * (triangle + 1),
-         3 * (medial->triangle_count - triangle - 1) * sizeof *rest);
-  return qmat_medial_set_simplices(context, medial, medial->edges, medial->edge_count, rest,
-                                   medial->triangle_count - 1);
-}
-
-static qmat_status restore_triangle(qmat_context *context, qmat_medial *medial, const uint32_t corners[3]) {
-  uint32_t *all = qmat_arena_alloc(&context->arena, medial->triangle_count + 1, 3 * sizeof *all);
-  if (!all) return qmat_fail_memory(context, "the medial mesh");
-  memcpy(all, medial->triangles, 3 * medial->triangle_count * sizeof *all);
-  memcpy(all + 3 * medial->triangle_count, corners, 3 * sizeof *all);
-  return qmat_medial_set_simplices(context, medial, medial->edges, medial->edge_count, all,
-                                   medial->triangle_count + 1);
+static void restore_triangle(qmat_medial *medial, size_t triangle, const uint32_t corners[3]) {
+  uint32_t *row = &medial->triangles[3 * triangle];
+  memmove(row + 3, row, 3 * (medial->triangle_count++ - triangle) * sizeof *row);
+  memcpy(row, corners, 3 * sizeof *row);
 }
 
 /* At most so many walls of a void are tried. */
 enum { MOST_WALLS = 12 };
 
 /* Opens a void of the medial mesh that the solid has not: takes the first wall away without which the errors still
- * keep within epsilon. `*opened`: whether there was one. */
-static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened) {
+ * keep within epsilon. `*opened`: whether there was one; `*errors` are then those without it. */
+static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon;
   uint32_t *walls;
   size_t count;
@@ -320,32 +310,35 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened) {
   for (size_t i = 0; i < count && i < MOST_WALLS && status == QMAT_OK && !*opened; i++) {
     uint32_t corners[3];
     memcpy(corners, &unit->triangles[3 * (size_t)walls[i]], sizeof corners);
-    qmat_medial_errors errors = {.surface_to_envelope = 0};
-    status = remove_triangle(s->context, unit, walls[i]);
-    if (status == QMAT_OK) status = measure(s, unit, &errors);
-    *opened = errors.surface_to_envelope <= epsilon && errors.boundary_to_surface <= epsilon;
-    qmat_medial_errors_uninit(&errors);
-    if (status == QMAT_OK && !*opened) status = restore_triangle(s->context, unit, corners);
+    *errors = (qmat_medial_errors){.surface_to_envelope = 0};
+    remove_triangle(unit, walls[i]);
+    status = measure(s, unit, errors);
+    *opened = status == QMAT_OK && errors->surface_to_envelope <= epsilon && errors->boundary_to_surface <= epsilon;
+    qmat_medial_errors_uninit(errors);
+    if (!*opened) restore_triangle(unit, walls[i], corners);
   }
   return status;
 }
 
-/* Opens voids of a result that keeps within epsilon until there is none that the solid has not. */
+/* Opens voids of a result that keeps within epsilon until there is none that the solid has not. A slab less leaves the
+ * solid by no more, but the surface may be farther away. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
   const qmat_simplification_rules *rules = &s->dense.rules;
   if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
-  bool opened = true;
-  while (opened) {
+  json_t *root = a->report->root;
+  for (bool opened = true; opened;) {
     qmat_topology topology;
+    qmat_medial_errors errors;
     qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
     if (status != QMAT_OK || !topology.known || topology.voids == 0 || topology.euler <= rules->target_euler)
       return status;
-    status = open_void(s, a->medial, &opened);
+    status = open_void(s, a->medial, &opened, &errors);
     if (status != QMAT_OK) return status;
-    const size_t triangles = a->medial->triangle_count;
-    if (opened && (set_count(a->report->root, "triangles", triangles) ||
-                   json_object_set_new(a->report->root, "euler_characteristic", json_integer(topology.euler - 1))))
-      return qmat_fail_memory(s->context, "the report");
+    if (!opened) break;
+    int bad = set_count(root, "triangles", a->medial->triangle_count);
+    bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler - 1));
+    bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors.surface_to_envelope + s->deviation));
+    if (bad) return qmat_fail_memory(s->context, "the report");
   }
   return QMAT_OK;
 }
@@ -395,22 +388,7 @@ static qmat_status report_in_order(qmat_context *context, const qmat_ordered_col
                                    qmat_report *report) {
   const qmat_simplification *run = &o->simplification;
   json_t *root = report->root;
-  int bad = set_count(root, "initial_spheres", run->complex.vertex_count);
-  bad |= set_count(root, "spheres", unit->sphere_count);
-  bad |= set_count(root, "edges", unit->edge_count);
-  bad |= set_count(root, "triangles", unit->triangle_count);
-  bad |= set_count(root, "collapses", run->collapses);
-  bad |= set_count(root, "control_points", o->control.count);
-  bad |= set_count(root, "refused_by_surface", run->refused_by_surface);
-  bad |= set_count(root, "refused_by_coverage", run->refused_by_coverage);
-  bad |= set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
-  bad |= set_count(root, "refused_by_protection", run->refused_by_protection);
-  bad |= set_count(root, "refused_by_topology", run->refused_by_topology);
-  bad |= report_features(run, root);
-  bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
-  if (run->rules.has_target)
-    bad |=
-        json_object_set_new(root, "euler_characteristic_of_solid", json_integer((json_int_t)run->rules.target_euler));
+  int bad = report_run(root, run, run->complex.vertex_count, unit);
   bad |= json_object_set_new(root, "held", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
   bad |= report_errors(root, epsilon, deviation, errors);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
