@@ -137,6 +137,25 @@ static inline qmat_mesh *shape_l(void) {
   return mesh;
 }
 
+/* A prism of a regular polygon in the unit circle, from z = 0 up. */
+static inline qmat_mesh *shape_prism(uint32_t sides, double height) {
+  qmat_mesh *mesh = shape_new();
+  for (int level = 0; level < 2; level++)
+    for (uint32_t i = 0; i < sides; i++) {
+      const double a = 2 * 3.14159265358979323846 * i / sides;
+      shape_vertex(mesh, cos(a), sin(a), level * height);
+    }
+  for (uint32_t i = 0; i < sides; i++) {
+    const uint32_t k = (i + 1) % sides;
+    shape_quad(mesh, i, k, k + sides, i + sides);
+  }
+  for (uint32_t i = 1; i + 1 < sides; i++) {
+    shape_triangle(mesh, 0, i + 1, i);
+    shape_triangle(mesh, sides, sides + i, sides + i + 1);
+  }
+  return mesh;
+}
+
 /* p -> scale * p + shift, in place. */
 static inline void shape_map(qmat_mesh *mesh, double scale, double x, double y, double z) {
   for (size_t i = 0; i < mesh->vertex_count; i++) {

@@ -239,12 +239,6 @@ static void release(sharp *s) {
   pipeline_free(&s->p);
 }
 
-static size_t count_features(const qmat_medial *medial) {
-  size_t count = 0;
-  for (size_t i = 0; i < medial->sphere_count; i++) count += medial->spheres[4 * i + 3] == 0;
-  return count;
-}
-
 static double to_segment(const double *p, const double *a, const double *b) {
   double along = 0, square = 0, rest = 0;
   for (int k = 0; k < 3; k++) along += (p[k] - a[k]) * (b[k] - a[k]), square += (b[k] - a[k]) * (b[k] - a[k]);
@@ -295,7 +289,7 @@ static void check_exact(const sharp *s) {
 static void test_a_box_becomes_its_corners_and_its_middle_exactly(void **state) {
   (void)state;
   sharp s = make_sharp(shape_box(3, 2, 1), "spacing=5%", "epsilon=4%", 0);
-  assert_int_equal(count_features(s.simple), 8);
+  assert_int_equal(pipeline_features(s.simple), 8);
   for (size_t i = 0; i < s.simple->sphere_count; i++) {
     const double *c = &s.simple->spheres[4 * i];
     if (c[3] > 0) continue;
@@ -316,28 +310,9 @@ static void test_a_turned_bracket_keeps_its_convex_edges_alone(void **state) {
   pipeline_shuffle(mesh);
   sharp s = make_sharp(mesh, "spacing=5%", "epsilon=4%", 0);
   check_exact(&s);
-  assert_int_equal(count_features(s.simple), 12);
+  assert_int_equal(pipeline_features(s.simple), 12);
   assert_int_equal(pipeline_euler(s.simple), 1);
   release(&s);
-}
-
-/* A short cylinder of many sides. */
-static qmat_mesh *disc(uint32_t sides) {
-  qmat_mesh *mesh = shape_new();
-  for (int level = 0; level < 2; level++)
-    for (uint32_t i = 0; i < sides; i++) {
-      const double a = 2 * 3.14159265358979323846 * i / sides;
-      shape_vertex(mesh, cos(a), sin(a), 0.5 * level);
-    }
-  for (uint32_t i = 0; i < sides; i++) {
-    const uint32_t k = (i + 1) % sides;
-    shape_quad(mesh, i, k, k + sides, i + sides);
-  }
-  for (uint32_t i = 1; i + 1 < sides; i++) {
-    shape_triangle(mesh, 0, i + 1, i);
-    shape_triangle(mesh, sides, sides + i, sides + i + 1);
-  }
-  return mesh;
 }
 
 static void test_round_creases_are_thinned_to_what_is_asked(void **state) {
@@ -347,13 +322,13 @@ static void test_round_creases_are_thinned_to_what_is_asked(void **state) {
   for (size_t i = 0; i < COUNT(shares); i++) {
     char params[64];
     snprintf(params, sizeof params, "epsilon=4%% crease=%g", shares[i]);
-    sharp s = make_sharp(disc(12), "", params, 0);
+    sharp s = make_sharp(shape_prism(12, 0.5), "", params, 0);
     const double to_cones = measure(&s, s.initial).to_cones;
     assert_true(to_cones <= shares[i] * 0.04);
     assert_near(pipeline_number(s.report, "crease_error"), to_cones, ROUNDING);
-    const size_t left = count_features(s.simple);
+    const size_t left = pipeline_features(s.simple);
     assert_int_equal(pipeline_count(s.report, "features"), left);
-    assert_true(left >= 6 && left > before && left < count_features(s.initial));
+    assert_true(left >= 6 && left > before && left < pipeline_features(s.initial));
     before = left;
     release(&s);
   }
@@ -361,12 +336,12 @@ static void test_round_creases_are_thinned_to_what_is_asked(void **state) {
 
 static void test_edges_are_rounded_off_without_features(void **state) {
   (void)state;
-  sharp with = make_sharp(disc(12), "", "epsilon=4%", 0);
-  sharp without = make_sharp(disc(12), "features=none", "epsilon=4%", 0);
+  sharp with = make_sharp(shape_prism(12, 0.5), "", "epsilon=4%", 0);
+  sharp without = make_sharp(shape_prism(12, 0.5), "features=none", "epsilon=4%", 0);
   const double kept = measure(&with, with.initial).outside, lost = measure(&without, with.initial).outside;
   assert_true(kept <= 0.25 * 0.04 + ROUNDING);
   assert_true(lost > 2 * kept);
-  assert_int_equal(count_features(without.simple), 0);
+  assert_int_equal(pipeline_features(without.simple), 0);
   release(&with);
   release(&without);
 }
@@ -378,7 +353,7 @@ static void test_features_stay_at_any_level_and_number(void **state) {
                                        "epsilon=4% error=one_sided"};
   for (size_t i = 0; i < COUNT(params); i++) {
     sharp s = make_sharp(shape_box(3, 2, 1), "spacing=10%", params[i], 0);
-    assert_true(count_features(s.simple) >= 8);
+    assert_true(pipeline_features(s.simple) >= 8);
     assert_near(measure(&s, s.initial).to_cones, 0, ROUNDING);
     release(&s);
   }
@@ -387,9 +362,9 @@ static void test_features_stay_at_any_level_and_number(void **state) {
 static void test_the_number_of_threads_does_not_matter(void **state) {
   (void)state;
   static const int threads[] = {2, 8};
-  sharp s = make_sharp(disc(12), "", "epsilon=4%", 1);
+  sharp s = make_sharp(shape_prism(12, 0.5), "", "epsilon=4%", 1);
   for (size_t i = 0; i < COUNT(threads); i++) {
-    sharp other = make_sharp(disc(12), "", "epsilon=4%", threads[i]);
+    sharp other = make_sharp(shape_prism(12, 0.5), "", "epsilon=4%", threads[i]);
     assert_memory_equal(&other.simple->base.digest, &s.simple->base.digest, sizeof s.simple->base.digest);
     assert_memory_equal(&other.report->base.digest, &s.report->base.digest, sizeof s.report->base.digest);
     release(&other);

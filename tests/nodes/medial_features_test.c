@@ -76,25 +76,6 @@ static void check_mesh(qmat_mesh *mesh, const char *text, size_t creases, size_t
   pipeline_free(&p);
 }
 
-/* A prism of a regular polygon. */
-static qmat_mesh *prism(uint32_t sides, double height) {
-  qmat_mesh *mesh = shape_new();
-  for (int level = 0; level < 2; level++)
-    for (uint32_t i = 0; i < sides; i++) {
-      const double a = 2 * 3.14159265358979323846 * i / sides;
-      shape_vertex(mesh, cos(a), sin(a), level * height);
-    }
-  for (uint32_t i = 0; i < sides; i++) {
-    const uint32_t k = (i + 1) % sides;
-    shape_quad(mesh, i, k, k + sides, i + sides);
-  }
-  for (uint32_t i = 1; i + 1 < sides; i++) {
-    shape_triangle(mesh, 0, i + 1, i);
-    shape_triangle(mesh, sides, sides + i, sides + i + 1);
-  }
-  return mesh;
-}
-
 /* A square frame: a ring with creases on the outside, and at the rims of the hole. */
 static qmat_mesh *frame(void) {
   qmat_mesh *mesh = shape_new();
@@ -154,10 +135,11 @@ static void test_a_cavity_has_no_crease(void **state) {
 
 static void test_rims_of_a_hole_and_of_a_prism_of_many_sides_are_loops(void **state) {
   (void)state;
-  check_mesh(prism(12, 2), no_division, 2, 0, 24, 24);  /* sides at 30 degrees, rims that bend by 30 */
-  check_mesh(prism(5, 2), no_division, 15, 10, 10, 15); /* by 72 */
-  check_mesh(prism(12, 2), "angle=25 spacing=100%", 36, 24, 24, 36); /* where rims and sides meet there are corners */
-  check_mesh(frame(), no_division, 20, 16, 16, 20);     /* four of the hole's edges are concave */
+  check_mesh(shape_prism(12, 2), no_division, 2, 0, 24, 24);  /* sides at 30 degrees, rims that bend by 30 */
+  check_mesh(shape_prism(5, 2), no_division, 15, 10, 10, 15); /* by 72 */
+  check_mesh(shape_prism(12, 2), "angle=25 spacing=100%", 36, 24, 24,
+             36);                                   /* where rims and sides meet there are corners */
+  check_mesh(frame(), no_division, 20, 16, 16, 20); /* four of the hole's edges are concave */
 }
 
 static void test_creases_do_not_join_parts(void **state) {
@@ -220,7 +202,7 @@ static void test_neither_turns_nor_the_order_of_vertices_matter(void **state) {
   mesh = shape_l();
   pipeline_shuffle(mesh);
   check_mesh(mesh, no_division, 17, 12, 12, 17);
-  mesh = prism(12, 2);
+  mesh = shape_prism(12, 2);
   shape_rotate(mesh);
   pipeline_shuffle(mesh);
   check_mesh(mesh, no_division, 2, 0, 24, 24);

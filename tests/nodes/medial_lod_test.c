@@ -145,22 +145,36 @@ typedef struct setting {
   const char *model;
   int resolution;
   const char *chain, *simplify; /* the same run, for both nodes */
+  bool sharp;                   /* with medial.features */
 } setting;
 
 static const setting settings[] = {
-    {"octopus", 6, "finest=3%", "finest=3% on_exceed=raise"},
-    {"torus", 6, "finest=3% topology=free", "finest=3% on_exceed=raise topology=free"},
-    {"capsule", 8, "finest=3% on_exceed=stop", "finest=3% on_exceed=stop"},
+    {"octopus", 6, "finest=3%", "finest=3% on_exceed=raise", false},
+    {"torus", 6, "finest=3% topology=free", "finest=3% on_exceed=raise topology=free", false},
+    {"capsule", 8, "finest=3% on_exceed=stop", "finest=3% on_exceed=stop", false},
     {"octopus", 6, "finest=3% error=one_sided on_exceed=stop protect=late",
-     "finest=3% error=one_sided on_exceed=stop protect=late"},
-    {"torus", 6, "finest=3% error=one_sided", "finest=3% error=one_sided on_exceed=raise"},
-    {"capsule", 8, "finest=3% cost=hausdorff", "finest=3% cost=hausdorff on_exceed=raise"},
-    {"octopus", 6, "finest=3% cost=pmat on_exceed=stop", "finest=3% cost=pmat on_exceed=stop"},
-    {"torus", 6, "finest=3% compat=qmat", "finest=3% compat=qmat"},
+     "finest=3% error=one_sided on_exceed=stop protect=late", false},
+    {"torus", 6, "finest=3% error=one_sided", "finest=3% error=one_sided on_exceed=raise", false},
+    {"capsule", 8, "finest=3% cost=hausdorff", "finest=3% cost=hausdorff on_exceed=raise", false},
+    {"torus", 6, "finest=3% cost=pmat on_exceed=stop", "finest=3% cost=pmat on_exceed=stop", false},
+    {"torus", 6, "finest=3% compat=qmat", "finest=3% compat=qmat", false},
+    {"box", 4, "finest=3%", "finest=3% on_exceed=raise", true},
+    {"l-bracket", 4, "finest=3% crease=1 on_exceed=stop", "finest=3% crease=1 on_exceed=stop", true},
 };
 
 static const char *const bounds[] = {"epsilon=0 vertices=1",  "epsilon=0 vertices=60",  "epsilon=2% vertices=0",
                                      "epsilon=3% vertices=0", "epsilon=7% vertices=40", "epsilon=100% vertices=0"};
+
+/* The medial mesh with features in place of the initial one. */
+static void add_features(pipeline *p) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "medial.features", "features=sharp", (const qmat_value *[]){&p->mesh->base, &p->medial->base},
+                    outputs);
+  qmat_value_release(&p->medial->base);
+  p->medial = (qmat_medial *)outputs[0];
+  assert_true(pipeline_count((const qmat_report *)outputs[1], "spheres") > 0);
+  qmat_value_release(outputs[1]);
+}
 
 static void test_every_level_is_what_a_run_of_its_own_makes(void **state) {
   (void)state;
@@ -169,6 +183,7 @@ static void test_every_level_is_what_a_run_of_its_own_makes(void **state) {
     const setting *s = &settings[i];
     pipeline p = {0};
     pipeline_make(&p, pipeline_model(s->model, s->resolution), "spacing=8% n_f=0", "");
+    if (s->sharp) add_features(&p);
     const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base, &p.medial->base};
     qmat_value *outputs[PIPELINE_MOST_PORTS], *direct[PIPELINE_MOST_PORTS];
     pipeline_must_run(0, "medial.chain", s->chain, inputs, outputs);
@@ -185,6 +200,7 @@ static void test_every_level_is_what_a_run_of_its_own_makes(void **state) {
       if (memcmp(&m->base.digest, &direct[0]->digest, sizeof m->base.digest) != 0)
         fail_msg("%s %s: %zu spheres of the chain, %zu of the run", s->model, params, m->sphere_count,
                  ((const qmat_medial *)direct[0])->sphere_count);
+      assert_true((pipeline_features(m) > 0) == s->sharp);
       levels += m->sphere_count != before;
       before = m->sphere_count;
       qmat_value_release(&m->base);

@@ -145,6 +145,13 @@ static inline void pipeline_free(pipeline *p) {
   *p = (pipeline){NULL, NULL, NULL, NULL, NULL};
 }
 
+/* The spheres of radius zero. */
+static inline size_t pipeline_features(const qmat_medial *medial) {
+  size_t count = 0;
+  for (size_t i = 0; i < medial->sphere_count; i++) count += medial->spheres[4 * i + 3] == 0;
+  return count;
+}
+
 /* The diagonal of the mesh's bounding box. */
 static inline double pipeline_diagonal(const qmat_mesh *mesh) {
   qmat_context context = {0};
