@@ -22,7 +22,8 @@ given_models() {
     esac
     "$build/qmat_models" "$stand_in" -o "$work/$stand_in.off"
     echo "$work/$stand_in.off"
-  done | uniq
+  done >"$work/given"
+  awk '!seen[$0]++' "$work/given"
 }
 
 # number KEY FILE: the last number of that name in a JSON file.

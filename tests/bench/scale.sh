@@ -5,9 +5,6 @@
 #   scale.sh [MODEL...]      the first model is also divided into a million triangles; default: a generated octopus
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
-top=$(cd "$(dirname "$0")/../.." && pwd)
-build=${QMAT_BUILD:-$top/build/release}
+. "$(dirname "$0")/functions.sh"
 cmake --build "$build" --target qmat qmat_scale >&2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
 "$build/qmat_scale" "$build/qmat" "$work" "$@"
