@@ -32,3 +32,7 @@ char *qmat_json_text(const json_t *json, size_t flags, size_t *size) {
   if (size != NULL) *size = text.size;
   return text.bytes;
 }
+
+int qmat_json_set_count(json_t *object, const char *key, size_t count) {
+  return json_object_set_new(object, key, json_integer((json_int_t)count));
+}

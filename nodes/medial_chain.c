@@ -2,6 +2,7 @@
 /* medial.chain: every collapse of one run, for medial meshes of any number of spheres or any error. */
 #include <string.h>
 
+#include "core/json_text.h"
 #include "nodes/collapse_chain.h"
 #include "nodes/libraries.h"
 #include "nodes/simplifier.h"
@@ -39,10 +40,6 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   return qmat_value_seal(context, &chain->base);
 }
 
-static int set_count(json_t *root, const char *key, size_t count) {
-  return json_object_set_new(root, key, json_integer((json_int_t)count));
-}
-
 /* How many spheres are left at a few errors. */
 static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, qmat_report *report) {
   static const struct {
@@ -53,10 +50,11 @@ static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, q
                 {"spheres_at_1%", 0.01},
                 {"spheres_at_2%", 0.02},
                 {"spheres_at_4%", 0.04}};
-  int bad = set_count(report->root, "initial_spheres", chain->sphere_count);
-  bad |= set_count(report->root, "collapses", chain->collapse_count);
+  int bad = qmat_json_set_count(report->root, "initial_spheres", chain->sphere_count);
+  bad |= qmat_json_set_count(report->root, "collapses", chain->collapse_count);
   for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)
-    bad |= set_count(report->root, levels[i].key, chain->sphere_count - qmat_chain_length(chain, 0, levels[i].epsilon));
+    bad |= qmat_json_set_count(report->root, levels[i].key,
+                               chain->sphere_count - qmat_chain_length(chain, 0, levels[i].epsilon));
   return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
 }
 
@@ -101,13 +99,7 @@ static const qmat_param params[] = {
     {0},
 };
 
-static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
-    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
-    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh"},
-    {0},
-};
+static const qmat_port inputs[] = {QMAT_SIMPLIFY_INPUTS, {0}};
 
 static const qmat_port outputs[] = {
     {.name = "chain", .type = QMAT_CHAIN, .doc = "The initial medial mesh and its collapses, for medial.lod"},

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/medial_distance.h"
 #include "core/node.h"
 #include "nodes/boundary_distance.h"
@@ -220,19 +221,15 @@ static qmat_status count_degenerate(evaluation *e) {
 
 /* ---- the report ---- */
 
-static int set_count(json_t *root, const char *key, int64_t count) {
-  return json_object_set_new(root, key, json_integer((json_int_t)count));
-}
-
 static int set_topology(json_t *root, const qmat_topology *t, bool partly, const char *const keys[4]) {
   int bad = 0;
   if (t->known || partly) {
-    bad |= set_count(root, keys[0], t->euler);
-    bad |= set_count(root, keys[1], (int64_t)t->components);
+    bad |= json_object_set_new(root, keys[0], json_integer((json_int_t)t->euler));
+    bad |= qmat_json_set_count(root, keys[1], t->components);
   }
   if (t->known) {
-    bad |= set_count(root, keys[2], (int64_t)t->loops);
-    bad |= set_count(root, keys[3], (int64_t)t->voids);
+    bad |= qmat_json_set_count(root, keys[2], t->loops);
+    bad |= qmat_json_set_count(root, keys[3], t->voids);
   }
   return bad;
 }
@@ -281,7 +278,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
     bad |= json_object_set_new(report->root, lengths[i].key, json_real(lengths[i].value));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= set_count(report->root, counts[i].key, (int64_t)counts[i].value);
+    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
   if (e->deviation > 0) bad |= json_object_set_new(report->root, "deviation", json_real(e->deviation));
   bad |= set_topology(report->root, &e->topology, true, of_medial);
   bad |= set_topology(report->root, &e->solid_topology, false, of_solid);

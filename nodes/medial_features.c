@@ -5,6 +5,7 @@
 
 #include "core/envelope.h"
 #include "core/frame.h"
+#include "core/json_text.h"
 #include "core/medial_build.h"
 #include "core/vector.h"
 #include "nodes/creases.h"
@@ -358,7 +359,7 @@ static qmat_status make_report(const feature_builder *b, qmat_report *report) {
   } counts[] = {{"creases", b->creases.count}, {"corners", corners}, {"spheres", b->feature_count}, {"gaps", b->gaps}};
   int bad = 0;
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= json_object_set_new(report->root, counts[i].name, json_integer((json_int_t)counts[i].value));
+    bad |= qmat_json_set_count(report->root, counts[i].name, counts[i].value);
   bad |= json_object_set_new(report->root, "longest_link", json_real(b->longest_link));
   return bad ? qmat_fail_memory(b->context, "the report") : qmat_value_seal(b->context, &report->base);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.lod: one level of detail of a chain of collapses. */
+#include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/collapse_chain.h"
 
@@ -20,7 +21,7 @@ static qmat_status fill_report(qmat_context *context, const medial_lod_params *p
   int bad = json_object_set_new(report->root, "epsilon", json_real(params->epsilon));
   bad |= json_object_set_new(report->root, "held", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= json_object_set_new(report->root, counts[i].key, json_integer((json_int_t)counts[i].count));
+    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].count);
   return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
@@ -42,18 +43,16 @@ static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_me
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
   const qmat_control_points *control = &s->round_controls[s->newest];
-  qmat_status status =
-      qmat_medial_cover_measure(s->context, s->surface, unit, control->points, control->surface_count, tolerance,
-                                least_reported * epsilon, epsilon - tolerance, errors);
+  qmat_status status = qmat_medial_cover_measure(s->context, s->surface, unit, control->points, control->surface_count,
+                                                 tolerance, least_reported * epsilon, epsilon - tolerance, errors);
   if (status != QMAT_OK) return status;
   const bool two_sided = s->params->epsilon > 0 && s->params->error == QMAT_ERROR_TWO_SIDED;
   const qmat_simplification *round = &s->rounds[s->newest];
   if (two_sided) errors->envelope_to_surface = qmat_protrusion_largest_bound(&round->protrusion, &round->complex);
   if (!two_sided || errors->envelope_to_surface > epsilon)
     status = qmat_medial_protrusion_measure(s->context, s->surface, unit, tolerance, least_reported * epsilon, errors);
-  return status == QMAT_OK && two_sided
-             ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
-             : status;
+  return status == QMAT_OK && two_sided ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
+                                        : status;
 }
 
 /* Fills notches and voids of the envelope; `left` gets what is still found afterwards, `filled` how many spheres that
@@ -133,7 +132,7 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
 static int report_features(const qmat_simplification *run, json_t *root) {
   const size_t left = run->creases.left;
   if (left == 0) return 0;
-  int bad = json_object_set_new(root, "features", json_integer((json_int_t)left));
+  int bad = qmat_json_set_count(root, "features", left);
   bad |= json_object_set_new(root, "crease_error", json_real(qmat_crease_guard_error(&run->creases)));
   return bad;
 }
@@ -146,23 +145,19 @@ static int report_errors(json_t *root, double epsilon, double deviation, const q
   return bad;
 }
 
-static int set_count(json_t *root, const char *key, size_t count) {
-  return json_object_set_new(root, key, json_integer((json_int_t)count));
-}
-
 /* What is reported of any run, and of what it has left. */
 static int report_run(json_t *root, const qmat_simplification *run, size_t initial_spheres, const qmat_medial *unit) {
-  int bad = set_count(root, "initial_spheres", initial_spheres);
-  bad |= set_count(root, "spheres", unit->sphere_count);
-  bad |= set_count(root, "edges", unit->edge_count);
-  bad |= set_count(root, "triangles", unit->triangle_count);
-  bad |= set_count(root, "collapses", run->collapses);
-  bad |= set_count(root, "control_points", run->control->count);
-  bad |= set_count(root, "refused_by_surface", run->refused_by_surface);
-  bad |= set_count(root, "refused_by_coverage", run->refused_by_coverage);
-  bad |= set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
-  bad |= set_count(root, "refused_by_protection", run->refused_by_protection);
-  bad |= set_count(root, "refused_by_topology", run->refused_by_topology);
+  int bad = qmat_json_set_count(root, "initial_spheres", initial_spheres);
+  bad |= qmat_json_set_count(root, "spheres", unit->sphere_count);
+  bad |= qmat_json_set_count(root, "edges", unit->edge_count);
+  bad |= qmat_json_set_count(root, "triangles", unit->triangle_count);
+  bad |= qmat_json_set_count(root, "collapses", run->collapses);
+  bad |= qmat_json_set_count(root, "control_points", run->control->count);
+  bad |= qmat_json_set_count(root, "refused_by_surface", run->refused_by_surface);
+  bad |= qmat_json_set_count(root, "refused_by_coverage", run->refused_by_coverage);
+  bad |= qmat_json_set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
+  bad |= qmat_json_set_count(root, "refused_by_protection", run->refused_by_protection);
+  bad |= qmat_json_set_count(root, "refused_by_topology", run->refused_by_topology);
   bad |= report_features(run, root);
   bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
   if (run->rules.has_target)
@@ -176,10 +171,10 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   const qmat_simplification *run = &s->rounds[s->newest];
   json_t *root = report->root;
   int bad = report_run(root, run, s->dense.complex.vertex_count, unit);
-  bad |= set_count(root, "rounds", (size_t)rounds);
-  bad |= set_count(root, "filled", filled);
-  bad |= set_count(root, "moves", run->moves);
-  bad |= set_count(root, "surface_questions", s->dense.protrusion.lattice.questions);
+  bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
+  bad |= qmat_json_set_count(root, "filled", filled);
+  bad |= qmat_json_set_count(root, "moves", run->moves);
+  bad |= qmat_json_set_count(root, "surface_questions", s->dense.protrusion.lattice.questions);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
@@ -335,7 +330,7 @@ static qmat_status open_voids(simplifier *s, attempt *a) {
     status = open_void(s, a->medial, &opened, &errors);
     if (status != QMAT_OK) return status;
     if (!opened) break;
-    int bad = set_count(root, "triangles", a->medial->triangle_count);
+    int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
     bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler - 1));
     bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors.surface_to_envelope + s->deviation));
     if (bad) return qmat_fail_memory(s->context, "the report");
@@ -357,8 +352,7 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
     status = run_attempt(s, state, &s->dense, NULL, &extra, round, &a, &errors);
     const bool is_good = a.holds && (double)a.filled <= most_filled * (double)a.medial->sphere_count;
-    const bool is_done =
-        is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    const bool is_done = is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
     if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
@@ -409,8 +403,8 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
     status = qmat_medial_cover_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
                                        error_tolerance * bound, least_reported * bound, INFINITY, &errors);
   if (status == QMAT_OK)
-    status = qmat_medial_protrusion_measure(context, o.surface, medial, error_tolerance * bound,
-                                            least_reported * bound, &errors);
+    status = qmat_medial_protrusion_measure(context, o.surface, medial, error_tolerance * bound, least_reported * bound,
+                                            &errors);
   if (status == QMAT_OK)
     status = report_in_order(context, &o, o.params.epsilon > 0 ? epsilon : 0, deviation, medial, &errors, report);
   if (status == QMAT_OK) {
@@ -504,13 +498,7 @@ static const qmat_param params[] = {
     {0},
 };
 
-static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
-    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
-    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh"},
-    {0},
-};
+static const qmat_port inputs[] = {QMAT_SIMPLIFY_INPUTS, {0}};
 
 static const qmat_port outputs[] = {
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The simplified medial mesh"},
@@ -538,7 +526,8 @@ const qmat_node qmat_node_medial_simplify = {
         "places between where the surface is too far from the envelope, and the collapses are repeated with these, and "
         "for "
         "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
-        "on. Of a mesh that only stands for a surface (mesh.subdivide), the deviation is taken from epsilon and added to "
+        "on. Of a mesh that only stands for a surface (mesh.subdivide), the deviation is taken from epsilon and added "
+        "to "
         "the errors of the report. "
         "With on_exceed=raise both errors are held to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "

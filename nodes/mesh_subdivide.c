@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "core/node.h"
 #include "core/surface.h"
 #include "core/vector.h"
@@ -389,15 +390,15 @@ static qmat_status fill_report(qmat_context *context, const subdivision *s, int 
                                      "nonmanifold_edges", "components", "euler_characteristic", "closed",
                                      "oriented"};
   json_t *root = report->root;
-  int bad = json_object_set_new(root, "surfaces", json_integer((json_int_t)s->surface_count));
+  int bad = qmat_json_set_count(root, "surfaces", s->surface_count);
   bad |= json_object_set_new(root, "level", json_integer(level));
   bad |= json_object_set_new(root, "deviation", json_real(a->deviation));
   if (a->mesh) {
     bad |= json_object_set_new(root, "depth", json_integer(depth));
     bad |= json_object_set_new(root, "deviation_seen", json_real(a->seen));
     bad |= json_object_set_new(root, "deviation_of_sharpness", json_real(a->unresolved));
-    bad |= json_object_set_new(root, "points_measured", json_integer((json_int_t)a->point_count));
-    bad |= json_object_set_new(root, "creases_without_edge", json_integer((json_int_t)a->creases_without_edge));
+    bad |= qmat_json_set_count(root, "points_measured", a->point_count);
+    bad |= qmat_json_set_count(root, "creases_without_edge", a->creases_without_edge);
     for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
       bad |= json_object_set(root, kept[i], json_object_get(facts, kept[i]));
     if (a->creases_without_edge > 0) bad |= add_warning(root, a->creases_without_edge);

@@ -117,6 +117,14 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
     .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                       \
   }
 
+/* The inputs of both nodes. */
+#define QMAT_SIMPLIFY_INPUTS                                                                         \
+  {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},                                  \
+      {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},        \
+      {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"}, { \
+    .name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh"                          \
+  }
+
 /* The initial medial mesh in the unit frame, in the context's arena. */
 typedef struct qmat_initial_medial {
   double *spheres; /* 4 per sphere */
@@ -129,7 +137,7 @@ typedef struct qmat_initial_medial {
 qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
                                           double *deviation);
 
-/* Reads the inputs of both nodes (mesh, thickness, samples, medial, in that order). `*surface` is new, also after some
+/* Reads the inputs of both nodes (QMAT_SIMPLIFY_INPUTS, in that order). `*surface` is new, also after some
  * failures; the caller frees it. QMAT_ERROR_GEOMETRY names what does not belong together; QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,

@@ -73,11 +73,21 @@ static void test_what_json_cannot_say_gives_nothing(void **state) {
   json_decref(number);
 }
 
+static void test_a_count_is_a_whole_number_and_no_object_takes_none(void **state) {
+  (void)state;
+  json_t *object = json_object();
+  assert_int_equal(qmat_json_set_count(object, "spheres", (size_t)1 << 40), 0);
+  assert_int_equal(json_integer_value(json_object_get(object, "spheres")), (json_int_t)1 << 40);
+  json_decref(object);
+  assert_int_equal(qmat_json_set_count(NULL, "spheres", 1), -1); /* of an object for which memory was short */
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_it_is_the_text_that_jansson_makes),
       cmocka_unit_test(test_a_shortage_of_memory_gives_nothing_and_never_a_part),
       cmocka_unit_test(test_what_json_cannot_say_gives_nothing),
+      cmocka_unit_test(test_a_count_is_a_whole_number_and_no_object_takes_none),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
