@@ -2,6 +2,7 @@
 #include "graphs/graph_run.h"
 
 #include <errno.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/parallel_items.h"
 #include "graphs/run_cache.h"
 #include "io/bytes.h"
 
@@ -538,16 +540,27 @@ typedef struct executor {
   qmat_context *context;
   qmat_run *run;
   const qmat_run_observer *observer;
-  bool unsteady; /* a node made other bytes than the cache had of it */
+  bool unsteady;         /* a node made other bytes than the cache had of it */
+  pthread_mutex_t *lock; /* held while the cache is used; NULL: no other executor uses it */
 } executor;
 
 static qmat_status run_step(executor *executor, size_t index);
+
+static void lock_cache(const executor *executor) {
+  if (executor->lock) pthread_mutex_lock(executor->lock);
+}
+
+static void unlock_cache(const executor *executor) {
+  if (executor->lock) pthread_mutex_unlock(executor->lock);
+}
 
 // Sees to it that a value is there: from the cache, or else by running the step that makes it.
 static qmat_status need_value(executor *executor, size_t index) {
   qmat_run_slot *slot = &executor->run->slots[index];
   if (slot->value) return QMAT_OK;
+  lock_cache(executor);
   slot->value = qmat_run_load(executor->run, slot->step, index - executor->run->steps[slot->step].first_slot);
+  unlock_cache(executor);
   return slot->value ? QMAT_OK : run_step(executor, slot->step);
 }
 
@@ -609,27 +622,65 @@ static qmat_status plan_item(qmat_context *context, const qmat_run *run, const q
   return QMAT_OK;
 }
 
-// Runs a step for one value of each list, or takes what the cache has of that.
-static qmat_status run_item(executor *outer, size_t index, const qmat_value *const *inputs, size_t item,
-                            qmat_list **outputs) {
-  qmat_run_step *step = &outer->run->steps[index];
-  const size_t output_count = qmat_output_count(outer->run->graph->nodes[step->node].type);
+// A step that runs once for each value of the lists that it is given.
+typedef struct lifted_step {
+  executor *outer;
+  size_t step;
+  const qmat_value *const *inputs;
+  qmat_list **outputs;
+  pthread_mutex_t lock; /* of the cache, and of what the items count in the outer run */
+} lifted_step;
+
+// Runs a step for one value of each list, or takes what the cache has of that. One of the threads of qmat_run_items.
+static qmat_status run_item(void *user, qmat_context *context, size_t item) {
+  lifted_step *lifted = user;
+  const qmat_run *run = lifted->outer->run;
+  qmat_run_step *step = &lifted->outer->run->steps[lifted->step];
+  const size_t output_count = qmat_output_count(run->graph->nodes[step->node].type);
   qmat_run one;
-  executor executor = {.context = outer->context, .run = &one};
-  qmat_status status = plan_item(outer->context, outer->run, step, inputs, item, &one);
+  executor executor = {.context = context, .run = &one, .lock = &lifted->lock};
+  bool hit = false;
+  qmat_status status = plan_item(context, run, step, lifted->inputs, item, &one);
   if (status == QMAT_OK) {
-    if (qmat_run_look_up(&one, 0)) {
-      step->lifted_hits++;
-    } else {
-      status = run_step(&executor, 0);
-    }
+    lock_cache(&executor);
+    hit = qmat_run_look_up(&one, 0);
+    unlock_cache(&executor);
+    if (!hit) status = run_step(&executor, 0);
   }
   for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
     status = need_value(&executor, port);
-    outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
+    lifted->outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
   }
-  if (executor.unsteady) outer->unsteady = true;
+  pthread_mutex_lock(&lifted->lock);
+  if (hit) step->lifted_hits++;
+  if (executor.unsteady) lifted->outer->unsteady = true;
+  pthread_mutex_unlock(&lifted->lock);
   qmat_run_uninit(&one);
+  return status;
+}
+
+// The bytes of the values that a step is given for one item.
+static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, size_t item) {
+  size_t size = 0;
+  for (size_t port = 0; port < qmat_input_count(type); port++)
+    if (inputs[port] && inputs[port]->type == QMAT_LIST && !type->inputs[port].list)
+      size += qmat_value_bytes(qmat_value_at(inputs[port], item));
+  return size;
+}
+
+static qmat_status run_items(executor *executor, size_t index, const qmat_value *const *inputs, const qmat_list *first,
+                             qmat_list **outputs) {
+  qmat_context *context = executor->context;
+  const qmat_node *type = executor->run->graph->nodes[executor->run->steps[index].node].type;
+  size_t *sizes = qmat_alloc(first->count, sizeof *sizes), failed;
+  if (!sizes) return qmat_fail_memory(context, "values");
+  for (size_t i = 0; i < first->count; i++) sizes[i] = item_size(type, inputs, i);
+  lifted_step lifted = {.outer = executor, .step = index, .inputs = inputs, .outputs = outputs};
+  pthread_mutex_init(&lifted.lock, NULL);
+  const qmat_status status = qmat_run_items(context, first->count, sizes, "meshes", run_item, &lifted, &failed);
+  pthread_mutex_destroy(&lifted.lock);
+  qmat_free(sizes);
+  if (failed != SIZE_MAX) qmat_fail_within(context, first->names[failed]);
   return status;
 }
 
@@ -651,10 +702,7 @@ static qmat_status run_lifted(executor *executor, size_t index, const qmat_value
     }
     if (!lists[port]) status = qmat_fail_memory(context, "values");
   }
-  for (size_t i = 0; i < first->count && status == QMAT_OK; i++) {
-    status = run_item(executor, index, inputs, i, lists);
-    if (status != QMAT_OK && status != QMAT_CANCELLED) qmat_fail_within(context, first->names[i]);
-  }
+  if (status == QMAT_OK) status = run_items(executor, index, inputs, first, lists);
   for (size_t port = 0; port < output_count && status == QMAT_OK; port++)
     status = qmat_value_seal(context, &lists[port]->base);
   for (size_t port = 0; lists && port < output_count; port++) {
@@ -706,7 +754,9 @@ static qmat_status run_step(executor *executor, size_t index) {
     status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the node makes other bytes than the cache has of it");
     goto cleanup;
   }
+  lock_cache(executor);
   qmat_run_store(run, index, &reads);
+  unlock_cache(executor);
   qmat_run_note_reads(run, &reads);
   tell_done(executor, index);
 cleanup:

@@ -141,11 +141,12 @@ bool qmat_same_file(const char *a, const char *b);
 qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path);
 
 /* Runs the steps one after another; a value is released when its last reader is done. No output is written. A node that
- * is given lists at inputs which do not take them whole runs once for each of their values, and its outputs are lists;
- * each such run has a cache key of its own. QMAT_ERROR_USAGE: lists of different lengths. With a
- * cache, a step whose result is known is not run, and its values are loaded only where a node that does run, an output
- * file or a want needs them. Returns the first failing node's status; QMAT_CANCELLED when the context's progress
- * function asks to stop. Once per plan. */
+ * is given lists at inputs which do not take them whole runs once for each of their values, several at the same time
+ * (qmat_run_items), and its outputs are lists; each such run has a cache key of its own. QMAT_ERROR_USAGE: lists of
+ * different lengths. With a cache, a step whose result is known is not run, and its values are loaded only where a node
+ * that does run, an output file or a want needs them. Returns the first failing node's status, of a node that runs
+ * several times that of the first value in their order; QMAT_CANCELLED when the context's progress function asks to
+ * stop. Once per plan. */
 qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer);
 
 /* Sets the state of every step as if it were run, without running any. Instead of qmat_run_execute, once per plan. */
