@@ -88,6 +88,7 @@ static const row chain_rows[] = {
     ARRAY(qmat_chain, errors, F64, collapse_count, 1),    END};
 static const row report_rows[] = {SCALAR(qmat_report, root, JSON), END};
 static const row file_rows[] = {SCALAR(qmat_file, format, TEXT), ARRAY(qmat_file, parts, PARTS, part_count, 1), END};
+static const row failure_rows[] = {SCALAR(qmat_failure, reason, TEXT), END};
 static const row list_rows[] = {ARRAY(qmat_list, items, ITEMS, count, 1), ARRAY(qmat_list, names, NAMES, count, 1),
                                 END};
 
@@ -99,6 +100,7 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value);
 static qmat_status check_chain(qmat_context *context, const qmat_value *value);
 static qmat_status check_report(qmat_context *context, const qmat_value *value);
 static qmat_status check_file(qmat_context *context, const qmat_value *value);
+static qmat_status check_failure(qmat_context *context, const qmat_value *value);
 static qmat_status check_list(qmat_context *context, const qmat_value *value);
 
 typedef struct value_type {
@@ -117,6 +119,7 @@ static const value_type value_types[QMAT_VALUE_TYPE_COUNT] = {
     [QMAT_CHAIN] = {"chain", sizeof(qmat_chain), chain_rows, check_chain},
     [QMAT_REPORT] = {"report", sizeof(qmat_report), report_rows, check_report},
     [QMAT_FILE] = {"file", sizeof(qmat_file), file_rows, check_file},
+    [QMAT_FAILURE] = {"failure", sizeof(qmat_failure), failure_rows, check_failure},
     [QMAT_LIST] = {"list", sizeof(qmat_list), list_rows, check_list},
 };
 
@@ -223,6 +226,10 @@ qmat_file *qmat_file_new(void) {
   return value_new(QMAT_FILE);
 }
 
+qmat_failure *qmat_failure_new(void) {
+  return value_new(QMAT_FAILURE);
+}
+
 qmat_list *qmat_list_new(size_t count) {
   qmat_list *list = value_new(QMAT_LIST);
   if (list == NULL) return NULL;
@@ -246,7 +253,32 @@ const qmat_value *qmat_value_at(const qmat_value *value, size_t index) {
 }
 
 qmat_value_type qmat_value_item_type(const qmat_value *value) {
-  return qmat_value_at(value, 0)->type;
+  size_t index = 0;
+  while (index + 1 < qmat_value_count(value) && qmat_value_at(value, index)->type == QMAT_FAILURE) ++index;
+  return qmat_value_at(value, index)->type;
+}
+
+const char *qmat_value_failure(const qmat_value *value) {
+  return value->type == QMAT_FAILURE ? ((const qmat_failure *)value)->reason : NULL;
+}
+
+qmat_value *qmat_failure_of_error(qmat_context *context) {
+  qmat_error error = context->error;
+  char reason[2048];
+  error.node_id[0] = error.file[0] = '\0';
+  qmat_error_format(&error, reason, sizeof reason);
+  for (char *c = reason; !qmat_is_utf8(reason) && *c != '\0'; ++c) {
+    if ((unsigned char)*c >= 0x80) *c = '?';
+  }
+  qmat_failure *failure = qmat_failure_new();
+  if (failure != NULL) failure->reason = qmat_strdup(reason);
+  if (failure == NULL || failure->reason == NULL) {
+    qmat_fail_memory(context, "the reason of a failure");
+  } else if (qmat_value_seal(context, &failure->base) == QMAT_OK) {
+    return &failure->base;
+  }
+  if (failure != NULL) qmat_value_release(&failure->base);
+  return NULL;
 }
 
 char *qmat_strdup(const char *text) {
@@ -948,13 +980,19 @@ static qmat_status check_file(qmat_context *context, const qmat_value *value) {
   return check_parts(context, file->parts, file->part_count);
 }
 
+static qmat_status check_failure(qmat_context *context, const qmat_value *value) {
+  return check_utf8(context, ((const qmat_failure *)value)->reason, "reason");
+}
+
 static qmat_status check_list(qmat_context *context, const qmat_value *value) {
   const qmat_list *list = (const qmat_list *)value;
   if (list->count < 2)
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "a list has %zu items, not two or more", list->count);
+  const qmat_value_type type = qmat_value_item_type(value);
+  if (type == QMAT_FAILURE) return qmat_fail(context, QMAT_ERROR_INTERNAL, "a list has nothing but failures");
   for (size_t i = 0; i < list->count; ++i) {
     const qmat_value *item = list->items[i];
-    if (!item->sealed || item->type == QMAT_LIST || item->type != list->items[0]->type) {
+    if (!item->sealed || item->type == QMAT_LIST || (item->type != type && item->type != QMAT_FAILURE)) {
       qmat_fail(context, QMAT_ERROR_INTERNAL, "it is a list, not sealed, or not of the type of the others");
       return fail_element(context, "item", i);
     }

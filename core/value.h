@@ -26,6 +26,7 @@ typedef enum qmat_value_type {
   QMAT_CHAIN,
   QMAT_REPORT,
   QMAT_FILE,
+  QMAT_FAILURE,
   QMAT_LIST,
   QMAT_VALUE_TYPE_COUNT
 } qmat_value_type;
@@ -133,8 +134,14 @@ typedef struct qmat_file {
   qmat_file_part *parts;
 } qmat_file;
 
+/* Stands in a list for a value that could not be made. */
+typedef struct qmat_failure {
+  qmat_value base;
+  char *reason; /* UTF-8, one line: the type of the node and its error, nothing of where files lie */
+} qmat_failure;
+
 /* Values of one type, and what each is of: the meshes of a scene, and all that is made of each of them. Two at least: a
- * list of one is the value itself. */
+ * list of one is the value itself. Failures stand among them, but are not all of them. */
 typedef struct qmat_list {
   qmat_value base;
   size_t count;
@@ -152,14 +159,21 @@ qmat_medial *qmat_medial_new(void);
 qmat_chain *qmat_chain_new(void);
 qmat_report *qmat_report_new(void);
 qmat_file *qmat_file_new(void);
+qmat_failure *qmat_failure_new(void);
 /* A list of `count` items and names, all NULL; fill both. */
 qmat_list *qmat_list_new(size_t count);
 
 /* The values that `value` stands for: those of a list, or itself; NULL has none. `index` is below the count. */
 size_t qmat_value_count(const qmat_value *value);
 const qmat_value *qmat_value_at(const qmat_value *value, size_t index);
-/* The type of those values. */
+/* The type of those values, or of those that are no failures. */
 qmat_value_type qmat_value_item_type(const qmat_value *value);
+
+/* A sealed failure whose reason is the context's newest error, without its file and the node's id. NULL when memory is
+ * short, which is then the newest error. */
+qmat_value *qmat_failure_of_error(qmat_context *context);
+/* Why a value could not be made; NULL: it was made, and is no failure. The value owns the text. */
+const char *qmat_value_failure(const qmat_value *value);
 
 /* Whether `name` is a relative path that leads to a file below its folder: no "..", no "." and nothing empty in it, no
  * backslash, at most 255 bytes. */

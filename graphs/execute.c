@@ -130,13 +130,33 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
   return true;
 }
 
-// What readers of files left out, say: strings in the reports of steps that ran.
+// Whether a step before has told the same of the same mesh: what failed once is missing in all that comes after it.
+static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
+  for (size_t i = 0; i < step; i++) {
+    const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
+    const char *before = json_string_value(json_object_get(of_mesh, "failure"));
+    if (before && strcmp(before, failure) == 0) return true;
+  }
+  return false;
+}
+
+// What readers of files left out, say: strings in the reports of steps that ran; and meshes that could not be
+// described.
 static void print_warnings(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
+    const char *id = run->graph->nodes[run->steps[i].node].id;
     const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
     for (size_t k = 0; k < json_array_size(warnings); k++) {
       const char *text = json_string_value(json_array_get(warnings, k));
-      if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", run->graph->nodes[run->steps[i].node].id, text);
+      if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", id, text);
+    }
+    const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
+    for (size_t k = 0; k < json_array_size(meshes); k++) {
+      const json_t *of_mesh = json_array_get(meshes, k);
+      const char *name = json_string_value(json_object_get(of_mesh, "name"));
+      const char *failure = json_string_value(json_object_get(of_mesh, "failure"));
+      if (name && failure && !was_told(run, i, k, failure))
+        fprintf(stderr, "qmat: warning: mesh '%s' cannot be described: %s\n", qmat_show(name).text, failure);
     }
   }
 }

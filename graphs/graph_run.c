@@ -100,9 +100,11 @@ json_t *qmat_report_json(const qmat_value *report) {
   json_t *all = json_array(), *warnings = json_array(), *root = json_object();
   bool done = all && warnings && root;
   for (size_t i = 0; i < list->count && done; i++) {
-    json_t *one = ((const qmat_report *)list->items[i])->root;
-    done = json_array_append_new(all, json_pack("{s:s, s:O}", "name", list->names[i], "report", one)) == 0 &&
-           add_warnings(warnings, list->names[i], one);
+    const char *failure = qmat_value_failure(list->items[i]);
+    json_t *one = failure ? NULL : ((const qmat_report *)list->items[i])->root;
+    json_t *of_item = failure ? json_pack("{s:s, s:s}", "name", list->names[i], "failure", failure)
+                              : json_pack("{s:s, s:O}", "name", list->names[i], "report", one);
+    done = json_array_append_new(all, of_item) == 0 && add_warnings(warnings, list->names[i], one);
   }
   done = done && json_object_set(root, "meshes", all) == 0;
   if (json_array_size(warnings) > 0) done = done && json_object_set(root, "warnings", warnings) == 0;
@@ -628,15 +630,41 @@ typedef struct lifted_step {
   size_t step;
   const qmat_value *const *inputs;
   qmat_list **outputs;
-  pthread_mutex_t lock; /* of the cache, and of what the items count in the outer run */
+  pthread_mutex_t lock;   /* of the cache, of what the items count in the outer run, and of the next two */
+  size_t first_unusable;  /* the first item that the node cannot work on; SIZE_MAX: none */
+  qmat_error first_error; /* why */
 } lifted_step;
+
+// What cannot be made of one item stands as a failure in the lists; the others go on.
+static qmat_status leave_out(lifted_step *lifted, qmat_context *context, size_t item, const qmat_value *failure) {
+  const qmat_run *run = lifted->outer->run;
+  qmat_run_step *step = &lifted->outer->run->steps[lifted->step];
+  qmat_value *made = failure ? qmat_value_retain(failure) : qmat_failure_of_error(context);
+  if (!made) return context->error.status;
+  for (size_t port = 0; port < qmat_output_count(run->graph->nodes[step->node].type); port++)
+    lifted->outputs[port]->items[item] = qmat_value_retain(made);
+  qmat_value_release(made);
+  pthread_mutex_lock(&lifted->lock);
+  if (failure) step->lifted_left_out++;
+  if (!failure && item < lifted->first_unusable) {
+    lifted->first_unusable = item;
+    lifted->first_error = context->error;
+  }
+  pthread_mutex_unlock(&lifted->lock);
+  return QMAT_OK;
+}
 
 // Runs a step for one value of each list, or takes what the cache has of that. One of the threads of qmat_run_items.
 static qmat_status run_item(void *user, qmat_context *context, size_t item) {
   lifted_step *lifted = user;
   const qmat_run *run = lifted->outer->run;
   qmat_run_step *step = &lifted->outer->run->steps[lifted->step];
-  const size_t output_count = qmat_output_count(run->graph->nodes[step->node].type);
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (!lifted->inputs[port] || type->inputs[port].list) continue;
+    const qmat_value *given = qmat_value_at(lifted->inputs[port], item);
+    if (qmat_value_failure(given)) return leave_out(lifted, context, item, given);
+  }
   qmat_run one;
   executor executor = {.context = context, .run = &one, .lock = &lifted->lock};
   bool hit = false;
@@ -647,7 +675,7 @@ static qmat_status run_item(void *user, qmat_context *context, size_t item) {
     unlock_cache(&executor);
     if (!hit) status = run_step(&executor, 0);
   }
-  for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
+  for (size_t port = 0; port < qmat_output_count(type) && status == QMAT_OK; port++) {
     status = need_value(&executor, port);
     lifted->outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
   }
@@ -656,7 +684,7 @@ static qmat_status run_item(void *user, qmat_context *context, size_t item) {
   if (executor.unsteady) lifted->outer->unsteady = true;
   pthread_mutex_unlock(&lifted->lock);
   qmat_run_uninit(&one);
-  return status;
+  return status == QMAT_ERROR_GEOMETRY ? leave_out(lifted, context, item, NULL) : status;
 }
 
 // The bytes of the values that a step is given for one item.
@@ -668,6 +696,19 @@ static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, 
   return size;
 }
 
+// Fails when nothing could be made of any item, with the error of the first.
+static qmat_status check_any_made(const lifted_step *lifted, qmat_context *context, const qmat_list *first) {
+  const qmat_list *made = lifted->outputs[0];
+  for (size_t i = 0; i < made->count; i++)
+    if (!qmat_value_failure(made->items[i])) return QMAT_OK;
+  if (lifted->first_unusable == SIZE_MAX) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s", qmat_value_failure(made->items[0]));
+    return qmat_fail_within(context, first->names[0]);
+  }
+  context->error = lifted->first_error;
+  return qmat_fail_within(context, first->names[lifted->first_unusable]);
+}
+
 static qmat_status run_items(executor *executor, size_t index, const qmat_value *const *inputs, const qmat_list *first,
                              qmat_list **outputs) {
   qmat_context *context = executor->context;
@@ -675,12 +716,14 @@ static qmat_status run_items(executor *executor, size_t index, const qmat_value 
   size_t *sizes = qmat_alloc(first->count, sizeof *sizes), failed;
   if (!sizes) return qmat_fail_memory(context, "values");
   for (size_t i = 0; i < first->count; i++) sizes[i] = item_size(type, inputs, i);
-  lifted_step lifted = {.outer = executor, .step = index, .inputs = inputs, .outputs = outputs};
+  lifted_step lifted = {
+      .outer = executor, .step = index, .inputs = inputs, .outputs = outputs, .first_unusable = SIZE_MAX};
   pthread_mutex_init(&lifted.lock, NULL);
-  const qmat_status status = qmat_run_items(context, first->count, sizes, "meshes", run_item, &lifted, &failed);
+  qmat_status status = qmat_run_items(context, first->count, sizes, "meshes", run_item, &lifted, &failed);
   pthread_mutex_destroy(&lifted.lock);
   qmat_free(sizes);
   if (failed != SIZE_MAX) qmat_fail_within(context, first->names[failed]);
+  if (status == QMAT_OK && qmat_output_count(type) > 0) status = check_any_made(&lifted, context, first);
   return status;
 }
 
@@ -693,7 +736,7 @@ static qmat_status run_lifted(executor *executor, size_t index, const qmat_value
   qmat_list **lists = qmat_calloc(output_count, sizeof *lists);
   qmat_status status = lists ? QMAT_OK : qmat_fail_memory(context, "values");
   step->lifted = first->count;
-  step->lifted_hits = 0;
+  step->lifted_hits = step->lifted_left_out = 0;
   for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
     lists[port] = qmat_list_new(first->count);
     for (size_t i = 0; lists[port] && i < first->count; i++) {
@@ -1029,8 +1072,13 @@ bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
     *summary = (qmat_run_summary){.step = i, .triangles = step->mesh_triangles};
     const json_t *meshes = json_object_get(step->report, "meshes");
     bool whole = meshes || summarise_report(step->report, summary);
-    for (size_t k = 0; k < json_array_size(meshes) && whole; k++)
-      whole = summarise_report(json_object_get(json_array_get(meshes, k), "report"), summary);
+    for (size_t k = 0; k < json_array_size(meshes) && whole; k++) {
+      const json_t *of_mesh = json_array_get(meshes, k);
+      if (json_object_get(of_mesh, "failure"))
+        summary->failures++;
+      else
+        whole = summarise_report(json_object_get(of_mesh, "report"), summary);
+    }
     if (whole) return true;
   }
   return false;

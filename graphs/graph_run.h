@@ -75,11 +75,12 @@ typedef struct qmat_run_step {
   qmat_digest key;       /* of all of them */
   qmat_digest first_key; /* of those that are known before it has run: without the files beside its own */
   double seconds;
-  qmat_run_made *made;   /* per output port */
-  json_t *report;        /* of its first report output, see qmat_report_json; NULL: it makes none */
-  size_t lifted;         /* the values of the lists that it ran for, one by one; 0: it ran once, or not at all */
-  size_t lifted_hits;    /* for so many of them the cache had the result */
-  size_t mesh_triangles; /* of its first mesh input; 0: none */
+  qmat_run_made *made;    /* per output port */
+  json_t *report;         /* of its first report output, see qmat_report_json; NULL: it makes none */
+  size_t lifted;          /* the values of the lists that it ran for, one by one; 0: it ran once, or not at all */
+  size_t lifted_hits;     /* for so many of them the cache had the result */
+  size_t lifted_left_out; /* for so many of them a node before could not make an input */
+  size_t mesh_triangles;  /* of its first mesh input; 0: none */
 } qmat_run_step;
 
 /* A value on its way between steps. */
@@ -142,11 +143,12 @@ qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, cons
 
 /* Runs the steps one after another; a value is released when its last reader is done. No output is written. A node that
  * is given lists at inputs which do not take them whole runs once for each of their values, several at the same time
- * (qmat_run_items), and its outputs are lists; each such run has a cache key of its own. QMAT_ERROR_USAGE: lists of
- * different lengths. With a cache, a step whose result is known is not run, and its values are loaded only where a node
- * that does run, an output file or a want needs them. Returns the first failing node's status, of a node that runs
- * several times that of the first value in their order; QMAT_CANCELLED when the context's progress function asks to
- * stop. Once per plan. */
+ * (qmat_run_items), and its outputs are lists; each such run has a cache key of its own. A value that the node cannot
+ * work on (QMAT_ERROR_GEOMETRY) gives a failure in these lists, which the nodes after it leave out; the run goes on
+ * while anything can be made of another value. QMAT_ERROR_USAGE: lists of different lengths. With a cache, a step whose
+ * result is known is not run, and its values are loaded only where a node that does run, an output file or a want needs
+ * them. Returns the first failing node's status, of a node that runs several times that of the first value in their
+ * order; QMAT_CANCELLED when the context's progress function asks to stop. Once per plan. */
 qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer);
 
 /* Sets the state of every step as if it were run, without running any. Instead of qmat_run_execute, once per plan. */
@@ -162,8 +164,8 @@ const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port);
 void qmat_run_uninit(qmat_run *run);
 
 /* The root of a report; of a list of reports an object whose list "meshes" has an object for each, with its "name" and
- * "report", and whose list "warnings" has those of all, where there are any. NULL when memory is short; the caller
- * calls json_decref. */
+ * "report" (or, of a failure, its "failure"), and whose list "warnings" has those of all, where there are any. NULL
+ * when memory is short; the caller calls json_decref. */
 json_t *qmat_report_json(const qmat_value *report);
 
 /* The names of what a value of this type counts ("spheres", "cones", "slabs"), in the plural, ended by NULL. */
@@ -177,6 +179,7 @@ typedef struct qmat_run_summary {
   uint64_t spheres;
   size_t triangles;                                         /* of the mesh that they describe; 0: not known */
   size_t meshes;                                            /* that they describe, each within its own diagonal */
+  size_t failures;                                          /* meshes of the scene that could not be described */
   double epsilon, surface_to_envelope, envelope_to_surface; /* of several meshes the largest */
   bool evaluated; /* by a node that tells whether the errors are certified; the second is then of the boundary */
   bool certified, estimate;

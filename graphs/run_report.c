@@ -57,8 +57,11 @@ static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
   if (step->keyed) json_object_set_new(json, "key", digest_json(&step->key));
   json_object_set_new(json, "seconds", json_real(step->seconds));
   if (step->lifted > 0) {
-    json_object_set_new(json, "runs", json_integer((json_int_t)(step->lifted - step->lifted_hits)));
+    json_object_set_new(json, "runs",
+                        json_integer((json_int_t)(step->lifted - step->lifted_hits - step->lifted_left_out)));
     json_object_set_new(json, "hits", json_integer((json_int_t)step->lifted_hits));
+    if (step->lifted_left_out > 0)
+      json_object_set_new(json, "left_out", json_integer((json_int_t)step->lifted_left_out));
   }
   json_object_set_new(json, "params", params);
   json_object_set_new(json, "outputs", outputs);
@@ -131,7 +134,9 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
     json_object_set_new(brief, "node", json_string(run->graph->nodes[run->steps[summary.step].node].id));
     json_object_set_new(brief, "spheres", json_integer((json_int_t)summary.spheres));
     json_object_set_new(brief, "triangles", json_integer((json_int_t)summary.triangles));
-    if (summary.meshes > 1) json_object_set_new(brief, "meshes", json_integer((json_int_t)summary.meshes));
+    if (summary.meshes + summary.failures > 1)
+      json_object_set_new(brief, "meshes", json_integer((json_int_t)summary.meshes));
+    if (summary.failures > 0) json_object_set_new(brief, "failures", json_integer((json_int_t)summary.failures));
     json_object_set_new(brief, "epsilon", json_real(summary.epsilon));
     json_object_set_new(brief, "surface_to_envelope", json_real(summary.surface_to_envelope));
     json_object_set_new(brief, "envelope_to_surface", json_real(summary.envelope_to_surface));
@@ -272,7 +277,12 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
   qmat_format_bound(summary->envelope_to_surface, in);
   if (summary->triangles > 0)
     snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
-  if (summary->meshes > 1) {
+  if (summary->failures > 0) {
+    char all[96];
+    snprintf(all, sizeof all, "%zu of the %zu meshes of %.48s", summary->meshes, summary->meshes + summary->failures,
+             model);
+    memcpy(model, all, sizeof model);
+  } else if (summary->meshes > 1) {
     const size_t used = strlen(model);
     snprintf(model + used, sizeof model - used, " of %zu meshes", summary->meshes);
   }

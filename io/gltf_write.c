@@ -622,7 +622,7 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
   *file = NULL;
   qmat_status status = open_document(context, scene, additions[0].options.binary, &document);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
-    status = add_medial(context, scene, i, &additions[i], &document);
+    if (additions[i].medial) status = add_medial(context, scene, i, &additions[i], &document);
   if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK) status = make_file(context, scene, &document, file);
   close_document(&document);

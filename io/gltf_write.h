@@ -48,7 +48,7 @@ qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, co
 
 /* A medial mesh that is to be added to a scene. */
 typedef struct qmat_gltf_addition {
-  const qmat_medial *medial;
+  const qmat_medial *medial; /* NULL, in a scene: its mesh stays as it is */
   const qmat_mesh *skin; /* to be added as a mesh; NULL: none */
   qmat_gltf_options options;
 } qmat_gltf_addition;

@@ -198,16 +198,31 @@ static json_t *add_mesh_report(json_t *report, const json_t *root, const char *n
   return json_array_append_new(json_object_get(report, "meshes"), of_mesh) == 0 ? of_mesh : NULL;
 }
 
+/* One of several meshes; a failure where its facets make none. */
+static qmat_status make_mesh(qmat_context *context, const char *path, const qmat_soup *soup,
+                             const qmat_read_options *options, qmat_value **mesh, json_t *report) {
+  qmat_mesh *made = NULL;
+  qmat_status status = qmat_soup_to_mesh(context, soup, path, options, &made, report);
+  *mesh = made ? &made->base : NULL;
+  if (status != QMAT_ERROR_GEOMETRY) return status;
+  *mesh = qmat_failure_of_error(context);
+  if (!*mesh) return context->error.status;
+  const int failed = json_object_set_new(report, "failure", json_string(qmat_value_failure(*mesh)));
+  return failed ? qmat_fail_memory(context, "the report") : QMAT_OK;
+}
+
 /* The meshes that were read as one value. */
 static qmat_status make_meshes(qmat_context *context, const char *path, const json_t *root, qmat_gltf_meshes *from,
                                const qmat_read_options *options, qmat_value **mesh, json_t *report) {
-  qmat_mesh *made = NULL;
   qmat_status status = QMAT_OK;
   if (from->count == 1) {
+    qmat_mesh *made = NULL;
     status = qmat_soup_to_mesh(context, &from->soups[0], path, options, &made, report);
     *mesh = made ? &made->base : NULL;
     return status;
   }
+  qmat_error first_error = {0};
+  size_t failed = 0;
   qmat_list *list = qmat_list_new(from->count);
   if (!list || json_object_set_new(report, "meshes", json_array()) != 0)
     status = qmat_fail_memory(context, "the meshes of a scene");
@@ -218,11 +233,14 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const js
       status = qmat_fail_memory(context, "the meshes of a scene");
       break;
     }
-    made = NULL;
-    status = qmat_soup_to_mesh(context, &from->soups[i], path, options, &made, of_mesh);
+    status = make_mesh(context, path, &from->soups[i], options, &list->items[i], of_mesh);
     qmat_soup_uninit(&from->soups[i]);
-    list->items[i] = made ? &made->base : NULL;
     if (status != QMAT_OK) qmat_fail_within(context, list->names[i]);
+    if (status == QMAT_OK && qmat_value_failure(list->items[i]) && failed++ == 0) first_error = context->error;
+  }
+  if (status == QMAT_OK && failed == from->count) {
+    context->error = first_error;
+    status = qmat_fail_within(context, list->names[0]);
   }
   if (status == QMAT_OK) status = qmat_value_seal(context, &list->base);
   if (status == QMAT_OK) {

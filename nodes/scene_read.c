@@ -76,7 +76,8 @@ const qmat_node qmat_node_scene_read = {
         "kept whole, with the files that it refers to, for scene.write to hand on; its meshes are read one by one, as "
         "they are stored: in their own spaces, in bind pose, without the transforms of the nodes that carry them, and "
         "once, however many those are. Meshes that no node carries, and those without triangles, are left out. Nodes "
-        "that take a mesh then run once for each. merged places all meshes as one surface in world space, skins in the "
+        "that take a mesh then run once for each; where one of several meshes has no usable facets or no inside, the "
+        "others are described all the same. merged places all meshes as one surface in world space, skins in the "
         "pose that their joints stand in. Of USD all meshes are placed as one; USD layers are composed from the files "
         "beside them, and the report's warnings say what was left out. Subdivision surfaces are "
         "placed as their control cages, which mesh.subdivide takes to the limit.",

@@ -52,11 +52,17 @@ static qmat_certificate certificate_of(const qmat_report *report) {
   return json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
 }
 
-/* What is to be written of one medial mesh. */
+/* What is given for one mesh; NULL: nothing, or it could not be made. */
+static const qmat_value *given_for(const qmat_value *value, size_t index) {
+  const qmat_value *item = value ? qmat_value_at(value, index) : NULL;
+  return item && !qmat_value_failure(item) ? item : NULL;
+}
+
+/* What is to be written of one medial mesh; NULL: none. */
 static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_medial *medial,
                                       const qmat_mesh *skin, const qmat_report *report, const char *name) {
   const double epsilon = reported(report, "epsilon"), told = reported(report, "diagonal");
-  const double diagonal = told > 0 ? told : diagonal_of(medial);
+  const double diagonal = told > 0 || !medial ? told : diagonal_of(medial);
   qmat_gltf_addition addition = {
       .medial = medial,
       .skin = skin,
@@ -105,10 +111,10 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   if (!additions) return qmat_fail_memory(context, "a glTF file");
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
-    additions[i] = addition_of(params, (const qmat_medial *)qmat_value_at(inputs[IN_MEDIAL], i),
-                               shows && inputs[IN_SKIN] ? (const qmat_mesh *)qmat_value_at(inputs[IN_SKIN], i) : NULL,
-                               inputs[IN_REPORT] ? (const qmat_report *)qmat_value_at(inputs[IN_REPORT], i) : NULL,
-                               name_of(scene, inputs[IN_MEDIAL], i));
+    additions[i] =
+        addition_of(params, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
+                    shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
+                    (const qmat_report *)given_for(inputs[IN_REPORT], i), name_of(scene, inputs[IN_MEDIAL], i));
   }
   const qmat_status status =
       kept ? qmat_gltf_enrich(context, scene, additions, count, file)
@@ -147,7 +153,8 @@ static qmat_status check_lists(qmat_context *context, const qmat_value *const in
     return qmat_fail_field(context, names[i]);
   }
   for (size_t i = 0; i < count; i++) {
-    if (((const qmat_medial *)qmat_value_at(inputs[IN_MEDIAL], i))->sphere_count > 0) continue;
+    const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
+    if (!medial || medial->sphere_count > 0) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
     if (count > 1) qmat_fail_within(context, ((const qmat_list *)inputs[IN_MEDIAL])->names[i]);
     return qmat_fail_field(context, "medial");
@@ -261,7 +268,8 @@ const qmat_node qmat_node_scene_write = {
         "is added to the extras of the nodes that carry it (a child of the node has them where its extras are no "
         "object), in that mesh's own space; one of all meshes merged gets a node of its own. Nothing else changes: the "
         "JSON only gains keys and members, buffers stay byte for byte, files that the asset refers to are written "
-        "beside the new one. skin_beside adds the skins as meshes. Of any other scene glb and gltf are made anew, and "
+        "beside the new one. A mesh that no medial mesh could be made of stays as it is. skin_beside adds the skins as "
+        "meshes. Of any other scene glb and gltf are made anew, and "
         "hold the skin as an ordinary mesh, so that every client shows something. The medial mesh is "
         "a Draco blob in base64, in the extras of a node, where clients keep it (qmat_data; triangles first, then "
         "edges on no triangle as (i, j, j), then lone spheres as (i, i, i); the order of spheres is kept). Without "

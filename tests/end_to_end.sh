@@ -272,6 +272,23 @@ else
   holds "a scene: several do not fit where one does" grep -q 'holds one medial mesh, and there are 2' complaints.txt
 fi
 
+# A mesh that encloses nothing stays as it is, and is told; where no mesh is left, there is no result.
+sed -e 's/"POSITION":2},"indices":1/"POSITION":2},"indices":3/' \
+  -e 's/"max":\[3,1,1\]}/&,{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}/' scene/in.gltf >scene/flat.gltf
+qmat mat scene/flat.gltf -o scene/out/flat.gltf --epsilon 10% >flat.txt 2>flat_warnings.txt
+holds "a flat mesh in a scene: the run goes on" test $? -eq 0
+holds "a flat mesh in a scene: one warning names it" \
+  test "$(grep -c "mesh 'bar' cannot be described: " flat_warnings.txt)$(grep -c . flat_warnings.txt)" = 11
+holds "a flat mesh in a scene: it is counted" grep -q 'describe 1 of the 2 meshes' flat.txt
+holds "a flat mesh in a scene: the other has a medial mesh on each node" \
+  test "$(grep -c '"qmat_data"' scene/out/flat.gltf)" -eq 2
+sed -e 's/"indices":1/"indices":3/' scene/flat.gltf >scene/flat2.gltf
+qmat mat scene/flat2.gltf -o scene/out/flat2.gltf --epsilon 10% >flat.txt 2>flat_warnings.txt
+holds "a scene of flat meshes: exit code 1" test $? -eq 1
+holds "a scene of flat meshes: one error names the first" \
+  test "$(grep -c 'cube: ' flat_warnings.txt)$(grep -c . flat_warnings.txt)" = 11
+holds "a scene of flat meshes: no file" test ! -e scene/out/flat2.gltf
+
 # ---- Real models ----
 
 if [ -d "$data/surfaces" ]; then

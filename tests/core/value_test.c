@@ -121,6 +121,13 @@ static qmat_file *file_example(void) {
   return file;
 }
 
+static qmat_failure *failure_example(void) {
+  qmat_failure *failure = qmat_failure_new();
+  assert_non_null(failure);
+  failure->reason = qmat_strdup("it is flat");
+  return failure;
+}
+
 /* Of two fields. */
 static qmat_list *list_example(void) {
   qmat_context context = {0};
@@ -153,6 +160,8 @@ static qmat_value *example_of(qmat_value_type type) {
       return &report_example()->base;
     case QMAT_FILE:
       return &file_example()->base;
+    case QMAT_FAILURE:
+      return &failure_example()->base;
     case QMAT_LIST:
       return &list_example()->base;
     default:
@@ -192,7 +201,8 @@ static void test_new_values_are_empty_and_can_be_released_at_once(void **state) 
   (void)state;
   qmat_value *values[] = {&qmat_scene_new()->base,   &qmat_mesh_new()->base,   &qmat_field_new()->base,
                           &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_chain_new()->base,
-                          &qmat_report_new()->base,  &qmat_file_new()->base,   &qmat_list_new(0)->base};
+                          &qmat_report_new()->base,  &qmat_file_new()->base,   &qmat_failure_new()->base,
+                          &qmat_list_new(0)->base};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
     assert_non_null(values[type]);
     assert_int_equal(values[type]->type, type);
@@ -233,6 +243,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
                              [QMAT_FILE] = 4 + 8,
+                             [QMAT_FAILURE] = 10,
                              [QMAT_LIST] = 2 * (3 * 8 + 10)};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
     qmat_value *value = example_of((qmat_value_type)type);
@@ -999,6 +1010,39 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   qmat_value_release(&list->base);
 }
 
+static void test_failures_stand_among_the_items_of_a_list_but_are_not_all_of_them(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_list *list = list_example();
+  qmat_value_release(list->items[0]);
+  list->items[0] = &failure_example()->base;
+  assert_sealed(&context, list->items[0]);
+  assert_sealed(&context, &list->base);
+  assert_int_equal(qmat_value_item_type(&list->base), QMAT_FIELD);
+  assert_string_equal(qmat_value_failure(qmat_value_at(&list->base, 0)), "it is flat");
+  assert_null(qmat_value_failure(qmat_value_at(&list->base, 1)));
+  qmat_list *failures = qmat_list_new(2);
+  for (size_t i = 0; i < 2; ++i) {
+    failures->items[i] = qmat_value_retain(list->items[0]);
+    failures->names[i] = qmat_strdup("a");
+  }
+  assert_not_sealed(&failures->base, QMAT_ERROR_INTERNAL, "a list has nothing but failures");
+  qmat_value_release(&list->base);
+}
+
+static void test_a_failure_tells_the_error_but_not_where_it_was(void **state) {
+  (void)state;
+  qmat_context context = {.node_id = "mine", .node_type = "mesh.sdf"};
+  qmat_fail(&context, QMAT_ERROR_GEOMETRY, "it is called \xff\xc3\xa9");
+  qmat_fail_at(&context, "/home/me/a.glb", 3, 1);
+  qmat_fail_element(&context, "facet", 7);
+  qmat_value *failure = qmat_failure_of_error(&context);
+  assert_non_null(failure);
+  assert_true(failure->sealed);
+  assert_string_equal(qmat_value_failure(failure), "mesh.sdf: facet 7: it is called ?\xc3\xa9");
+  qmat_value_release(failure);
+}
+
 static void test_copied_texts_are_equal_and_apart(void **state) {
   (void)state;
   const char *text = "caf\xc3\xa9";
@@ -1044,6 +1088,8 @@ int main(void) {
       cmocka_unit_test(test_counts_beyond_32_bits_are_refused_before_the_arrays_are_read),
       cmocka_unit_test(test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing),
       cmocka_unit_test(test_a_list_has_items_of_one_type_and_stands_for_them),
+      cmocka_unit_test(test_failures_stand_among_the_items_of_a_list_but_are_not_all_of_them),
+      cmocka_unit_test(test_a_failure_tells_the_error_but_not_where_it_was),
       cmocka_unit_test(test_copied_texts_are_equal_and_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

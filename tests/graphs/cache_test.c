@@ -24,7 +24,7 @@
 
 static struct {
   atomic_int read, scale; /* values of a list are worked on at the same time */
-  double drift;  // added by a node that breaks its promise
+  double drift;           // added by a node that breaks its promise
 } ran;
 
 static char library_text[64];
@@ -78,6 +78,7 @@ static qmat_status scale_run(qmat_context *context, const void *data, const qmat
                              qmat_value *outputs[]) {
   const scale_params *params = data;
   ran.scale++;
+  if (test_value(inputs[0]) == '?') return qmat_fail(context, QMAT_ERROR_GEOMETRY, "that is no number");
   double number = params->factor * test_value(inputs[0]) + ran.drift;
   return test_report(context, params->whole ? (double)(long)number : number, &outputs[0]);
 }
@@ -165,12 +166,15 @@ static const qmat_node test_split = {.name = "test.split",
                                      .outputs = split_outputs,
                                      .run = split_run};
 
-/* Takes a list whole. */
+/* Takes a list whole; what could not be made counts nothing. */
 static qmat_status sum_run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                            qmat_value *outputs[]) {
   (void)params;
   double sum = 0;
-  for (size_t i = 0; i < qmat_value_count(inputs[0]); i++) sum += test_value(qmat_value_at(inputs[0], i));
+  for (size_t i = 0; i < qmat_value_count(inputs[0]); i++) {
+    const qmat_value *item = qmat_value_at(inputs[0], i);
+    if (!qmat_value_failure(item)) sum += test_value(item);
+  }
   return test_report(context, sum, &outputs[0]);
 }
 
@@ -492,6 +496,36 @@ static void test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_
   assert_true(sum == 2 * 'b');
   assert_int_equal(ran.scale, 5);
   assert_int_equal(lifted, 0);
+  qmat_context_uninit(&context);
+}
+
+static void test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_them(void **state) {
+  fixture *f = *state;
+  qmat_context context = {0};
+  double sum;
+  size_t lifted, hits;
+  /* Another node after the one that fails, which must not be asked for what is missing. */
+  static const char rest[] =
+      "  twice: { type: test.scale, params: { factor: 2 }, in: { number: scale.number } }\n"
+      "  all:   { type: test.sum, in: { number: twice.number } }\n"
+      "  add:   { type: test.add, in: { first: all.number, second: sum.number } }\n";
+  put_file(f->model, "a?c?");
+  for (int again = 0; again < 2; again++) {
+    context.threads = 1 + again;
+    test_ok(&context, run_split(f, rest, &context, &sum, &lifted, &hits));
+    assert_true(sum == 6 * ('a' + 'c'));
+    assert_string_equal(f->states, again ? "hhh" : "rrr");
+    assert_int_equal(ran.scale, 4 + 2);
+  }
+  put_file(f->model, "???");
+  for (context.threads = 1; context.threads <= 4; context.threads++) {
+    assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_GEOMETRY);
+    assert_string_equal(context.error.message, "?: that is no number");
+    assert_string_equal(context.error.node_id, "scale");
+  }
+  put_file(f->model, "?"); /* one is no list: there is nothing to go on with */
+  assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "that is no number");
   qmat_context_uninit(&context);
 }
 
@@ -1039,6 +1073,7 @@ int main(void) {
       CASE(test_side_files_count),
       CASE(test_forced_nodes_run_and_are_the_same),
       CASE(test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_one_stays),
+      CASE(test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_them),
       CASE(test_lists_of_different_lengths_do_not_go_together),
       CASE(test_a_node_that_breaks_its_promise_is_named),
       CASE(test_a_damaged_blob_is_a_miss),

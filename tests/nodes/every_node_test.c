@@ -246,6 +246,13 @@ static void save_model(const qmat_model *model, const char *path) {
   assert_int_equal(fclose(file), 0);
 }
 
+static qmat_value *failure(void) {
+  qmat_failure *made = qmat_failure_new();
+  assert_non_null(made);
+  made->reason = qmat_strdup("it is flat");
+  return &made->base;
+}
+
 /* That report twice. */
 static qmat_value *list_of(const qmat_value *report) {
   qmat_list *list = qmat_list_new(2);
@@ -271,6 +278,7 @@ static void make_solid(world to, const qmat_model *model) {
   values[QMAT_MEDIAL] = simple;
   seal(values[QMAT_CHAIN] = chain_of((const qmat_medial *)simple));
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
+  seal(values[QMAT_FAILURE] = failure());
   seal(values[QMAT_LIST] = list_of(values[QMAT_REPORT]));
   print_message("%s: %zu facets, %zu samples, %zu medial spheres\n", world_names[to],
                 ((const qmat_mesh *)values[QMAT_MESH])->triangle_count,
@@ -335,6 +343,7 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
   file->parts = qmat_calloc(1, sizeof *file->parts);
   file->parts[0].name = qmat_strdup("");
   values[QMAT_FILE] = &file->base;
+  values[QMAT_FAILURE] = failure();
   values[QMAT_LIST] = list_of(values[QMAT_REPORT]);
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) seal(values[type]);
 }
@@ -656,8 +665,7 @@ static void test_defaults_pass_the_check_and_run(void **state) {
     for (size_t port = 0; port < qmat_output_count(run.node); port++) {
       // An input that is handed on has the references of its owners too.
       bool is_input = false;
-      for (size_t k = 0; k < qmat_input_count(run.node); k++)
-        is_input = is_input || run.inputs[k] == run.outputs[port];
+      for (size_t k = 0; k < qmat_input_count(run.node); k++) is_input = is_input || run.inputs[k] == run.outputs[port];
       if (!is_input) assert_int_equal(run.outputs[port]->references, 1);
     }
     qmat_context_uninit(&context);
