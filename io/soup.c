@@ -32,6 +32,12 @@ qmat_status qmat_soup_reserve(qmat_context *context, qmat_soup *soup, size_t ver
   return QMAT_OK;
 }
 
+/* Asks whether to go on where `count` comes past a multiple of so many by `more`. */
+static qmat_status report_progress(qmat_context *context, size_t count, size_t more, const char *unit) {
+  enum { REPORT_EVERY = 1 << 15 };
+  return count / REPORT_EVERY == (count + more) / REPORT_EVERY ? QMAT_OK : qmat_progress(context, count, 0, unit);
+}
+
 qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const double *positions, size_t count) {
   if (count > soup->vertex_capacity - soup->vertex_count) {
     qmat_status status = qmat_soup_reserve(context, soup, count, 0, 0);
@@ -39,7 +45,7 @@ qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const
   }
   if (count > 0) memcpy(soup->positions + 3 * soup->vertex_count, positions, 3 * count * sizeof *positions);
   soup->vertex_count += count;
-  return QMAT_OK;
+  return report_progress(context, soup->vertex_count - count, count, "vertices read");
 }
 
 qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const uint32_t *corners, size_t count,
@@ -55,7 +61,7 @@ qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const ui
   soup->facet_ordinals[soup->facet_count] = ordinal;
   soup->facet_lines[soup->facet_count] = line;
   soup->facet_count++;
-  return QMAT_OK;
+  return report_progress(context, soup->facet_count - 1, 1, "facets read");
 }
 
 /* The arrays of a cage: where they and their counts stand, and the bytes per count. */
@@ -495,9 +501,11 @@ qmat_status qmat_soup_to_mesh(qmat_context *context, const qmat_soup *soup, cons
   qmat_status status = made ? check_counts(&c) : fail_shortage(&c);
   if (status == QMAT_OK) status = check_facets(&c);
   if (status == QMAT_OK) status = weld(&c);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, soup->facet_count, "facets");
   if (status == QMAT_OK) status = triangulate(&c);
   if (status == QMAT_OK) status = drop_repeats(&c);
   if (status == QMAT_OK) status = fill_mesh(&c, made);
+  if (status == QMAT_OK) status = qmat_progress(context, soup->facet_count, soup->facet_count, "facets");
   qmat_arena_uninit(&c.arena);
   qmat_free(c.triangles);
   if (status == QMAT_OK) {

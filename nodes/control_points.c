@@ -187,6 +187,15 @@ static bool is_far(const qmat_control_points *control, size_t i, double epsilon)
   return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= content_with_star * epsilon);
 }
 
+/* So many points or facets are done between two calls of the progress function. */
+enum { SLICE = 1 << 11 };
+
+/* The end of the slice that starts at `first`, of `count`; QMAT_CANCELLED. */
+static qmat_status next_slice(qmat_context *context, size_t first, size_t count, size_t *last) {
+  *last = count - first < SLICE ? count : first + SLICE;
+  return qmat_progress(context, first, count, "control points");
+}
+
 static size_t count_far(const qmat_control_points *control, double epsilon) {
   size_t far = 0;
   for (size_t i = 0; i < control->count; i++) far += is_far(control, i, epsilon);
@@ -212,21 +221,25 @@ static qmat_status ask_all_spheres(qmat_context *context, const qmat_complex *co
   const int threads = qmat_threads(context);
   const double *reaches = find_reaches(context, complex);
   if (!reaches) return qmat_fail_memory(context, "control points");
+  for (size_t first = 0, last; first < control->count; first = last) {
+    const qmat_status status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t i = 0; i < control->count; i++) {
-    if (!is_far(control, i, epsilon)) continue;
-    const double *p = &control->points[3 * i];
-    witness best = {.distance = control->distances[i]};
-    memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
-    memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
-    for (size_t v = 0; v < complex->vertex_count; v++) {
-      const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
-      if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+    for (size_t i = first; i < last; i++) {
+      if (!is_far(control, i, epsilon)) continue;
+      const double *p = &control->points[3 * i];
+      witness best = {.distance = control->distances[i]};
+      memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
+      memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
+      for (size_t v = 0; v < complex->vertex_count; v++) {
+        const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
+        if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+      }
+      for (size_t v = 0; v < complex->vertex_count; v++)
+        if (qmat_sphere_distance(&complex->spheres[4 * v], p) - reaches[v] < best.distance)
+          take_star(complex, p, (uint32_t)v, &best);
+      store(control, i, &best);
     }
-    for (size_t v = 0; v < complex->vertex_count; v++)
-      if (qmat_sphere_distance(&complex->spheres[4 * v], p) - reaches[v] < best.distance)
-        take_star(complex, p, (uint32_t)v, &best);
-    store(control, i, &best);
   }
   return QMAT_OK;
 }
@@ -263,17 +276,21 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
 static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double epsilon,
                                 qmat_control_points *control) {
   qmat_envelope *envelope;
-  const qmat_status status = envelope_of(context, complex, &envelope);
+  qmat_status status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < control->count; first = last) {
+    status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
-  for (size_t i = 0; i < control->count; i++) {
-    if (!is_far(control, i, epsilon)) continue;
-    const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
-    store(control, i, &w);
+    for (size_t i = first; i < last; i++) {
+      if (!is_far(control, i, epsilon)) continue;
+      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
+      store(control, i, &w);
+    }
   }
   qmat_envelope_free(envelope);
-  return QMAT_OK;
+  return status;
 }
 
 static qmat_status allocate(qmat_context *context, qmat_control_points *control) {
@@ -342,6 +359,10 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   if (!shell->places || !points) return qmat_fail_memory(context, "control points");
   size_t count = 0;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
+    if (t % SLICE == 0) {
+      const qmat_status status = qmat_progress(context, t, mesh->triangle_count, "control points");
+      if (status != QMAT_OK) return status;
+    }
     const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
     double normal[3];
     if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
@@ -357,14 +378,18 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   for (size_t i = 0; i < count; i++)
     if (i == 0 || shell->places[i].cube != shell->places[i - 1].cube) shell->places[kept++] = shell->places[i];
   const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < kept; first = last) {
+    const qmat_status status = next_slice(context, first, kept, &last);
+    if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t i = 0; i < kept; i++) {
-    shell_place *place = &shell->places[i];
-    place->witness.distance = INFINITY;
-    if (!qmat_surface_inside(surface, place->point) ||
-        qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
-      continue;
-    look_around(a, place->point, &mesh->triangles[3 * (size_t)place->facet], 3, 0, &place->witness);
+    for (size_t i = first; i < last; i++) {
+      shell_place *place = &shell->places[i];
+      place->witness.distance = INFINITY;
+      if (!qmat_surface_inside(surface, place->point) ||
+          qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
+        continue;
+      look_around(a, place->point, &mesh->triangles[3 * (size_t)place->facet], 3, 0, &place->witness);
+    }
   }
   for (size_t i = 0; i < kept; i++)
     if (shell->places[i].witness.distance <= 0) shell->places[shell->count++] = shell->places[i];
@@ -388,6 +413,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
   if (status != QMAT_OK) return status;
   for (;; control->spacing *= 1.25) {
+    if ((status = qmat_progress(context, 0, 0, "control points")) != QMAT_OK) return status;
     size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
       const grid g = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
@@ -401,23 +427,29 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   if ((status = allocate(context, control)) != QMAT_OK) return status;
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, control->points);
   const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < samples->count; first = last) {
+    if ((status = next_slice(context, first, samples->count, &last)) != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t i = 0; i < samples->count; i++) {
-    const uint32_t sample = (uint32_t)i;
-    witness best;
-    look_around(&a, &control->points[3 * i], &sample, 1, epsilon, &best);
-    store(control, i, &best);
-  }
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    const uint32_t *corners = &mesh->triangles[3 * t];
-    const grid g = grid_of(positions, corners, control->spacing);
-    const size_t count = grid_points(&g, control->spacing);
-    if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
-    for (size_t i = starts[t]; i < starts[t] + count; i++) {
+    for (size_t i = first; i < last; i++) {
+      const uint32_t sample = (uint32_t)i;
       witness best;
-      look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);
+      look_around(&a, &control->points[3 * i], &sample, 1, epsilon, &best);
       store(control, i, &best);
+    }
+  }
+  for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
+    if ((status = next_slice(context, first, mesh->triangle_count, &last)) != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t t = first; t < last; t++) {
+      const uint32_t *corners = &mesh->triangles[3 * t];
+      const grid g = grid_of(positions, corners, control->spacing);
+      const size_t count = grid_points(&g, control->spacing);
+      if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
+      for (size_t i = starts[t]; i < starts[t] + count; i++) {
+        witness best;
+        look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);
+        store(control, i, &best);
+      }
     }
   }
   size_t next = control->surface_count;
@@ -449,12 +481,17 @@ qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *co
   if (extra->inner_count)
     memcpy(&control->points[3 * extra->surface_count], extra->inner, 3 * extra->inner_count * sizeof *control->points);
   const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < control->count; first = last) {
+    status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
-  for (size_t i = 0; i < control->count; i++) {
-    const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
-    store(control, i, &w);
+    for (size_t i = first; i < last; i++) {
+      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
+      store(control, i, &w);
+    }
   }
   qmat_envelope_free(envelope);
+  if (status != QMAT_OK) return status;
   size_t kept = extra->surface_count;
   for (size_t i = kept; i < control->count; i++) {
     if (!(control->distances[i] < 0)) continue;

@@ -94,6 +94,7 @@ qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh,
   qmat_status status = qmat_progress(context, 0, 0, "creases");
   if (status != QMAT_OK) return status;
   if (count) qsort(sides, count, sizeof *sides, by_ends);
+  if ((status = qmat_progress(context, 0, 0, "creases")) != QMAT_OK) return status;
   const double least_cosine = cosine_of(angle);
   for (size_t i = 0, end; i < count; i = end) {
     for (end = i + 1; end < count && sides[end].low == sides[i].low && sides[end].high == sides[i].high;) end++;

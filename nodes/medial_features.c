@@ -147,15 +147,20 @@ static uint32_t nearest_sphere(const qmat_envelope *envelope, const double *sphe
 static qmat_status find_anchors(feature_builder *b) {
   qmat_envelope *envelope;
   const qmat_medial *m = b->initial;
-  const qmat_status status = qmat_envelope_new(b->context, b->graph.spheres, m->sphere_count, m->edges, m->edge_count,
-                                               m->triangles, m->triangle_count, &envelope);
+  qmat_status status = qmat_envelope_new(b->context, b->graph.spheres, m->sphere_count, m->edges, m->edge_count,
+                                         m->triangles, m->triangle_count, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(b->context);
+  const size_t slice = 1 << 10;
+  for (size_t first = 0; first < b->feature_count; first += slice) {
+    if ((status = qmat_progress(b->context, first, b->feature_count, "features")) != QMAT_OK) break;
+    const size_t last = b->feature_count - first < slice ? b->feature_count : first + slice;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
-  for (size_t i = 0; i < b->feature_count; i++)
-    b->features[i].anchor = nearest_sphere(envelope, b->graph.spheres, b->features[i].unit);
+    for (size_t i = first; i < last; i++)
+      b->features[i].anchor = nearest_sphere(envelope, b->graph.spheres, b->features[i].unit);
+  }
   qmat_envelope_free(envelope);
-  return QMAT_OK;
+  return status;
 }
 
 /* --- paths in the medial mesh --------------------------------------------------------------------------------------

@@ -69,12 +69,19 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   size_t *row_starts = qmat_arena_calloc(arena, spheres + 1, sizeof *row_starts);
   if (!middle_spheres || !middles || !row_starts) return qmat_fail_memory(context, "medial edges");
   const int threads = qmat_threads(context);
+  const size_t slice = 1 << 12;
+  for (size_t first = 0; first < edges; first += slice) {
+    const qmat_status status = qmat_progress(context, first, edges, "refinement");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < edges ? first + slice : edges;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 512)
-  for (size_t e = 0; e < edges; e++)
-    middles[e] = find_middle(surface, &medial->spheres[4 * (size_t)medial->edges[2 * e]],
-                             &medial->spheres[4 * (size_t)medial->edges[2 * e + 1]], tolerance, &middle_spheres[4 * e])
-                     ? 0
-                     : NONE;
+    for (size_t e = first; e < last; e++)
+      middles[e] =
+          find_middle(surface, &medial->spheres[4 * (size_t)medial->edges[2 * e]],
+                      &medial->spheres[4 * (size_t)medial->edges[2 * e + 1]], tolerance, &middle_spheres[4 * e])
+              ? 0
+              : NONE;
+  }
   size_t count = 0;
   for (size_t e = 0; e < edges; e++) {
     row_starts[medial->edges[2 * e] + 1]++;

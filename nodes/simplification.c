@@ -9,7 +9,9 @@
 #include "core/vector.h"
 #include "nodes/collapse_candidates.h"
 
-enum { REPORT_EVERY = 256 };
+/* So many costs are found, or collapses tried, between two calls of the progress function: of the last collapses each
+ * looks at thousands of points. */
+enum { COSTS_A_REPORT = 256, ATTEMPTS_A_REPORT = 16 };
 
 /* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
 static size_t late_stage(size_t initial) {
@@ -112,7 +114,7 @@ static qmat_status fill_heap(qmat_simplification *s) {
   }
   if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* looks at stars, one at a time */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
-      if (e % REPORT_EVERY == 0) status = qmat_progress(s->context, e, count, "costs");
+      if (e % COSTS_A_REPORT == 0) status = qmat_progress(s->context, e, count, "costs");
       if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
     }
   } else {
@@ -480,7 +482,7 @@ static qmat_status report_progress(const qmat_simplification *s) {
 static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
-    qmat_status status = attempts % REPORT_EVERY == 0 ? report_progress(s) : QMAT_OK;
+    qmat_status status = attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
     if (status != QMAT_OK) return status;
     const uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
@@ -519,7 +521,8 @@ static qmat_status refit(qmat_simplification *s, size_t *moved) {
         qmat_crease_guard_is_feature(&s->creases, v))
       continue;
     s->settled[v] = 1;
-    qmat_status status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
+    qmat_status status = report_progress(s);
+    if (status == QMAT_OK) status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
       status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
     double sphere[4], before, after;
@@ -539,7 +542,6 @@ static qmat_status refit(qmat_simplification *s, size_t *moved) {
       update_neighbourhood(s);
       ++*moved;
     }
-    if (status == QMAT_OK) status = report_progress(s);
     if (status != QMAT_OK) return status;
   }
   s->moves += *moved;

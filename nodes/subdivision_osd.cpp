@@ -180,7 +180,11 @@ qmat_status make(qmat_context *context, const qmat_cage *cage, int level, int de
   }
   Far::TopologyRefiner::UniformOptions options(depth);
   options.fullTopologyInLastLevel = true;
+  qmat_status status = qmat_progress(context, 0, 0, "levels");
+  if (status != QMAT_OK) return status;
   refiner->RefineUniform(options);
+  status = qmat_progress(context, 0, 0, "levels");
+  if (status != QMAT_OK) return status;
   return fill(context, *refiner, limits_of(*refiner, cage, &limit->unresolved), level, limit);
 }
 

@@ -614,6 +614,37 @@ static void test_progress_function_cancels(void **state) {
   }
 }
 
+/* How often a run asks whether it may go on when no time is too short, by what it is at. */
+typedef struct {
+  qmat_context *context;
+  size_t control_points, collapses;
+} questions;
+
+static bool count_question(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                           const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total;
+  questions *asked = user;
+  asked->context->progress_time = 0;
+  asked->control_points += strcmp(unit, "control points") == 0;
+  asked->collapses += strcmp(unit, "collapses") == 0;
+  return true;
+}
+
+static void test_it_asks_whether_to_go_on_at_every_few_points_and_collapses(void **state) {
+  (void)state;
+  const pipeline *p = model(TORUS);
+  qmat_context context = {0};
+  questions asked = {.context = &context};
+  context.progress = count_question;
+  context.progress_user = &asked;
+  result r;
+  assert_int_equal(try_simplify(&context, p, p->medial, "epsilon=4%", &r), QMAT_OK);
+  assert_true(asked.control_points >= (p->samples->count + p->mesh->triangle_count) / 2048);
+  assert_true(asked.collapses >= (p->medial->sphere_count - r.medial->sphere_count) / 16);
+  release(&r);
+  qmat_context_uninit(&context);
+}
+
 /* --- invariance --------------------------------------------------------------------------------------------------- */
 
 static void test_moving_scaling_and_shuffling_change_little(void **state) {
@@ -692,6 +723,7 @@ int main(void) {
       cmocka_unit_test(test_isolated_spheres_stay_beside_what_collapses),
       cmocka_unit_test(test_inputs_of_another_mesh_are_named),
       cmocka_unit_test(test_progress_function_cancels),
+      cmocka_unit_test(test_it_asks_whether_to_go_on_at_every_few_points_and_collapses),
       cmocka_unit_test(test_moving_scaling_and_shuffling_change_little),
       cmocka_unit_test(test_threads_do_not_change_a_byte),
   };
