@@ -384,6 +384,17 @@ static qmat_status check_inputs(qmat_context *context, const qmat_node *node, co
   return QMAT_OK;
 }
 
+static qmat_status check_counts(qmat_context *context, const qmat_node *node, const void *params,
+                                const qmat_value *const inputs[]) {
+  if (node->check_counts == NULL) return QMAT_OK;
+  size_t *counts = qmat_alloc(qmat_input_count(node), sizeof *counts);
+  if (counts == NULL) return qmat_fail_memory(context, "the counts of values");
+  for (size_t i = 0; i < qmat_input_count(node); ++i) counts[i] = qmat_value_count(inputs[i]);
+  const qmat_status status = node->check_counts(context, params, counts);
+  qmat_free(counts);
+  return status;
+}
+
 static qmat_status check_outputs(qmat_context *context, const qmat_node *node, qmat_value *const outputs[]) {
   for (size_t i = 0; i < qmat_output_count(node); ++i) {
     if (outputs[i] != NULL && outputs[i]->sealed && fits(&node->outputs[i], outputs[i])) continue;
@@ -399,6 +410,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
   context->node_type = node->name;
   for (size_t i = 0; i < qmat_output_count(node); ++i) outputs[i] = NULL;
   qmat_status status = check_inputs(context, node, inputs);
+  if (status == QMAT_OK) status = check_counts(context, node, params, inputs);
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "");
   if (status == QMAT_OK) {
     context->error.status = QMAT_OK;

@@ -71,6 +71,10 @@ typedef struct qmat_node {
   const qmat_library *const *libraries; /* those that may change its results, ended by NULL; NULL: none */
   /* Rules between parameters; NULL: none. Fails with qmat_fail + qmat_fail_field. */
   qmat_status (*check)(qmat_context *context, const void *params);
+  /* Rules for how many values the inputs that take lists whole are given; NULL: none. `counts` has a number for every
+   * input, 0 where nothing is given. Fails as `check` does. Asked by qmat_node_run, and by the runner as soon as the
+   * counts are known. */
+  qmat_status (*check_counts)(qmat_context *context, const void *params, const size_t counts[]);
   /* Makes every output, sealed, one reference each (the caller releases them). On failure no output is set.
    * params and inputs are const; scratch comes from context->arena. */
   qmat_status (*run)(qmat_context *context, const void *params, const qmat_value *const inputs[],
@@ -97,11 +101,11 @@ qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const
                              void *params);
 
 /* Runs a node whose parameters have been checked. `inputs` and `outputs` hold one pointer per port; outputs start out
- * NULL. What the descriptor promises is looked at on both sides: every input that is not optional is there, and every
- * input is sealed and of its port's type, else QMAT_ERROR_USAGE names the port and the node does not run; on success
- * every output is sealed and of its port's type, else QMAT_ERROR_INTERNAL; on failure every output is NULL and an error
- * is recorded. Asks the progress function once, with 0 of 0, before it starts. The caller releases the outputs. Scratch
- * memory of the context is freed. */
+ * NULL. What the descriptor promises is looked at on both sides: every input that is not optional is there, every input
+ * is sealed and of its port's type, and the lists are as long as the node wants them, else QMAT_ERROR_USAGE names the
+ * port and the node does not run; on success every output is sealed and of its port's type, else QMAT_ERROR_INTERNAL;
+ * on failure every output is NULL and an error is recorded. Asks the progress function once, with 0 of 0, before it
+ * starts. The caller releases the outputs. Scratch memory of the context is freed. */
 qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
                           const qmat_value *const inputs[], qmat_value *outputs[]);
 

@@ -836,6 +836,51 @@ static qmat_status take_name(executor *executor, const qmat_run_step *step, bool
   return QMAT_OK;
 }
 
+// Whether a step has made a list of its own accord, and not because it was given one.
+static bool made_list(const qmat_node *type, const qmat_run_step *step) {
+  for (size_t port = 0; port < qmat_output_count(type); port++)
+    if (type->outputs[port].list && step->made[port].items > 1) return true;
+  return false;
+}
+
+// Refuses what later steps would refuse for the lengths of their lists, before the steps in between are run.
+static qmat_status check_list_lengths(executor *executor, size_t next) {
+  const qmat_run *run = executor->run;
+  qmat_context *context = executor->context;
+  size_t most_inputs = 0;
+  for (size_t i = 0; i < run->step_count; i++) {
+    const size_t count = qmat_input_count(run->graph->nodes[run->steps[i].node].type);
+    if (count > most_inputs) most_inputs = count;
+  }
+  size_t *of_slots = qmat_calloc(run->slot_count, sizeof *of_slots); /* 0: not known yet */
+  size_t *counts = qmat_calloc(most_inputs, sizeof *counts);
+  qmat_status status = of_slots && counts ? QMAT_OK : qmat_fail_memory(context, "the counts of values");
+  for (size_t i = 0; i < run->slot_count && status == QMAT_OK; i++)
+    if (run->slots[i].step == SIZE_MAX) of_slots[i] = qmat_value_count(run->slots[i].value);
+  for (size_t i = 0; i < run->step_count && status == QMAT_OK; i++) {
+    const qmat_run_step *step = &run->steps[i];
+    const qmat_graph_node *node = &run->graph->nodes[step->node];
+    size_t lifted = 1;
+    bool known = true;
+    for (size_t port = 0; port < qmat_input_count(node->type); port++) {
+      counts[port] = step->inputs[port] == SIZE_MAX ? 0 : of_slots[step->inputs[port]];
+      if (step->inputs[port] != SIZE_MAX && counts[port] == 0) known = false;
+      if (!node->type->inputs[port].list && counts[port] > lifted) lifted = counts[port];
+    }
+    for (size_t port = 0; port < qmat_output_count(node->type); port++) {
+      const bool open = !known || (node->type->outputs[port].list && lifted == 1);
+      of_slots[step->first_slot + port] = step->done ? step->made[port].items : open ? 0 : lifted;
+    }
+    if (i < next || !known || !node->type->check_counts) continue;
+    context->node_id = node->id;
+    context->node_type = node->type->name;
+    status = node->type->check_counts(context, step->params, counts);
+  }
+  qmat_free(of_slots);
+  qmat_free(counts);
+  return status;
+}
+
 static qmat_status execute_step(executor *executor, size_t index, bool *named) {
   qmat_run *run = executor->run;
   qmat_run_step *step = &run->steps[index];
@@ -854,6 +899,7 @@ static qmat_status execute_step(executor *executor, size_t index, bool *named) {
     status = run_step(executor, index);
   }
   if (status == QMAT_OK) status = take_name(executor, step, named);
+  if (status == QMAT_OK && made_list(node->type, step)) status = check_list_lengths(executor, index + 1);
   for (size_t port = 0; port < qmat_input_count(node->type); port++)
     if (step->inputs[port] != SIZE_MAX) run->slots[step->inputs[port]].readers--;
   release_unread(run);

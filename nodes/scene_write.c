@@ -141,17 +141,29 @@ static qmat_status write_usd(qmat_context *context, const scene_write_params *pa
                         file);
 }
 
-/* What goes with a list of medial meshes is a list, too, of as many. */
-static qmat_status check_lists(qmat_context *context, const qmat_value *const inputs[]) {
+/* What goes with a list of medial meshes is a list, too, of as many; not every format holds several. */
+static qmat_status check_counts(qmat_context *context, const void *data, const size_t counts[]) {
   static const int others[] = {IN_SKIN, IN_REPORT};
   static const char *const names[] = {"skin", "report"};
-  const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
+  const scene_write_params *params = data;
+  const bool is_gltf = params->format == FORMAT_GLB || params->format == FORMAT_GLTF;
+  const size_t count = counts[IN_MEDIAL];
+  if (!is_gltf && count > 1) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the format holds one medial mesh, and there are %zu", count);
+    qmat_fail_field(context, "medial");
+    return qmat_fail_hint(context, "choose one by scene.read's parameter mesh, or set that to merged");
+  }
   for (size_t i = 0; i < 2; i++) {
-    const size_t of_other = qmat_value_count(inputs[others[i]]);
+    const size_t of_other = counts[others[i]];
     if (of_other == 0 || of_other == count) continue;
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu are given for %zu medial meshes", of_other, count);
     return qmat_fail_field(context, names[i]);
   }
+  return QMAT_OK;
+}
+
+static qmat_status check_spheres(qmat_context *context, const qmat_value *const inputs[]) {
+  const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   for (size_t i = 0; i < count; i++) {
     const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
     if (!medial || medial->sphere_count > 0) continue;
@@ -166,16 +178,9 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
                        qmat_value *outputs[]) {
   const scene_write_params *params = data;
   const qmat_medial *medial = (const qmat_medial *)inputs[IN_MEDIAL];
-  const bool is_gltf = params->format == FORMAT_GLB || params->format == FORMAT_GLTF;
   qmat_file *file = NULL;
-  qmat_status status = check_lists(context, inputs);
+  qmat_status status = check_spheres(context, inputs);
   if (status != QMAT_OK) return status;
-  if (!is_gltf && qmat_value_count(inputs[IN_MEDIAL]) > 1) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the format holds one medial mesh, and there are %zu",
-              qmat_value_count(inputs[IN_MEDIAL]));
-    qmat_fail_field(context, "medial");
-    return qmat_fail_hint(context, "choose one by scene.read's parameter mesh, or set that to merged");
-  }
   switch ((file_format)params->format) {
     case FORMAT_MA:
       status = qmat_ma_write(context, medial, &file);
@@ -288,5 +293,6 @@ const qmat_node qmat_node_scene_write = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .check_counts = check_counts,
     .run = run,
 };

@@ -270,6 +270,8 @@ if qmat mat scene/in.gltf -o all.ma --epsilon 10% --set model.mesh=all >said.txt
   fail "a scene: several medial meshes in a format of one"
 else
   holds "a scene: several do not fit where one does" grep -q 'holds one medial mesh, and there are 2' complaints.txt
+  qmat mat scene/in.gltf -o all.ma --set model.mesh=all --progress json >events.txt 2>&1
+  holds "a scene: that is found before anything is computed" test "$(grep -c '"start"' events.txt)" -eq 1
 fi
 
 # A mesh that encloses nothing stays as it is, and is told; where no mesh is left, there is no result.

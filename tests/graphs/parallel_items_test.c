@@ -27,7 +27,7 @@ static qmat_status run(void *user, qmat_context *context, size_t item) {
   journal *j = user;
   j->runs[item]++;
   j->threads[item] = qmat_threads(context);
-  const int in_use = j->in_use += context->threads;
+  const int in_use = atomic_fetch_add(&j->in_use, context->threads) + context->threads;
   int most = j->most_in_use;
   while (in_use > most && !atomic_compare_exchange_weak(&j->most_in_use, &most, in_use)) continue;
   void *scratch = qmat_arena_alloc(&context->arena, 100, 1); /* each item has an arena of its own */
