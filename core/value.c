@@ -754,6 +754,10 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
   if (status == QMAT_OK) status = check_u32_count(context, mesh->triangle_count, "facets");
   if (status == QMAT_OK) status = check_finite(context, mesh->positions, mesh->vertex_count, 3, "vertex", "position");
   if (status != QMAT_OK) return status;
+  if (!(mesh->deviation >= 0 && isfinite(mesh->deviation))) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is no length");
+    return qmat_fail_field(context, "deviation");
+  }
   for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
     if (mesh->triangles[i] < mesh->vertex_count) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "corner %zu names vertex %u of %zu", i % 3, mesh->triangles[i],

@@ -504,6 +504,12 @@ static void test_bad_meshes_name_the_first_bad_element(void **state) {
   mesh = mesh_example();
   mesh->vertex_count = 0;
   assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "facet 0: corner 0 names vertex 0 of 0");
+  const double no_lengths[] = {-1e-300, (double)NAN, (double)INFINITY};
+  for (size_t i = 0; i < sizeof no_lengths / sizeof *no_lengths; i++) {
+    mesh = mesh_example();
+    mesh->deviation = no_lengths[i];
+    assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "deviation: it is no length");
+  }
 }
 
 /* Two surfaces: a quad with everything that a cage can have, and a triangle. */
