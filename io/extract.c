@@ -128,17 +128,28 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
   return status;
 }
 
-/* What is said of a carrier; NULL when memory is short. */
-static json_t *describe_carrier(const json_t *root, size_t index) {
-  const json_t *nodes = json_object_get(root, "nodes"), *node = json_array_get(nodes, index);
-  const char *name = json_string_value(json_object_get(node, "name"));
-  size_t alike = 0;
-  for (size_t i = 0; name && i < json_array_size(nodes); i++) {
-    const char *other = json_string_value(json_object_get(json_array_get(nodes, i), "name"));
-    alike += other && strcmp(other, name) == 0;
+/* How many nodes have each name, by name; NULL when memory is short. */
+static json_t *count_names(const json_t *nodes) {
+  json_t *counts = json_object();
+  bool done = counts != NULL;
+  for (size_t i = 0; i < json_array_size(nodes) && done; i++) {
+    const char *name = json_string_value(json_object_get(json_array_get(nodes, i), "name"));
+    if (!name) continue;
+    const json_int_t before = json_integer_value(json_object_get(counts, name));
+    done = json_object_set_new(counts, name, json_integer(before + 1)) == 0;
   }
+  if (done) return counts;
+  json_decref(counts);
+  return NULL;
+}
+
+/* What is said of a carrier; NULL when memory is short. */
+static json_t *describe_carrier(const json_t *root, size_t index, const json_t *name_counts) {
+  const json_t *node = json_array_get(json_object_get(root, "nodes"), index);
+  const char *name = json_string_value(json_object_get(node, "name"));
+  const bool alone = name && json_integer_value(json_object_get(name_counts, name)) == 1;
   json_t *carrier = json_object();
-  json_t *text = alike == 1 ? json_string(name) : json_sprintf("%zu", index);
+  json_t *text = alone ? json_string(name) : json_sprintf("%zu", index);
   const int64_t mesh = qmat_gltf_mesh_of(node);
   bool done = json_object_set_new(carrier, "node", text) == 0;
   if (mesh >= 0 && !qmat_gltf_is_skin(root, (size_t)mesh))
@@ -152,22 +163,23 @@ json_t *qmat_medial_carriers(qmat_context *context, const char *path) {
   qmat_bytes bytes = {0};
   qmat_gltf_asset asset = {0};
   qmat_format format = QMAT_FORMAT_UNKNOWN;
-  json_t *carriers = json_array();
-  qmat_status status = carriers ? qmat_bytes_read_file(context, path, &bytes) : qmat_fail_memory(context, "facts");
+  json_t *carriers = json_array(), *seen = json_object(), *name_counts = NULL; /* the keys of `seen` are data */
+  qmat_status status =
+      carriers && seen ? qmat_bytes_read_file(context, path, &bytes) : qmat_fail_memory(context, "facts");
   if (status == QMAT_OK) status = qmat_format_choose(context, path, &bytes, &format);
   if (status == QMAT_OK && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF))
     status = qmat_gltf_asset_init(context, bytes.data, bytes.size, path, &asset);
   const json_t *nodes = json_object_get(asset.root, "nodes");
+  if (status == QMAT_OK && !(name_counts = count_names(nodes))) status = qmat_fail_memory(context, "facts");
   for (size_t i = 0; i < json_array_size(nodes) && status == QMAT_OK; i++) {
-    const json_t *data = data_of(json_array_get(nodes, i));
-    bool known = data == NULL;
-    for (size_t k = 0; k < i && !known; k++) {
-      const json_t *other = data_of(json_array_get(nodes, k));
-      known = other && json_equal((json_t *)(uintptr_t)other, (json_t *)(uintptr_t)data);
-    }
-    if (!known && json_array_append_new(carriers, describe_carrier(asset.root, i)) != 0)
+    const char *data = json_string_value(data_of(json_array_get(nodes, i)));
+    if (!data || json_object_get(seen, data)) continue;
+    if (json_object_set_new(seen, data, json_true()) != 0 ||
+        json_array_append_new(carriers, describe_carrier(asset.root, i, name_counts)) != 0)
       status = qmat_fail_memory(context, "facts");
   }
+  json_decref(name_counts);
+  json_decref(seen);
   qmat_gltf_asset_uninit(&asset);
   qmat_bytes_uninit(&bytes);
   if (status == QMAT_OK) return carriers;

@@ -18,7 +18,8 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
 
 /* The nodes of a glTF asset whose medial meshes differ, each by what qmat_medial_extract takes as `name`: its name, or
  * its number where it has none or shares it. An array of objects with "node" and, where it carries one, the number of
- * its "mesh"; of other formats empty. NULL on failure, with the error recorded. The caller calls json_decref. */
+ * its "mesh"; of other formats empty. NULL on failure, with the error recorded. The caller calls json_decref. Linear.
+ */
 json_t *qmat_medial_carriers(qmat_context *context, const char *path);
 
 #endif

@@ -105,9 +105,9 @@ static int hex_digit(char c) {
   return -1;
 }
 
-char *qmat_gltf_relative_path(const char *uri, size_t length) {
-  char *path = qmat_alloc(length + 1, 1);
-  if (!path) return NULL;
+qmat_status qmat_gltf_relative_path(qmat_context *context, const char *uri, size_t length, char **name) {
+  char *path = *name = qmat_alloc(length + 1, 1);
+  if (!path) return qmat_fail_memory(context, "the name of a file");
   size_t used = 0;
   bool sound = length > 0;
   for (size_t i = 0; i < length && sound; i++) {
@@ -130,9 +130,10 @@ char *qmat_gltf_relative_path(const char *uri, size_t length) {
     part += part_length;
     if (*part == '/') part++;
   }
-  if (sound && used > 0 && path[used - 1] != '/') return path;
+  if (sound && path[used - 1] != '/') return QMAT_OK;
   qmat_free(path);
-  return NULL;
+  *name = NULL;
+  return QMAT_OK;
 }
 
 char *qmat_gltf_beside(const char *asset, const char *name) {
@@ -262,9 +263,11 @@ static qmat_status add_part(keeper *keeper, const char *name, const uint8_t *byt
 }
 
 static qmat_status warn(const keeper *keeper, const char *uri, const char *what) {
-  char text[512];
-  snprintf(text, sizeof text, "the file \"%.200s\" %s: it is not copied", uri, what);
-  return json_array_append_new(keeper->warnings, json_string(text)) == 0
+  enum { MOST_BYTES = 200 };
+  size_t length = strnlen(uri, MOST_BYTES);
+  while (length > 0 && ((unsigned char)uri[length] & 0xC0) == 0x80) length--; /* not within a character */
+  json_t *text = json_sprintf("the file \"%.*s\" %s: it is not copied", (int)length, uri, what);
+  return json_array_append_new(keeper->warnings, text) == 0
              ? QMAT_OK
              : qmat_fail_memory(keeper->context, "the warnings of a reader");
 }
@@ -288,7 +291,9 @@ static void shorten(char *name) {
 
 static qmat_status keep_file(keeper *keeper, const char *uri, size_t length) {
   if (strncmp(uri, "data:", 5) == 0) return QMAT_OK;
-  char *name = qmat_gltf_relative_path(uri, length);
+  char *name;
+  qmat_status status = qmat_gltf_relative_path(keeper->context, uri, length, &name);
+  if (status != QMAT_OK) return status;
   if (name) shorten(name);
   if (!name || !qmat_is_part_name(name) || !qmat_is_utf8(name)) {
     qmat_free(name);
@@ -297,7 +302,6 @@ static qmat_status keep_file(keeper *keeper, const char *uri, size_t length) {
   bool known = false;
   for (size_t i = 1; i < keeper->scene->part_count && !known; i++)
     known = strcmp(keeper->scene->parts[i].name, name) == 0;
-  qmat_status status = QMAT_OK;
   if (!known) {
     qmat_context *context = keeper->context;
     const qmat_error before = context->error;

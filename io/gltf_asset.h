@@ -13,8 +13,7 @@
 /* The key in a mesh's extras that says that it is the skin of a medial mesh, and no model. */
 #define QMAT_GLTF_SKIN_MARK "qmat_skin"
 
-/* A .glb or .gltf as its JSON and its bytes, with nothing checked but the container. A zeroed one is empty and valid.
- */
+/* A .glb or .gltf as its JSON and its bytes, only the container checked. A zeroed one is empty and valid. */
 typedef struct qmat_gltf_asset {
   bool binary;
   json_t *root;         /* an object */
@@ -32,9 +31,9 @@ qmat_status qmat_gltf_asset_init(qmat_context *context, const uint8_t *bytes, si
 void qmat_gltf_asset_uninit(qmat_gltf_asset *asset);
 
 /* The name of an external file that the `length` characters of a URI stand for, below the asset's folder: percent
- * signs decoded, blanks kept. NULL when it is not a relative path that stays inside that folder; the caller frees it
- * with qmat_free. */
-char *qmat_gltf_relative_path(const char *uri, size_t length);
+ * signs decoded, blanks kept. `*name` is NULL when it is not a relative path that stays inside that folder; the caller
+ * frees it with qmat_free. QMAT_ERROR_MEMORY. */
+qmat_status qmat_gltf_relative_path(qmat_context *context, const char *uri, size_t length, char **name);
 
 /* The path of a file below the folder of the file `asset`; NULL when memory is short. qmat_free frees it. */
 char *qmat_gltf_beside(const char *asset, const char *name);
@@ -51,10 +50,10 @@ bool qmat_gltf_is_skin(const json_t *root, size_t mesh);
 /* How many nodes carry that mesh. */
 size_t qmat_gltf_mesh_carriers(const json_t *root, size_t mesh);
 
-/* The meshes that `choice` stands for: "all" (each that a node carries, in their
- * order, without skins that qmat added), else the one of that name,
- * else the one of that number. `*meshes` (qmat_free it) has `*count` of them, at least one. QMAT_ERROR_USAGE for a
- * choice that is none or several, QMAT_ERROR_GEOMETRY where no node carries a mesh, QMAT_ERROR_MEMORY. Linear. */
+/* The meshes that `choice` stands for: "all" (each that a node carries, in their order, without skins that qmat added),
+ * else the one of that name, else the one of that number. `*meshes` (qmat_free it) has `*count` of them, at least one;
+ * NULL on failure. `path` is for errors. QMAT_ERROR_USAGE for a choice that is none or several, QMAT_ERROR_GEOMETRY
+ * where no node carries a mesh, QMAT_ERROR_MEMORY. Linear. */
 qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, const char *path, const char *choice,
                                     uint32_t **meshes, size_t *count);
 

@@ -247,12 +247,14 @@ static qmat_status load_external(const checker *check, size_t index, const char 
       return QMAT_OK;
     }
   }
-  char *name = qmat_gltf_relative_path(uri, uri_length);
+  char *name;
+  qmat_status status = qmat_gltf_relative_path(check->context, uri, uri_length, &name);
+  if (status != QMAT_OK) return status;
   if (!name) {
     return fail(check, "buffer", index, "its uri \"%.100s\" is not a relative path inside the asset's folder", uri);
   }
   char *path = qmat_gltf_beside(check->path, name);
-  qmat_status status = path ? qmat_bytes_read_file(check->context, path, &buffer->file) : fail_memory(check);
+  status = path ? qmat_bytes_read_file(check->context, path, &buffer->file) : fail_memory(check);
   if (status != QMAT_OK && path) qmat_fail_element(check->context, "buffer", (int64_t)index);
   buffer->bytes = buffer->file.data;
   buffer->size = buffer->file.size;

@@ -32,10 +32,13 @@ typedef struct qmat_gltf_options {
  *      qmat_data_format  "draco"
  *      qmat_vertices, qmat_edges, qmat_triangles     counts of the medial mesh
  *      qmat_epsilon      as in the options; missing when not known
- *      qmat_error_out, qmat_error_in   of what qmat_data decodes to: those of the options and qmat_quantisation,
- * rounded up; missing when not known qmat_error_unit   "diagonal"; with them qmat_certified    that both are at most
- * qmat_epsilon, where the options say so before quantisation; missing when not known qmat_quantisation the largest |dc|
- * + |dr| of a sphere of `medial` against the one decoded from qmat_data qmat_quantisation_unit  "model"
+ *      qmat_error_out    of what qmat_data decodes to: those of the options and qmat_quantisation,
+ *      qmat_error_in     rounded up; missing when not known
+ *      qmat_error_unit   "diagonal"; with the three above
+ *      qmat_certified    that both are at most qmat_epsilon, where the options say so before quantisation;
+ *                        missing when not known
+ *      qmat_quantisation       the largest |dc| + |dr| of a sphere of `medial` against the one that qmat_data has
+ *      qmat_quantisation_unit  "model"
  *      qmat_position_bits, qmat_radius_bits
  *      qmat_frame        "node": spheres are in the node's local space, like the skin
  * Chosen bits are raised until the measured error is within options->quantisation or single precision ends; with

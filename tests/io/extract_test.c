@@ -219,11 +219,53 @@ static void test_broken_data_and_wrong_counts_are_errors(void **state) {
   qmat_context_uninit(&context);
 }
 
+static void test_carriers_are_told_apart_by_what_names_them(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  /* The two named A differ; B has what the first A has; the fourth has no name and the last no medial mesh. */
+  json_t *root =
+      json_pack("{s:{s:s}, s:[{}], s:[{s:s, s:i, s:{s:s}}, {s:s, s:{s:s}}, {s:s, s:{s:s}}, {s:{s:s}}, {s:s, s:{s:i}}]}",
+                "asset", "version", "2.0", "meshes", "nodes", "name", "A", "mesh", 0, "extras", "qmat_data", "QUJD",
+                "name", "A", "extras", "qmat_data", "QUJE", "name", "B", "extras", "qmat_data", "QUJD", "extras",
+                "qmat_data", "QUJF", "name", "C", "extras", "qmat_data", 7);
+  assert_non_null(root);
+  size_t size;
+  char *text = qmat_json_text(root, 0, &size), path[128];
+  assert_non_null(text);
+  snprintf(path, sizeof path, "%s/a.gltf", folder);
+  write_file(path, text, size);
+  json_t *carriers = qmat_medial_carriers(&context, path);
+  assert_non_null(carriers);
+  static const char *const expected[] = {"0", "1", "3"};
+  assert_int_equal(json_array_size(carriers), 3);
+  for (size_t i = 0; i < 3; i++) {
+    const json_t *carrier = json_array_get(carriers, i), *mesh = json_object_get(carrier, "mesh");
+    assert_string_equal(json_string_value(json_object_get(carrier, "node")), expected[i]);
+    assert_true(json_is_integer(mesh) == (i == 0));
+  }
+  json_decref(carriers);
+  /* Without the second A, the first is known by its name. */
+  json_array_remove(json_object_get(root, "nodes"), 1);
+  qmat_free(text);
+  text = qmat_json_text(root, 0, &size);
+  write_file(path, text, size);
+  carriers = qmat_medial_carriers(&context, path);
+  assert_int_equal(json_array_size(carriers), 2);
+  assert_string_equal(json_string_value(json_object_get(json_array_get(carriers, 0), "node")), "A");
+  assert_string_equal(json_string_value(json_object_get(json_array_get(carriers, 1), "node")), "2");
+  json_decref(carriers);
+  json_decref(root);
+  qmat_free(text);
+  unlink(path);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_what_was_written_comes_back_with_its_facts),
       cmocka_unit_test(test_every_form_gives_back_what_was_written_within_what_it_states),
       cmocka_unit_test(test_of_several_one_has_to_be_named),
+      cmocka_unit_test(test_carriers_are_told_apart_by_what_names_them),
       cmocka_unit_test(test_broken_data_and_wrong_counts_are_errors),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);

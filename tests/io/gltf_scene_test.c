@@ -364,6 +364,28 @@ static void test_one_of_all_meshes_gets_a_node_of_the_scene(void **state) {
   release(&f);
 }
 
+static void test_a_long_name_of_a_missing_file_is_told_in_whole_characters(void **state) {
+  (void)state;
+  char name[256];
+  memset(name, 'a', 199);
+  snprintf(name + 199, sizeof name - 199, "\xC3\xA9.png"); /* the 200th byte is the first of two */
+  json_t *root = json_pack("{s:[{s:s}]}", "images", "uri", name), *warnings = json_array();
+  assert_true(root && warnings);
+  qmat_context context = {0};
+  qmat_scene *scene = qmat_scene_new();
+  const uint8_t bytes[] = {'{', '}'};
+  assert_int_equal(qmat_gltf_keep(&context, root, bytes, sizeof bytes, "/nowhere/at/all.gltf", scene, warnings),
+                   QMAT_OK);
+  assert_int_equal(scene->part_count, 1);
+  assert_int_equal(json_array_size(warnings), 1);
+  memcpy(name + 199, "\" cannot be read", 17);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), name));
+  qmat_value_release(&scene->base);
+  json_decref(root);
+  json_decref(warnings);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_meshes_are_read_once_each_in_their_own_space),
@@ -372,6 +394,7 @@ int main(void) {
       cmocka_unit_test(test_what_comes_out_is_read_again_with_the_same_meshes),
       cmocka_unit_test(test_a_second_time_replaces_what_the_first_left),
       cmocka_unit_test(test_one_of_all_meshes_gets_a_node_of_the_scene),
+      cmocka_unit_test(test_a_long_name_of_a_missing_file_is_told_in_whole_characters),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
