@@ -27,7 +27,7 @@ typedef enum element {
   ELEMENT_SIZE = 8,    /* size_t that is no row's count, as u64 */
   ELEMENT_PARTS = 9,   /* qmat_file_part array: u64 count, then per part text name, u64 size, bytes */
   ELEMENT_NUMBER = 10, /* one double */
-  ELEMENT_ITEMS = 11,  /* qmat_value * array: per value u64 size and its binary form */
+  ELEMENT_ITEMS = 11,  /* qmat_value * array: per value the u64 size of its binary form, and its digest */
   ELEMENT_NAMES = 12   /* char * array: texts */
 } element;
 
@@ -452,7 +452,7 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
         sink size = {0};
         if (!write_rows(&size, items[i])) return false;
         put_u64(to, size.used);
-        if (!write_rows(to, items[i])) return false;
+        put(to, items[i]->digest.bytes, sizeof items[i]->digest.bytes);
       }
       return true;
     }
@@ -1010,6 +1010,7 @@ static qmat_status check_list(qmat_context *context, const qmat_value *value) {
 typedef struct reader {
   const uint8_t *bytes;
   size_t size, used;
+  const qmat_value_source *items;
 } reader;
 
 static qmat_status fail_form(qmat_context *context, const reader *from, const char *what) {
@@ -1121,32 +1122,20 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   return QMAT_OK;
 }
 
-/* Grows an array of pointers that is owned by a list by one. */
-static void **add_pointer(qmat_value *value, const row *r, size_t *capacity, size_t count) {
-  void *array = pointer_of(value, r);
-  if (qmat_grow(&array, capacity, count + 1, sizeof(void *)) != 0) return NULL;
-  set_pointer(value, r, array);
-  ((void **)array)[count] = NULL;
-  return (void **)array + count;
-}
-
 static qmat_status read_items(qmat_context *context, reader *from, qmat_value *value, const row *r) {
-  size_t *count = mutable_slot(value, r->count_offset), capacity = 0;
-  while (from->used < from->size) {
-    uint64_t size;
-    const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
-    if (bytes == NULL) return fail_form(context, from, "an item is longer than what is left");
-    /* Lists hold no lists, which also bounds the depth. */
-    static const uint8_t list_start[] = {4, 0, 0, 0, 'l', 'i', 's', 't'};
-    if (size >= 16 && memcmp(bytes + 8, list_start, sizeof list_start) == 0)
-      return fail_form(context, from, "an item is a list");
-    void **place = add_pointer(value, r, &capacity, *count);
-    if (place == NULL) return qmat_fail_memory(context, "the items of a list");
-    qmat_value *item;
-    const qmat_status status = qmat_value_deserialize(context, bytes, (size_t)size, &item);
-    if (status != QMAT_OK) return status;
-    *place = item;
-    ++*count;
+  qmat_digest digest;
+  const size_t count = from->size / (8 + sizeof digest.bytes);
+  if (from->size % (8 + sizeof digest.bytes) != 0) return fail_form(context, from, "an item is cut short");
+  qmat_value **items = qmat_calloc(count, sizeof *items);
+  if (items == NULL) return qmat_fail_memory(context, "the items of a list");
+  set_pointer(value, r, items);
+  *(size_t *)mutable_slot(value, r->count_offset) = count;
+  for (size_t i = 0; i < count; ++i) {
+    uint64_t size = 0;
+    take_u64(from, &size);
+    memcpy(digest.bytes, take(from, sizeof digest.bytes), sizeof digest.bytes);
+    items[i] = from->items != NULL ? from->items->find(from->items->user, &digest, size) : NULL;
+    if (items[i] == NULL) return fail_form(context, from, "an item is not at hand");
   }
   return QMAT_OK;
 }
@@ -1226,7 +1215,7 @@ static qmat_status read_rows(qmat_context *context, reader *from, qmat_value *va
     uint64_t size;
     const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
     if (bytes == NULL) return fail_form(context, from, "a row is longer than what is left");
-    reader content = {bytes, (size_t)size, 0};
+    reader content = {bytes, (size_t)size, 0, from->items};
     const qmat_status status = read_content(context, &content, value, r);
     if (status != QMAT_OK) {
       if (status == QMAT_ERROR_FORMAT) fail_element(context, "byte", from->used - content.size + content.used);
@@ -1238,9 +1227,10 @@ static qmat_status read_rows(qmat_context *context, reader *from, qmat_value *va
   return QMAT_OK;
 }
 
-qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, size_t size, qmat_value **value) {
+qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, size_t size,
+                                   const qmat_value_source *items, qmat_value **value) {
   *value = NULL;
-  reader from = {bytes, size, 0};
+  reader from = {bytes, size, 0, items};
   const uint8_t *magic = take(&from, sizeof MAGIC);
   uint32_t version;
   if (magic == NULL || memcmp(magic, MAGIC, sizeof MAGIC) != 0) {

@@ -203,10 +203,20 @@ const char *qmat_value_type_name(qmat_value_type type);
 /* The bytes that the value's arrays hold. */
 size_t qmat_value_bytes(const qmat_value *value);
 
-/* The versioned little-endian binary form: what the digest is taken over. Writes a qmat_alloc'd buffer that the
- * caller frees. */
+/* The versioned little-endian binary form: what the digest is taken over. That of a list names its items by their
+ * digests and does not hold them. Writes a qmat_alloc'd buffer that the caller frees. */
 qmat_status qmat_value_serialize(qmat_context *context, const qmat_value *value, uint8_t **bytes, size_t *size);
-/* The value that `size` bytes describe, sealed; every length is checked against `size` before it is trusted. */
-qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, size_t size, qmat_value **value);
+
+/* Where the items of a list are found: `find` gives the sealed value whose binary form has that digest and size, for
+ * the caller to release; NULL: it has none. */
+typedef struct qmat_value_source {
+  qmat_value *(*find)(void *user, const qmat_digest *digest, uint64_t size);
+  void *user;
+} qmat_value_source;
+
+/* The value that `size` bytes describe, sealed; every length is checked against `size` before it is trusted. `items`
+ * NULL: lists are refused. QMAT_ERROR_FORMAT, also where an item of a list is not found. */
+qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, size_t size,
+                                   const qmat_value_source *items, qmat_value **value);
 
 #endif

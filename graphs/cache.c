@@ -297,42 +297,70 @@ bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size)
          qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
 }
 
+// The blobs that the items of a list are in. Items are no lists themselves.
+typedef struct list_items {
+  qmat_cache *cache;
+  bool missing; /* one of them is not there, or not what it should be: that is not the list's fault */
+} list_items;
+
 // The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
 // twice.
-static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest, qmat_value_type type) {
+static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest,
+                               const qmat_value_source *items) {
   qmat_context nobody = {0};  // bad bytes are no error here
   qmat_value *value;
-  if (qmat_value_deserialize(&nobody, bytes, size, &value) != QMAT_OK) return NULL;
-  if (value->type == type && qmat_digest_equal(&value->digest, digest)) return value;
+  if (qmat_value_deserialize(&nobody, bytes, size, items, &value) != QMAT_OK) return NULL;
+  if (qmat_digest_equal(&value->digest, digest)) return value;
   qmat_value_release(value);
   return NULL;
 }
 
-static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type) {
+static qmat_value *local_value(qmat_cache *cache, const qmat_digest *digest, const qmat_value_source *items) {
+  qmat_value *value = NULL;
+  qmat_bytes bytes = {0};
+  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  if (path && !is_bad(cache, digest) && read_file(path, &bytes)) {
+    value = parse_value(bytes.data, bytes.size, digest, items);
+    const list_items *list = items ? items->user : NULL;
+    if (!value && !(list && list->missing)) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  }
+  qmat_bytes_uninit(&bytes);
+  qmat_free(path);
+  return value;
+}
+
+static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size,
+                                const qmat_value_source *items) {
   qmat_writer body = {0};
   qmat_value *value = NULL;
   if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size, &body)) {
-    value = body.size == size ? parse_value(body.bytes, body.size, digest, type) : NULL;
+    value = body.size == size ? parse_value(body.bytes, body.size, digest, items) : NULL;
+    const list_items *list = items ? items->user : NULL;
     if (value)
       keep_bytes(cache, QMAT_CACHE_BLOB, digest, body.bytes, body.size);
-    else
+    else if (!(list && list->missing))
       warn_of_lie(cache, "a blob");
   }
   qmat_writer_uninit(&body);
   return value;
 }
 
+static qmat_value *find_item(void *user, const qmat_digest *digest, uint64_t size) {
+  list_items *list = user;
+  qmat_value *item = local_value(list->cache, digest, NULL);
+  if (!item) item = remote_value(list->cache, digest, size, NULL);
+  if (!item) list->missing = true;
+  return item;
+}
+
 qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type) {
-  qmat_value *value = NULL;
-  qmat_bytes bytes = {0};
-  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
-  if (path && !is_bad(cache, digest) && read_file(path, &bytes)) {
-    value = parse_value(bytes.data, bytes.size, digest, type);
-    if (!value) set_aside(cache, QMAT_CACHE_BLOB, digest);
-  }
-  qmat_bytes_uninit(&bytes);
-  qmat_free(path);
-  return value ? value : remote_value(cache, digest, size, type);
+  list_items list = {.cache = cache};
+  const qmat_value_source source = {find_item, &list}, *items = type == QMAT_LIST ? &source : NULL;
+  qmat_value *value = local_value(cache, digest, items);
+  if (!value && !list.missing) value = remote_value(cache, digest, size, items);
+  if (!value || value->type == type) return value;
+  qmat_value_release(value);
+  return NULL;
 }
 
 static void touch(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
@@ -343,10 +371,6 @@ static void touch(const qmat_cache *cache, qmat_cache_kind kind, const qmat_dige
 
 void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key) {
   touch(cache, QMAT_CACHE_RECORD, key);
-}
-
-void qmat_cache_touch_blob(qmat_cache *cache, const qmat_digest *digest) {
-  touch(cache, QMAT_CACHE_BLOB, digest);
 }
 
 /* ---- writing ---- */
@@ -360,19 +384,71 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
 }
 
-bool qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, uint64_t *blob_size, bool *added) {
+// Stores the binary form of a value; gives what a record says of it.
+static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added) {
   qmat_context nobody = {0};
   const qmat_digest *digest = &value->digest;
   uint8_t *bytes;
   size_t size;
-  *added = false;
-  if (!qmat_cache_is_writable(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return false;
-  *blob_size = size;
+  if (!qmat_cache_is_writable(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return NULL;
   bool kept = has_locally(cache, digest, size);
   if (!kept) kept = *added = keep_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
   bool sent = send_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
   qmat_free(bytes);
-  return kept || sent;
+  char hex[65];
+  qmat_digest_hex(digest, hex);
+  return kept || sent ? json_pack("{s:s, s:I}", "digest", hex, "blob", (json_int_t)size) : NULL;
+}
+
+json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *added) {
+  *added = false;
+  json_t *items = value->type == QMAT_LIST ? json_array() : NULL;
+  bool done = value->type != QMAT_LIST || items;
+  for (size_t i = 0; items && i < qmat_value_count(value) && done; i++)
+    done = json_array_append_new(items, put_blob(cache, qmat_value_at(value, i), added)) == 0;
+  json_t *stored = done ? put_blob(cache, value, added) : NULL;
+  if (stored && items && json_object_set(stored, "items", items) != 0) {
+    json_decref(stored);
+    stored = NULL;
+  }
+  json_decref(items);
+  return stored;
+}
+
+// The blobs that a record names for one value: its own, and those of a list's items.
+static size_t blob_count(const json_t *stored) {
+  return 1 + json_array_size(json_object_get(stored, "items"));
+}
+
+static bool blob_at(const json_t *stored, size_t index, qmat_digest *digest, uint64_t *size) {
+  const json_t *blob = index == 0 ? stored : json_array_get(json_object_get(stored, "items"), index - 1);
+  const char *hex = json_string_value(json_object_get(blob, "digest"));
+  const json_int_t bytes = json_integer_value(json_object_get(blob, "blob"));
+  *size = (uint64_t)bytes;
+  return hex && qmat_digest_parse(hex, digest) && bytes > 0;
+}
+
+bool qmat_cache_has_stored(qmat_cache *cache, const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (!blob_at(stored, i, &digest, &size) || !qmat_cache_has(cache, &digest, size)) return false;
+  return true;
+}
+
+void qmat_cache_touch_stored(qmat_cache *cache, const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (blob_at(stored, i, &digest, &size)) touch(cache, QMAT_CACHE_BLOB, &digest);
+}
+
+uint64_t qmat_cache_stored_size(const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size, total = 0;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (blob_at(stored, i, &digest, &size)) total += size;
+  return total;
 }
 
 bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record) {
@@ -492,6 +568,21 @@ static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, cons
   return bsearch(&wanted, entries, count, sizeof *entries, by_kind_and_name);
 }
 
+// Marks the blobs that a record names for one value; false when one of them is missing.
+static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t count, bool *named) {
+  bool complete = true;
+  for (size_t i = 0; i < blob_count(stored); i++) {
+    qmat_digest digest;
+    uint64_t size;
+    qmat_cache_entry *blob = blob_at(stored, i, &digest, &size) ? find_blob(entries, count, &digest) : NULL;
+    if (blob)
+      named[blob - entries] = true;
+    else
+      complete = false;
+  }
+  return complete;
+}
+
 // Marks the blobs that records name (by their use), and deletes records of which one is missing.
 static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t count, qmat_cache_sweep *sweep) {
   const int64_t hour = (int64_t)3600 * 1000000000, now = now_nanoseconds();
@@ -501,15 +592,8 @@ static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t
     json_t *record = qmat_cache_record(cache, &entries[i].digest);
     const json_t *outputs = json_object_get(record, "outputs");
     bool complete = record != NULL;
-    for (size_t k = 0; k < json_array_size(outputs); k++) {
-      const char *hex = json_string_value(json_object_get(json_array_get(outputs, k), "digest"));
-      qmat_digest digest;
-      qmat_cache_entry *blob = hex && qmat_digest_parse(hex, &digest) ? find_blob(entries, count, &digest) : NULL;
-      if (blob)
-        named[blob - entries] = true;
-      else
-        complete = false;
-    }
+    for (size_t k = 0; k < json_array_size(outputs); k++)
+      if (!mark_named(json_array_get(outputs, k), entries, count, named)) complete = false;
     // Another process may have stored the blobs since they were listed.
     if (record && !complete && now - entries[i].used > hour) delete_entry(cache, &entries[i], sweep);
     json_decref(record);
@@ -573,14 +657,8 @@ static qmat_cache_health check_record(qmat_cache *cache, const qmat_cache_entry 
   if (!record) return QMAT_CACHE_BROKEN;
   const json_t *outputs = json_object_get(record, "outputs");
   qmat_cache_health health = QMAT_CACHE_SOUND;
-  for (size_t i = 0; i < json_array_size(outputs); i++) {
-    const json_t *output = json_array_get(outputs, i);
-    const char *hex = json_string_value(json_object_get(output, "digest"));
-    json_int_t size = json_integer_value(json_object_get(output, "blob"));
-    qmat_digest digest;
-    if (!hex || !qmat_digest_parse(hex, &digest) || size < 0 || !qmat_cache_has(cache, &digest, (uint64_t)size))
-      health = QMAT_CACHE_INCOMPLETE;
-  }
+  for (size_t i = 0; i < json_array_size(outputs); i++)
+    if (!qmat_cache_has_stored(cache, json_array_get(outputs, i))) health = QMAT_CACHE_INCOMPLETE;
   json_decref(record);
   return health;
 }

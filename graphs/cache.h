@@ -70,12 +70,19 @@ bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size)
  * should be. */
 qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type);
 
-/* Notes that a record or a blob was used just now: what was used least recently is deleted first. */
+/* Notes that a record was used just now: what was used least recently is deleted first. */
 void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key);
-void qmat_cache_touch_blob(qmat_cache *cache, const qmat_digest *digest);
 
-/* Stores a sealed value; `*blob_size` becomes the size of its blob, `*added` whether it was not there before. */
-bool qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, uint64_t *blob_size, bool *added);
+/* Stores a sealed value; of a list each item as a blob of its own, which other lists and runs share. Gives what a
+ * record says of it: {"digest": hexadecimal, "blob": size of the blob}, of a list with "items", the same of each; NULL
+ * when it could not be stored. `*added`: whether any of it was not there before. The caller calls json_decref. */
+json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *added);
+
+/* Of such an object: whether all blobs that it names are there; that they were used just now; their sizes together. */
+bool qmat_cache_has_stored(qmat_cache *cache, const json_t *stored);
+void qmat_cache_touch_stored(qmat_cache *cache, const json_t *stored);
+uint64_t qmat_cache_stored_size(const json_t *stored);
+
 /* Stores a record; its "key" holds the items of `key`. Store what it names first. */
 bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record);
 

@@ -7,7 +7,7 @@
 /* What the result of a node depends on, as a list of items, and the digest of that list: the key that a result is kept
  * under. The items come from the node's descriptor alone. Each is a JSON array of three texts, tag, name and value:
  *
- *     key      format          "1"
+ *     key      format          "2"
  *     program  sources         digest of the sources of core/, io/ and nodes/ (where it was built so)
  *     node     medial.simplify its version
  *     library  Embree          its version and instruction set
@@ -19,7 +19,7 @@
  *
  * Folders, host, user, time, threads, locale and the node's id are not among them. */
 
-enum { QMAT_KEY_FORMAT = 1 };
+enum { QMAT_KEY_FORMAT = 2 };
 
 /* The items of one run of a node. `inputs` holds a digest per input port, NULL where nothing is connected; `files` one
  * per parameter: of the file that it names, NULL for other parameters and where no path is given. NULL when memory is

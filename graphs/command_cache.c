@@ -70,7 +70,7 @@ static qmat_status list(cache_call *call) {
     if (outputs && node) {
       json_int_t bytes = 0;
       for (size_t k = 0; k < json_array_size(outputs); k++)
-        bytes += json_integer_value(json_object_get(json_array_get(outputs, k), "blob"));
+        bytes += (json_int_t)qmat_cache_stored_size(json_array_get(outputs, k));
       double seconds = json_real_value(json_object_get(record, "seconds"));
       const char *type = json_string_value(json_array_get(node, 1)),
                  *version = json_string_value(json_array_get(node, 2));
@@ -102,7 +102,7 @@ static void print_record(const json_t *record) {
   for (size_t i = 0; i < json_array_size(outputs); i++) {
     const json_t *output = json_array_get(outputs, i);
     char size[32];
-    qmat_format_bytes((uint64_t)json_integer_value(json_object_get(output, "blob")), size);
+    qmat_format_bytes(qmat_cache_stored_size(output), size);
     printf("output   %-16s %s %s (%s)\n", json_string_value(json_object_get(output, "port")),
            json_string_value(json_object_get(output, "type")), json_string_value(json_object_get(output, "digest")),
            size);

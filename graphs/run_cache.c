@@ -141,12 +141,12 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   const json_t *counts = json_object_get(output, "counts");
   json_int_t size = json_integer_value(json_object_get(output, "blob"));
   json_int_t bytes = json_integer_value(json_object_get(output, "bytes"));
-  json_int_t items = json_integer_value(json_object_get(output, "items"));
+  const size_t items = json_array_size(json_object_get(output, "items"));
   const char *expected = qmat_value_type_name(items > 1 ? QMAT_LIST : port->type);
   if (!name || strcmp(name, port->name) != 0 || !type || strcmp(type, expected) != 0 || !hex ||
       !qmat_digest_parse(hex, &made->digest) || size <= 0 || bytes < 0)
     return false;
-  made->items = items > 1 ? (size_t)items : 1;
+  made->items = items > 1 ? items : 1;
   made->blob_size = (uint64_t)size;
   made->bytes = (size_t)bytes;
   for (size_t i = 0; i < 3; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
@@ -173,7 +173,7 @@ static bool take_record(qmat_run *run, size_t index, const json_t *record) {
   const json_t *outputs = json_object_get(record, "outputs");
   for (size_t port = 0; port < qmat_output_count(type); port++) {
     read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port]);
-    if (!qmat_cache_has(run->cache, &step->made[port].digest, step->made[port].blob_size)) return false;
+    if (!qmat_cache_has_stored(run->cache, json_array_get(outputs, port))) return false;
   }
   // Reports are small, and the summary of the run is made of them.
   for (size_t port = 0; port < qmat_output_count(type) && !step->report; port++) {
@@ -187,7 +187,7 @@ static bool take_record(qmat_run *run, size_t index, const json_t *record) {
     qmat_run_slot *slot = &run->slots[step->first_slot + port];
     slot->digest = step->made[port].digest;
     slot->known = true;
-    qmat_cache_touch_blob(run->cache, &slot->digest);
+    qmat_cache_touch_stored(run->cache, json_array_get(outputs, port));
   }
   qmat_cache_touch_record(run->cache, &step->key);
   return true;
@@ -286,16 +286,14 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
     qmat_run_made *made = &step->made[port];
     const qmat_value *value = run->slots[step->first_slot + port].value;
     bool added;
-    char hex[65];
-    qmat_digest_hex(&made->digest, hex);
-    done = qmat_cache_put_value(run->cache, value, &made->blob_size, &added);
+    json_t *stored = qmat_cache_put_value(run->cache, value, &added);
     *any_added = *any_added || added;
-    json_t *output = json_pack("{s:s, s:s, s:s, s:I, s:I, s:[I, I, I]}", "port", type->outputs[port].name, "type",
-                               qmat_value_type_name(value->type), "digest", hex, "blob", (json_int_t)made->blob_size,
-                               "bytes", (json_int_t)made->bytes, "counts", (json_int_t)made->counts[0],
-                               (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
-    if (output && made->items > 1)
-      done = json_object_set_new(output, "items", json_integer((json_int_t)made->items)) == 0 && done;
+    made->blob_size = (uint64_t)json_integer_value(json_object_get(stored, "blob"));
+    json_t *output = json_pack("{s:s, s:s, s:I, s:[I, I, I]}", "port", type->outputs[port].name, "type",
+                               qmat_value_type_name(value->type), "bytes", (json_int_t)made->bytes, "counts",
+                               (json_int_t)made->counts[0], (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
+    done = stored && output && json_object_update(output, stored) == 0;
+    json_decref(stored);
     done = json_array_append_new(outputs, output) == 0 && done;
   }
   if (done) return outputs;

@@ -374,6 +374,7 @@ void qmat_run_print(const qmat_run *run, FILE *out) {
     }
     const qmat_param *format = qmat_output_format_param(node->type);
     if (format) fprintf(out, "%s%s", joint, format->choices[step->format]);
+    if (step->lifted_hits > 0) fprintf(out, "%s%zu of %zu from the cache", joint, step->lifted_hits, step->lifted);
     fputc('\n', out);
   }
   for (size_t i = 0; i < run->file_count; i++) {

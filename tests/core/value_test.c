@@ -142,6 +142,36 @@ static qmat_list *list_example(void) {
   return list;
 }
 
+/* What the items of list_example are found as. */
+static qmat_value *known_item;
+static uint64_t known_size;
+
+static int make_known_item(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  uint8_t *bytes;
+  size_t size;
+  known_item = &field_example()->base;
+  assert_int_equal(qmat_value_seal(&context, known_item), QMAT_OK);
+  assert_int_equal(qmat_value_serialize(&context, known_item, &bytes, &size), QMAT_OK);
+  qmat_free(bytes);
+  known_size = size;
+  return 0;
+}
+
+static int release_known_item(void **state) {
+  (void)state;
+  qmat_value_release(known_item);
+  return 0;
+}
+
+static qmat_value *find_known_item(void *user, const qmat_digest *digest, uint64_t size) {
+  (void)user;
+  return size == known_size && qmat_digest_equal(digest, &known_item->digest) ? qmat_value_retain(known_item) : NULL;
+}
+
+static const qmat_value_source known_items = {find_known_item, NULL};
+
 static qmat_value *example_of(qmat_value_type type) {
   switch (type) {
     case QMAT_SCENE:
@@ -261,7 +291,7 @@ static void test_every_type_is_read_back_to_the_same_bytes_and_digest(void **sta
     size_t size, size_again;
     assert_sealed(&context, value);
     assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
-    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &again), QMAT_OK);
+    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &again), QMAT_OK);
     assert_int_equal(again->type, type);
     assert_int_equal(again->references, 1);
     assert_true(again->sealed);
@@ -285,7 +315,7 @@ static void test_the_content_comes_back_field_by_field(void **state) {
   qmat_value *value;
   assert_sealed(&context, &medial->base);
   assert_int_equal(qmat_value_serialize(&context, &medial->base, &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &value), QMAT_OK);
   const qmat_medial *again = (const qmat_medial *)value;
   assert_int_equal(again->sphere_count, 4);
   assert_int_equal(again->edge_count, 4);
@@ -305,7 +335,7 @@ static void test_the_content_comes_back_field_by_field(void **state) {
   qmat_file *file = file_example();
   assert_sealed(&context, &file->base);
   assert_int_equal(qmat_value_serialize(&context, &file->base, &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &value), QMAT_OK);
   const qmat_file *file_again = (const qmat_file *)value;
   assert_string_equal(file_again->format, "gltf");
   assert_int_equal(file_again->part_count, 3);
@@ -377,7 +407,7 @@ static void test_long_arrays_come_back_whole(void **state) {
   size_t size;
   qmat_value *value;
   assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &value), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &value), QMAT_OK);
   const qmat_mesh *again = (const qmat_mesh *)value;
   assert_memory_equal(again->positions, mesh->positions, 3 * COUNT * sizeof(double));
   assert_memory_equal(again->triangles, mesh->triangles, 3 * COUNT * sizeof(uint32_t));
@@ -401,7 +431,7 @@ static void test_empty_values_are_valid(void **state) {
     size_t size;
     qmat_value *again;
     assert_int_equal(qmat_value_serialize(&context, values[i], &bytes, &size), QMAT_OK);
-    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &again), QMAT_OK);
+    assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &again), QMAT_OK);
     assert_memory_equal(&again->digest, &values[i]->digest, sizeof again->digest);
     if (again->type == QMAT_MEDIAL) assert_null(((const qmat_medial *)again)->region_offsets);
     for (size_t k = 0; k < i; ++k) {
@@ -544,7 +574,7 @@ static void test_cages_come_back_and_bad_ones_name_the_first_bad_element(void **
   qmat_mesh *mesh = cage_example();
   assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_OK);
   assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &read), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &read), QMAT_OK);
   assert_memory_equal(&read->digest, &mesh->base.digest, sizeof read->digest);
   const qmat_cage *cage = &((qmat_mesh *)read)->cage;
   assert_int_equal(cage->surface_count, 2);
@@ -739,7 +769,7 @@ static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
 static qmat_status read_exactly(qmat_context *context, const uint8_t *bytes, size_t size, qmat_value **value) {
   uint8_t *exact = test_malloc(size + (size == 0));
   if (size > 0) memcpy(exact, bytes, size);
-  const qmat_status status = qmat_value_deserialize(context, exact, size, value);
+  const qmat_status status = qmat_value_deserialize(context, exact, size, &known_items, value);
   test_free(exact);
   return status;
 }
@@ -949,7 +979,7 @@ static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing
     size_t granted = 0;
     for (qmat_status status = QMAT_ERROR_MEMORY; status != QMAT_OK; ++granted) {
       allocations_left = granted;
-      status = qmat_value_deserialize(&context, bytes, size, &again);
+      status = qmat_value_deserialize(&context, bytes, size, &known_items, &again);
       if (status == QMAT_OK) break;
       assert_int_equal(status, QMAT_ERROR_MEMORY);
       assert_int_equal(context.error.status, QMAT_ERROR_MEMORY);
@@ -985,9 +1015,12 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   size_t size;
   qmat_value *value;
   assert_int_equal(qmat_value_serialize(&context, &list->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, NULL, &value), QMAT_ERROR_FORMAT);
+  assert_non_null(strstr(context.error.message, "an item is not at hand"));
+  assert_null(value);
   for (size_t cut = 0; cut < size; ++cut) {
     uint8_t *part = copy_of(bytes, cut); /* to the byte, so that reading beyond is noticed */
-    assert_int_equal(qmat_value_deserialize(&context, part, cut, &value), QMAT_ERROR_FORMAT);
+    assert_int_equal(qmat_value_deserialize(&context, part, cut, &known_items, &value), QMAT_ERROR_FORMAT);
     qmat_free(part);
   }
   qmat_free(bytes);
@@ -1098,5 +1131,5 @@ int main(void) {
       cmocka_unit_test(test_a_failure_tells_the_error_but_not_where_it_was),
       cmocka_unit_test(test_copied_texts_are_equal_and_apart),
   };
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, make_known_item, release_known_item);
 }

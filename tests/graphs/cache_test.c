@@ -529,6 +529,68 @@ static void test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_t
   qmat_context_uninit(&context);
 }
 
+static void test_a_list_is_kept_as_its_items_and_each_of_them_once(void **state) {
+  fixture *f = *state;
+  qmat_context context = {0};
+  qmat_cache cache;
+  open_cache(f, &cache);
+  qmat_list *lists[2];
+  json_t *stored[2];
+  bool added;
+  for (int k = 0; k < 2; k++) {
+    lists[k] = qmat_list_new(3);
+    for (int i = 0; i < 3; i++) {
+      char name[8];
+      snprintf(name, sizeof name, "%d", i);
+      lists[k]->names[i] = qmat_strdup(name);
+      test_ok(&context, test_report(&context, i + (i == 1) * 10 * k, &lists[k]->items[i]));
+    }
+    test_ok(&context, qmat_value_seal(&context, &lists[k]->base));
+    stored[k] = qmat_cache_put_value(&cache, &lists[k]->base, &added);
+    assert_true(added);
+    assert_int_equal(json_array_size(json_object_get(stored[k], "items")), 3);
+    assert_true(qmat_cache_has_stored(&cache, stored[k]));
+    assert_int_equal(count_entries(f, QMAT_CACHE_BLOB),
+                     k == 0 ? 4 : 6); /* the other list, and the one item that is new */
+  }
+  json_decref(qmat_cache_put_value(&cache, &lists[0]->base, &added));
+  assert_false(added);
+  for (int k = 0; k < 2; k++) {
+    const uint64_t size = (uint64_t)json_integer_value(json_object_get(stored[k], "blob"));
+    qmat_value *again = qmat_cache_value(&cache, &lists[k]->base.digest, size, QMAT_LIST);
+    assert_non_null(again);
+    for (size_t i = 0; i < 3; i++)
+      assert_true(qmat_digest_equal(&qmat_value_at(again, i)->digest, &lists[k]->items[i]->digest));
+    qmat_value_release(again);
+  }
+
+  /* Without an item the list is no hit and is not given, but is sound: it comes back with the item. */
+  char path[256];
+  blob_path(f, 11, path);
+  assert_int_equal(unlink(path), 0);
+  const uint64_t size = (uint64_t)json_integer_value(json_object_get(stored[1], "blob"));
+  assert_true(qmat_cache_has_stored(&cache, stored[0]));
+  assert_false(qmat_cache_has_stored(&cache, stored[1]));
+  assert_null(qmat_cache_value(&cache, &lists[1]->base.digest, size, QMAT_LIST));
+  assert_int_equal(count_entries(f, QMAT_CACHE_BAD), 0);
+  json_decref(qmat_cache_put_value(&cache, lists[1]->items[1], &added));
+  qmat_value *again = qmat_cache_value(&cache, &lists[1]->base.digest, size, QMAT_LIST);
+  assert_non_null(again);
+  qmat_value_release(again);
+
+  /* An item of other bytes is set aside, and the list is not. */
+  put_file(path, "what is this");
+  assert_null(qmat_cache_value(&cache, &lists[1]->base.digest, size, QMAT_LIST));
+  assert_int_equal(count_entries(f, QMAT_CACHE_BAD), 1);
+  assert_int_equal(count_entries(f, QMAT_CACHE_BLOB), 5);
+  for (int k = 0; k < 2; k++) {
+    json_decref(stored[k]);
+    qmat_value_release(&lists[k]->base);
+  }
+  qmat_cache_close(&cache);
+  qmat_context_uninit(&context);
+}
+
 static void test_lists_of_different_lengths_do_not_go_together(void **state) {
   fixture *f = *state;
   qmat_context context = {0};
@@ -969,7 +1031,7 @@ static void test_why_names_the_format_of_keys(void **state) {
   qmat_cache_close(&cache);
   foresee(f, "3");
   assert_string_equal(f->states, "rdd");
-  assert_string_equal(f->why[0], "would run:|the format of keys is 1, was 0");
+  assert_string_equal(f->why[0], "would run:|the format of keys is 2, was 0");
 }
 
 /* ---- looking after it ---- */
@@ -980,23 +1042,26 @@ static void test_what_was_used_least_recently_is_deleted_first(void **state) {
   qmat_cache cache;
   open_cache(f, &cache);
   qmat_value *values[10];
-  uint64_t size = 0;
+  json_t *stored[10];
   for (int i = 0; i < 10; i++) {
     bool added;
     test_ok(&context, test_report(&context, 10 + i, &values[i]));
-    assert_true(qmat_cache_put_value(&cache, values[i], &size, &added));
+    stored[i] = qmat_cache_put_value(&cache, values[i], &added);
+    assert_non_null(stored[i]);
     assert_true(added);
     char path[256];
     blob_path(f, 10 + i, path);
     const struct timespec times[2] = {{.tv_sec = 1000 + i}, {.tv_sec = 1000 + i}};
     assert_int_equal(utimensat(AT_FDCWD, path, times, 0), 0);
   }
-  qmat_cache_touch_blob(&cache, &values[0]->digest);
+  qmat_cache_touch_stored(&cache, stored[0]);
+  const uint64_t size = qmat_cache_stored_size(stored[0]);
   const qmat_cache_sweep sweep = qmat_cache_collect(&cache, 6 * size, false);
   assert_int_equal(sweep.deleted, 5); /* down to nine tenths of the limit */
   assert_int_equal(sweep.freed, 5 * size);
   for (int i = 0; i < 10; i++) {
-    assert_int_equal(qmat_cache_has(&cache, &values[i]->digest, size), i == 0 || i > 5);
+    assert_int_equal(qmat_cache_has_stored(&cache, stored[i]), i == 0 || i > 5);
+    json_decref(stored[i]);
     qmat_value_release(values[i]);
   }
   qmat_cache_close(&cache);
@@ -1074,6 +1139,7 @@ int main(void) {
       CASE(test_forced_nodes_run_and_are_the_same),
       CASE(test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_one_stays),
       CASE(test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_them),
+      CASE(test_a_list_is_kept_as_its_items_and_each_of_them_once),
       CASE(test_lists_of_different_lengths_do_not_go_together),
       CASE(test_a_node_that_breaks_its_promise_is_named),
       CASE(test_a_damaged_blob_is_a_miss),
