@@ -103,10 +103,14 @@ static void cancel(const char *job) {
   ask(&command, line, sizeof line);
 }
 
+static void exit_path(const char *folder, size_t index, char path[4200]) {
+  snprintf(path, 4200, "%s/%zu.exit", folder, index);
+}
+
 // Takes what a task has left; false when it has not ended.
 static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   char path[4200];
-  snprintf(path, sizeof path, "%s/%zu.exit", folder, index);
+  exit_path(folder, index, path);
   FILE *file = fopen(path, "re");
   if (!file) return false;
   if (fscanf(file, "%d", &asset->exit_code) != 1) asset->exit_code = -1;
@@ -152,6 +156,11 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     asset->state = QMAT_ASSET_FAILED;
     asset->exit_code = -1;
     observer(user, batch, asset);
+  }
+  // Tasks that were cancelled may have ended since.
+  for (size_t i = 0; i < batch->count; i++) {
+    exit_path(folder, i, path);
+    unlink(path);
   }
   snprintf(path, sizeof path, "%s/array.sh", folder);
   unlink(path);

@@ -187,6 +187,18 @@ static void print_table(const qmat_batch *batch) {
 
 /* ---- the call ---- */
 
+// A folder for the reports of the assets. The machines of a cluster share the folder of the results, and no other.
+static qmat_status make_report_folder(batch_call *call) {
+  const char *temporary = getenv("TMPDIR");
+  if (!temporary || !*temporary) temporary = "/tmp";
+  int length = snprintf(call->reports, sizeof call->reports, "%s/%sqmat-batch-XXXXXX",
+                        call->slurm ? call->folder : temporary, call->slurm ? "." : "");
+  if (length < (int)sizeof call->reports && mkdtemp(call->reports)) return QMAT_OK;
+  call->reports[0] = 0;
+  qmat_fail(call->context, QMAT_ERROR_IO, "no folder for reports can be made in it");
+  return qmat_fail_at(call->context, call->slurm ? call->folder : temporary, 0, 0);
+}
+
 static qmat_status prepare(batch_call *call) {
   qmat_context *context = call->context;
   const qmat_invocation *invocation = call->invocation;
@@ -217,14 +229,7 @@ static qmat_status prepare(batch_call *call) {
   ssize_t length = readlink("/proc/self/exe", call->program, sizeof call->program - 1);
   if (length <= 0) return qmat_fail(context, QMAT_ERROR_IO, "the program cannot find itself");
   call->program[length] = 0;
-  const char *temporary = getenv("TMPDIR");
-  snprintf(call->reports, sizeof call->reports, "%.32s/qmat-batch-XXXXXX",
-           temporary && *temporary ? temporary : "/tmp");
-  if (!mkdtemp(call->reports)) {
-    call->reports[0] = 0;
-    return qmat_fail(context, QMAT_ERROR_IO, "no folder for reports can be made");
-  }
-  return QMAT_OK;
+  return make_report_folder(call);
 }
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {

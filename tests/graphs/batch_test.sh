@@ -20,6 +20,18 @@ holds() {
   fi
 }
 
+# child_of PROCESS: its first child, waited for, in $child.
+child_of() {
+  child=
+  tries=0
+  while [ -z "$child" ] && [ $tries -lt 1200 ]; do
+    child=$(cut -d ' ' -f 1 "/proc/$1/task/$1/children" 2>/dev/null)
+    tries=$((tries + 1))
+    [ -n "$child" ] || sleep 0.05
+  done
+  [ -n "$child" ] || child=none
+}
+
 cat >graph.yaml <<'END'
 qmat: 1
 nodes:
@@ -97,12 +109,7 @@ awk 'BEGIN {
 }' >models/aaa_torus.off
 "$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
 running=$!
-child=
-for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30; do
-  child=$(cat "/proc/$running/task/$running/children" 2>/dev/null | tr -d ' ')
-  if [ -n "$child" ]; then break; fi
-  sleep 0.05
-done
+child_of $running
 kill -SEGV "$child"
 wait $running
 code=$?
@@ -112,7 +119,7 @@ holds "the rest is made" grep -q '^9 done, 1 failed' out.txt
 rm -r rest cache
 "$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
 running=$!
-sleep 0.3
+child_of $running # by then it listens to signals
 kill -TERM $running
 wait $running
 code=$?
@@ -121,6 +128,22 @@ holds "nothing goes on after a signal" test ! -e rest/box9.glb
 batch --inputs 'models/box*.off' --out rest --set samples.spacing=2%
 holds "it goes on" test $code -eq 0
 holds "no reports are left" test -z "$(ls -d qmat-batch-* 2>/dev/null)"
+
+# A folder for temporary files whose path is long, and one that is not there.
+mkdir -p "a folder for temporary files/with a rather long path to it/and ünïcode"
+(
+  TMPDIR="$work/a folder for temporary files/with a rather long path to it/and ünïcode"
+  batch --inputs 'models/box*.off' --out rest
+  exit $code
+)
+holds "a long path of temporary files" test $? -eq 0
+(
+  TMPDIR=$work/nowhere
+  batch --inputs 'models/box*.off' --out rest
+  exit $code
+)
+holds "no folder for temporary files" test $? -eq 1
+holds "no folder for temporary files is told" grep -q "^qmat: $work/nowhere: " err.txt
 
 # Mistakes.
 mkdir other

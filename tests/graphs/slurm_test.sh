@@ -56,7 +56,7 @@ fail() {
 
 # ---- a cluster ----
 host=$(hostname -s)
-port=$((20000 + $$ % 20000))
+port=$((10000 + $$ % 20000)) # below those that systems give to clients
 SLURM_CONF=$work/slurm.conf
 export SLURM_CONF
 cat >slurm.conf <<END
@@ -106,7 +106,7 @@ pids="$pids $two"
 tries=0
 until [ "$(timeout 5 sinfo --noheader --format=%t --states=idle -N 2>/dev/null | wc -l)" -eq 2 ]; do
   tries=$((tries + 1))
-  [ $tries -lt 20 ] || skip "the cluster does not start here"
+  [ $tries -lt 60 ] || skip "the cluster does not start here"
   sleep 1
 done
 
@@ -140,12 +140,12 @@ done
 
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
-timeout 200 "$qmat" batch graph.yaml --inputs 'models/*.off' --out results --engine slurm >out.txt 2>err.txt &
+timeout 600 "$qmat" batch graph.yaml --inputs 'models/*.off' --out results --engine slurm >out.txt 2>err.txt &
 batch=$!
 tries=0
 until timeout 5 squeue --noheader --states=running --nodelist=two 2>/dev/null | grep -q .; do
   tries=$((tries + 1))
-  [ $tries -lt 100 ] || fail "nothing runs on the second machine"
+  [ $tries -lt 600 ] || fail "nothing runs on the second machine"
   sleep 0.1
 done
 kill -KILL $two
@@ -160,8 +160,30 @@ cmp right.glb results/torus3.glb || fail "the same bytes as without Slurm"
 
 # The same again, on the machine that is left: all from the cache; and one that fails.
 echo OFF >models/bad.off
-timeout 100 "$qmat" batch graph.yaml --inputs 'models/*.off' --out again --engine slurm --json >out.txt 2>err.txt
+timeout 300 "$qmat" batch graph.yaml --inputs 'models/*.off' --out again --engine slurm --json >out.txt 2>err.txt
 code=$?
 [ $code -eq 1 ] || fail "exit code 1, not $code"
 [ "$(grep -c '"hits":5' out.txt)" -eq 10 ] || fail "the second batch comes from the cache"
 grep '"result":"failed"' out.txt | grep -q 'bad.off' || fail "the failure is told"
+
+# Interrupted: the job array is cancelled, and nothing is left of it.
+"$qmat" batch graph.yaml --inputs 'models/torus*.off' --out cancelled --engine slurm --force >out.txt 2>err.txt &
+batch=$!
+tries=0
+until timeout 5 squeue --noheader --states=running 2>/dev/null | grep -q .; do
+  tries=$((tries + 1))
+  [ $tries -lt 600 ] || fail "nothing runs that could be cancelled"
+  sleep 0.1
+done
+[ -n "$(ls -d cancelled/.qmat-batch-*)" ] || fail "what the machines tell is in the folder that they share"
+kill -INT $batch
+wait $batch
+code=$?
+[ $code -eq 3 ] || fail "exit code 3 after a signal, not $code"
+tries=0
+while timeout 5 squeue --noheader 2>/dev/null | grep -q .; do
+  tries=$((tries + 1))
+  [ $tries -lt 600 ] || fail "the job array goes on after a signal"
+  sleep 0.1
+done
+[ -z "$(ls -d cancelled/.qmat-batch-* 2>/dev/null)" ] || fail "nothing is left over after a signal"
