@@ -265,9 +265,10 @@ awk 'BEGIN {
 "$qmat" run "$graph" --set model=torus.off --set samples.spacing=2% -o torus.glb --progress json --threads 1 >out.txt \
   2>err.txt &
 running=$!
-for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30; do
-  if grep -q '"event":"start","node":"thickness"' err.txt; then break; fi
+tries=0
+until grep -q '"event":"start","node":"thickness"' err.txt || [ $tries -ge 600 ]; do
   sleep 0.1
+  tries=$((tries + 1))
 done
 kill -TERM $running
 wait $running

@@ -181,7 +181,7 @@ awk 'BEGIN {
 "$qmat" mat torus.off -o torus.glb --epsilon 0.1% --progress json >out.txt 2>err.txt &
 running=$!
 tries=0
-while ! grep -q '"event":"start"' err.txt && [ $tries -lt 100 ]; do
+while ! grep -q '"event":"start"' err.txt && [ $tries -lt 600 ]; do
   sleep 0.1
   tries=$((tries + 1))
 done
