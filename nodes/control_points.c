@@ -10,6 +10,7 @@
 #include "core/triangle.h"
 #include "core/vector.h"
 #include "nodes/inner_points.h"
+#include "nodes/point_grid.h"
 
 enum { FINEST_GRID = 256 };
 
@@ -91,13 +92,27 @@ static void fill_grid(const grid *g, double spacing, double *points) {
   }
 }
 
-/* Which spheres answer for each sample, and which samples lie in each facet besides its corners. */
+/* Which spheres answer for each sample, and where the samples are. */
 typedef struct {
   const qmat_mesh *mesh;
   const qmat_complex *complex;
   size_t *sphere_starts; /* per sample, + 1 */
   uint32_t *spheres;
+  const double *reaches; /* per sphere, of find_reaches */
+  qmat_point_grid samples;
 } answering;
+
+/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it. */
+static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
+  double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
+  for (size_t e = 0; e < complex->edge_count && reaches; e++) {
+    const uint32_t *ends = &complex->edges[2 * e];
+    const double *a = &complex->spheres[4 * (size_t)ends[0]], *b = &complex->spheres[4 * (size_t)ends[1]];
+    const double reach = qmat_point_distance(a, b) + fabs(a[3] - b[3]);
+    for (int k = 0; k < 2; k++) reaches[ends[k]] = qmat_larger(reaches[ends[k]], reach);
+  }
+  return reaches;
+}
 
 static qmat_status find_answering(qmat_context *context, const qmat_samples *samples, const qmat_medial *medial,
                                   answering *a) {
@@ -117,7 +132,8 @@ static qmat_status find_answering(qmat_context *context, const qmat_samples *sam
     for (size_t v = 0; v < medial->sphere_count; v++)
       for (uint32_t i = medial->region_offsets[v]; i < medial->region_offsets[v + 1]; i++)
         a->spheres[a->sphere_starts[medial->region_samples[i] + 1]++] = (uint32_t)v;
-  return QMAT_OK;
+  a->reaches = find_reaches(context, a->complex);
+  return a->reaches ? QMAT_OK : qmat_fail_memory(context, "responsible regions");
 }
 
 typedef struct {
@@ -172,14 +188,30 @@ static void store(qmat_control_points *control, size_t i, const witness *w) {
   control->distances[i] = w->distance;
 }
 
+/* The best witness among what answers for `count` samples. */
 static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double epsilon,
                         witness *best) {
   *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
   for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
   if (!(best->distance > content_with_sphere * epsilon)) return;
   for (size_t k = 0; k < count; k++)
-    for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++)
-      take_star(a->complex, point, a->spheres[i], best);
+    for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
+      const uint32_t v = a->spheres[i];
+      if (qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point) - a->reaches[v] < best->distance)
+        take_star(a->complex, point, v, best);
+    }
+}
+
+/* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where they
+ * leave the point farther than `enough` the sample nearest to it is asked. */
+static void look_around_in_facet(const answering *a, const double *point, size_t facet, double epsilon, double enough,
+                                 witness *best) {
+  look_around(a, point, &a->mesh->triangles[3 * facet], 3, epsilon, best);
+  if (best->distance <= enough) return;
+  const uint32_t nearest = qmat_point_grid_nearest(&a->samples, point);
+  witness other;
+  look_around(a, point, &nearest, 1, epsilon, &other);
+  if (other.distance < best->distance) *best = other;
 }
 
 /* Also without a bound every point needs some witness. */
@@ -202,25 +234,12 @@ static size_t count_far(const qmat_control_points *control, double epsilon) {
   return far;
 }
 
-/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it. */
-static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
-  double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
-  for (size_t e = 0; e < complex->edge_count && reaches; e++) {
-    const uint32_t *ends = &complex->edges[2 * e];
-    const double *a = &complex->spheres[4 * (size_t)ends[0]], *b = &complex->spheres[4 * (size_t)ends[1]];
-    const double reach = qmat_point_distance(a, b) + fabs(a[3] - b[3]);
-    for (int k = 0; k < 2; k++) reaches[ends[k]] = qmat_larger(reaches[ends[k]], reach);
-  }
-  return reaches;
-}
-
 /* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
  * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
-static qmat_status ask_all_spheres(qmat_context *context, const qmat_complex *complex, double epsilon,
+static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double epsilon,
                                    qmat_control_points *control) {
+  const qmat_complex *complex = a->complex;
   const int threads = qmat_threads(context);
-  const double *reaches = find_reaches(context, complex);
-  if (!reaches) return qmat_fail_memory(context, "control points");
   for (size_t first = 0, last; first < control->count; first = last) {
     const qmat_status status = next_slice(context, first, control->count, &last);
     if (status != QMAT_OK) return status;
@@ -236,7 +255,7 @@ static qmat_status ask_all_spheres(qmat_context *context, const qmat_complex *co
         if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
       }
       for (size_t v = 0; v < complex->vertex_count; v++)
-        if (qmat_sphere_distance(&complex->spheres[4 * v], p) - reaches[v] < best.distance)
+        if (qmat_sphere_distance(&complex->spheres[4 * v], p) - a->reaches[v] < best.distance)
           take_star(complex, p, (uint32_t)v, &best);
       store(control, i, &best);
     }
@@ -388,7 +407,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
       if (!qmat_surface_inside(surface, place->point) ||
           qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
         continue;
-      look_around(a, place->point, &mesh->triangles[3 * (size_t)place->facet], 3, 0, &place->witness);
+      look_around_in_facet(a, place->point, place->facet, 0, 0, &place->witness);
     }
   }
   for (size_t i = 0; i < kept; i++)
@@ -406,8 +425,11 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   answering a = {.mesh = mesh, .complex = complex};
   qmat_inner_points inner = {.count = 0};
-  if (!starts) return qmat_fail_memory(context, "control points");
+  double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
+  if (!starts || !unit_samples) return qmat_fail_memory(context, "control points");
+  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
   qmat_status status = find_answering(context, samples, medial, &a);
+  if (status == QMAT_OK) status = qmat_point_grid_init(context, unit_samples, samples->count, &a.samples);
   if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
@@ -425,7 +447,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   }
   control->count = control->surface_count + inner.count + shell.count;
   if ((status = allocate(context, control)) != QMAT_OK) return status;
-  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, control->points);
+  memcpy(control->points, unit_samples, 3 * samples->count * sizeof *unit_samples);
   const int threads = qmat_threads(context);
   for (size_t first = 0, last; first < samples->count; first = last) {
     if ((status = next_slice(context, first, samples->count, &last)) != QMAT_OK) return status;
@@ -439,7 +461,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   }
   for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
     if ((status = next_slice(context, first, mesh->triangle_count, &last)) != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t t = first; t < last; t++) {
       const uint32_t *corners = &mesh->triangles[3 * t];
       const grid g = grid_of(positions, corners, control->spacing);
@@ -447,7 +469,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
         witness best;
-        look_around(&a, &control->points[3 * i], corners, 3, epsilon, &best);
+        look_around_in_facet(&a, &control->points[3 * i], t, epsilon, content_with_star * epsilon, &best);
         store(control, i, &best);
       }
     }
@@ -466,7 +488,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
   const size_t far = count_far(control, epsilon);
   if (far == 0) return QMAT_OK;
   if (far * complex->vertex_count > most_sphere_looks) return ask_envelope(context, complex, epsilon, control);
-  return ask_all_spheres(context, complex, epsilon, control);
+  return ask_all_spheres(context, &a, epsilon, control);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
