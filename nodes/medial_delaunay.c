@@ -38,6 +38,7 @@ typedef struct {
   qmat_surface *surface;
   const double *points; /* samples in the unit frame */
   const uint8_t *thin;  /* per sample */
+  const uint32_t *parts; /* per vertex of the mesh: the connected part of the surface it belongs to; NULL: there is one */
   const uint32_t *stand_ins; /* per sample: the one that is triangulated in its place, itself when it is one */
   size_t site_count;         /* samples that are triangulated */
   qmat_tetrahedra cells;     /* with samples as corners */
@@ -116,6 +117,61 @@ static bool deep_inside(const qmat_surface *surface, const double *point) {
          !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
 }
 
+static uint32_t find_root(uint32_t *parent, uint32_t i) {
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
+  }
+  return i;
+}
+
+/* Joins two sets; the smaller id leads, so that the result does not depend on the order. */
+static void join(uint32_t *parent, uint32_t a, uint32_t b) {
+  a = find_root(parent, a);
+  b = find_root(parent, b);
+  if (a < b) parent[b] = a;
+  if (b < a) parent[a] = b;
+}
+
+/* Finds the connected parts of the surface, each named by its smallest vertex. */
+static qmat_status find_surface_parts(delaunay *d) {
+  const qmat_mesh *mesh = d->mesh;
+  uint32_t *part = qmat_arena_alloc(&d->context->arena, mesh->vertex_count, sizeof *part);
+  if (!part) return qmat_fail_memory(d->context, "parts of the surface");
+  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = (uint32_t)i;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
+    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
+  }
+  size_t count = 0;
+  for (size_t i = 0; i < mesh->vertex_count; i++) {
+    part[i] = find_root(part, (uint32_t)i);
+    count += part[i] == i;
+  }
+  d->parts = count > 1 ? part : NULL;
+  return QMAT_OK;
+}
+
+static uint32_t part_of_sample(const delaunay *d, uint32_t sample) {
+  return d->parts ? d->parts[d->mesh->triangles[3 * (size_t)d->samples->facets[sample]]] : 0;
+}
+
+/* Whether a tetrahedron reaches from one part of the surface to another through the outside, as a needle between two
+ * solids does: its incentre may all the same lie inside, between the samples and the surface that bulges beyond them. */
+static bool spans_gap(const delaunay *d, const uint32_t *corners) {
+  for (int a = 0; a < 3 && d->parts; a++)
+    for (int b = a + 1; b < 4; b++) {
+      if (part_of_sample(d, corners[a]) == part_of_sample(d, corners[b])) continue;
+      double middle[3];
+      for (size_t k = 0; k < 3; k++)
+        middle[k] = 0.5 * (d->points[3 * (size_t)corners[a] + k] + d->points[3 * (size_t)corners[b] + k]);
+      if (!qmat_surface_inside(d->surface, middle) &&
+          qmat_surface_distance(d->surface, middle, d->params->detail, NULL, NULL) > d->params->detail)
+        return true;
+    }
+  return false;
+}
+
 /* Algorithm 1 for one tetrahedron. With completion "all" a tetrahedron belongs to the solid when its incentre does;
  * its medial vertex is the circumcentre where that is inside too. */
 static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sphere[4]) {
@@ -130,7 +186,7 @@ static cell_kind select_medial_vertex(const delaunay *d, size_t cell, double sph
   incentre(p, centre);
   const bool all = d->params->completion == COMPLETION_ALL;
   const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
-  if (all && !in_solid) return CELL_DROPPED;
+  if (all && (!in_solid || spans_gap(d, corner))) return CELL_DROPPED;
   if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
     const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
     if (nearest > least_depth) {
@@ -160,22 +216,6 @@ static qmat_status select_medial_vertices(delaunay *d) {
       d->kinds[cell] = (uint8_t)select_medial_vertex(d, cell, &d->spheres[4 * cell]);
   }
   return QMAT_OK;
-}
-
-static uint32_t find_root(uint32_t *parent, uint32_t i) {
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
-/* Joins two sets; the smaller id leads, so that the result does not depend on the order. */
-static void join(uint32_t *parent, uint32_t a, uint32_t b) {
-  a = find_root(parent, a);
-  b = find_root(parent, b);
-  if (a < b) parent[b] = a;
-  if (b < a) parent[a] = b;
 }
 
 /* Numbers the medial vertices: one for each set of adjacent kept tetrahedra whose centres lie close together. It is the
@@ -292,20 +332,6 @@ static qmat_status connect(delaunay *d) {
     }
   }
   return QMAT_OK;
-}
-
-/* Which connected part of the surface each vertex of the mesh belongs to, as its smallest vertex. */
-static uint32_t *surface_parts(delaunay *d) {
-  const qmat_mesh *mesh = d->mesh;
-  uint32_t *part = qmat_arena_alloc(&d->context->arena, mesh->vertex_count, sizeof *part);
-  if (!part) return NULL;
-  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = (uint32_t)i;
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
-    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
-  }
-  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = find_root(part, (uint32_t)i);
-  return part;
 }
 
 /* A component of the medial mesh, and its place in the order of size, largest first. */
@@ -447,9 +473,9 @@ static int by_sample(const void *left, const void *right) {
   return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
 }
 
-/* The spheres of each surface part's samples, as (part, sphere) pairs, sorted; or, with `parts` NULL, the spheres of
- * the samples for which more than one component answers. */
-static contact *find_contacts(delaunay *d, const uint32_t *index, const uint32_t *parts, size_t *count) {
+/* The spheres of the samples for which more than one component answers, as (sample, sphere) pairs, sorted; or, with
+ * `by_part`, of each surface part's samples, with the part in place of the sample. */
+static contact *find_contacts(delaunay *d, const uint32_t *index, bool by_part, size_t *count) {
   qmat_arena *arena = &d->context->arena;
   const size_t samples = d->samples->count;
   uint32_t *component_of = qmat_arena_alloc(arena, samples, sizeof *component_of);
@@ -463,15 +489,14 @@ static contact *find_contacts(delaunay *d, const uint32_t *index, const uint32_t
     component_of[sample] = component;
   }
   size_t room = 0;
-  for (size_t i = 0; i < 4 * d->cells.count; i++) room += d->kinds[i / 4] && (parts || shared[d->cells.corners[i]]);
+  for (size_t i = 0; i < 4 * d->cells.count; i++) room += d->kinds[i / 4] && (by_part || shared[d->cells.corners[i]]);
   contact *contacts = qmat_arena_alloc(arena, room, sizeof *contacts);
   if (!contacts) return NULL;
   *count = 0;
   for (size_t i = 0; i < 4 * d->cells.count; i++) {
     const uint32_t sample = d->cells.corners[i];
-    if (!d->kinds[i / 4] || !(parts || shared[sample])) continue;
-    const uint32_t part = parts ? parts[d->mesh->triangles[3 * (size_t)d->samples->facets[sample]]] : sample;
-    contacts[(*count)++] = (contact){part, d->sphere_of[i / 4]};
+    if (!d->kinds[i / 4] || !(by_part || shared[sample])) continue;
+    contacts[(*count)++] = (contact){by_part ? part_of_sample(d, sample) : sample, d->sphere_of[i / 4]};
   }
   qsort(contacts, *count, sizeof *contacts, by_sample);
   size_t kept = 0;
@@ -495,9 +520,8 @@ static qmat_status add_link(delaunay *d, uint32_t a, uint32_t b) {
  * small, since components that share a sample are joined before. */
 static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_t *joined, const double *spheres,
                                      size_t *links) {
-  uint32_t *parts = surface_parts(d);
   size_t count = 0;
-  contact *contacts = parts ? find_contacts(d, index, parts, &count) : NULL;
+  contact *contacts = find_contacts(d, index, true, &count);
   if (!contacts) return qmat_fail_memory(d->context, "components");
   for (size_t first = 0, last; first < count; first = last) {
     for (last = first; last < count && contacts[last].sample == contacts[first].sample;) last++;
@@ -535,7 +559,7 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
   size_t count = 0, contact_count = 0;
   const component *parts = index && spheres ? find_components(d, index, &count) : NULL;
   uint32_t *joined = qmat_arena_alloc(arena, count, sizeof *joined);
-  const contact *contacts = parts ? find_contacts(d, index, NULL, &contact_count) : NULL;
+  const contact *contacts = parts ? find_contacts(d, index, false, &contact_count) : NULL;
   if (!parts || !joined || !contacts) return qmat_fail_memory(d->context, "components");
   for (size_t i = 0; i < count; i++) joined[i] = (uint32_t)i;
   for (size_t cell = 0; cell < d->cells.count; cell++)
@@ -725,6 +749,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   d.stand_ins = stand_ins;
   if ((status = qmat_stand_ins_find(context, d.surface, d.samples, points, values, d.params->detail, stand_ins)))
     goto done;
+  if ((status = find_surface_parts(&d)) != QMAT_OK) goto done;
   if ((status = triangulate(&d)) != QMAT_OK) goto done;
   if ((status = select_medial_vertices(&d)) != QMAT_OK) goto done;
   for (size_t i = 0; i < d.cells.count; i++) by_kind[d.kinds[i]]++;
@@ -857,7 +882,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 3,
+    .version = 4,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc = "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
            "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "

@@ -290,6 +290,27 @@ static void test_two_solids_give_two_pieces(void **state) {
   pipeline_free(&p);
 }
 
+/* Tetrahedra that reach from one sphere to the other are needles, whose incentres may lie below a bulging surface. */
+static void test_spheres_beside_each_other_are_not_joined(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_sphere(1, 24), *small = shape_sphere(0.05, 24);
+  shape_map(small, 1, 3, 0, 0);
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  for (size_t i = 0; i < small->vertex_count; i++)
+    shape_vertex(mesh, small->positions[3 * i], small->positions[3 * i + 1], small->positions[3 * i + 2]);
+  for (size_t i = 0; i < small->triangle_count; i++)
+    shape_triangle(mesh, first + small->triangles[3 * i], first + small->triangles[3 * i + 1],
+                   first + small->triangles[3 * i + 2]);
+  qmat_value_release(&small->base);
+  pipeline p;
+  pipeline_make(&p, mesh, "", "");
+  assert_int_equal(pipeline_components(p.medial), 2);
+  assert_int_equal(pipeline_count(p.report, "links"), 0);
+  for (size_t i = 0; i < p.medial->sphere_count; i++)
+    assert_true(p.medial->spheres[4 * i] < 1 || p.medial->spheres[4 * i] > 2.95);
+  pipeline_free(&p);
+}
+
 static void test_cavity_is_left_out(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_new();
@@ -607,6 +628,7 @@ int main(void) {
       cmocka_unit_test(test_thin_sheet_gives_one_piece_near_its_middle),
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_two_solids_give_two_pieces),
+      cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
       cmocka_unit_test(test_flat_parts_are_thinned_and_every_sample_is_answered_for),
