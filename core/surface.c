@@ -324,7 +324,7 @@ static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle
 typedef struct nearest_query {
   const qmat_surface *surface;
   const double *point;
-  double slack; /* by how much single precision may misjudge the distance to a box */
+  double slack;         /* by how much single precision may misjudge the distance to a box */
   double square, reach; /* of the nearest so far: the squared distance and the distance */
   double closest[3];
   uint32_t triangle;
@@ -625,7 +625,9 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
     }
   }
   status = build_scene(context, made);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status == QMAT_OK) status = build_balls(context, made);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status != QMAT_OK) goto failed;
   if (!(mesh->closed && mesh->oriented)) {
     status = build_winding_tree(context, made);

@@ -12,8 +12,9 @@
  * are in the mesh's unit frame. After qmat_surface_new it is only read: any number of threads may ask at once. */
 typedef struct qmat_surface qmat_surface;
 
-/* Builds the search structure. `*surface` is freed with qmat_surface_free; on failure it is NULL. The mesh must stay
- * alive as long. Degenerate triangles are allowed. Cost: O(n log n) time on all threads, about 150 bytes a triangle. */
+/* Builds the search structure. `*surface` is freed with qmat_surface_free; on failure, also QMAT_CANCELLED, it is NULL.
+ * The mesh must stay alive as long. Degenerate triangles are allowed. Cost: O(n log n) time on all threads, about 150
+ * bytes a triangle. */
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface);
 void qmat_surface_free(qmat_surface *surface);
 
