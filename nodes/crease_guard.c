@@ -144,12 +144,13 @@ bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_compl
                               qmat_crease_guard_is_feature(guard, ends[1])};
   *asked = INFINITY;
   if (!is_feature[0] && !is_feature[1]) return false;
+  const bool is_last_inner = complex->live_vertices <= guard->left + 1;
   const qmat_quadric quadric = qmat_merged_quadric(complex, quadrics, edge);
   candidates->count = 0;
   for (int k = 0; k < 2; k++) {
     if (!is_feature[k]) continue;
-    const double error =
-        is_feature[1 - k] ? error_without(guard, guard->features[ends[1 - k]], guard->features[ends[k]]) : 0;
+    double error = is_last_inner ? INFINITY : 0;
+    if (is_feature[1 - k]) error = error_without(guard, guard->features[ends[1 - k]], guard->features[ends[k]]);
     if (error <= held && error < INFINITY)
       qmat_candidates_add(candidates, &quadric, &complex->spheres[4 * (size_t)ends[k]]);
     else

@@ -8,8 +8,9 @@
 
 /* Keeps the sharp features of a medial mesh while it is simplified: its spheres of radius zero, as medial.features
  * makes them. They stay where they are, and so does the cone between two that follow each other on a crease. An inner
- * sphere may go into a feature, never the other way; of a crease only points between its corners may go, into one of
- * the two next to them, and only where all points of the initial crease stay close to the cones that are left.
+ * sphere may go into a feature, but for the last of all, never the other way; of a crease only points between its
+ * corners may go, into one of the two next to them, and only where all points of the initial crease stay close to the
+ * cones that are left.
  *
  * The arrays live in the context's arena. Zeroed, it guards nothing. */
 typedef struct qmat_crease_guard {

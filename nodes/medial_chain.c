@@ -111,7 +111,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_chain = {
     .name = "medial.chain",
-    .version = 2,
+    .version = 3,
     .summary = "Collapses medial edges to the last and records how, for any level of detail",
     .doc =
         "Does what medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left, "

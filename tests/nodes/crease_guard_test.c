@@ -107,6 +107,18 @@ static void test_a_crease_keeps_its_corners_and_bumps(void **state) {
   guarded_uninit(&g);
 }
 
+static void test_the_last_inner_sphere_stays(void **state) {
+  (void)state;
+  guarded g;
+  guarded_init(&g, crease_spheres, 7, crease_edges, COUNT(crease_edges) / 2);
+  collapse_to(&g, 1, 4, 1);
+  collapse_to(&g, 2, 5, 2);
+  const uint32_t corner = g.complex.vertex_alive[3] ? 3 : 6;
+  assert_int_equal(g.complex.live_vertices, g.guard.left + 1);
+  check_edge(&g, corner, 9 - corner, 1, false, false, INFINITY);
+  guarded_uninit(&g);
+}
+
 static void test_points_that_are_gone_still_count(void **state) {
   (void)state;
   guarded g;
@@ -334,6 +346,17 @@ static void test_round_creases_are_thinned_to_what_is_asked(void **state) {
   }
 }
 
+static void test_a_thin_plate_keeps_a_sphere_that_has_a_skin(void **state) {
+  (void)state;
+  sharp s = make_sharp(shape_box(1, 1, 1e-4), "spacing=100%", "epsilon=4%", 0);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  assert_int_equal(pipeline_features(s.simple), 8);
+  assert_true(s.simple->sphere_count > 8);
+  pipeline_must_run(0, "medial.skin", "", (const qmat_value *[]){&s.simple->base}, outputs);
+  for (size_t i = 0; i < qmat_output_count(qmat_node_find("medial.skin")); i++) qmat_value_release(outputs[i]);
+  release(&s);
+}
+
 static void test_edges_are_rounded_off_without_features(void **state) {
   (void)state;
   sharp with = make_sharp(shape_prism(12, 0.5), "", "epsilon=4%", 0);
@@ -375,6 +398,7 @@ static void test_the_number_of_threads_does_not_matter(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_crease_keeps_its_corners_and_bumps),
+      cmocka_unit_test(test_the_last_inner_sphere_stays),
       cmocka_unit_test(test_points_that_are_gone_still_count),
       cmocka_unit_test(test_neighbours_on_different_creases_stay_apart),
       cmocka_unit_test(test_a_loop_keeps_three_points),
@@ -383,6 +407,7 @@ int main(void) {
       cmocka_unit_test(test_a_box_becomes_its_corners_and_its_middle_exactly),
       cmocka_unit_test(test_a_turned_bracket_keeps_its_convex_edges_alone),
       cmocka_unit_test(test_round_creases_are_thinned_to_what_is_asked),
+      cmocka_unit_test(test_a_thin_plate_keeps_a_sphere_that_has_a_skin),
       cmocka_unit_test(test_edges_are_rounded_off_without_features),
       cmocka_unit_test(test_features_stay_at_any_level_and_number),
       cmocka_unit_test(test_the_number_of_threads_does_not_matter),
