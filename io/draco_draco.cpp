@@ -204,8 +204,27 @@ draco::GeometryAttribute::Type type_of(qmat_draco_meaning meaning) {
       return draco::GeometryAttribute::POSITION;
     case QMAT_DRACO_NORMAL:
       return draco::GeometryAttribute::NORMAL;
+    case QMAT_DRACO_COLOR:
+      return draco::GeometryAttribute::COLOR;
+    case QMAT_DRACO_TEXCOORD:
+      return draco::GeometryAttribute::TEX_COORD;
     default:
       return draco::GeometryAttribute::GENERIC;
+  }
+}
+
+draco::DataType data_type_of(qmat_draco_number number) {
+  switch (number) {
+    case QMAT_DRACO_INT8:
+      return draco::DT_INT8;
+    case QMAT_DRACO_UINT8:
+      return draco::DT_UINT8;
+    case QMAT_DRACO_INT16:
+      return draco::DT_INT16;
+    case QMAT_DRACO_UINT16:
+      return draco::DT_UINT16;
+    default:
+      return draco::DT_FLOAT32;
   }
 }
 
@@ -217,10 +236,11 @@ qmat_status encode(qmat_context *context, const qmat_draco_attribute *attributes
   for (size_t a = 0; a < attribute_count; a++) {
     const qmat_draco_attribute &given = attributes[a];
     auto attribute = std::make_unique<draco::PointAttribute>();
-    attribute->Init(type_of(given.meaning), static_cast<int8_t>(given.components), draco::DT_FLOAT32, false,
-                    point_count);
-    attribute->buffer()->Write(0, given.values,
-                               static_cast<size_t>(given.components) * point_count * sizeof *given.values);
+    const draco::DataType type = data_type_of(given.number);
+    attribute->Init(type_of(given.meaning), static_cast<int8_t>(given.components), type, false, point_count);
+    attribute->buffer()->Write(
+        0, given.values,
+        static_cast<size_t>(given.components) * point_count * static_cast<size_t>(draco::DataTypeLength(type)));
     mesh.AddAttribute(std::move(attribute));
   }
   mesh.SetNumFaces(face_count);
@@ -234,6 +254,7 @@ qmat_status encode(qmat_context *context, const qmat_draco_attribute *attributes
   encoder.SetEncodingMethod(keep_order ? draco::MESH_SEQUENTIAL_ENCODING : draco::MESH_EDGEBREAKER_ENCODING);
   encoder.SetSpeedOptions(3, 3);
   for (size_t a = 0; a < attribute_count; a++) {
+    if (attributes[a].number != QMAT_DRACO_FLOAT) continue;
     encoder.SetAttributeQuantization(static_cast<int32_t>(a), attributes[a].bits);
     if (attributes[a].bits > kMostCodedBits) encoder.SetUseBuiltInAttributeCompression(false);
   }
@@ -263,6 +284,7 @@ qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute 
   if (point_count > most || face_count > most) return qmat_fail_memory(context, "the faces of a Draco mesh");
   for (size_t a = 0; a < attribute_count; a++) {
     const int least = attributes[a].meaning == QMAT_DRACO_NORMAL ? 2 : 1;
+    if (attributes[a].number != QMAT_DRACO_FLOAT) continue;
     if (attributes[a].bits < least || attributes[a].bits > 30) {
       return qmat_fail(context, QMAT_ERROR_USAGE, "%d quantisation bits: must be %d to 30", attributes[a].bits, least);
     }

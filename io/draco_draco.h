@@ -17,14 +17,29 @@ extern "C" {
 
 /* ---- writing ---- */
 
-typedef enum qmat_draco_meaning { QMAT_DRACO_POSITION, QMAT_DRACO_NORMAL, QMAT_DRACO_GENERIC } qmat_draco_meaning;
+typedef enum qmat_draco_meaning {
+  QMAT_DRACO_POSITION,
+  QMAT_DRACO_NORMAL,
+  QMAT_DRACO_COLOR,
+  QMAT_DRACO_TEXCOORD,
+  QMAT_DRACO_GENERIC
+} qmat_draco_meaning;
+
+typedef enum qmat_draco_number {
+  QMAT_DRACO_FLOAT,
+  QMAT_DRACO_INT8,
+  QMAT_DRACO_UINT8,
+  QMAT_DRACO_INT16,
+  QMAT_DRACO_UINT16
+} qmat_draco_number;
 
 /* One number or vector a point. Its unique id in the bitstream is its place among the attributes. */
 typedef struct qmat_draco_attribute {
   qmat_draco_meaning meaning;
-  int components;      /* 1 to 4 */
-  int bits;            /* quantisation, 1 to 30 (2 to 30 for normals) */
-  const float *values; /* components * point_count, finite; not owned */
+  qmat_draco_number number;
+  int components;     /* 1 to 4 */
+  int bits;           /* quantisation of floats, 1 to 30 (2 to 30 for normals); whole numbers are kept */
+  const void *values; /* components * point_count of that number, finite; not owned */
 } qmat_draco_attribute;
 
 /* Encodes a triangle mesh. `faces` holds 3 * face_count point ids below point_count; neither count may be 0. With

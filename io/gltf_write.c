@@ -11,9 +11,9 @@
 #include "io/bytes.h"
 #include "io/draco.h"
 #include "io/gltf_asset.h"
+#include "io/gltf_compress.h"
 
 #define NORMAL_BITS 10
-#define DRACO_EXTENSION "KHR_draco_mesh_compression"
 #define DATA_URI "data:application/octet-stream;base64,"
 
 enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126, ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
@@ -278,12 +278,13 @@ static qmat_status make_skin(qmat_context *context, const qmat_mesh *skin, const
 typedef struct document {
   json_t *root;
   bool binary;
-  qmat_gltf_asset asset; /* that was read; else empty */
-  qmat_writer data;      /* what is added to its buffers */
-  bool in_chunk;         /* that goes into the GLB's chunk, not into a buffer with a URI */
-  size_t data_start;     /* behind the bytes of the asset's own chunk, 0: in another buffer */
-  json_int_t buffer;     /* the number of the buffer */
-  json_int_t material;   /* of skins; -1: there is none yet */
+  qmat_gltf_asset asset;           /* that was read; else empty */
+  qmat_gltf_compressed compressed; /* its meshes, where they are to be; then its chunk is the asset's */
+  qmat_writer data;                /* what is added to its buffers */
+  bool in_chunk;                   /* that goes into the GLB's chunk, not into a buffer with a URI */
+  size_t data_start;               /* behind the bytes of the asset's own chunk, 0: in another buffer */
+  json_int_t buffer;               /* the number of the buffer */
+  json_int_t material;             /* of skins; -1: there is none yet */
 } document;
 
 /* root[key] as an array, made when it is not there; NULL when memory is short or it is something else. */
@@ -370,10 +371,10 @@ static bool add_skin(document *document, const skin_data *data, size_t offset, c
                                 "indices", accessor + 2, "material", document->material);
   bool done = true;
   if (primitive && data->compressed) {
-    json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", DRACO_EXTENSION, "bufferView", view, "attributes",
+    json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", QMAT_GLTF_DRACO, "bufferView", view, "attributes",
                                   "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
-    done = set(primitive, "extensions", extension) && add_extension(root, "extensionsUsed", DRACO_EXTENSION) &&
-           add_extension(root, "extensionsRequired", DRACO_EXTENSION);
+    done = set(primitive, "extensions", extension) && add_extension(root, "extensionsUsed", QMAT_GLTF_DRACO) &&
+           add_extension(root, "extensionsRequired", QMAT_GLTF_DRACO);
   }
   json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
   if (mesh && name) done = set(mesh, "name", json_string(name)) && done;
@@ -478,12 +479,59 @@ static void close_document(document *document) {
   qmat_writer_uninit(&document->data);
   json_decref(document->root);
   qmat_gltf_asset_uninit(&document->asset);
+  qmat_gltf_compressed_uninit(&document->compressed);
+}
+
+/* Compresses the asset's own meshes; `report` gains what came of it. */
+static qmat_status compress_meshes(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                   size_t count, document *document, json_t *report) {
+  json_t *notes = json_array();
+  if (!notes) return qmat_fail_memory(context, "the report");
+  qmat_status status = QMAT_OK;
+  if (scene->mesh_count == 0 || document->data_start == 0) {
+    const char *why = scene->mesh_count == 0 ? "they are described as one" : "their data are in no binary chunk";
+    if (json_array_append_new(notes, json_sprintf("the meshes are left as they are: %s", why)) != 0)
+      status = qmat_fail_memory(context, "the report");
+  } else {
+    double error = 1;
+    for (size_t i = 0; i < count; i++) {
+      const qmat_gltf_options *options = &additions[i].options;
+      if (additions[i].medial && options->diagonal > 0) error = fmin(error, options->quantisation / options->diagonal);
+    }
+    status = qmat_gltf_compress(context, document->root, document->asset.chunk, document->asset.chunk_size, error,
+                                notes, &document->compressed);
+  }
+  if (status == QMAT_OK && document->compressed.chunk) {
+    document->asset.chunk = document->compressed.chunk;
+    document->asset.chunk_size = document->data_start = document->compressed.chunk_size;
+  }
+  if (status == QMAT_OK && report) {
+    bool done = set(report, "draco_primitives", json_integer((json_int_t)document->compressed.primitives));
+    if (json_array_size(notes) > 0) done = json_object_set(report, "warnings", notes) == 0 && done;
+    if (!done) status = qmat_fail_memory(context, "the report");
+  }
+  json_decref(notes);
+  return status;
+}
+
+/* The options of a mesh whose surface has been moved: what is certified stays so where that can be. */
+static qmat_gltf_options options_after(const qmat_gltf_options *options, double moved) {
+  qmat_gltf_options after = *options;
+  if (!(moved > 0 && options->diagonal > 0)) return after;
+  after.error_out += moved / options->diagonal;
+  after.error_in += moved / options->diagonal;
+  const double left = (options->epsilon - fmax(after.error_out, after.error_in)) * options->diagonal;
+  if (options->certified == QMAT_CERTIFICATE_YES && left > 0 && left < options->quantisation) after.quantisation = left;
+  return after;
 }
 
 /* Adds one medial mesh and its skin. */
 static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, size_t index,
                               const qmat_gltf_addition *addition, document *document) {
-  const qmat_gltf_options *options = &addition->options;
+  const bool is_moved = scene && document->compressed.moved && scene->mesh_count > 0;
+  const qmat_gltf_options after =
+      options_after(&addition->options, is_moved ? document->compressed.moved[scene->meshes[index]] : 0);
+  const qmat_gltf_options *options = &after;
   /* A file's name need not be UTF-8, JSON must. */
   const char *name = options->name && options->name[0] && qmat_is_utf8(options->name) ? options->name : NULL;
   const bool has_skin = addition->skin && addition->skin->triangle_count > 0;
@@ -617,10 +665,11 @@ static qmat_status make_file(qmat_context *context, const qmat_scene *scene, con
 
 /* `scene` NULL: an asset of its own. */
 static qmat_status write_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
-                                  size_t count, qmat_file **file) {
+                                  size_t count, bool draco_meshes, json_t *report, qmat_file **file) {
   document document = {0};
   *file = NULL;
   qmat_status status = open_document(context, scene, additions[0].options.binary, &document);
+  if (status == QMAT_OK && draco_meshes) status = compress_meshes(context, scene, additions, count, &document, report);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
     if (additions[i].medial) status = add_medial(context, scene, i, &additions[i], &document);
   if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");
@@ -632,10 +681,10 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
 qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                             const qmat_gltf_options *options, qmat_file **file) {
   const qmat_gltf_addition addition = {.medial = medial, .skin = skin, .options = *options};
-  return write_document(context, NULL, &addition, 1, file);
+  return write_document(context, NULL, &addition, 1, false, NULL, file);
 }
 
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
-                             size_t count, qmat_file **file) {
-  return write_document(context, scene, additions, count, file);
+                             size_t count, bool draco_meshes, json_t *report, qmat_file **file) {
+  return write_document(context, scene, additions, count, draco_meshes, report, file);
 }

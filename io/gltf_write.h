@@ -52,7 +52,7 @@ qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, co
 /* A medial mesh that is to be added to a scene. */
 typedef struct qmat_gltf_addition {
   const qmat_medial *medial; /* NULL, in a scene: its mesh stays as it is */
-  const qmat_mesh *skin; /* to be added as a mesh; NULL: none */
+  const qmat_mesh *skin;     /* to be added as a mesh; NULL: none */
   qmat_gltf_options options;
 } qmat_gltf_addition;
 
@@ -63,8 +63,11 @@ typedef struct qmat_gltf_addition {
  * earlier run left there is replaced. The one medial mesh of all is carried by a node that is added to the scene. A
  * skin becomes a child of each of these nodes (the mesh of the node that was added for it), with its data behind those
  * of the GLB's binary chunk, else in a buffer of its own. The options' `binary` is the same for all. Files that the
- * asset refers to are further parts of `*file`. Otherwise as qmat_gltf_write. */
+ * asset refers to are further parts of `*file`. With `draco_meshes` the asset's own triangles are compressed
+ * (qmat_gltf_compress), within the smallest `quantisation`, and what that moves is part of the errors in the extras;
+ * `report` (an object, may be NULL) gains draco_primitives and, where something is left as it is, warnings. Otherwise
+ * as qmat_gltf_write. */
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
-                             size_t count, qmat_file **file);
+                             size_t count, bool draco_meshes, json_t *report, qmat_file **file);
 
 #endif

@@ -19,11 +19,12 @@ typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMA
 
 typedef struct scene_write_params {
   int format; /* a file_format */
-  bool draco, skin_beside;
+  bool draco, draco_meshes, skin_beside;
   int64_t position_bits, radius_bits;
 } scene_write_params;
 
 enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
+enum { OUT_FILE, OUT_REPORT };
 
 /* The diagonal of the box around all spheres: the model's own, up to the error of the medial mesh. */
 static double diagonal_of(const qmat_medial *medial) {
@@ -98,7 +99,7 @@ static const char *name_of(const qmat_scene *scene, const qmat_value *medial, si
 
 /* All inputs of one mesh, or lists of one length. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
-                              qmat_file **file) {
+                              json_t *report, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
   const bool kept = scene && scene->part_count > 0;
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
@@ -117,7 +118,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
                     (const qmat_report *)given_for(inputs[IN_REPORT], i), name_of(scene, inputs[IN_MEDIAL], i));
   }
   const qmat_status status =
-      kept ? qmat_gltf_enrich(context, scene, additions, count, file)
+      kept ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
            : qmat_gltf_write(context, additions[0].medial, additions[0].skin, &additions[0].options, file);
   qmat_free(additions);
   return status;
@@ -181,6 +182,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_file *file = NULL;
   qmat_status status = check_spheres(context, inputs);
   if (status != QMAT_OK) return status;
+  qmat_report *report = qmat_report_new();
+  if (!report) return qmat_fail_memory(context, "the report");
   switch ((file_format)params->format) {
     case FORMAT_MA:
       status = qmat_ma_write(context, medial, &file);
@@ -193,10 +196,17 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
       status = write_usd(context, params, inputs, &file);
       break;
     default:
-      status = write_gltf(context, params, inputs, &file);
+      status = write_gltf(context, params, inputs, report->root, &file);
       break;
   }
-  if (status == QMAT_OK) outputs[0] = &file->base;
+  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
+  if (status == QMAT_OK) {
+    outputs[OUT_FILE] = &file->base;
+    outputs[OUT_REPORT] = &report->base;
+    return QMAT_OK;
+  }
+  if (file) qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
   return status;
 }
 
@@ -216,6 +226,11 @@ static const qmat_param params[] = {
      .doc = "Compress the skin too: smaller, but some engines refuse the file or show nothing (glb and gltf)",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, draco)},
+    {.name = "draco_meshes",
+     .unit = "",
+     .doc = "Compress the triangles of a glTF scene that is handed on; as with draco, some engines refuse the file",
+     .type = QMAT_PARAM_BOOL,
+     .offset = offsetof(scene_write_params, draco_meshes)},
     {.name = "skin_beside",
      .unit = "",
      .doc = "Add the skin to a glTF scene that is handed on, as a mesh beside the one that it describes",
@@ -258,7 +273,8 @@ static const qmat_port inputs[] = {
 };
 
 static const qmat_port outputs[] = {
-    {.name = "file", .type = QMAT_FILE, .doc = "The finished file"},
+    [OUT_FILE] = {.name = "file", .type = QMAT_FILE, .doc = "The finished file"},
+    [OUT_REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "What was compressed of the scene, and what was not"},
     {0},
 };
 
@@ -266,7 +282,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 2,
+    .version = 3,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A scene that scene.read took from glTF goes on as glb or gltf with all that is in it: each mesh's medial mesh "
@@ -274,7 +290,12 @@ const qmat_node qmat_node_scene_write = {
         "object), in that mesh's own space; one of all meshes merged gets a node of its own. Nothing else changes: the "
         "JSON only gains keys and members, buffers stay byte for byte, files that the asset refers to are written "
         "beside the new one. A mesh that no medial mesh could be made of stays as it is. skin_beside adds the skins as "
-        "meshes. Of any other scene glb and gltf are made anew, and "
+        "meshes. draco_meshes compresses the scene's own indexed triangle lists with all attributes "
+        "(KHR_draco_mesh_compression: positions with 14 bits or what a twentieth of epsilon asks for, normals with 10, "
+        "texture coordinates 12, colours 8, other floats 12) and takes their data out of a GLB's binary chunk; what "
+        "that moves the surface by is added to the stated errors. Primitives with morph targets, with shared data or "
+        "compressed ones stay as they are, and so does an asset with data elsewhere or with an extension that may "
+        "refer to them: the report's warnings tell. Of any other scene glb and gltf are made anew, and "
         "hold the skin as an ordinary mesh, so that every client shows something. The medial mesh is "
         "a Draco blob in base64, in the extras of a node, where clients keep it (qmat_data; triangles first, then "
         "edges on no triangle as (i, j, j), then lone spheres as (i, i, i); the order of spheres is kept). Without "

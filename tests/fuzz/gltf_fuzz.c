@@ -51,15 +51,17 @@ static void write_again(qmat_context *context, const qmat_scene *scene) {
     additions[i] = (qmat_gltf_addition){
         .medial = medial, .options = {.binary = true, .position_bits = 8, .radius_bits = 8, .name = scene->name}};
   }
-  qmat_file *file = NULL;
-  if (qmat_gltf_enrich(context, scene, additions, count, &file) == QMAT_OK) {
-    qmat_gltf_asset asset;
-    assert_int_equal(qmat_gltf_asset_init(context, file->parts[0].bytes, file->parts[0].size, "written", &asset),
-                     QMAT_OK);
-    qmat_gltf_asset_uninit(&asset);
-    qmat_value_release(&file->base);
-  } else {
-    assert_true(context->error.status != QMAT_ERROR_INTERNAL);
+  for (int draco_meshes = 0; draco_meshes < 2; draco_meshes++) {
+    qmat_file *file = NULL;
+    if (qmat_gltf_enrich(context, scene, additions, count, draco_meshes, NULL, &file) == QMAT_OK) {
+      qmat_gltf_asset asset;
+      assert_int_equal(qmat_gltf_asset_init(context, file->parts[0].bytes, file->parts[0].size, "written", &asset),
+                       QMAT_OK);
+      qmat_gltf_asset_uninit(&asset);
+      qmat_value_release(&file->base);
+    } else {
+      assert_true(context->error.status != QMAT_ERROR_INTERNAL);
+    }
   }
   qmat_free(additions);
   qmat_value_release(&medial->base);

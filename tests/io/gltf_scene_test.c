@@ -170,7 +170,7 @@ static qmat_file *enrich(fixture *f, size_t count, bool binary, const qmat_mesh 
                                                     .name = "scene"}};
   }
   qmat_file *file;
-  if (qmat_gltf_enrich(&f->context, f->scene, additions, count, &file) != QMAT_OK)
+  if (qmat_gltf_enrich(&f->context, f->scene, additions, count, false, NULL, &file) != QMAT_OK)
     fail_msg("%s", f->context.error.message);
   for (size_t i = 0; i < 2; i++) qmat_value_release(&medials[i]->base);
   return file;

@@ -73,13 +73,15 @@ static qmat_file *must_write(const qmat_medial *medial, wiring with, const char 
   inputs[qmat_input_find(node, "scene")] = with.scene ? &with.scene->base : NULL;
   inputs[qmat_input_find(node, "skin")] = with.skin ? &with.skin->base : NULL;
   inputs[qmat_input_find(node, "report")] = with.report ? &with.report->base : NULL;
-  qmat_value *outputs[1] = {NULL};
+  qmat_value *outputs[2] = {NULL};
   void *params = make_params(node, settings);
   qmat_context context = {0};
   assert_int_equal(qmat_params_check(&context, node, params), QMAT_OK);
   if (node->run(&context, params, inputs, outputs) != QMAT_OK) fail_msg("%s", context.error.message);
   assert_int_equal(outputs[0]->type, QMAT_FILE);
   assert_true(outputs[0]->sealed);
+  assert_int_equal(outputs[1]->type, QMAT_REPORT);
+  qmat_value_release(outputs[1]);
   free(params);
   qmat_context_uninit(&context);
   return (qmat_file *)outputs[0];
@@ -283,7 +285,7 @@ static void test_a_medial_mesh_without_spheres_is_refused(void **state) {
   assert_int_equal(qmat_value_seal(&context, &none->base), QMAT_OK);
   const qmat_value *inputs[4] = {NULL};
   inputs[qmat_input_find(node, "medial")] = &none->base;
-  qmat_value *outputs[1] = {NULL};
+  qmat_value *outputs[2] = {NULL};
   void *params = make_params(node, NULL);
   assert_int_equal(node->run(&context, params, inputs, outputs), QMAT_ERROR_GEOMETRY);
   assert_null(outputs[0]);
