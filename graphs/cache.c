@@ -384,6 +384,17 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
 }
 
+// Whether the blob is there as it should be. One that was damaged goes: a value that was made anew would not be stored.
+static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
+  if (!has_locally(cache, digest, size)) return false;
+  qmat_digest found;
+  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  bool sound = path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
+  qmat_free(path);
+  if (!sound) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  return sound;
+}
+
 // Stores the binary form of a value; gives what a record says of it.
 static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added) {
   qmat_context nobody = {0};
@@ -391,7 +402,7 @@ static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added)
   uint8_t *bytes;
   size_t size;
   if (!qmat_cache_is_writable(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return NULL;
-  bool kept = has_locally(cache, digest, size);
+  bool kept = is_kept(cache, digest, size);
   if (!kept) kept = *added = keep_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
   bool sent = send_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
   qmat_free(bytes);
