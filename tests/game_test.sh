@@ -21,9 +21,9 @@ mv installed moved
 PKG_CONFIG_PATH=$(dirname "$(find "$work/moved" -name qmat.pc)")
 export PKG_CONFIG_PATH
 printf '#include <stdio.h>\n#include <qmat.h>\nint main(void) { return puts(qmat_version()) < 0; }\n' >version.c
-# shellcheck disable=SC2046
-cc version.c -o version $(pkg-config --cflags --libs qmat) -Wl,-rpath,"$(pkg-config --variable=libdir qmat)" >out.txt 2>&1 ||
-  die "pkg-config"
+# It writes a space in a path as a shell reads it.
+eval "cc version.c -o version $(pkg-config --cflags --libs qmat) -Wl,-rpath,$(pkg-config --variable=libdir qmat)" \
+  >out.txt 2>&1 || die "pkg-config"
 ./version >out.txt || die "the program that pkg-config helped to build"
 
 # make_assets: builds; the assets that were made anew, in $made.
