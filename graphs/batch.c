@@ -40,9 +40,15 @@ static qmat_status add_asset(qmat_context *context, qmat_batch *batch, const cha
   return asset->stem ? QMAT_OK : qmat_fail_memory(context, "assets");
 }
 
+// Whether a folder's error is one to stop at: a folder that is not there holds no match.
+static int is_unreadable(const char *folder, int number) {
+  (void)folder;
+  return number != ENOENT && number != ENOTDIR;
+}
+
 static qmat_status find_matches(qmat_context *context, const char *pattern, qmat_batch *batch) {
   glob_t found;
-  int result = glob(pattern, GLOB_ERR, NULL, &found);
+  int result = glob(pattern, 0, is_unreadable, &found);
   if (result == GLOB_NOMATCH) return qmat_fail(context, QMAT_ERROR_USAGE, "no file matches '%s'", pattern);
   if (result != 0)
     return qmat_fail(context, result == GLOB_NOSPACE ? QMAT_ERROR_MEMORY : QMAT_ERROR_IO,

@@ -151,18 +151,26 @@ static void on_asset(void *user, const qmat_batch *batch, const qmat_asset *asse
             asset->state == QMAT_ASSET_DONE ? "ok" : "failed", asset->seconds);
 }
 
+// The columns that a name takes, as far as each of its characters takes one.
+static int columns_of(const char *name) {
+  int columns = 0;
+  for (; *name; name++) columns += ((unsigned char)*name & 0xc0) != 0x80;
+  return columns;
+}
+
 static void print_table(const qmat_batch *batch) {
   int width = 5;
   size_t counts[4] = {0};
   for (size_t i = 0; i < batch->count; i++)
-    if ((int)strlen(batch->assets[i].stem) > width) width = (int)strlen(batch->assets[i].stem);
+    if (columns_of(batch->assets[i].stem) > width) width = columns_of(batch->assets[i].stem);
   printf("%-*s  result   seconds  hits   spheres  surface to envelope  envelope to surface\n", width, "asset");
   for (size_t i = 0; i < batch->count; i++) {
     const qmat_asset *asset = &batch->assets[i];
     const json_t *summary = json_object_get(asset->result, "summary"), *nodes = json_object_get(asset->result, "nodes");
     static const char *const results[] = {"not run", "running", "ok", "failed"};
     counts[asset->state]++;
-    printf("%-*s  %-7s %8.2f s", width, asset->stem, results[asset->state], asset->seconds);
+    printf("%s%*s  %-7s %8.2f s", asset->stem, width - columns_of(asset->stem), "", results[asset->state],
+           asset->seconds);
     if (asset->state == QMAT_ASSET_DONE)
       printf("  %2lld/%-2zu", json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits")),
              json_array_size(nodes));
@@ -186,6 +194,20 @@ static void print_table(const qmat_batch *batch) {
 }
 
 /* ---- the call ---- */
+
+// Refuses a format that an output of the graph is not saved in.
+static qmat_status check_format(const batch_call *call) {
+  const qmat_graph *graph = &call->invocation->graph;
+  for (size_t i = 0; call->format && i < graph->output_count; i++) {
+    char path[64];
+    int format;
+    snprintf(path, sizeof path, "asset.%.48s", call->format);
+    if (graph->nodes[graph->outputs[i].node].type->outputs[graph->outputs[i].port].type != QMAT_FILE) continue;
+    if (qmat_graph_output_format(call->context, graph, i, path, &format) != QMAT_OK)
+      return qmat_fail_field(call->context, "--format");
+  }
+  return QMAT_OK;
+}
 
 // A folder for the reports of the assets. The machines of a cluster share the folder of the results, and no other.
 static qmat_status make_report_folder(batch_call *call) {
@@ -224,6 +246,7 @@ static qmat_status prepare(batch_call *call) {
   qmat_status status = read_count(context, invocation, "jobs", 1024, &call->jobs);
   call->threads = call->slurm || call->jobs > qmat_threads(context) ? 1 : qmat_threads(context) / call->jobs;
   if (status == QMAT_OK) status = read_count(context, invocation, "threads", 1024, &call->threads);
+  if (status == QMAT_OK) status = check_format(call);
   if (status == QMAT_OK) status = find_input(call);
   if (status != QMAT_OK) return status;
   ssize_t length = readlink("/proc/self/exe", call->program, sizeof call->program - 1);

@@ -153,6 +153,11 @@ holds "two results of one name" test $code -eq 2
 holds "two results of one name are told" grep -q "would have one name" err.txt
 batch --inputs 'nothing*' --out results
 holds "a pattern without a match" test $code -eq 2
+batch --inputs 'nowhere/*.off' --out results
+holds "a pattern in no folder" test $code -eq 2
+batch --inputs models/list.txt --out results --format txt
+holds "no such format" test $code -eq 2
+holds "no such format is told once" test "$(grep -c 'known endings' err.txt)" -eq 1
 batch --inputs models/list.txt
 holds "no folder" test $code -eq 2
 batch --inputs models/list.txt --out graph.yaml
