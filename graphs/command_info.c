@@ -9,6 +9,13 @@
 #include "io/model.h"
 #include "nodes/nodes.h"
 
+// Control characters in a file's texts are not for the terminal.
+static void print_text(const char *key, const char *text) {
+  printf("  %s: ", key);
+  for (; *text; text++) putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
+  putchar('\n');
+}
+
 static void print_object(const json_t *object) {
   const char *key;
   json_t *value;
@@ -16,7 +23,7 @@ static void print_object(const json_t *object) {
     if (json_is_array(value)) {
       for (size_t i = 0; i < json_array_size(value); i++) {
         const char *text = json_string_value(json_array_get(value, i));
-        if (text) printf("  %s: %s\n", key, text);
+        if (text) print_text(key, text);
       }
     } else if (json_is_string(value)) {
       printf("  %s: %s\n", key, qmat_show(json_string_value(value)).text);

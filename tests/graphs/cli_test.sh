@@ -121,11 +121,14 @@ expect 2 "would overwrite" "$qmat" mat box.off -o box.glb --report box.off
 holds "the model is untouched" cmp -s box.off box.ma
 rm box.ma
 
-expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.ma --epsilon 5% $coarse --report report.json --threads 1
-holds "both files" test -s box.glb -a -s box.ma
+expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.gltf -o box.ma --epsilon 5% $coarse --report report.json \
+  --threads 1
+holds "all files" test -s box.glb -a -s box.gltf -a -s box.ma
 expect 0 "a medial mesh of" "$qmat" info box.glb
 expect 0 "triangles: 12" "$qmat" info box.off
 expect 0 "not refuted" "$qmat" info box.glb --against box.off
+sed 's/^{$/{"images": [{"uri": "\\u001b[2J.png"}],/' box.gltf >odd.gltf
+expect 0 'the file "?[2J.png" cannot be read' "$qmat" info odd.gltf
 expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
 expect 0 "spheres" "$qmat" extract box.glb -o back.ma
 holds "as many spheres as before" test "$(head -n 1 back.ma)" = "$(head -n 1 box.ma)"
@@ -137,7 +140,7 @@ expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
 expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5% $coarse
 expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
 holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
-holds "the report names both" test "$(grep -c '"sha256"' report.json)" -eq 2
+holds "the report names all" test "$(grep -c '"sha256"' report.json)" -eq 3
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
   --set epsilon=5% $coarse -o again.glb --threads 2
