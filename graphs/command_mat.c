@@ -76,10 +76,9 @@ const qmat_command qmat_command_mat = {
     .doc =
         "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
         "0, which means no bound on the distance. A glTF scene that is saved as glTF goes on with all that is in it, "
-        "and "
-        "each of its meshes gains a medial mesh; for other formats its meshes are taken as one (model.mesh=merged). "
-        "Every other parameter is reached by --set; 'qmat nodes' lists the "
-        "nodes and 'qmat node NAME' their parameters.",
+        "and each of its meshes gains a medial mesh; for other formats its meshes are taken as one "
+        "(model.mesh=merged). Every other parameter is reached by --set; 'qmat nodes' lists the nodes and 'qmat node "
+        "NAME' their parameters.",
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,
     .least = 1,

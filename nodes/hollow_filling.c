@@ -133,5 +133,7 @@ qmat_status qmat_hollows_fill(qmat_context *context, const qmat_surface *surface
       ++*added;
   }
   if (*added == 0) return QMAT_OK;
-  return extend(context, medial, spheres, neighbours, *added);
+  const qmat_status status = extend(context, medial, spheres, neighbours, *added);
+  if (status != QMAT_OK) *added = 0;
+  return status;
 }

@@ -528,8 +528,7 @@ const qmat_node qmat_node_mesh_subdivide = {
         "the largest distance from the mesh to the limits of edge middles and face centres, since each further level "
         "brings a quarter of the one before on smooth surfaces, and about half at worst; edges that are still "
         "semi-sharp add the distance to their neighbours. It is measured, not proved. The mesh carries it along: "
-        "medial.simplify "
-        "holds its errors to what is left of epsilon, and medial.evaluate adds it to what it states.",
+        "medial.simplify holds its errors to what is left of epsilon, and medial.evaluate adds it to what it states.",
     .citation = "Catmull and Clark 1978; Loop 1987; DeRose et al. 1998, Subdivision surfaces in character animation",
     .params_size = sizeof(mesh_subdivide_params),
     .params = params,
