@@ -22,6 +22,7 @@ typedef enum obstacle {
   OBSTACLE_TARGETS,
   OBSTACLE_SHARED,
   OBSTACLE_DATA,
+  OBSTACLE_REFUSED,
   OBSTACLE_COUNT
 } obstacle;
 
@@ -31,6 +32,7 @@ static const char *const obstacle_texts[OBSTACLE_COUNT] = {
     [OBSTACLE_TARGETS] = "it has morph targets",
     [OBSTACLE_SHARED] = "its data are used by something else, too",
     [OBSTACLE_DATA] = "its data are sparse, outside the binary chunk, or not as glTF asks for",
+    [OBSTACLE_REFUSED] = "Draco cannot encode it",
 };
 
 /* An accessor's numbers in the chunk. */
@@ -355,12 +357,16 @@ static json_t *make_extension(const packing *p, size_t view) {
   return NULL;
 }
 
-static qmat_status pack(compressor *c, const packing *p, json_t **extension) {
+static qmat_status pack(compressor *c, const packing *p, json_t **extension, obstacle *why) {
   uint8_t *bytes = NULL;
   size_t size = 0;
   *extension = NULL;
   qmat_status status = qmat_draco_encode(c->context, p->attributes, p->attribute_count, p->vertex_count, p->corners,
                                          p->triangle_count, false, &bytes, &size);
+  if (status == QMAT_ERROR_DEPENDENCY) { /* of nothing but degenerate triangles, say */
+    *why = OBSTACLE_REFUSED;
+    return QMAT_OK;
+  }
   if (status == QMAT_OK) status = describe(c, p, bytes, size);
   if (status == QMAT_OK) {
     json_t *view = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)c->blobs.size, "byteLength",
@@ -396,7 +402,7 @@ static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t m
     c->result->moved[mesh] = fmax(c->result->moved[mesh], json_number_value(json_object_get(extension, "qmat new")));
   } else {
     status = take_primitive(c, primitive, &p, &why);
-    if (status == QMAT_OK && why == OBSTACLE_NONE) status = pack(c, &p, &extension);
+    if (status == QMAT_OK && why == OBSTACLE_NONE) status = pack(c, &p, &extension, &why);
     /* For primitives of the same geometry; it goes when the views are placed. */
     if (extension && json_object_set_new(extension, "qmat new", json_real(p.moved)) != 0)
       status = qmat_fail_memory(c->context, "a glTF file");

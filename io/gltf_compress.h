@@ -27,11 +27,11 @@ typedef struct qmat_gltf_compressed {
  * 10 bits, texture coordinates 12, colours 8, other floats 12; whole numbers stay as they are. Vertices are reordered,
  * split and dropped as edgebreaker does, degenerate triangles go.
  *
- * Left as they are: what is compressed already, is no indexed triangle list, has morph targets, shares vertices with
- * another primitive that has other triangles, is not in the chunk, or has types that glTF does not allow; and all of an
- * asset that uses an extension which may refer to the data in ways that are not known here. `notes` (an array) gains a
- * text for each reason. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY. Free with qmat_gltf_compressed_uninit, also after a
- * failure. One thread; the same bytes for the same input. Cost: linear, but for sorting. */
+ * Left as they are: what is compressed already, is no indexed triangle list, has morph targets, shares data with
+ * another primitive that has other triangles, is not in the chunk, has types that glTF does not allow, or is nothing
+ * that Draco can encode; and all of an asset that uses an extension which may refer to the data in ways that are not
+ * known here. `notes` (an array) gains a text for each reason. QMAT_ERROR_MEMORY. Free with
+ * qmat_gltf_compressed_uninit, also after a failure. One thread; the same bytes for the same input. Cost: linear. */
 qmat_status qmat_gltf_compress(qmat_context *context, json_t *root, const uint8_t *chunk, size_t size, double error,
                                json_t *notes, qmat_gltf_compressed *compressed);
 

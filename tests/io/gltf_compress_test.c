@@ -202,6 +202,8 @@ static void test_what_cannot_be_taken_stays_as_it_is(void **state) {
       {"'_CORNER':2},'indices':1}]}", "'_CORNER':0},'indices':1}]}", "used by something else", 0},
       {"'count':36", "'count':35", "not as glTF asks for", 0},
       {"'count':36", "'count':37", "not as glTF asks for", 0},
+      {"'bufferView':1,'componentType':5123,'count':36", "'bufferView':0,'componentType':5121,'count':12",
+       "Draco cannot encode it", 0}, /* corner 0 again and again */
       {"'byteOffset':4,", "'byteOffset':9,", "not as glTF asks for", 0},
       {"'componentType':5121", "'componentType':5125", "not as glTF asks for", 0},
       {"'buffer':0,'byteLength':96", "'buffer':1,'byteLength':96", "outside the binary chunk", 0},
