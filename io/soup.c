@@ -225,7 +225,7 @@ static qmat_status check_counts(conversion *c) {
 
 static qmat_status refuse_or_drop(conversion *c, size_t facet) {
   if (!c->drops_defects) {
-    qmat_fail_hint(c->context, "'defects: drop' leaves such facets out");
+    qmat_fail_hint(c->context, "'defects: drop' (qmat mat: --set model.defects=drop) leaves such facets out");
     return at_facet(c, facet);
   }
   c->dropped[facet] = 1;
