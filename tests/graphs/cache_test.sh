@@ -201,6 +201,37 @@ printf "$zero$zero$zero$two$zero$zero$zero$one$zero$zero$zero$one\000\002\001\00
 holds "why names the side file" grep -q 'the side file box.bin has other bytes' out.txt
 run -o b.ma
 all run "another byte in the side file"
+
+# A scene of two meshes, one of which changes: the other comes from the cache.
+mkdir scene
+printf '%s' '{"asset":{"version":"2.0"},"buffers":[{"uri":"two.bin","byteLength":108}],"bufferViews":[
+ {"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
+ {"buffer":0,"byteOffset":60,"byteLength":48}],"accessors":[
+ {"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},
+ {"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"},
+ {"bufferView":2,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[2,2,2]}],"meshes":[
+ {"name":"one","primitives":[{"attributes":{"POSITION":0},"indices":1}]},
+ {"name":"other","primitives":[{"attributes":{"POSITION":2},"indices":1}]}],
+ "nodes":[{"mesh":0},{"mesh":1}],"scenes":[{"nodes":[0,1]}],"scene":0}' >scene/two.gltf
+# put_scene X: the side file, with X as the first coordinate of the second mesh's second corner.
+put_scene() {
+  # shellcheck disable=SC2059
+  printf "$zero$zero$zero$one$zero$zero$zero$one$zero$zero$zero$one\000\002\001\000\001\003\000\003\002\001\002\003" >scene/two.bin
+  # shellcheck disable=SC2059
+  printf "$zero$zero$zero$1$zero$zero$zero$two$zero$zero$zero$one" >>scene/two.bin
+}
+model=scene/two.gltf
+put_scene "$one"
+run --to initial
+all run "a scene of two meshes"
+run --to initial
+all hit "a scene of two meshes again"
+put_scene "$two"
+run --to initial
+is initial run "a mesh of two that has changed"
+holds "the other mesh comes from the cache" test "$(grep -c '1 of 2 from the cache' out.txt)" -eq 3
+"$qmat" cache verify >out.txt 2>err.txt
+holds "lists are whole in the cache" grep -q ' 0 broken, 0 incomplete' out.txt
 model=box.off
 
 # A cache that cannot be written, or is damaged.
