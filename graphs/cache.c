@@ -292,7 +292,7 @@ static bool has_locally(const qmat_cache *cache, const qmat_digest *digest, uint
   return there;
 }
 
-bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
+static bool has_blob(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
   return has_locally(cache, digest, size) ||
          qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
 }
@@ -443,7 +443,7 @@ bool qmat_cache_has_stored(qmat_cache *cache, const json_t *stored) {
   qmat_digest digest;
   uint64_t size;
   for (size_t i = 0; i < blob_count(stored); i++)
-    if (!blob_at(stored, i, &digest, &size) || !qmat_cache_has(cache, &digest, size)) return false;
+    if (!blob_at(stored, i, &digest, &size) || !has_blob(cache, &digest, size)) return false;
   return true;
 }
 

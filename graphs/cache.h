@@ -63,9 +63,6 @@ const char *qmat_cache_warning(const qmat_cache *cache);
  * json_decref. */
 json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key);
 
-/* Whether a blob is there and `size` bytes long; its bytes are not looked at. */
-bool qmat_cache_has(qmat_cache *cache, const qmat_digest *digest, uint64_t size);
-
 /* The value of that digest, whose blob has `size` bytes, sealed and checked; NULL: it is not there, or not what it
  * should be. */
 qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type);
@@ -78,7 +75,8 @@ void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key);
  * when it could not be stored. `*added`: whether any of it was not there before. The caller calls json_decref. */
 json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *added);
 
-/* Of such an object: whether all blobs that it names are there; that they were used just now; their sizes together. */
+/* Of such an object: whether all blobs that it names are there, of their sizes (their bytes are not looked at); that
+ * they were used just now; their sizes together. */
 bool qmat_cache_has_stored(qmat_cache *cache, const json_t *stored);
 void qmat_cache_touch_stored(qmat_cache *cache, const json_t *stored);
 uint64_t qmat_cache_stored_size(const json_t *stored);
