@@ -16,7 +16,7 @@ typedef qmat_simplify_params medial_simplify_params;
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
  * is repeated, at most this often, with control points in the places found. Notches and voids of the envelope are
  * filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
-enum { MOST_ROUNDS = 4, MOST_FILLINGS = 6 };
+enum { MOST_ROUNDS = 8, MOST_FILLINGS = 6 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
