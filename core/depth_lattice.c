@@ -25,13 +25,6 @@ qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *l
   return QMAT_OK;
 }
 
-qmat_status qmat_depth_lattice_view_init(qmat_context *context, const qmat_depth_lattice *base,
-                                         qmat_depth_lattice *view) {
-  const qmat_status status = qmat_depth_lattice_init(context, view, base->surface, base->spacing);
-  view->base = base;
-  return status;
-}
-
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
   qmat_free(lattice->keys);
   qmat_free(lattice->depths);
@@ -90,41 +83,15 @@ double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double 
   return qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
 }
 
-/* Whether the depth at a node is known. */
-static bool find_depth(const qmat_depth_lattice *lattice, uint64_t key, double *depth) {
-  if (lattice->base && find_depth(lattice->base, key, depth)) return true;
-  const size_t slot = find_slot(lattice->keys, lattice->capacity, key);
-  if (lattice->keys[slot] != key) return false;
-  *depth = lattice->depths[slot];
-  return true;
-}
-
-static void remember(qmat_depth_lattice *lattice, uint64_t key, double depth) {
-  if (2 * (lattice->count + 1) > lattice->capacity && !grow(lattice)) return;
-  const size_t slot = find_slot(lattice->keys, lattice->capacity, key);
-  if (lattice->keys[slot] == key) return;
-  lattice->keys[slot] = key;
-  lattice->depths[slot] = depth;
-  lattice->count++;
-}
-
-void qmat_depth_lattice_absorb(qmat_depth_lattice *lattice, qmat_depth_lattice *view) {
-  for (size_t slot = 0; slot < view->capacity && view->count > 0; slot++)
-    if (view->keys[slot] != 0) remember(lattice, view->keys[slot], view->depths[slot]);
-  memset(view->keys, 0, view->capacity * sizeof *view->keys);
-  view->count = 0;
-  lattice->questions += view->questions;
-  view->questions = 0;
-}
-
 /* The depth at a node; from a neighbour where one is known. */
 static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
   static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};
   for (int k = 0; k < 3; k++)
     for (int sign = 0; sign < 2; sign++) {
-      double depth;
-      if (find_depth(lattice, sign ? key + steps[k] : key - steps[k], &depth))
-        return qmat_depth_lattice_exact_near(lattice, node, depth, lattice->spacing);
+      const uint64_t neighbour = sign ? key + steps[k] : key - steps[k];
+      const size_t slot = find_slot(lattice->keys, lattice->capacity, neighbour);
+      if (lattice->keys[slot] == neighbour)
+        return qmat_depth_lattice_exact_near(lattice, node, lattice->depths[slot], lattice->spacing);
     }
   return qmat_depth_lattice_exact(lattice, node);
 }
@@ -143,9 +110,15 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
     square += (point[k] - node[k]) * (point[k] - node[k]);
   }
   *distance = sqrt(square);
-  double depth;
-  if (find_depth(lattice, key, &depth)) return depth;
-  depth = ask_node(lattice, key, node);
-  remember(lattice, key, depth);
+  size_t slot = find_slot(lattice->keys, lattice->capacity, key);
+  if (lattice->keys[slot] == key) return lattice->depths[slot];
+  const double depth = ask_node(lattice, key, node);
+  if (2 * (lattice->count + 1) > lattice->capacity) {
+    if (!grow(lattice)) return depth;
+    slot = find_slot(lattice->keys, lattice->capacity, key);
+  }
+  lattice->keys[slot] = key;
+  lattice->depths[slot] = depth;
+  lattice->count++;
   return depth;
 }

@@ -6,10 +6,9 @@
 
 /* Depths (the distance to the surface, negative outside) remembered at the nodes of a cubic lattice, each asked of the
  * surface when it is first wanted. Depth is 1-Lipschitz, so a node bounds it everywhere around. What it answers depends
- * on the place alone, never on what was asked before. One thread at a time; several may have views of one. */
+ * on the place alone, never on what was asked before. One thread at a time. */
 typedef struct qmat_depth_lattice {
   const qmat_surface *surface;
-  const struct qmat_depth_lattice *base; /* of a view: what is known there need not be asked again */
   double spacing;
   size_t count, capacity; /* capacity: a power of two */
   uint64_t *keys;         /* 0: free */
@@ -22,14 +21,6 @@ typedef struct qmat_depth_lattice {
 qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *lattice, const qmat_surface *surface,
                                     double spacing);
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice);
-
-/* A view of a lattice, which it reads and leaves as it is while it remembers further nodes itself. `base` has to live
- * as long. QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit, also after a failure. */
-qmat_status qmat_depth_lattice_view_init(qmat_context *context, const qmat_depth_lattice *base,
-                                         qmat_depth_lattice *view);
-
-/* Gives what the view has remembered to the lattice that it is a view of, and empties it. Cost: the view's capacity. */
-void qmat_depth_lattice_absorb(qmat_depth_lattice *lattice, qmat_depth_lattice *view);
 
 /* The depth at the node nearest to `point` (3 doubles, unit frame), and how far that node is. Points beyond the lattice
  * (farther than 2 diagonals) are asked of the surface themselves. */

@@ -73,42 +73,6 @@ static qmat_status find_triangle_edges(qmat_context *context, qmat_complex *comp
   return QMAT_OK;
 }
 
-static bool scratch_init(qmat_complex *complex) {
-  complex->stamp = 0;
-  complex->mark_of_vertex = qmat_calloc(complex->vertex_count, sizeof(uint32_t));
-  complex->edge_to_vertex = qmat_alloc(complex->vertex_count, sizeof(uint32_t));
-  complex->mark_of_edge = qmat_calloc(complex->edge_count, sizeof(uint32_t));
-  complex->triangle_at_edge = qmat_alloc(complex->edge_count, sizeof(uint32_t));
-  return complex->mark_of_vertex && complex->edge_to_vertex && complex->mark_of_edge && complex->triangle_at_edge;
-}
-
-static void scratch_uninit(qmat_complex *complex) {
-  qmat_free(complex->mark_of_vertex);
-  qmat_free(complex->edge_to_vertex);
-  qmat_free(complex->mark_of_edge);
-  qmat_free(complex->triangle_at_edge);
-}
-
-qmat_status qmat_complex_view_init(qmat_context *context, const qmat_complex *complex, qmat_complex *view) {
-  *view = *complex;
-  return scratch_init(view) ? QMAT_OK : qmat_fail_memory(context, "a view of the medial complex");
-}
-
-void qmat_complex_view_update(const qmat_complex *complex, qmat_complex *view) {
-  const qmat_complex scratch = *view;
-  *view = *complex;
-  view->mark_of_vertex = scratch.mark_of_vertex;
-  view->edge_to_vertex = scratch.edge_to_vertex;
-  view->mark_of_edge = scratch.mark_of_edge;
-  view->triangle_at_edge = scratch.triangle_at_edge;
-  view->stamp = scratch.stamp;
-}
-
-void qmat_complex_view_uninit(qmat_complex *view) {
-  scratch_uninit(view);
-  *view = (qmat_complex){0};
-}
-
 qmat_status qmat_complex_init(qmat_context *context, qmat_complex *complex, const qmat_medial *medial,
                               const double *spheres) {
   const size_t vertices = medial->sphere_count, edges = medial->edge_count, triangles = medial->triangle_count;
@@ -126,9 +90,13 @@ qmat_status qmat_complex_init(qmat_context *context, qmat_complex *complex, cons
   complex->vertex_alive = qmat_alloc(vertices, 1);
   complex->edge_alive = qmat_alloc(edges, 1);
   complex->triangle_alive = qmat_alloc(triangles, 1);
-  const bool has_scratch = scratch_init(complex);
-  if (!has_scratch || !complex->spheres || !complex->edges || !complex->edge_triangles || !complex->triangles ||
-      !complex->triangle_edges || !complex->vertex_alive || !complex->edge_alive || !complex->triangle_alive)
+  complex->mark_of_vertex = qmat_calloc(vertices, sizeof(uint32_t));
+  complex->edge_to_vertex = qmat_alloc(vertices, sizeof(uint32_t));
+  complex->mark_of_edge = qmat_calloc(edges, sizeof(uint32_t));
+  complex->triangle_at_edge = qmat_alloc(edges, sizeof(uint32_t));
+  if (!complex->spheres || !complex->edges || !complex->edge_triangles || !complex->triangles ||
+      !complex->triangle_edges || !complex->vertex_alive || !complex->edge_alive || !complex->triangle_alive ||
+      !complex->mark_of_vertex || !complex->edge_to_vertex || !complex->mark_of_edge || !complex->triangle_at_edge)
     return qmat_fail_memory(context, "the medial complex");
   memcpy(complex->spheres, spheres ? spheres : medial->spheres, 4 * vertices * sizeof(double));
   if (edges) memcpy(complex->edges, medial->edges, 2 * edges * sizeof(uint32_t));
@@ -152,7 +120,10 @@ void qmat_complex_uninit(qmat_complex *complex) {
   qmat_free(complex->vertex_alive);
   qmat_free(complex->edge_alive);
   qmat_free(complex->triangle_alive);
-  scratch_uninit(complex);
+  qmat_free(complex->mark_of_vertex);
+  qmat_free(complex->edge_to_vertex);
+  qmat_free(complex->mark_of_edge);
+  qmat_free(complex->triangle_at_edge);
   rows_uninit(&complex->vertex_edges);
   rows_uninit(&complex->vertex_triangles);
   *complex = (qmat_complex){0};

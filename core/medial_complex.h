@@ -55,13 +55,6 @@ qmat_status qmat_complex_init(qmat_context *context, qmat_complex *complex, cons
                               const double *spheres);
 void qmat_complex_uninit(qmat_complex *complex);
 
-/* A view of a complex, with scratch of its own, so that several threads may preview collapses while nothing changes.
- * After a change it has to be updated before it is used. QMAT_ERROR_MEMORY. Free with qmat_complex_view_uninit, also
- * after a failure. */
-qmat_status qmat_complex_view_init(qmat_context *context, const qmat_complex *complex, qmat_complex *view);
-void qmat_complex_view_update(const qmat_complex *complex, qmat_complex *view);
-void qmat_complex_view_uninit(qmat_complex *view);
-
 /* Looks at what collapsing a live edge would do; changes nothing but scratch. The arrays of `collapse` grow as needed
  * and are reused; zero it before the first use and free it with qmat_collapse_uninit. Cost: linear in both stars. */
 qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *collapse);

@@ -68,32 +68,6 @@ void qmat_coverage_uninit(qmat_coverage *coverage) {
   *coverage = (qmat_coverage){0};
 }
 
-void qmat_coverage_view_init(const qmat_coverage *coverage, qmat_coverage *view) {
-  *view = *coverage;
-  view->marks = NULL;
-  view->stamp = 0;
-  view->found = NULL;
-  view->found_count = view->found_capacity = 0;
-  view->star = view->link = (qmat_star_parts){0};
-}
-
-void qmat_coverage_view_uninit(qmat_coverage *view) {
-  qmat_free(view->found);
-  qmat_free(view->star.items);
-  qmat_free(view->link.items);
-  *view = (qmat_coverage){0};
-}
-
-void qmat_coverage_swap_found(qmat_coverage *a, qmat_coverage *b) {
-  const qmat_coverage old = *a;
-  a->found = b->found;
-  a->found_count = b->found_count;
-  a->found_capacity = b->found_capacity;
-  b->found = old.found;
-  b->found_count = old.found_count;
-  b->found_capacity = old.found_capacity;
-}
-
 /* F at the witness after the collapse: an upper bound of F there. */
 static double witness_distance(const qmat_coverage *coverage, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double sphere[4], size_t point) {

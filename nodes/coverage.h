@@ -44,14 +44,6 @@ qmat_status qmat_coverage_init(qmat_context *context, qmat_coverage *coverage, s
                                double *limits, const uint32_t *witnesses, const double *weights, size_t vertex_count);
 void qmat_coverage_uninit(qmat_coverage *coverage);
 
-/* A view, with scratch of its own but for the marks, so that several threads may test while nothing changes: `marks`
- * has to be given point_count zeros and a stamp of 0 before the first test. Free with qmat_coverage_view_uninit. */
-void qmat_coverage_view_init(const qmat_coverage *coverage, qmat_coverage *view);
-void qmat_coverage_view_uninit(qmat_coverage *view);
-
-/* Swaps what the newest test of either has found, so that a test by a view may be committed. */
-void qmat_coverage_swap_found(qmat_coverage *a, qmat_coverage *b);
-
 /* Whether every control point keeps within its limit when `collapse` makes `sphere` (4 doubles) of its edge. `first` is
  * a point to try first (QMAT_NONE: none): what failed before is likely to fail again. Changes nothing but scratch.
  * `*kept` is the answer. QMAT_ERROR_MEMORY. */

@@ -174,6 +174,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
   bad |= qmat_json_set_count(root, "filled", filled);
   bad |= qmat_json_set_count(root, "moves", run->moves);
+  bad |= qmat_json_set_count(root, "surface_questions", s->dense.protrusion.lattice.questions);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }

@@ -120,9 +120,9 @@ static bool search_piece(search *s, const piece *p, int level) {
     ask = size <= s->smallest || last;
   }
   if (ask) {
-    const double depth = s->lattice
-                             ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
-                             : -qmat_surface_signed_distance(s->surface, centre);
+    const double depth =
+        s->lattice ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
+                   : -qmat_surface_signed_distance(s->surface, centre);
     if (depth == INFINITY) { /* deeper than that */
       s->bound = maximum(s->bound, s->content);
       return true;
@@ -205,34 +205,6 @@ void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
   qmat_free(protrusion->new_edge_bounds);
   qmat_free(protrusion->new_triangle_bounds);
   *protrusion = (qmat_protrusion){0};
-}
-
-void qmat_protrusion_view_init(const qmat_protrusion *protrusion, qmat_protrusion *view) {
-  *view = *protrusion;
-  view->lattice = (qmat_depth_lattice){0};
-  view->new_edge_bounds = view->new_triangle_bounds = NULL;
-  view->new_edge_capacity = view->new_triangle_capacity = 0;
-}
-
-void qmat_protrusion_view_uninit(qmat_protrusion *view) {
-  qmat_free(view->new_edge_bounds);
-  qmat_free(view->new_triangle_bounds);
-  *view = (qmat_protrusion){0};
-}
-
-static void copy_bounds(const qmat_protrusion *from, qmat_protrusion *to) {
-  to->sphere_depth = from->sphere_depth;
-  to->failed = from->failed;
-  to->new_edge_bounds = from->new_edge_bounds;
-  to->new_edge_capacity = from->new_edge_capacity;
-  to->new_triangle_bounds = from->new_triangle_bounds;
-  to->new_triangle_capacity = from->new_triangle_capacity;
-}
-
-void qmat_protrusion_swap_bounds(qmat_protrusion *a, qmat_protrusion *b) {
-  const qmat_protrusion old = *a;
-  copy_bounds(b, a);
-  copy_bounds(&old, b);
 }
 
 bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,

@@ -32,14 +32,6 @@ qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrus
                                  const qmat_complex *complex, const double *depths, double limit);
 void qmat_protrusion_uninit(qmat_protrusion *protrusion);
 
-/* A view, with scratch of its own but for the lattice, so that several threads may test while nothing changes:
- * `lattice` has to be set before the first test. Free with qmat_protrusion_view_uninit. */
-void qmat_protrusion_view_init(const qmat_protrusion *protrusion, qmat_protrusion *view);
-void qmat_protrusion_view_uninit(qmat_protrusion *view);
-
-/* Swaps what the newest test of either has bounded, so that a test by a view may be committed. */
-void qmat_protrusion_swap_bounds(qmat_protrusion *a, qmat_protrusion *b);
-
 /* Bounds the depth of the merged sphere's centre from below: from its ends where that proves it inside and within the
  * limit, else by asking. True when the centre lies inside and the sphere within the limit. */
 bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,

@@ -8,8 +8,6 @@
 #include "core/medial_build.h"
 #include "core/vector.h"
 #include "nodes/collapse_candidates.h"
-#include "nodes/collapse_trial.h"
-#include "nodes/speculation.h"
 
 /* So many costs are found, or collapses tried, between two calls of the progress function: of the last collapses each
  * looks at thousands of points. */
@@ -27,10 +25,6 @@ static bool in_order(const qmat_simplification *s) {
 
 static bool is_two_sided(const qmat_simplification *s) {
   return s->rules.error == QMAT_ERROR_TWO_SIDED;
-}
-
-bool qmat_simplification_holds_protrusion(const qmat_simplification *s) {
-  return s->held < INFINITY && is_two_sided(s);
 }
 
 /* Levels by which what is held rises: twelve to each doubling of the finest. Beyond the whole model nothing is held. */
@@ -61,6 +55,21 @@ static bool hold_next(qmat_simplification *s) {
   return true;
 }
 
+static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
+  if (s->rules.cost == QMAT_COST_PMAT) {
+    qmat_candidates_find_larger(&s->complex, s->quadrics, edge, c);
+  } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
+    const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+    if (status != QMAT_OK) return status;
+    return qmat_hausdorff_candidates(s->context, &s->coverage, &s->complex, &s->collapse, s->control->surface_count, c);
+  } else if (s->rules.published) {
+    qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
+  } else {
+    qmat_candidates_find(&s->complex, s->quadrics, edge, c);
+  }
+  return QMAT_OK;
+}
+
 /* What an edge at sharp features may collapse to, whatever is held; where there is nothing the candidates stay. */
 static void prefer_features(const qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
@@ -74,8 +83,7 @@ static void prefer_features(const qmat_simplification *s, uint32_t edge, qmat_ca
 /* The cost of the best candidate. */
 static qmat_status set_cost(qmat_simplification *s, uint32_t edge) {
   qmat_candidates c;
-  const qmat_trial_tools tools = qmat_trial_tools_of(s);
-  const qmat_status status = qmat_trial_candidates(s, &tools, edge, &c);
+  const qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
   prefer_features(s, edge, &c);
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
@@ -254,6 +262,73 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
   return after <= before || after <= (int64_t)(s->complex.live_vertices - s->creases.left) / SPHERES_PER_FAULT;
 }
 
+typedef enum { DONE, REFUSED, EXCEEDED } outcome;
+
+static bool holds_protrusion(const qmat_simplification *s) {
+  return s->held < INFINITY && is_two_sided(s);
+}
+
+static bool is_inner(const qmat_simplification *s, size_t point) {
+  return point >= s->control->surface_count;
+}
+
+/* Whether the newest preview merges into a sharp feature. */
+static bool merges_feature(const qmat_simplification *s) {
+  return qmat_crease_guard_is_feature(&s->creases, s->collapse.kept) ||
+         qmat_crease_guard_is_feature(&s->creases, s->collapse.removed);
+}
+
+/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may. A
+ * sharp feature lies on the surface.
+ */
+static outcome test_inside(qmat_simplification *s, const double *sphere) {
+  const bool on_surface = merges_feature(s);
+  const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) || on_surface;
+  const bool inside = s->rules.published || on_surface || s->protrusion.sphere_depth > 0;
+  if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
+  if (!s->rules.published && !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere))
+    return REFUSED;
+  return kept || !(sphere[3] - s->protrusion.sphere_depth > s->protrusion.limit) ? DONE : EXCEEDED;
+}
+
+/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
+ * they exceed it, `*asked` is no more than what would have to be held. */
+static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uint32_t first, outcome *result,
+                               double *asked) {
+  bool kept;
+  s->coverage.found_count = 0;
+  *result = test_inside(s, sphere);
+  *asked = sphere[3] - s->protrusion.sphere_depth;
+  if (*result != DONE) {
+    s->refused_by_surface++;
+    return QMAT_OK;
+  }
+  *result = EXCEEDED;
+  if (s->held < INFINITY) {
+    const qmat_status status =
+        qmat_coverage_test(s->context, &s->coverage, &s->complex, &s->collapse, sphere, first, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->refused_by_coverage++;
+      *asked = fmax(s->held, is_inner(s, s->coverage.failed_point) ? -s->control->distances[s->coverage.failed_point]
+                                                                   : s->coverage.failed_distance);
+      return QMAT_OK;
+    }
+  }
+  if (holds_protrusion(s)) {
+    const qmat_status status =
+        qmat_protrusion_test(s->context, &s->protrusion, &s->complex, &s->collapse, sphere, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->refused_by_protrusion++;
+      *asked = s->protrusion.failed;
+      return QMAT_OK;
+    }
+  }
+  *result = DONE;
+  return QMAT_OK;
+}
+
 /* The largest error that is recorded: more than the whole model. */
 static const double most_error = 2;
 
@@ -268,74 +343,94 @@ static void record(qmat_simplification *s, const double *sphere) {
 /* Does what the newest preview and the newest test allow. */
 static qmat_status commit(qmat_simplification *s, const double *sphere) {
   if (in_order(s)) record(s, sphere);
-  if (qmat_simplification_holds_protrusion(s))
+  if (holds_protrusion(s))
     qmat_protrusion_commit(&s->protrusion, &s->collapse);
   else
     s->protrusion.depths[s->collapse.kept] = s->protrusion.sphere_depth;
   qmat_coverage_commit(&s->coverage, &s->collapse);
   qmat_crease_guard_commit(&s->creases, &s->complex, &s->collapse, sphere);
-  const qmat_status status = qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
-  if (status == QMAT_OK) qmat_speculation_forget(s, s->collapse.kept);
+  return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
+}
+
+/* A sphere whose sampled error is this many times what is held is not worth a test. */
+static const double worth_testing = 1.1;
+
+/* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
+ * look good as they are. */
+static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
+                              outcome *result) {
+  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
+  int least = 0;
+  qmat_status status =
+      qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
+  for (int i = 0; i < c->count && status == QMAT_OK; i++) {
+    status =
+        qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], &errors[i]);
+    if (errors[i] < errors[least]) least = i;
+  }
+  memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
+  if (status == QMAT_OK)
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, &error);
+  s->fitted_errors[edge] = error;
+  if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  for (int i = 0; i < c->count && status == QMAT_OK && *result != DONE; i++) {
+    if (!(errors[i] <= worth_testing * s->held)) continue;
+    memcpy(sphere, c->spheres[i], sizeof c->spheres[i]);
+    status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  }
   return status;
 }
 
-static void count_refusals(qmat_simplification *s, const qmat_trial *trial) {
-  s->refused_by_surface += trial->refused_by_surface;
-  s->refused_by_coverage += trial->refused_by_coverage;
-  s->refused_by_protrusion += trial->refused_by_protrusion;
-}
-
-/* What an edge may collapse to where sharp features and thin parts are protected: `bound` to what lies there, as far as
- * what is `asked` is held. False where that is nothing now. */
-static bool find_allowed(qmat_simplification *s, uint32_t edge, qmat_candidates *c, bool *bound, double *asked,
-                         qmat_trial_outcome *outcome) {
-  const double share = s->rules.crease_share;
-  *bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->held, c, asked);
-  *asked /= share;
-  if (*bound && c->count == 0) {
-    s->refused_by_protection++;
-    s->asked[edge] = *asked;
-    if (*asked < INFINITY) *outcome = QMAT_TRIAL_EXCEEDED;
-    return false;
-  }
-  if (!*bound && s->protecting && !apply_protection(s, edge, c, bound)) {
-    s->refused_by_protection++;
-    return false;
-  }
-  return true;
-}
-
-/* Tries a collapse, and does it where it may be done. */
-static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, qmat_trial_outcome *outcome) {
-  const qmat_trial_tools tools = qmat_trial_tools_of(s);
+/* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
+static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *result) {
   qmat_candidates c;
-  qmat_trial trial;
-  bool bound = false;
-  double asked = INFINITY;
-  qmat_status status = QMAT_OK;
-  *outcome = QMAT_TRIAL_REFUSED;
-  const bool tried = qmat_speculation_take(s, edge, &trial);
-  if (!tried) {
-    status = qmat_trial_candidates(s, &tools, edge, &c);
-    if (status == QMAT_OK && !find_allowed(s, edge, &c, &bound, &asked, outcome)) return QMAT_OK;
-    if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
-    if (status != QMAT_OK) return status;
+  *result = REFUSED;
+  qmat_status status = find_candidates(s, edge, &c);
+  if (status != QMAT_OK) return status;
+  double asked;
+  const double share = s->rules.crease_share;
+  bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->held, &c, &asked);
+  asked /= share;
+  if (bound && c.count == 0) {
+    s->refused_by_protection++;
+    s->asked[edge] = asked;
+    if (asked < INFINITY) *result = EXCEEDED;
+    return QMAT_OK;
   }
+  if (!bound && s->protecting && !apply_protection(s, edge, &c, &bound)) {
+    s->refused_by_protection++;
+    return QMAT_OK;
+  }
+  status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+  if (status != QMAT_OK) return status;
   int64_t change;
   if (!keeps_topology(s, &change)) {
     s->refused_by_topology++;
     return QMAT_OK;
   }
-  if (!tried) status = qmat_trial_run(s, &tools, &c, bound, &trial);
-  if (status != QMAT_OK) return status;
-  count_refusals(s, &trial);
-  s->asked[edge] = fmin(bound ? asked : INFINITY, trial.asked);
-  s->failed_points[edge] = trial.failed_point;
-  if (s->fitting && !bound) s->fitted_errors[edge] = trial.fitted_error;
-  *outcome = trial.outcome;
-  if (trial.outcome != QMAT_TRIAL_DONE) return QMAT_OK;
-  s->euler += change;
-  return commit(s, trial.sphere);
+  bool exceeded = false;
+  s->asked[edge] = bound ? asked : INFINITY;
+  const double *sphere = NULL;
+  const bool fits = s->fitting && !bound;
+  for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
+    sphere = c.spheres[i];
+    const size_t refused = s->refused_by_coverage;
+    status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
+    if (s->refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
+    if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
+    exceeded |= *result == EXCEEDED;
+  }
+  double fitted[4];
+  if (status == QMAT_OK && fits) {
+    status = try_fitted(s, edge, &c, fitted, result);
+    sphere = fitted;
+  }
+  if (status == QMAT_OK && *result == DONE) {
+    s->euler += change;
+    return commit(s, sphere);
+  }
+  if (exceeded) *result = EXCEEDED;
+  return status;
 }
 
 /* An edge whose fitted sphere had this many times the error that is held is not tried again for a sphere nearby that
@@ -400,13 +495,13 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
     s->protecting = s->rules.protect == QMAT_PROTECT_ALWAYS ||
                     (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= late_stage(initial));
     qmat_edge_heap_remove(&s->heap, edge);
-    qmat_trial_outcome outcome;
-    status = try_collapse(s, edge, &outcome);
+    outcome result;
+    status = try_collapse(s, edge, &result);
     if (status != QMAT_OK) return status;
-    if (outcome == QMAT_TRIAL_DONE) {
+    if (result == DONE) {
       s->collapses++;
       update_neighbourhood(s);
-    } else if (outcome == QMAT_TRIAL_EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
+    } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
       *ended = !hold_next(s);
       qmat_edge_heap_update(&s->heap, edge);
     }
@@ -420,7 +515,6 @@ static const double least_gain = 0.02;
 /* Fits every sphere to the surface where that lowers its largest error; not those that did not move and whose
  * neighbours have not moved since. */
 static qmat_status refit(qmat_simplification *s, size_t *moved) {
-  const qmat_trial_tools tools = qmat_trial_tools_of(s);
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
     if (!s->complex.vertex_alive[v] || s->settled[v] || (s->protecting && is_protected(s, v)) ||
@@ -440,11 +534,10 @@ static qmat_status refit(qmat_simplification *s, size_t *moved) {
           qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, INFINITY, sphere, &after);
     if (status != QMAT_OK) return status;
     if (!(after <= (1 - least_gain) * before)) continue;
-    qmat_trial trial = {.asked = INFINITY};
+    outcome result;
     double asked;
-    status = qmat_trial_test_sphere(s, &tools, sphere, QMAT_NONE, &trial, &asked);
-    count_refusals(s, &trial);
-    if (status == QMAT_OK && trial.outcome == QMAT_TRIAL_DONE) {
+    status = test_sphere(s, sphere, QMAT_NONE, &result, &asked);
+    if (status == QMAT_OK && result == DONE) {
       status = commit(s, sphere);
       update_neighbourhood(s);
       ++*moved;
@@ -467,25 +560,6 @@ static void queue_raised(qmat_simplification *s) {
       qmat_edge_heap_update(&s->heap, e);
 }
 
-/* Fits spheres to the surface, which makes room for more collapses, and then what is left of the error small for its
- * own sake. */
-static qmat_status collapse_fitted(qmat_simplification *s) {
-  qmat_status status = QMAT_OK;
-  bool ended = false;
-  for (int i = 0; i < s->rules.refits; i++) {
-    const size_t collapses = s->collapses;
-    size_t moved;
-    if (i == 0) queue_all(s);
-    status = collapse_edges(s, &ended);
-    if (status != QMAT_OK || ended) return status;
-    if (i > 0 && s->collapses == collapses) break;
-    if ((status = refit(s, &moved)) != QMAT_OK) return status;
-  }
-  size_t moved = 1;
-  for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++) status = refit(s, &moved);
-  return status;
-}
-
 qmat_status qmat_simplification_run(qmat_simplification *s) {
   bool ended = s->held > s->rules.limit; /* where even the lowest level is above it */
   qmat_status status = collapse_edges(s, &ended);
@@ -494,11 +568,20 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     queue_raised(s);
     status = collapse_edges(s, &ended);
   }
-  if (status != QMAT_OK || ended || in_order(s) || !(s->rules.limit < INFINITY) || s->rules.refits == 0) return status;
-  s->fitting = true;
-  status = qmat_speculation_start(s);
-  if (status == QMAT_OK) status = collapse_fitted(s);
-  qmat_speculation_end(s);
+  if (status != QMAT_OK || ended || in_order(s) || !(s->rules.limit < INFINITY)) return status;
+  for (int i = 0; i < s->rules.refits && !ended; i++) {
+    const size_t collapses = s->collapses;
+    size_t moved;
+    s->fitting = true;
+    if (i == 0) queue_all(s);
+    status = collapse_edges(s, &ended);
+    if (status != QMAT_OK || ended) return status;
+    if (i > 0 && s->collapses == collapses) break;
+    if ((status = refit(s, &moved)) != QMAT_OK) return status;
+  }
+  /* What is left of the error is made small for its own sake. */
+  size_t moved = 1;
+  for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++) status = refit(s, &moved);
   return status;
 }
 

@@ -70,7 +70,6 @@ typedef struct qmat_simplification {
   double *fitted_errors;   /* per edge: of the sphere that was fitted last */
   uint8_t *settled;        /* per vertex: whether a fit did not move it, and nothing has moved around it since */
   bool protecting, fitting;
-  struct qmat_speculation *speculation; /* trials made ahead of their turn; NULL: none */
   int64_t euler; /* of the medial mesh */
   size_t collapses, moves, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
       refused_by_topology;
@@ -84,11 +83,7 @@ qmat_status qmat_simplification_init(qmat_simplification *simplification, const 
                                      const double *depths);
 void qmat_simplification_uninit(qmat_simplification *simplification);
 
-/* Whether the distance by which the envelope leaves the solid is held. */
-bool qmat_simplification_holds_protrusion(const qmat_simplification *simplification);
-
-/* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. With QMAT_EXCEED_SKIP on
- * all threads, else on one; the same for any number of threads. */
+/* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
 qmat_status qmat_simplification_run(qmat_simplification *simplification);
 
 /* What is left, renumbered in the order of the initial medial mesh, still in the unit frame, with the samples that each

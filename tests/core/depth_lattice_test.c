@@ -128,43 +128,6 @@ static void test_answers_do_not_depend_on_what_was_asked_before(void **state) {
   free(ways);
 }
 
-static void test_view_answers_like_its_lattice_and_gives_it_what_it_has_found(void **state) {
-  enum { POINTS = 3000 };
-  static double points[POINTS][3];
-  random_numbers random = {.seed = 3};
-  for (size_t i = 0; i < POINTS; i++) random_point(&random, 0.5, points[i]);
-  qmat_context context = {0};
-  qmat_depth_lattice lattice, alone, view;
-  make_lattice(&lattice, state, 0.02);
-  make_lattice(&alone, state, 0.02);
-  double distance, other;
-  for (size_t i = 0; i < POINTS / 2; i++) qmat_depth_lattice_near(&lattice, points[i], &distance);
-  const size_t known = lattice.count;
-  assert_int_equal(qmat_depth_lattice_view_init(&context, &lattice, &view), QMAT_OK);
-  for (size_t i = 0; i < POINTS; i++) {
-    const double near = qmat_depth_lattice_near(&view, points[i], &distance);
-    assert_near(near, qmat_depth_lattice_near(&alone, points[i], &other), 0);
-    assert_near(distance, other, 0);
-  }
-  /* The view asks for what the lattice does not know, and leaves that as it is. */
-  assert_int_equal(lattice.count, known);
-  assert_int_equal(view.count, alone.count - known);
-  assert_true(view.questions == view.count && view.count > 0);
-  qmat_depth_lattice_absorb(&lattice, &view);
-  assert_int_equal(lattice.count, alone.count);
-  assert_int_equal(view.count, 0);
-  assert_true(lattice.questions == alone.questions && view.questions == 0);
-  for (size_t i = 0; i < POINTS; i++) {
-    const double near = qmat_depth_lattice_near(&view, points[i], &distance);
-    assert_near(near, qmat_depth_lattice_near(&lattice, points[i], &other), 0);
-  }
-  assert_true(lattice.questions == alone.questions && view.questions == 0); /* nothing was asked again */
-  qmat_depth_lattice_uninit(&view);
-  qmat_depth_lattice_uninit(&alone);
-  qmat_depth_lattice_uninit(&lattice);
-  qmat_context_uninit(&context);
-}
-
 static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
   qmat_depth_lattice lattice;
   make_lattice(&lattice, state, 0.01);
@@ -203,7 +166,6 @@ int main(void) {
       cmocka_unit_test(test_near_depth_differs_by_no_more_than_the_way_to_the_node),
       cmocka_unit_test(test_nodes_are_exact),
       cmocka_unit_test(test_answers_do_not_depend_on_what_was_asked_before),
-      cmocka_unit_test(test_view_answers_like_its_lattice_and_gives_it_what_it_has_found),
       cmocka_unit_test(test_points_beyond_the_lattice_are_asked_exactly),
       cmocka_unit_test(test_corners_of_the_lattice_have_keys_of_their_own),
   };

@@ -445,50 +445,6 @@ static void test_random_collapses_follow_the_naive_complex(void **state) {
   assert_true(collapses > 500 && vanished > 500 && merged_triangles > 500 && merged_edges > 500);
 }
 
-static void check_same_preview(const qmat_collapse *a, const qmat_collapse *b) {
-  assert_int_equal(a->kept, b->kept);
-  assert_int_equal(a->removed, b->removed);
-  assert_int_equal(a->neighbour_count, b->neighbour_count);
-  assert_int_equal(a->triangle_count, b->triangle_count);
-  assert_int_equal(a->vanishing_count, b->vanishing_count);
-  for (size_t i = 0; i < a->neighbour_count; i++) {
-    assert_int_equal(a->neighbours[i], b->neighbours[i]);
-    assert_int_equal(a->kept_edges[i], b->kept_edges[i]);
-    assert_int_equal(a->removed_edges[i], b->removed_edges[i]);
-  }
-  for (size_t i = 0; i < 2 * a->triangle_count; i++) assert_int_equal(a->triangle_pairs[i], b->triangle_pairs[i]);
-}
-
-static void test_view_previews_what_the_complex_does_after_every_collapse(void **state) {
-  (void)state;
-  random_numbers random = {.seed = 5};
-  qmat_collapse collapse = {0}, seen = {0};
-  for (int round = 0; round < 30; round++) {
-    qmat_context context = {0};
-    qmat_complex complex, view;
-    qmat_medial *medial = random_medial(&random);
-    assert_int_equal(qmat_complex_init(&context, &complex, medial, NULL), QMAT_OK);
-    qmat_value_release(&medial->base);
-    assert_int_equal(qmat_complex_view_init(&context, &complex, &view), QMAT_OK);
-    while (complex.live_edges > 0) {
-      const uint32_t edge = random_live_edge(&random, &complex);
-      qmat_complex_view_update(&complex, &view);
-      const uint64_t before = fingerprint(&complex);
-      assert_int_equal(qmat_complex_preview(&context, &view, edge, &seen), QMAT_OK);
-      assert_true(fingerprint(&complex) == before);
-      assert_int_equal(qmat_complex_preview(&context, &complex, edge, &collapse), QMAT_OK);
-      check_same_preview(&collapse, &seen);
-      const double sphere[4] = {1, 2, 3, 4};
-      assert_int_equal(qmat_complex_collapse(&context, &complex, &collapse, sphere), QMAT_OK);
-    }
-    qmat_complex_view_uninit(&view);
-    qmat_complex_uninit(&complex);
-    qmat_context_uninit(&context);
-  }
-  qmat_collapse_uninit(&collapse);
-  qmat_collapse_uninit(&seen);
-}
-
 static void test_marks_of_old_previews_do_not_come_alive_again(void **state) {
   (void)state;
   random_numbers random = {.seed = 2};
@@ -535,7 +491,6 @@ int main(void) {
       cmocka_unit_test(test_nothing_and_isolated_spheres_are_complexes_too),
       cmocka_unit_test(test_medial_mesh_without_a_side_of_a_triangle_is_named),
       cmocka_unit_test(test_random_collapses_follow_the_naive_complex),
-      cmocka_unit_test(test_view_previews_what_the_complex_does_after_every_collapse),
       cmocka_unit_test(test_marks_of_old_previews_do_not_come_alive_again),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
