@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
+
 /* Half-edge 3 * t + k goes from corner k to corner k + 1 of triangle t. */
 
 #define NONE UINT32_MAX
@@ -220,25 +222,6 @@ static void choose_sides(work *w, uint8_t *turn_patch) {
   for (size_t t = 0; t < w->triangle_count; t++) w->turned[t] ^= turn_patch[w->patch_of[t]];
 }
 
-/* The least vertex of the component, with the way there made shorter. */
-static uint32_t find_root(uint32_t *parents, uint32_t vertex) {
-  while (parents[vertex] != vertex) {
-    parents[vertex] = parents[parents[vertex]];
-    vertex = parents[vertex];
-  }
-  return vertex;
-}
-
-static void join_vertices(uint32_t *parents, uint32_t a, uint32_t b) {
-  a = find_root(parents, a);
-  b = find_root(parents, b);
-  if (a < b) {
-    parents[b] = a;
-  } else {
-    parents[a] = b;
-  }
-}
-
 /* Counts edges and components of the triangles as they will be. `parents` and `open` (per vertex) and `volumes` (per
  * vertex) are scratch. */
 static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *volumes, qmat_connectivity *result) {
@@ -249,8 +232,8 @@ static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *v
   memset(volumes, 0, w->vertex_count * sizeof *volumes);
   for (size_t t = 0; t < w->triangle_count; t++) {
     const uint32_t *corners = w->triangles + 3 * t;
-    join_vertices(parents, corners[0], corners[1]);
-    join_vertices(parents, corners[0], corners[2]);
+    qmat_sets_join(parents, corners[0], corners[1]);
+    qmat_sets_join(parents, corners[0], corners[2]);
     result->flipped += w->turned[t];
   }
   for (size_t first = 0, last; first < 3 * w->triangle_count; first = last) {
@@ -264,10 +247,10 @@ static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *v
     if (count % 2 != 0) result->closed = false;
     bool agrees = apart == count % 2;
     if (!agrees) result->oriented = false;
-    if (count % 2 != 0 || !agrees) open[find_root(parents, low_end(w, w->order[first]))] = 1;
+    if (count % 2 != 0 || !agrees) open[qmat_set_leader(parents, low_end(w, w->order[first]))] = 1;
   }
   for (size_t t = 0; t < w->triangle_count; t++) {
-    uint32_t root = find_root(parents, w->triangles[3 * t]);
+    uint32_t root = qmat_set_leader(parents, w->triangles[3 * t]);
     double from[3];
     local_point(w, root, from);
     volumes[root] += triangle_volume(w, t, from);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
 #include "core/triangle.h"
 #include "core/vector.h"
 
@@ -48,33 +49,21 @@ static bool is_crease(const qmat_mesh *mesh, const double *positions, const tria
   return dot(normals[0], across) < 0;
 }
 
-static uint32_t find_root(uint32_t *parent, uint32_t i) {
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
 /* Leaves out edges that hang together over less than `shortest`. */
 static qmat_status drop_short(qmat_context *context, const double *positions, size_t vertex_count, double shortest,
                               qmat_crease_edges *edges) {
-  uint32_t *parent = qmat_arena_alloc(&context->arena, vertex_count, sizeof *parent);
+  uint32_t *parent = qmat_sets_new(context, vertex_count);
   double *lengths = qmat_arena_calloc(&context->arena, vertex_count, sizeof *lengths);
   if (!parent || !lengths) return qmat_fail_memory(context, "creases");
-  for (size_t v = 0; v < vertex_count; v++) parent[v] = (uint32_t)v;
-  for (size_t e = 0; e < edges->count; e++) {
-    const uint32_t a = find_root(parent, edges->ends[2 * e]), b = find_root(parent, edges->ends[2 * e + 1]);
-    parent[a > b ? a : b] = a > b ? b : a;
-  }
+  for (size_t e = 0; e < edges->count; e++) qmat_sets_join(parent, edges->ends[2 * e], edges->ends[2 * e + 1]);
   for (size_t e = 0; e < edges->count; e++) {
     const uint32_t *ends = &edges->ends[2 * e];
-    lengths[find_root(parent, ends[0])] +=
+    lengths[qmat_set_leader(parent, ends[0])] +=
         qmat_point_distance(&positions[3 * (size_t)ends[0]], &positions[3 * (size_t)ends[1]]);
   }
   size_t kept = 0;
   for (size_t e = 0; e < edges->count; e++)
-    if (!(lengths[find_root(parent, edges->ends[2 * e])] < shortest))
+    if (!(lengths[qmat_set_leader(parent, edges->ends[2 * e])] < shortest))
       memmove(&edges->ends[2 * kept++], &edges->ends[2 * e], 2 * sizeof *edges->ends);
   edges->count = kept;
   return QMAT_OK;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
 #include "core/medial_build.h"
 #include "core/node.h"
 #include "core/surface.h"
@@ -36,15 +37,15 @@ typedef struct {
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   qmat_surface *surface;
-  const double *points; /* samples in the unit frame */
-  const uint8_t *thin;  /* per sample */
-  const uint32_t *parts; /* per vertex of the mesh: the connected part of the surface it belongs to; NULL: there is one */
+  const double *points;      /* samples in the unit frame */
+  const uint8_t *thin;       /* per sample */
+  const uint32_t *parts;     /* per vertex of the mesh: its connected part of the surface; NULL: there is one */
   const uint32_t *stand_ins; /* per sample: the one that is triangulated in its place, itself when it is one */
   size_t site_count;         /* samples that are triangulated */
   qmat_tetrahedra cells;     /* with samples as corners */
-  uint8_t *kinds;    /* per cell */
-  double *spheres;   /* 4 per cell, unit frame */
-  uint32_t *sphere_of; /* per cell: its medial vertex, or NONE */
+  uint8_t *kinds;            /* per cell */
+  double *spheres;           /* 4 per cell, unit frame */
+  uint32_t *sphere_of;       /* per cell: its medial vertex, or NONE */
   size_t sphere_count;
   uint32_t *edges, *triangles;
   size_t edge_count, triangle_count;
@@ -82,8 +83,7 @@ static bool circumsphere(const double *const p[4], double sphere[4]) {
   if (determinant == 0) return false;
   double offset[3];
   for (int i = 0; i < 3; i++) {
-    offset[i] =
-        (square[0] * normal[0][i] + square[1] * normal[1][i] + square[2] * normal[2][i]) / (2 * determinant);
+    offset[i] = (square[0] * normal[0][i] + square[1] * normal[1][i] + square[2] * normal[2][i]) / (2 * determinant);
     sphere[i] = p[0][i] + offset[i];
     if (!(fabs(sphere[i]) <= 0.5)) return false; /* outside the bounding box, or not finite */
   }
@@ -104,8 +104,7 @@ static void incentre(const double *const p[4], double centre[3]) {
     for (int i = 0; i < 3; i++) sum[i] += area * p[k][i];
     total += area;
   }
-  for (int i = 0; i < 3; i++)
-    centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
+  for (int i = 0; i < 3; i++) centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
 }
 
 /* Coplanar samples are so only up to rounding, which leaves flat tetrahedra on the surface whose side is a matter of
@@ -117,35 +116,18 @@ static bool deep_inside(const qmat_surface *surface, const double *point) {
          !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
 }
 
-static uint32_t find_root(uint32_t *parent, uint32_t i) {
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
-/* Joins two sets; the smaller id leads, so that the result does not depend on the order. */
-static void join(uint32_t *parent, uint32_t a, uint32_t b) {
-  a = find_root(parent, a);
-  b = find_root(parent, b);
-  if (a < b) parent[b] = a;
-  if (b < a) parent[a] = b;
-}
-
 /* Finds the connected parts of the surface, each named by its smallest vertex. */
 static qmat_status find_surface_parts(delaunay *d) {
   const qmat_mesh *mesh = d->mesh;
-  uint32_t *part = qmat_arena_alloc(&d->context->arena, mesh->vertex_count, sizeof *part);
+  uint32_t *part = qmat_sets_new(d->context, mesh->vertex_count);
   if (!part) return qmat_fail_memory(d->context, "parts of the surface");
-  for (size_t i = 0; i < mesh->vertex_count; i++) part[i] = (uint32_t)i;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
-    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
-    join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
+    qmat_sets_join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
+    qmat_sets_join(part, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
   }
   size_t count = 0;
   for (size_t i = 0; i < mesh->vertex_count; i++) {
-    part[i] = find_root(part, (uint32_t)i);
+    part[i] = qmat_set_leader(part, (uint32_t)i);
     count += part[i] == i;
   }
   d->parts = count > 1 ? part : NULL;
@@ -157,7 +139,7 @@ static uint32_t part_of_sample(const delaunay *d, uint32_t sample) {
 }
 
 /* Whether a tetrahedron reaches from one part of the surface to another through the outside, as a needle between two
- * solids does: its incentre may all the same lie inside, between the samples and the surface that bulges beyond them. */
+ * solids does: its incentre may all the same lie inside, between the samples and the surface that bulges past them. */
 static bool spans_gap(const delaunay *d, const uint32_t *corners) {
   for (int a = 0; a < 3 && d->parts; a++)
     for (int b = a + 1; b < 4; b++) {
@@ -222,24 +204,24 @@ static qmat_status select_medial_vertices(delaunay *d) {
  * sets' leading centres that are compared, so that a row of close centres does not become one. */
 static qmat_status number_medial_vertices(delaunay *d) {
   const size_t count = d->cells.count;
-  uint32_t *parent = qmat_arena_alloc(&d->context->arena, count, sizeof *parent);
+  uint32_t *parent = qmat_sets_new(d->context, count);
   d->sphere_of = qmat_arena_alloc(&d->context->arena, count, sizeof *d->sphere_of);
   if (!parent || !d->sphere_of) return qmat_fail_memory(d->context, "medial vertices");
-  for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
   for (size_t i = 0; i < count; i++) {
     if (!d->kinds[i]) continue;
     for (size_t k = 0; k < 4; k++) {
       const uint32_t j = d->cells.neighbours[4 * i + k];
       if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
-      const uint32_t a = find_root(parent, (uint32_t)i), b = find_root(parent, j);
-      if (distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge) join(parent, a, b);
+      const uint32_t a = qmat_set_leader(parent, (uint32_t)i), b = qmat_set_leader(parent, j);
+      if (distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge)
+        qmat_sets_join(parent, a, b);
     }
   }
   uint32_t next = 0;
   for (size_t i = 0; i < count; i++) {
     d->sphere_of[i] = NONE;
     if (!d->kinds[i]) continue;
-    const uint32_t root = find_root(parent, (uint32_t)i);
+    const uint32_t root = qmat_set_leader(parent, (uint32_t)i);
     d->sphere_of[i] = root == i ? next++ : d->sphere_of[root];
   }
   d->sphere_count = next;
@@ -255,8 +237,8 @@ static int corner_index(const uint32_t *corners, uint32_t id) {
   return 3;
 }
 
-/* Walks the tetrahedra around the Delaunay edge (a, b) from `start`. Returns their number when the ring is closed, every
- * member is kept, and `start` is the smallest, so that each ring is found once; else 0. */
+/* Walks the tetrahedra around the Delaunay edge (a, b) from `start`. Returns their number when the ring is closed,
+ * every member is kept, and `start` is the smallest, so that each ring is found once; else 0. */
 static size_t walk_ring(const delaunay *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring, size_t capacity) {
   const uint32_t *corners = &d->cells.corners[4 * (size_t)start];
   int across = 0;
@@ -316,8 +298,8 @@ static qmat_status connect(delaunay *d) {
     for (int e = 0; e < 6; e++) {
       uint32_t ring[RING_CAPACITY];
       const uint32_t *corners = &d->cells.corners[4 * i];
-      const size_t n = walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring,
-                                 RING_CAPACITY);
+      const size_t n =
+          walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring, RING_CAPACITY);
       size_t polygon = 0;
       for (size_t k = 0; k < n; k++) {
         const uint32_t sphere = d->sphere_of[ring[k]];
@@ -348,15 +330,14 @@ static int larger_component(const void *left, const void *right) {
 /* The components, sorted; `index` (per sphere) gets each sphere's component. NULL when memory is short. */
 static component *find_components(delaunay *d, uint32_t *index, size_t *count) {
   qmat_arena *arena = &d->context->arena;
-  uint32_t *parent = qmat_arena_alloc(arena, d->sphere_count, sizeof *parent);
+  uint32_t *parent = qmat_sets_new(d->context, d->sphere_count);
   component *parts = qmat_arena_calloc(arena, d->sphere_count, sizeof *parts);
   uint32_t *order = qmat_arena_alloc(arena, d->sphere_count, sizeof *order);
   if (!parent || !parts || !order) return NULL;
-  for (size_t i = 0; i < d->sphere_count; i++) parent[i] = (uint32_t)i;
-  for (size_t e = 0; e < d->edge_count; e++) join(parent, d->edges[2 * e], d->edges[2 * e + 1]);
+  for (size_t e = 0; e < d->edge_count; e++) qmat_sets_join(parent, d->edges[2 * e], d->edges[2 * e + 1]);
   *count = 0;
   for (size_t i = 0; i < d->sphere_count; i++) {
-    const uint32_t root = find_root(parent, (uint32_t)i);
+    const uint32_t root = qmat_set_leader(parent, (uint32_t)i);
     if (root == i) {
       index[i] = (uint32_t)*count;
       parts[(*count)++].root = root;
@@ -365,7 +346,7 @@ static component *find_components(delaunay *d, uint32_t *index, size_t *count) {
   }
   qsort(parts, *count, sizeof *parts, larger_component);
   for (size_t i = 0; i < *count; i++) order[parts[i].root] = (uint32_t)i;
-  for (size_t i = 0; i < d->sphere_count; i++) index[i] = order[find_root(parent, (uint32_t)i)];
+  for (size_t i = 0; i < d->sphere_count; i++) index[i] = order[qmat_set_leader(parent, (uint32_t)i)];
   return parts;
 }
 
@@ -526,12 +507,12 @@ static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_
   for (size_t first = 0, last; first < count; first = last) {
     for (last = first; last < count && contacts[last].sample == contacts[first].sample;) last++;
     for (;;) {
-      const uint32_t home = find_root(joined, index[contacts[first].sphere]);
+      const uint32_t home = qmat_set_leader(joined, index[contacts[first].sphere]);
       medial_link best = {0, INFINITY, NONE, NONE};
       for (size_t i = first; i < last; i++) {
-        if (find_root(joined, index[contacts[i].sphere]) == home) continue;
+        if (qmat_set_leader(joined, index[contacts[i].sphere]) == home) continue;
         for (size_t j = first; j < last; j++) {
-          if (find_root(joined, index[contacts[j].sphere]) != home) continue;
+          if (qmat_set_leader(joined, index[contacts[j].sphere]) != home) continue;
           const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
           const double length = distance(&spheres[4 * (size_t)a], &spheres[4 * (size_t)b]);
           const medial_link link = {0, length, a < b ? a : b, a < b ? b : a};
@@ -541,7 +522,7 @@ static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_
       if (best.a == NONE) break;
       const qmat_status status = add_link(d, best.a, best.b);
       if (status != QMAT_OK) return status;
-      join(joined, index[best.a], index[best.b]);
+      qmat_sets_join(joined, index[best.a], index[best.b]);
       ++*links;
     }
   }
@@ -558,10 +539,9 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
   double *spheres = qmat_arena_alloc(arena, d->sphere_count, 4 * sizeof *spheres);
   size_t count = 0, contact_count = 0;
   const component *parts = index && spheres ? find_components(d, index, &count) : NULL;
-  uint32_t *joined = qmat_arena_alloc(arena, count, sizeof *joined);
+  uint32_t *joined = qmat_sets_new(d->context, count);
   const contact *contacts = parts ? find_contacts(d, index, false, &contact_count) : NULL;
   if (!parts || !joined || !contacts) return qmat_fail_memory(d->context, "components");
-  for (size_t i = 0; i < count; i++) joined[i] = (uint32_t)i;
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
   medial_link *candidates = NULL;
@@ -580,8 +560,7 @@ static qmat_status link_components(delaunay *d, size_t *components, size_t *link
   if (candidate_count) qsort(candidates, candidate_count, sizeof *candidates, better_link);
   for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
     const uint32_t a = index[candidates[i].a], b = index[candidates[i].b];
-    if (find_root(joined, a) == find_root(joined, b)) continue;
-    join(joined, a, b);
+    if (!qmat_sets_join(joined, a, b)) continue;
     ++*links;
     status = add_link(d, candidates[i].a, candidates[i].b);
   }
@@ -884,9 +863,10 @@ const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
     .version = 4,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
-    .doc = "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
-           "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "
-           "edges and slabs are the duals of the facets and edges between such tetrahedra.",
+    .doc =
+        "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
+        "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "
+        "edges and slabs are the duals of the facets and edges between such tetrahedra.",
     .citation = "Section 3.2, Algorithm 1",
     .params_size = sizeof(medial_delaunay_params),
     .params = params,

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
 #include "core/envelope.h"
 #include "core/frame.h"
 #include "core/node.h"
@@ -213,27 +214,13 @@ static qmat_status make_skin_surface(skin *s) {
   return status;
 }
 
-static uint32_t find_root(uint32_t *parents, uint32_t i) {
-  while (parents[i] != i) {
-    parents[i] = parents[parents[i]];
-    i = parents[i];
-  }
-  return i;
-}
-
 static qmat_status count_components(skin *s, size_t *components) {
   const qmat_skin_triangles *surface = &s->surface;
-  uint32_t *parents = qmat_arena_alloc(&s->context->arena, surface->vertex_count, sizeof *parents);
+  uint32_t *parents = qmat_sets_new(s->context, surface->vertex_count);
   if (!parents) return qmat_fail_memory(s->context, "surface vertices");
-  for (size_t i = 0; i < surface->vertex_count; i++) parents[i] = (uint32_t)i;
   *components = surface->vertex_count;
-  for (size_t i = 0; i < 3 * surface->triangle_count; i++) {
-    uint32_t a = find_root(parents, surface->triangles[i]);
-    uint32_t b = find_root(parents, surface->triangles[i - i % 3]);
-    if (a == b) continue;
-    parents[a > b ? a : b] = a > b ? b : a;
-    --*components;
-  }
+  for (size_t i = 0; i < 3 * surface->triangle_count; i++)
+    *components -= qmat_sets_join(parents, surface->triangles[i], surface->triangles[i - i % 3]);
   return QMAT_OK;
 }
 

@@ -5,36 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
+
 /* Entries that the reduction of a matrix may go through. */
 static const size_t most_entries = 100000000;
 
 /* How far from a shell its sides are asked, in diagonals. */
 static const double beside = 1e-5;
-
-/* ---- sets that are joined ---- */
-
-static uint32_t root_of(uint32_t *parents, uint32_t item) {
-  while (parents[item] != item) item = parents[item] = parents[parents[item]];
-  return item;
-}
-
-/* The smaller root stays. True when they were apart. */
-static bool join(uint32_t *parents, uint32_t a, uint32_t b) {
-  a = root_of(parents, a);
-  b = root_of(parents, b);
-  if (a < b)
-    parents[b] = a;
-  else
-    parents[a] = b;
-  return a != b;
-}
-
-static uint32_t *separate(qmat_context *context, size_t count) {
-  uint32_t *parents = qmat_arena_alloc(&context->arena, count, sizeof *parents);
-  if (parents)
-    for (size_t i = 0; i < count; i++) parents[i] = (uint32_t)i;
-  return parents;
-}
 
 /* ---- the medial mesh ---- */
 
@@ -154,7 +131,7 @@ static qmat_status rank_of_branches(qmat_context *context, const sides *s, uint3
       break;
     }
     for (size_t at = s->offsets[e]; at < s->offsets[e + 1]; at++)
-      if (!s->removed[s->triangles_at[at]]) buffers[0][count++] = root_of(sheets, s->triangles_at[at]);
+      if (!s->removed[s->triangles_at[at]]) buffers[0][count++] = qmat_set_leader(sheets, s->triangles_at[at]);
     count = keep_odd(buffers[0], count);
     while (count > 0) {
       sparse_row *pivot = &pivots[buffers[in][count - 1]];
@@ -194,7 +171,7 @@ static qmat_status count_voids(qmat_context *context, const qmat_medial *medial,
   qmat_status status = find_sides(context, medial, &s);
   if (status == QMAT_OK) status = remove_free(context, &s, &left);
   if (status != QMAT_OK) return status;
-  uint32_t *sheets = separate(context, s.triangle_count);
+  uint32_t *sheets = qmat_sets_new(context, s.triangle_count);
   if (!sheets) return qmat_fail_memory(context, "the topology");
   size_t sheet_count = left;
   for (size_t e = 0; e < s.edge_count; e++) {
@@ -203,7 +180,7 @@ static qmat_status count_voids(qmat_context *context, const qmat_medial *medial,
     size_t found = 0;
     for (size_t at = s.offsets[e]; found < 2; at++)
       if (!s.removed[s.triangles_at[at]]) pair[found++] = s.triangles_at[at];
-    sheet_count -= join(sheets, pair[0], pair[1]);
+    sheet_count -= qmat_sets_join(sheets, pair[0], pair[1]);
   }
   status = rank_of_branches(context, &s, sheets, &rank, known);
   *voids = sheet_count - rank;
@@ -228,10 +205,10 @@ qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *m
 qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *medial, qmat_topology *topology) {
   *topology = (qmat_topology){.known = true, .components = medial->sphere_count};
   topology->euler = (int64_t)medial->sphere_count - (int64_t)medial->edge_count + (int64_t)medial->triangle_count;
-  uint32_t *parents = separate(context, medial->sphere_count);
+  uint32_t *parents = qmat_sets_new(context, medial->sphere_count);
   if (!parents) return qmat_fail_memory(context, "the topology");
   for (size_t e = 0; e < medial->edge_count; e++)
-    topology->components -= join(parents, medial->edges[2 * e], medial->edges[2 * e + 1]);
+    topology->components -= qmat_sets_join(parents, medial->edges[2 * e], medial->edges[2 * e + 1]);
   const qmat_status status = count_voids(context, medial, &topology->voids, &topology->known);
   topology->loops = (size_t)((int64_t)(topology->components + topology->voids) - topology->euler);
   return status;
@@ -282,9 +259,9 @@ static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, u
       }
       const size_t a = (uint32_t)keys[i], b = (uint32_t)keys[i + 1];
       const bool same_way = corner_at(mesh, a) == corner_at(mesh, b);
-      join(shells, (uint32_t)(a / 3), (uint32_t)(b / 3));
-      join(fans, (uint32_t)a, (uint32_t)(same_way ? b : next_corner(b)));
-      join(fans, (uint32_t)next_corner(a), (uint32_t)(same_way ? next_corner(b) : b));
+      qmat_sets_join(shells, (uint32_t)(a / 3), (uint32_t)(b / 3));
+      qmat_sets_join(fans, (uint32_t)a, (uint32_t)(same_way ? b : next_corner(b)));
+      qmat_sets_join(fans, (uint32_t)next_corner(a), (uint32_t)(same_way ? next_corner(b) : b));
     }
   }
   return QMAT_OK;
@@ -324,13 +301,14 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   *topology = (qmat_topology){.known = mesh->closed && mesh->oriented && mesh->triangle_count < UINT32_MAX / 3};
   if (!topology->known) return QMAT_OK;
-  uint32_t *shells = separate(context, mesh->triangle_count), *fans = separate(context, 3 * mesh->triangle_count);
+  uint32_t *shells = qmat_sets_new(context, mesh->triangle_count),
+           *fans = qmat_sets_new(context, 3 * mesh->triangle_count);
   shell *sums = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *sums);
   if (!shells || !fans || !sums) return qmat_fail_memory(context, "the topology");
   const qmat_status status = join_at_edges(context, mesh, shells, fans, &topology->known);
   if (status != QMAT_OK || !topology->known) return status;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
-    shell *sum = &sums[root_of(shells, (uint32_t)t)];
+    shell *sum = &sums[qmat_set_leader(shells, (uint32_t)t)];
     double normal[3], centre[3];
     triangle_vectors(surface, t, normal, centre);
     const double area = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
@@ -340,7 +318,7 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
       sum->largest_area = area;
       sum->largest = (uint32_t)t;
     }
-    for (size_t c = 3 * t; c < 3 * t + 3; c++) sum->fan_count += root_of(fans, (uint32_t)c) == c;
+    for (size_t c = 3 * t; c < 3 * t + 3; c++) sum->fan_count += qmat_set_leader(fans, (uint32_t)c) == c;
   }
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const shell *sum = &sums[t];
