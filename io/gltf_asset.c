@@ -156,6 +156,25 @@ char *qmat_gltf_mesh_name(const json_t *root, size_t mesh) {
   return qmat_strdup(text);
 }
 
+size_t qmat_gltf_component_size(int64_t component_type) {
+  static const uint8_t sizes[] = {1, 1, 2, 2, 4, 4, 4};
+  return component_type >= 5120 && component_type <= 5126 ? sizes[component_type - 5120] : 0;
+}
+
+static bool add_name(json_t *root, const char *key, const char *name) {
+  json_t *names = json_object_get(root, key);
+  if (!names && json_object_set_new(root, key, json_array()) == 0) names = json_object_get(root, key);
+  for (size_t i = 0; i < json_array_size(names); i++) {
+    const char *other = json_string_value(json_array_get(names, i));
+    if (other && strcmp(other, name) == 0) return true;
+  }
+  return json_array_append_new(names, json_string(name)) == 0;
+}
+
+bool qmat_gltf_require_extension(json_t *root, const char *name) {
+  return add_name(root, "extensionsUsed", name) && add_name(root, "extensionsRequired", name);
+}
+
 int64_t qmat_gltf_mesh_of(const json_t *node) {
   const json_t *mesh = json_object_get(node, "mesh");
   const double number = json_is_number(mesh) ? json_number_value(mesh) : -1;

@@ -41,6 +41,12 @@ char *qmat_gltf_beside(const char *asset, const char *name);
 /* The name of a mesh, or "mesh 3" where it has none; NULL when memory is short. qmat_free frees it. */
 char *qmat_gltf_mesh_name(const json_t *root, size_t mesh);
 
+/* The bytes of a number of an accessor's componentType, 5120 (BYTE) to 5126 (FLOAT); 0: there is no such type. */
+size_t qmat_gltf_component_size(int64_t component_type);
+
+/* Names an extension among those that the asset uses and requires, once each; false when memory is short. */
+bool qmat_gltf_require_extension(json_t *root, const char *name);
+
 /* The number of the mesh that a node carries, also when written 3.0; -1: none. */
 int64_t qmat_gltf_mesh_of(const json_t *node);
 

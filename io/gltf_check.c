@@ -347,22 +347,9 @@ static qmat_status check_views(checker *check) {
 
 /* ---- accessors ---- */
 
-static int64_t component_size(int64_t component_type) {
-  switch (component_type) {
-    case BYTE:
-    case UNSIGNED_BYTE:
-      return 1;
-    case SHORT:
-    case UNSIGNED_SHORT:
-      return 2;
-    default:
-      return 4;
-  }
-}
-
 /* The bytes of one element; columns of matrices start at multiples of 4. */
 static int64_t element_size(int64_t component_type, int64_t components, bool matrix) {
-  int64_t size = component_size(component_type);
+  int64_t size = (int64_t)qmat_gltf_component_size(component_type);
   if (!matrix) return components * size;
   int64_t rows = components == 4 ? 2 : components == 9 ? 3 : 4;
   return rows * ((rows * size + 3) / 4 * 4);
@@ -403,7 +390,7 @@ static qmat_status check_sparse(const checker *check, size_t index, json_t *spar
   if (type != UNSIGNED_BYTE && type != UNSIGNED_SHORT && type != UNSIGNED_INT) {
     return fail(check, "accessor", index, "sparse.indices.componentType must be 5121, 5123 or 5125");
   }
-  int64_t index_size = component_size(type);
+  int64_t index_size = (int64_t)qmat_gltf_component_size(type);
   status = check_range(check, index, "sparse.indices: ", view_id[0], offset[0], count, index_size, index_size);
   if (status == QMAT_OK) {
     status = check_range(check, index, "sparse.values: ", view_id[1], offset[1], count, size, size);

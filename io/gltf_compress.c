@@ -9,6 +9,7 @@
 #include "io/bytes.h"
 #include "io/draco.h"
 #include "io/draco_draco.h"
+#include "io/gltf_asset.h"
 
 enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
 enum { LEAST_POSITION_BITS = 14, NORMAL_BITS = 10, TEXCOORD_BITS = 12, COLOR_BITS = 8, OTHER_BITS = 12 };
@@ -51,6 +52,8 @@ typedef struct compressor {
   const json_t **users; /* per accessor: the first primitive that uses it */
   bool *shared;         /* per accessor: something that is no copy of that primitive uses it, too */
   size_t accessor_count;
+  double *moved;     /* per accessor: how far the compression moves these positions; -1: they are not compressed */
+  bool *fresh;       /* per primitive, all meshes in a row: whether it was compressed here */
   qmat_writer blobs; /* the compressed data, each padded to 4 bytes */
   json_t *new_views; /* of them, their offsets still within `blobs` */
   qmat_gltf_compressed *result;
@@ -59,37 +62,19 @@ typedef struct compressor {
 
 /* ---- reading the JSON ---- */
 
-/* A whole number of an object, also when written 3.0; `missing` where there is none, -1 where it is none. */
-static json_int_t whole(const json_t *object, const char *key, json_int_t missing) {
-  const json_t *value = json_object_get(object, key);
-  if (!value) return missing;
+/* A whole number, also when written 3.0; -1: it is none. The second: of an object, `missing` where there is none. */
+static json_int_t whole_of(const json_t *value) {
   const double number = json_number_value(value);
   return json_is_number(value) && number >= 0 && number < 0x1p53 && number == floor(number) ? (json_int_t)number : -1;
 }
 
+static json_int_t whole(const json_t *object, const char *key, json_int_t missing) {
+  const json_t *value = json_object_get(object, key);
+  return value ? whole_of(value) : missing;
+}
+
 static const json_t *member(const json_t *root, const char *key, json_int_t index) {
   return index < 0 ? NULL : json_array_get(json_object_get(root, key), (size_t)index);
-}
-
-static json_int_t index_of(const json_t *value) {
-  const double number = json_number_value(value);
-  return json_is_number(value) && number >= 0 && number < 0x1p31 && number == floor(number) ? (json_int_t)number : -1;
-}
-
-static size_t width_of(json_int_t type) {
-  switch (type) {
-    case BYTE:
-    case UNSIGNED_BYTE:
-      return 1;
-    case SHORT:
-    case UNSIGNED_SHORT:
-      return 2;
-    case UNSIGNED_INT:
-    case FLOAT:
-      return 4;
-    default:
-      return 0;
-  }
 }
 
 static size_t components_of(const char *type) {
@@ -110,7 +95,7 @@ static bool view_accessor(const compressor *c, json_int_t index, accessor_view *
                    start = whole(buffer_view, "byteOffset", 0), length = whole(buffer_view, "byteLength", -1),
                    stride = whole(buffer_view, "byteStride", 0), most = (json_int_t)c->size;
   view->type = whole(accessor, "componentType", -1);
-  view->width = width_of(view->type);
+  view->width = qmat_gltf_component_size(view->type);
   view->components = components_of(json_string_value(json_object_get(accessor, "type")));
   const json_int_t wide = (json_int_t)(view->width * view->components);
   if (wide == 0 || count < 1 || count > most || offset < 0 || start < 0 || length < 0 || start > most ||
@@ -138,7 +123,7 @@ static bool same_geometry(const json_t *a, const json_t *b) {
 
 /* `primitive` NULL: something else. */
 static void note_user(compressor *c, const json_t *accessor, const json_t *primitive) {
-  const json_int_t index = index_of(accessor);
+  const json_int_t index = whole_of(accessor);
   if (index < 0 || (size_t)index >= c->accessor_count) return;
   if (!primitive || (c->users[index] && !same_geometry(c->users[index], primitive))) c->shared[index] = true;
   if (!c->users[index]) c->users[index] = primitive;
@@ -243,7 +228,7 @@ static bool draco_number_of(json_int_t type, qmat_draco_number *number) {
 static qmat_status take_attribute(compressor *c, packing *p, const char *name, const json_t *value, obstacle *why) {
   accessor_view view;
   qmat_draco_number number;
-  const json_int_t index = index_of(value);
+  const json_int_t index = whole_of(value);
   *why = OBSTACLE_DATA;
   if (p->attribute_count == MOST_ATTRIBUTES || !view_accessor(c, index, &view) || !draco_number_of(view.type, &number))
     return QMAT_OK;
@@ -272,7 +257,7 @@ static qmat_status take_attribute(compressor *c, packing *p, const char *name, c
 
 static qmat_status take_corners(compressor *c, packing *p, const json_t *value, obstacle *why) {
   accessor_view view;
-  p->indices = index_of(value);
+  p->indices = whole_of(value);
   *why = OBSTACLE_DATA;
   if (!view_accessor(c, p->indices, &view) || view.components != 1 || view.count % 3 != 0 ||
       (view.type != UNSIGNED_BYTE && view.type != UNSIGNED_SHORT && view.type != UNSIGNED_INT))
@@ -381,16 +366,21 @@ static qmat_status pack(compressor *c, const packing *p, json_t **extension, obs
   return status;
 }
 
-/* The primitive of the same geometry that was compressed before; NULL: none. */
-static const json_t *find_twin(const compressor *c, const json_t *primitive) {
+/* The accessor of a primitive's positions; -1: none. */
+static json_int_t position_of(const compressor *c, const json_t *primitive) {
   const json_int_t position = whole(json_object_get(primitive, "attributes"), "POSITION", -1);
-  const json_t *first = position >= 0 && (size_t)position < c->accessor_count ? c->users[position] : NULL;
-  if (!first || first == primitive || !same_geometry(first, primitive)) return NULL;
-  return json_object_get(json_object_get(json_object_get(first, "extensions"), QMAT_GLTF_DRACO), "qmat new") ? first
-                                                                                                             : NULL;
+  return position < (json_int_t)c->accessor_count ? position : -1;
 }
 
-static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t mesh) {
+/* The primitive of the same geometry that was compressed before; NULL: none. */
+static const json_t *find_twin(const compressor *c, const json_t *primitive) {
+  const json_int_t position = position_of(c, primitive);
+  return position >= 0 && c->moved[position] >= 0 && same_geometry(c->users[position], primitive) ? c->users[position]
+                                                                                                  : NULL;
+}
+
+/* `number`: of the primitive, all meshes in a row. */
+static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t mesh, size_t number) {
   packing p = {0};
   obstacle why = OBSTACLE_NONE;
   json_t *extension = NULL;
@@ -399,15 +389,12 @@ static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t m
   if (twin) {
     extension = json_deep_copy(json_object_get(json_object_get(twin, "extensions"), QMAT_GLTF_DRACO));
     if (!extension) return qmat_fail_memory(c->context, "a glTF file");
-    c->result->moved[mesh] = fmax(c->result->moved[mesh], json_number_value(json_object_get(extension, "qmat new")));
   } else {
     status = take_primitive(c, primitive, &p, &why);
     if (status == QMAT_OK && why == OBSTACLE_NONE) status = pack(c, &p, &extension, &why);
-    /* For primitives of the same geometry; it goes when the views are placed. */
-    if (extension && json_object_set_new(extension, "qmat new", json_real(p.moved)) != 0)
-      status = qmat_fail_memory(c->context, "a glTF file");
-    c->result->moved[mesh] = fmax(c->result->moved[mesh], extension ? p.moved : 0);
+    if (extension) c->moved[position_of(c, primitive)] = p.moved;
   }
+  if (extension) c->result->moved[mesh] = fmax(c->result->moved[mesh], c->moved[position_of(c, primitive)]);
   packing_uninit(&p);
   if (status == QMAT_OK && extension) {
     json_t *extensions = json_object_get(primitive, "extensions");
@@ -415,6 +402,7 @@ static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t m
       extensions = json_object_get(primitive, "extensions");
     if (json_object_set(extensions, QMAT_GLTF_DRACO, extension) != 0)
       status = qmat_fail_memory(c->context, "a glTF file");
+    c->fresh[number] = true;
     c->result->primitives++;
   } else if (status == QMAT_OK) {
     c->result->left++;
@@ -436,20 +424,20 @@ static bool is_harmless(const char *name) {
 }
 
 /* Calls `visit` for every number of a buffer view that the asset has but those of new data. */
-static void for_each_view(json_t *root, void (*visit)(void *user, json_t *owner), void *user) {
-  size_t i, k;
+static void for_each_view(const compressor *c, void (*visit)(void *user, json_t *owner), void *user) {
+  size_t i, k, number = 0;
   json_t *item, *primitive;
-  json_array_foreach(json_object_get(root, "accessors"), i, item) {
+  json_array_foreach(json_object_get(c->root, "accessors"), i, item) {
     json_t *sparse = json_object_get(item, "sparse");
     visit(user, item);
     if (sparse) visit(user, json_object_get(sparse, "indices"));
     if (sparse) visit(user, json_object_get(sparse, "values"));
   }
-  json_array_foreach(json_object_get(root, "images"), i, item) visit(user, item);
-  json_array_foreach(json_object_get(root, "meshes"), i, item) {
+  json_array_foreach(json_object_get(c->root, "images"), i, item) visit(user, item);
+  json_array_foreach(json_object_get(c->root, "meshes"), i, item) {
     json_array_foreach(json_object_get(item, "primitives"), k, primitive) {
       json_t *extension = json_object_get(json_object_get(primitive, "extensions"), QMAT_GLTF_DRACO);
-      if (extension && !json_object_get(extension, "qmat new")) visit(user, extension);
+      if (!c->fresh[number++] && extension) visit(user, extension);
     }
   }
 }
@@ -551,16 +539,15 @@ static bool place_views(compressor *c, view_table *table, const size_t *moved_by
   }
   const size_t first = json_array_size(kept);
   done = done && json_array_extend(kept, c->new_views) == 0;
-  if (done) for_each_view(c->root, renumber, table);
-  size_t i, k;
+  if (done) for_each_view(c, renumber, table);
+  size_t i, k, number = 0;
   json_t *mesh, *primitive;
   json_array_foreach(json_object_get(c->root, "meshes"), i, mesh) {
     json_array_foreach(json_object_get(mesh, "primitives"), k, primitive) {
+      if (!c->fresh[number++]) continue;
       json_t *extension = json_object_get(json_object_get(primitive, "extensions"), QMAT_GLTF_DRACO);
-      if (!json_object_get(extension, "qmat new")) continue;
-      const json_int_t number = whole(extension, "bufferView", 0) + (json_int_t)first;
-      json_object_del(extension, "qmat new");
-      done = json_object_set_new(extension, "bufferView", json_integer(number)) == 0 && done;
+      const json_int_t view = whole(extension, "bufferView", 0) + (json_int_t)first;
+      done = json_object_set_new(extension, "bufferView", json_integer(view)) == 0 && done;
     }
   }
   done = done && !table->failed && json_object_set(c->root, "bufferViews", kept) == 0;
@@ -568,25 +555,13 @@ static bool place_views(compressor *c, view_table *table, const size_t *moved_by
   return done;
 }
 
-/* Adds a name to a list of names of the asset. */
-static bool add_name(json_t *root, const char *key, const char *name) {
-  json_t *names = json_object_get(root, key);
-  if (!names && json_object_set_new(root, key, json_array()) == 0) names = json_object_get(root, key);
-  for (size_t i = 0; i < json_array_size(names); i++) {
-    const char *other = json_string_value(json_array_get(names, i));
-    if (other && strcmp(other, name) == 0) return true;
-  }
-  return json_array_append_new(names, json_string(name)) == 0;
-}
-
 static qmat_status finish(compressor *c, view_table *table) {
   size_t *moved_by = qmat_alloc((c->size + 3) / 4, sizeof *moved_by);
   json_t *buffer = json_array_get(json_object_get(c->root, "buffers"), 0);
-  for_each_view(c->root, mark_after, table);
+  for_each_view(c, mark_after, table);
   bool done = moved_by && rebuild_chunk(c, table, moved_by) && place_views(c, table, moved_by);
   done = done && json_object_set_new(buffer, "byteLength", json_integer((json_int_t)c->result->chunk_size)) == 0 &&
-         add_name(c->root, "extensionsUsed", QMAT_GLTF_DRACO) &&
-         add_name(c->root, "extensionsRequired", QMAT_GLTF_DRACO);
+         qmat_gltf_require_extension(c->root, QMAT_GLTF_DRACO);
   qmat_free(moved_by);
   return done ? QMAT_OK : qmat_fail_memory(c->context, "a glTF file");
 }
@@ -595,14 +570,22 @@ static qmat_status finish(compressor *c, view_table *table) {
 
 static qmat_status compress_meshes(compressor *c) {
   qmat_status status = QMAT_OK;
-  size_t i, k;
+  size_t i, k, number = 0;
   json_t *mesh, *primitive;
   json_array_foreach(json_object_get(c->root, "meshes"), i, mesh) {
     json_array_foreach(json_object_get(mesh, "primitives"), k, primitive) {
-      if (status == QMAT_OK) status = compress_primitive(c, primitive, i);
+      if (status == QMAT_OK) status = compress_primitive(c, primitive, i, number++);
     }
   }
   return status;
+}
+
+static size_t count_primitives(const json_t *root) {
+  const json_t *meshes = json_object_get(root, "meshes");
+  size_t count = 0;
+  for (size_t i = 0; i < json_array_size(meshes); i++)
+    count += json_array_size(json_object_get(json_array_get(meshes, i), "primitives"));
+  return count;
 }
 
 static qmat_status add_notes(const compressor *c, json_t *notes) {
@@ -641,17 +624,20 @@ qmat_status qmat_gltf_compress(qmat_context *context, json_t *root, const uint8_
   c.accessor_count = json_array_size(json_object_get(root, "accessors"));
   c.users = qmat_calloc(c.accessor_count, sizeof *c.users);
   c.shared = qmat_calloc(c.accessor_count, sizeof *c.shared);
+  c.moved = qmat_alloc(c.accessor_count, sizeof *c.moved);
+  c.fresh = qmat_calloc(count_primitives(root), sizeof *c.fresh);
   c.new_views = json_array();
   compressed->moved = qmat_calloc(compressed->mesh_count, sizeof *compressed->moved);
   table.was_used = qmat_calloc(table.count, sizeof *table.was_used);
   table.is_used = qmat_calloc(table.count, sizeof *table.is_used);
   table.numbers = qmat_calloc(table.count, sizeof *table.numbers);
   qmat_status status = QMAT_OK;
-  if (!c.users || !c.shared || !c.new_views || !compressed->moved || !table.was_used || !table.is_used ||
-      !table.numbers)
+  if (!c.users || !c.shared || !c.moved || !c.fresh || !c.new_views || !compressed->moved || !table.was_used ||
+      !table.is_used || !table.numbers)
     status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK) {
-    for_each_view(root, mark_before, &table);
+    for (size_t i = 0; i < c.accessor_count; i++) c.moved[i] = -1;
+    for_each_view(&c, mark_before, &table);
     note_users(&c);
     status = compress_meshes(&c);
   }
@@ -661,6 +647,8 @@ qmat_status qmat_gltf_compress(qmat_context *context, json_t *root, const uint8_
   json_decref(c.new_views);
   qmat_free(c.users);
   qmat_free(c.shared);
+  qmat_free(c.moved);
+  qmat_free(c.fresh);
   qmat_free(table.was_used);
   qmat_free(table.is_used);
   qmat_free(table.numbers);

@@ -303,16 +303,6 @@ static bool add(json_t *root, const char *key, json_t *member, json_int_t *numbe
   return false;
 }
 
-/* Adds a name to a list of extensions that does not have it yet. */
-static bool add_extension(json_t *root, const char *key, const char *name) {
-  const json_t *names = json_object_get(root, key);
-  for (size_t i = 0; i < json_array_size(names); i++) {
-    const char *other = json_string_value(json_array_get(names, i));
-    if (other && strcmp(other, name) == 0) return true;
-  }
-  return add(root, key, json_string(name), NULL);
-}
-
 /* Adds the buffer views of a skin whose data start at `offset`; `*first` is the number of the first. */
 static bool add_views(document *document, const skin_data *data, size_t offset, json_int_t *first) {
   static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
@@ -373,8 +363,7 @@ static bool add_skin(document *document, const skin_data *data, size_t offset, c
   if (primitive && data->compressed) {
     json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", QMAT_GLTF_DRACO, "bufferView", view, "attributes",
                                   "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
-    done = set(primitive, "extensions", extension) && add_extension(root, "extensionsUsed", QMAT_GLTF_DRACO) &&
-           add_extension(root, "extensionsRequired", QMAT_GLTF_DRACO);
+    done = set(primitive, "extensions", extension) && qmat_gltf_require_extension(root, QMAT_GLTF_DRACO);
   }
   json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
   if (mesh && name) done = set(mesh, "name", json_string(name)) && done;

@@ -56,4 +56,20 @@ static inline char *asset_replace(const char *text, const char *from, const char
   return out;
 }
 
+/* 96 bytes: the corners of a box of `side` by 1 by 1. */
+static inline void put_box_corners(qmat_writer *data, float side) {
+  for (int i = 0; i < 8; i++) {
+    qmat_put_f32(data, (float)(i >> 2) * side);
+    qmat_put_f32(data, (float)(i >> 1 & 1));
+    qmat_put_f32(data, (float)(i & 1));
+  }
+}
+
+/* 72 bytes: its triangles. */
+static inline void put_box_triangles(qmat_writer *data) {
+  static const uint16_t corners[36] = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
+                                       2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
+  for (int i = 0; i < 36; i++) qmat_put_u16(data, corners[i]);
+}
+
 #endif

@@ -31,19 +31,12 @@ static const char asset_text[] =
     "{'buffer':0,'byteOffset':332,'byteLength':9}],'buffers':[{'byteLength':341}]}";
 
 static qmat_writer asset_data(void) {
-  static const uint16_t triangles[36] = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
-                                         2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
   qmat_writer data = {0};
-  for (int box = 0; box < 2; box++) {
-    for (int i = 0; i < 8; i++) {
-      qmat_put_f32(&data, (float)((i >> 2) * (box == 0 ? 1 : 4)));
-      qmat_put_f32(&data, (float)(i >> 1 & 1));
-      qmat_put_f32(&data, (float)(i & 1));
-    }
-    for (int i = 0; i < 36 && box == 0; i++) qmat_put_u16(&data, triangles[i]);
-    for (int i = 0; i < 17 && box == 0; i++) /* interleaved with what nothing uses; the last names the corner */
-      for (int k = 0; k < 4; k++) qmat_put_u8(&data, (uint8_t)(i % 2 == 1 && k == 3 ? i / 2 : 9 + k));
-  }
+  put_box_corners(&data, 1);
+  put_box_triangles(&data);
+  for (int i = 0; i < 17; i++) /* interleaved with what nothing uses; the last names the corner */
+    for (int k = 0; k < 4; k++) qmat_put_u8(&data, (uint8_t)(i % 2 == 1 && k == 3 ? i / 2 : 9 + k));
+  put_box_corners(&data, 4);
   qmat_put_bytes(&data, "a picture", 9);
   assert_int_equal(data.size, 341);
   return data;
@@ -234,6 +227,25 @@ static void test_what_cannot_be_taken_stays_as_it_is(void **state) {
   }
 }
 
+static void test_what_was_compressed_before_keeps_its_data_and_all_that_it_says(void **state) {
+  (void)state;
+  outcome o;
+  char *text = asset_replace(asset_text, "'targets':[{'POSITION':3}]",
+                             "'extensions':{'KHR_draco_mesh_compression':{'bufferView':4,'attributes':{'POSITION':0},"
+                             "'qmat new':7}}");
+  compress(&o, text);
+  assert_int_equal(o.compressed.primitives, 2);
+  assert_int_equal(o.compressed.left, 1);
+  const json_t *draco = draco_of(o.root, 2);
+  assert_int_equal(number(draco, "qmat new"), 7);
+  size_t size;
+  const uint8_t *bytes = bytes_of(&o, (size_t)number(draco, "bufferView"), &size);
+  assert_int_equal(size, 9);
+  assert_memory_equal(bytes, "a picture", 9);
+  free(text);
+  uninit(&o);
+}
+
 static void test_the_same_asset_gives_the_same_bytes(void **state) {
   (void)state;
   outcome first, second;
@@ -252,6 +264,7 @@ int main(void) {
       cmocka_unit_test(test_what_is_decoded_is_what_was_given),
       cmocka_unit_test(test_the_readers_find_the_same_meshes),
       cmocka_unit_test(test_what_cannot_be_taken_stays_as_it_is),
+      cmocka_unit_test(test_what_was_compressed_before_keeps_its_data_and_all_that_it_says),
       cmocka_unit_test(test_the_same_asset_gives_the_same_bytes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

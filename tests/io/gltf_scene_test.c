@@ -40,17 +40,10 @@ static const char scene_text[] =
 
 /* 264 bytes: the corners of a box of side 1, its triangles, and the corners of a box of 4 by 1 by 1. */
 static qmat_writer box_data(void) {
-  static const uint16_t triangles[36] = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
-                                         2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
   qmat_writer data = {0};
-  for (int box = 0; box < 2; box++) {
-    for (int i = 0; i < 8; i++) {
-      qmat_put_f32(&data, (float)((i >> 2) * (box == 0 ? 1 : 4)));
-      qmat_put_f32(&data, (float)(i >> 1 & 1));
-      qmat_put_f32(&data, (float)(i & 1));
-    }
-    for (int i = 0; i < 36 && box == 0; i++) qmat_put_u16(&data, triangles[i]);
-  }
+  put_box_corners(&data, 1);
+  put_box_triangles(&data);
+  put_box_corners(&data, 4);
   assert_int_equal(data.size, 264);
   return data;
 }
