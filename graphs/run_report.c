@@ -270,22 +270,21 @@ void qmat_format_bound(double fraction, char *text) {
 }
 
 void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size) {
-  char spheres[32], triangles[32], out[48], in[48], model[96] = "the model";
+  char spheres[32], triangles[32], out[48], in[48], model[144];
   qmat_format_count(summary->spheres, spheres);
   qmat_format_count(summary->triangles, triangles);
   qmat_format_bound(summary->surface_to_envelope, out);
   qmat_format_bound(summary->envelope_to_surface, in);
+  char what[48] = "the model";
   if (summary->triangles > 0)
-    snprintf(model, sizeof model, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
-  if (summary->failures > 0) {
-    char all[96];
-    snprintf(all, sizeof all, "%zu of the %zu meshes of %.48s", summary->meshes, summary->meshes + summary->failures,
-             model);
-    memcpy(model, all, sizeof model);
-  } else if (summary->meshes > 1) {
-    const size_t used = strlen(model);
-    snprintf(model + used, sizeof model - used, " of %zu meshes", summary->meshes);
-  }
+    snprintf(what, sizeof what, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
+  if (summary->failures > 0)
+    snprintf(model, sizeof model, "%zu of the %zu meshes of %s", summary->meshes, summary->meshes + summary->failures,
+             what);
+  else if (summary->meshes > 1)
+    snprintf(model, sizeof model, "%s of %zu meshes", what, summary->meshes);
+  else
+    snprintf(model, sizeof model, "%s", what);
   bool one = summary->spheres == 1;
   const char *between =
       summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
