@@ -110,11 +110,11 @@ awk 'BEGIN {
 "$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
 running=$!
 child_of $running
-kill -SEGV "$child"
+kill -ABRT "$child" # the address sanitizer makes an exit code of SIGSEGV, but not of this
 wait $running
 code=$?
 holds "a crash is one asset's failure" test $code -eq 1
-holds "a crash is told" grep -q '^models/aaa_torus.off: ended by signal 11' out.txt
+holds "a crash is told" grep -q '^models/aaa_torus.off: ended by signal 6' out.txt
 holds "the rest is made" grep -q '^9 done, 1 failed' out.txt
 rm -r rest cache
 "$qmat" batch graph.yaml --inputs 'models/*.off' --out rest --jobs 1 --set samples.spacing=2% >out.txt 2>err.txt &
