@@ -18,45 +18,33 @@ qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *l
                                     double spacing) {
   /* No finer than the keys can number. */
   *lattice = (qmat_depth_lattice){.surface = surface, .spacing = fmax(spacing, 4 * reach / (double)key_offset)};
-  lattice->keys = qmat_calloc(FIRST_CAPACITY, sizeof *lattice->keys);
-  lattice->depths = qmat_alloc(FIRST_CAPACITY, sizeof *lattice->depths);
-  if (!lattice->keys || !lattice->depths) return qmat_fail_memory(context, "depths");
+  lattice->nodes = qmat_calloc(FIRST_CAPACITY, sizeof *lattice->nodes);
+  if (!lattice->nodes) return qmat_fail_memory(context, "depths");
   lattice->capacity = FIRST_CAPACITY;
   return QMAT_OK;
 }
 
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
-  qmat_free(lattice->keys);
-  qmat_free(lattice->depths);
+  qmat_free(lattice->nodes);
   *lattice = (qmat_depth_lattice){0};
 }
 
-static size_t find_slot(const uint64_t *keys, size_t capacity, uint64_t key) {
+/* The node of a key, or where it has room. */
+static qmat_lattice_node *find_node(qmat_lattice_node *nodes, size_t capacity, uint64_t key) {
   size_t slot = (size_t)qmat_hash_mix(key) & (capacity - 1);
-  while (keys[slot] != 0 && keys[slot] != key) slot = (slot + 1) & (capacity - 1);
-  return slot;
+  while (nodes[slot].key != 0 && nodes[slot].key != key) slot = (slot + 1) & (capacity - 1);
+  return &nodes[slot];
 }
 
 /* Doubles the table; when memory is short it stays as it is and simply forgets nothing more. */
 static bool grow(qmat_depth_lattice *lattice) {
   const size_t capacity = 2 * lattice->capacity;
-  uint64_t *keys = qmat_calloc(capacity, sizeof *keys);
-  double *depths = qmat_alloc(capacity, sizeof *depths);
-  if (!keys || !depths) {
-    qmat_free(keys);
-    qmat_free(depths);
-    return false;
-  }
-  for (size_t i = 0; i < lattice->capacity; i++) {
-    if (lattice->keys[i] == 0) continue;
-    const size_t slot = find_slot(keys, capacity, lattice->keys[i]);
-    keys[slot] = lattice->keys[i];
-    depths[slot] = lattice->depths[i];
-  }
-  qmat_free(lattice->keys);
-  qmat_free(lattice->depths);
-  lattice->keys = keys;
-  lattice->depths = depths;
+  qmat_lattice_node *nodes = qmat_calloc(capacity, sizeof *nodes);
+  if (!nodes) return false;
+  for (size_t i = 0; i < lattice->capacity; i++)
+    if (lattice->nodes[i].key != 0) *find_node(nodes, capacity, lattice->nodes[i].key) = lattice->nodes[i];
+  qmat_free(lattice->nodes);
+  lattice->nodes = nodes;
   lattice->capacity = capacity;
   return true;
 }
@@ -88,10 +76,10 @@ static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double n
   static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};
   for (int k = 0; k < 3; k++)
     for (int sign = 0; sign < 2; sign++) {
-      const uint64_t neighbour = sign ? key + steps[k] : key - steps[k];
-      const size_t slot = find_slot(lattice->keys, lattice->capacity, neighbour);
-      if (lattice->keys[slot] == neighbour)
-        return qmat_depth_lattice_exact_near(lattice, node, lattice->depths[slot], lattice->spacing);
+      const uint64_t beside = sign ? key + steps[k] : key - steps[k];
+      const qmat_lattice_node *neighbour = find_node(lattice->nodes, lattice->capacity, beside);
+      if (neighbour->key == beside)
+        return qmat_depth_lattice_exact_near(lattice, node, neighbour->depth, lattice->spacing);
     }
   return qmat_depth_lattice_exact(lattice, node);
 }
@@ -110,15 +98,14 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
     square += (point[k] - node[k]) * (point[k] - node[k]);
   }
   *distance = sqrt(square);
-  size_t slot = find_slot(lattice->keys, lattice->capacity, key);
-  if (lattice->keys[slot] == key) return lattice->depths[slot];
+  qmat_lattice_node *known = find_node(lattice->nodes, lattice->capacity, key);
+  if (known->key == key) return known->depth;
   const double depth = ask_node(lattice, key, node);
   if (2 * (lattice->count + 1) > lattice->capacity) {
     if (!grow(lattice)) return depth;
-    slot = find_slot(lattice->keys, lattice->capacity, key);
+    known = find_node(lattice->nodes, lattice->capacity, key);
   }
-  lattice->keys[slot] = key;
-  lattice->depths[slot] = depth;
+  *known = (qmat_lattice_node){key, depth};
   lattice->count++;
   return depth;
 }

@@ -4,6 +4,12 @@
 
 #include "core/surface.h"
 
+/* A node that was asked. */
+typedef struct qmat_lattice_node {
+  uint64_t key; /* 0: none */
+  double depth;
+} qmat_lattice_node;
+
 /* Depths (the distance to the surface, negative outside) remembered at the nodes of a cubic lattice, each asked of the
  * surface when it is first wanted. Depth is 1-Lipschitz, so a node bounds it everywhere around. What it answers depends
  * on the place alone, never on what was asked before. One thread at a time. */
@@ -11,8 +17,7 @@ typedef struct qmat_depth_lattice {
   const qmat_surface *surface;
   double spacing;
   size_t count, capacity; /* capacity: a power of two */
-  uint64_t *keys;         /* 0: free */
-  double *depths;
+  qmat_lattice_node *nodes;
   uint64_t questions; /* how often the surface was asked */
 } qmat_depth_lattice;
 

@@ -2,19 +2,19 @@
 #include "core/surface.h"
 
 #include <embree3/rtcore.h>
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/triangle_blocks.h"
+#include "core/vector.h"
 
 /* Embree stores single precision. In the unit frame coordinates are at most 1/2 and rays at most about 2 long, so that
  * its hits are within a few 1e-7 of the triangle's plane; TIE is well above that. */
 #define TIE 4e-6
 /* How far along the ray the double precision hit may be from the single precision one. */
 #define LONGEST_CORRECTION 1e-4
-/* Where single precision is not spent on the model any more. */
-#define FAR_AWAY 1e4
 /* Barycentric coordinate and cosine below which a ray that counts crossings may have met an edge. */
 #define GRAZING 1e-4f
 #define RAY_COUNT 7
@@ -33,10 +33,10 @@ struct qmat_surface {
   const qmat_mesh *mesh;
   qmat_frame frame;
   double *positions;
-  float *balls; /* 4 per triangle: a ball around it, to pass over triangles that are too far to matter */
   double low[3], high[3];
   RTCDevice device;
   RTCScene scene;
+  qmat_triangle_blocks *blocks; /* for distances */
   /* The winding number tree, for surfaces that are not closed and oriented: node 1 is the root, node k has the children
    * 2 k and 2 k + 1, leaf k (node leaf_count + k) holds order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
   size_t leaf_count; /* a power of two; 0: no tree */
@@ -62,20 +62,6 @@ typedef struct device_message {
   char text[256];
 } device_message;
 
-static void subtract(const double a[3], const double b[3], double out[3]) {
-  for (int i = 0; i < 3; i++) out[i] = a[i] - b[i];
-}
-
-static double dot(const double a[3], const double b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3]) {
-  out[0] = a[1] * b[2] - a[2] * b[1];
-  out[1] = a[2] * b[0] - a[0] * b[2];
-  out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 static const double *corner_position(const qmat_surface *surface, uint32_t triangle, int corner) {
   return surface->positions + 3 * (size_t)surface->mesh->triangles[3 * (size_t)triangle + (size_t)corner];
 }
@@ -84,9 +70,9 @@ static const double *corner_position(const qmat_surface *surface, uint32_t trian
 static void triangle_normal(const qmat_surface *surface, uint32_t triangle, double normal[3]) {
   double e[3], f[3];
   const double *a = corner_position(surface, triangle, 0);
-  subtract(corner_position(surface, triangle, 1), a, e);
-  subtract(corner_position(surface, triangle, 2), a, f);
-  cross(e, f, normal);
+  qmat_subtract(corner_position(surface, triangle, 1), a, e);
+  qmat_subtract(corner_position(surface, triangle, 2), a, f);
+  qmat_cross(e, f, normal);
 }
 
 /* --- rays ------------------------------------------------------------------------------------------------------- */
@@ -96,10 +82,10 @@ static void triangle_normal(const qmat_surface *surface, uint32_t triangle, doub
 static double refine_hit(const qmat_surface *surface, const query_context *query, uint32_t triangle, double found) {
   double normal[3], to_plane[3];
   triangle_normal(surface, triangle, normal);
-  subtract(corner_position(surface, triangle, 0), query->origin, to_plane);
-  const double slope = dot(query->direction, normal);
-  const double distance = dot(to_plane, normal) / slope, correction = fabs(distance - found);
-  const bool meets_plane = correction * fabs(slope) <= TIE * sqrt(dot(normal, normal));
+  qmat_subtract(corner_position(surface, triangle, 0), query->origin, to_plane);
+  const double slope = qmat_dot(query->direction, normal);
+  const double distance = qmat_dot(to_plane, normal) / slope, correction = fabs(distance - found);
+  const bool meets_plane = correction * fabs(slope) <= TIE * sqrt(qmat_dot(normal, normal));
   return meets_plane && correction <= LONGEST_CORRECTION ? distance : found;
 }
 
@@ -156,7 +142,7 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   query.start = start;
 
   /* Single precision starts a little before `start`, and never far from the unit ball that holds the model. */
-  const double foot = -dot(origin, direction);
+  const double foot = -qmat_dot(origin, direction);
   query.offset = start - TIE;
   if (foot - 1 > query.offset) query.offset = foot - 1;
   if (!(foot + 1 > query.offset)) return false;
@@ -172,7 +158,7 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   if (triangle != NULL) *triangle = query.triangle;
   if (normal != NULL) {
     triangle_normal(surface, query.triangle, normal);
-    const double length = sqrt(dot(normal, normal));
+    const double length = sqrt(qmat_dot(normal, normal));
     for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
   }
   return true;
@@ -192,7 +178,7 @@ static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
   int score = 0;
   for (int i = 0; i < RAY_COUNT && abs(score) < 4; i++) {
     /* Away from the centre, where less of the model lies. */
-    const double sign = dot(point, ray_directions[i]) < 0 ? -1 : 1;
+    const double sign = qmat_dot(point, ray_directions[i]) < 0 ? -1 : 1;
     const double direction[3] = {sign * ray_directions[i][0], sign * ray_directions[i][1], sign * ray_directions[i][2]};
     query_context query;
     rtcInitIntersectContext(&query.base);
@@ -211,12 +197,12 @@ static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
 /* The solid angle of a triangle as seen from a point, over 4 pi (van Oosterom and Strackee 1983). */
 static double solid_angle(const qmat_surface *surface, uint32_t triangle, const double point[3]) {
   double a[3], b[3], c[3], bc[3];
-  subtract(corner_position(surface, triangle, 0), point, a);
-  subtract(corner_position(surface, triangle, 1), point, b);
-  subtract(corner_position(surface, triangle, 2), point, c);
-  cross(b, c, bc);
-  const double la = sqrt(dot(a, a)), lb = sqrt(dot(b, b)), lc = sqrt(dot(c, c));
-  const double y = dot(a, bc), x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+  qmat_subtract(corner_position(surface, triangle, 0), point, a);
+  qmat_subtract(corner_position(surface, triangle, 1), point, b);
+  qmat_subtract(corner_position(surface, triangle, 2), point, c);
+  qmat_cross(b, c, bc);
+  const double la = sqrt(qmat_dot(a, a)), lb = sqrt(qmat_dot(b, b)), lc = sqrt(qmat_dot(c, c));
+  const double y = qmat_dot(a, bc), x = la * lb * lc + qmat_dot(a, b) * lc + qmat_dot(b, c) * la + qmat_dot(c, a) * lb;
   return y == 0 ? 0 : atan2(y, x) * 0.159154943091895335769; /* 2 / (4 pi) */
 }
 
@@ -237,10 +223,11 @@ static double winding_number(const qmat_surface *surface, const double point[3])
     const size_t index = stack[--depth];
     const winding_node *node = surface->nodes + index;
     double offset[3];
-    subtract(node->centre, point, offset);
-    const double square = dot(offset, offset);
+    qmat_subtract(node->centre, point, offset);
+    const double square = qmat_dot(offset, offset);
     if (square > DIPOLE_BETA * DIPOLE_BETA * node->radius * node->radius) {
-      winding += dot(node->area_vector, offset) / (square * sqrt(square)) * 0.0795774715459476678844; /* 1 / (4 pi) */
+      winding +=
+          qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * 0.0795774715459476678844; /* 1 / (4 pi) */
     } else if (index >= surface->leaf_count) {
       size_t begin, end;
       leaf_range(surface, index - surface->leaf_count, &begin, &end);
@@ -268,123 +255,9 @@ void qmat_surface_inside_many(const qmat_surface *surface, const double *points,
 
 /* --- distance --------------------------------------------------------------------------------------------------- */
 
-static void closest_on_segment(const double a[3], const double b[3], const double point[3], double closest[3]) {
-  double ab[3], ap[3];
-  subtract(b, a, ab);
-  subtract(point, a, ap);
-  const double length = dot(ab, ab);
-  const double t = length > 0 ? fmin(fmax(dot(ap, ab) / length, 0), 1) : 0;
-  for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
-}
-
-/* A plane is surely farther than a distance when its square is larger by this factor. */
-static const double surely_farther = 1 + 1e-9;
-
-/* The squared distance to a triangle: to its plane where the foot is inside, else to the edges that face the point.
- * INFINITY where the plane alone is farther than the square `enough`. */
-static double closest_on_triangle(const qmat_surface *surface, uint32_t triangle, const double point[3], double enough,
-                                  double closest[3]) {
-  const uint32_t *ids = surface->mesh->triangles + 3 * (size_t)triangle;
-  const double *corners[3];
-  for (int i = 0; i < 3; i++) corners[i] = corner_position(surface, triangle, i);
-  double normal[3];
-  triangle_normal(surface, triangle, normal);
-  const double square = dot(normal, normal);
-  double from_corner[3];
-  subtract(point, corners[0], from_corner);
-  const double height = dot(from_corner, normal);
-  if (height * height > surely_farther * enough * square) return INFINITY;
-
-  double nearest = INFINITY;
-  bool facing = false;
-  for (int i = 0; i < 3; i++) {
-    const int j = (i + 1) % 3;
-    double edge[3], to_point[3], outward[3];
-    subtract(corners[j], corners[i], edge);
-    subtract(point, corners[i], to_point);
-    cross(edge, normal, outward);
-    if (square > 0 && dot(outward, to_point) <= 0) continue;
-    facing = true;
-    /* The same order of ends for both triangles of an edge, so that both get the same bits. */
-    const bool rising = ids[i] < ids[j];
-    double candidate[3], offset[3];
-    closest_on_segment(corners[rising ? i : j], corners[rising ? j : i], point, candidate);
-    subtract(point, candidate, offset);
-    const double distance = dot(offset, offset);
-    if (distance < nearest) {
-      nearest = distance;
-      memcpy(closest, candidate, sizeof candidate);
-    }
-  }
-  if (facing) return nearest;
-  for (int i = 0; i < 3; i++) closest[i] = point[i] - height / square * normal[i];
-  return height / square * height;
-}
-
-typedef struct nearest_query {
-  const qmat_surface *surface;
-  const double *point;
-  double slack;         /* by how much single precision may misjudge the distance to a box */
-  double square, reach; /* of the nearest so far: the squared distance and the distance */
-  double closest[3];
-  uint32_t triangle;
-} nearest_query;
-
-/* Looks at one triangle; true when it is the nearest so far. */
-static bool try_triangle(nearest_query *query, uint32_t triangle) {
-  const float *ball = query->surface->balls + 4 * (size_t)triangle;
-  double closest[3], to_ball[3];
-  for (int i = 0; i < 3; i++) to_ball[i] = query->point[i] - (double)ball[i];
-  const double near = query->reach + (double)ball[3];
-  if (dot(to_ball, to_ball) > surely_farther * near * near) return false;
-  const double square = closest_on_triangle(query->surface, triangle, query->point, query->square, closest);
-  if (!(square < query->square || (square == query->square && triangle < query->triangle))) return false;
-  query->square = square;
-  query->reach = sqrt(square);
-  query->triangle = triangle;
-  memcpy(query->closest, closest, sizeof closest);
-  return true;
-}
-
-static float search_radius(const nearest_query *query, double distance) {
-  return nextafterf((float)(distance * (1 + 1e-6) + query->slack), INFINITY);
-}
-
-static bool see_triangle(struct RTCPointQueryFunctionArguments *args) {
-  nearest_query *query = args->userPtr;
-  if (!try_triangle(query, args->primID)) return false;
-  const float radius = search_radius(query, query->reach);
-  if (!(radius < args->query->radius)) return false;
-  args->query->radius = radius;
-  return true;
-}
-
 double qmat_surface_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
                              uint32_t *triangle) {
-  const double size = fmax(fmax(fabs(point[0]), fabs(point[1])), fabs(point[2]));
-  nearest_query query = {.surface = surface,
-                         .point = point,
-                         .slack = 4 * (double)FLT_EPSILON * (1 + size),
-                         .square = surely_farther * limit * limit,
-                         .reach = surely_farther * limit,
-                         .triangle = UINT32_MAX};
-  if (size < FAR_AWAY) {
-    struct RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    struct RTCPointQuery ball = {.x = (float)point[0],
-                                 .y = (float)point[1],
-                                 .z = (float)point[2],
-                                 .time = 0,
-                                 .radius = limit < 4 * FAR_AWAY ? search_radius(&query, limit) : INFINITY};
-    rtcPointQuery(surface->scene, &ball, &context, see_triangle, &query);
-  } else {
-    for (size_t i = 0; i < surface->mesh->triangle_count; i++) try_triangle(&query, (uint32_t)i);
-  }
-  const double distance = sqrt(query.square);
-  if (query.triangle == UINT32_MAX || !(distance <= limit)) return INFINITY;
-  if (closest != NULL) memcpy(closest, query.closest, sizeof query.closest);
-  if (triangle != NULL) *triangle = query.triangle;
-  return distance;
+  return qmat_triangle_blocks_distance(surface->blocks, point, limit, closest, triangle);
 }
 
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]) {
@@ -431,8 +304,8 @@ static double farthest_corner(const qmat_surface *surface, size_t begin, size_t 
   for (size_t i = begin; i < end; i++) {
     for (int corner = 0; corner < 3; corner++) {
       double offset[3];
-      subtract(corner_position(surface, surface->order[i], corner), centre, offset);
-      square = fmax(square, dot(offset, offset));
+      qmat_subtract(corner_position(surface, surface->order[i], corner), centre, offset);
+      square = fmax(square, qmat_dot(offset, offset));
     }
   }
   return sqrt(square);
@@ -445,7 +318,7 @@ static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t be
   memset(node, 0, sizeof *node);
   for (size_t i = begin; i < end; i++) {
     area_and_centroid(surface, surface->order[i], vector, centroid);
-    const double weight = sqrt(dot(vector, vector));
+    const double weight = sqrt(qmat_dot(vector, vector));
     *area += weight;
     for (int k = 0; k < 3; k++) {
       node->area_vector[k] += vector[k];
@@ -562,8 +435,10 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(surface->scene, geometry);
   rtcCommitScene(surface->scene);
+  status = qmat_triangle_blocks_new(context, surface->device, surface->positions, mesh->triangles, mesh->triangle_count,
+                                    &surface->blocks);
 check:
-  status = embree_status(context, surface->device, &message);
+  if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
   if (status == QMAT_OK && (surface->scene == NULL || geometry == NULL)) {
     status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree made no scene");
   }
@@ -571,33 +446,6 @@ done:
   if (geometry != NULL) rtcReleaseGeometry(geometry);
   rtcSetDeviceErrorFunction(surface->device, NULL, NULL);
   return status;
-}
-
-/* Around the middle of each triangle's box, rounded up: balls are compared, never measured. */
-static qmat_status build_balls(qmat_context *context, qmat_surface *surface) {
-  const qmat_mesh *mesh = surface->mesh;
-  surface->balls = qmat_alloc(4 * mesh->triangle_count, sizeof *surface->balls);
-  if (surface->balls == NULL) return qmat_fail_memory(context, "the triangles");
-  const int threads = qmat_threads(context);
-#pragma omp parallel for num_threads(threads) schedule(static)
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    float *ball = surface->balls + 4 * t;
-    const double *corners[3];
-    for (int i = 0; i < 3; i++) corners[i] = corner_position(surface, (uint32_t)t, i);
-    for (int k = 0; k < 3; k++) {
-      const double low = fmin(fmin(corners[0][k], corners[1][k]), corners[2][k]);
-      const double high = fmax(fmax(corners[0][k], corners[1][k]), corners[2][k]);
-      ball[k] = (float)(0.5 * (low + high));
-    }
-    double square = 0;
-    for (int i = 0; i < 3; i++) {
-      double offset[3];
-      for (int k = 0; k < 3; k++) offset[k] = corners[i][k] - (double)ball[k];
-      square = fmax(square, dot(offset, offset));
-    }
-    ball[3] = nextafterf((float)sqrt(square), INFINITY);
-  }
-  return QMAT_OK;
 }
 
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
@@ -626,7 +474,6 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
   }
   status = build_scene(context, made);
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
-  if (status == QMAT_OK) status = build_balls(context, made);
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status != QMAT_OK) goto failed;
   if (!(mesh->closed && mesh->oriented)) {
@@ -642,10 +489,10 @@ failed:
 
 void qmat_surface_free(qmat_surface *surface) {
   if (surface == NULL) return;
+  qmat_triangle_blocks_free(surface->blocks);
   if (surface->scene != NULL) rtcReleaseScene(surface->scene);
   if (surface->device != NULL) rtcReleaseDevice(surface->device);
   qmat_free(surface->positions);
-  qmat_free(surface->balls);
   qmat_free(surface->nodes);
   qmat_free(surface->order);
   qmat_free(surface);

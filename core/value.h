@@ -81,7 +81,8 @@ typedef struct qmat_field {
   char *unit; /* "model unit" or "1" */
 } qmat_field;
 
-/* Points on a surface: first every vertex of the mesh in its order, then the added ones by facet. */
+/* Points on a surface: first every vertex of the mesh in its order, then the added ones by facet; behind them may
+ * come those of medial.refine. */
 typedef struct qmat_samples {
   qmat_value base;
   size_t count, vertex_count; /* all samples, and how many of them are mesh vertices */

@@ -324,6 +324,55 @@ static void test_degenerate_triangles_change_nothing(void **state) {
   release(b);
 }
 
+/* Brute force for triangles whose planes cannot be trusted where they are thin: their sides alone then. */
+static double brute_distance_to_needles(const qmat_surface *surface, const double p[3], double thin) {
+  double best = INFINITY;
+  for (size_t t = 0; t < qmat_surface_mesh(surface)->triangle_count; t++) {
+    const double *corners[3] = {corner(surface, t, 0), corner(surface, t, 1), corner(surface, t, 2)};
+    double longest = 0, least = INFINITY;
+    for (int k = 0; k < 3; k++) {
+      const double *a = corners[k], *b = corners[(k + 1) % 3];
+      longest = fmax(longest, distance_to_triangle(a, a, a, b));
+      least = fmin(least, distance_to_triangle(a, b, b, corners[(k + 2) % 3]));
+      best = fmin(best, distance_to_triangle(a, b, b, p));
+    }
+    if (least > thin * longest) best = fmin(best, distance_to_triangle(corners[0], corners[1], corners[2], p));
+  }
+  return best;
+}
+
+/* Needles have planes that rounding turns; beside them lie triangles a thousand times smaller. */
+static void test_needles_and_specks_agree_with_brute_force(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  for (uint64_t i = 0; i < 600; i++) {
+    const double length = i % 3 == 0 ? 1e-3 : 0.5, width = i % 3 == 1 ? pow(10, uniform(41, i, -17, -2)) : 1e-3;
+    uint32_t ids[3];
+    double at[3], along[3], across[3];
+    for (uint64_t k = 0; k < 3; k++) {
+      at[k] = uniform(42, 3 * i + k, 0.2, 0.8);
+      along[k] = length * uniform(43, 3 * i + k, -0.5, 0.5);
+      across[k] = width * uniform(44, 3 * i + k, -0.5, 0.5);
+    }
+    ids[0] = shape_vertex(mesh, at[0], at[1], at[2]);
+    ids[1] = shape_vertex(mesh, at[0] + along[0], at[1] + along[1], at[2] + along[2]);
+    const double share = uniform(45, i, 0, 1);
+    ids[2] = shape_vertex(mesh, at[0] + share * along[0] + across[0], at[1] + share * along[1] + across[1],
+                          at[2] + share * along[2] + across[2]);
+    shape_triangle(mesh, ids[0], ids[1], ids[2]);
+  }
+  qmat_surface *surface = surface_of(shape_seal(mesh));
+  for (uint64_t i = 0; i < 3000; i++) {
+    double p[3];
+    const double *tip = corner(surface, i % mesh->triangle_count, 1);
+    for (uint64_t k = 0; k < 3; k++)
+      p[k] = i % 2 == 0 ? uniform(46, 3 * i + k, -0.6, 0.6) : tip[k] + uniform(46, 3 * i + k, -0.01, 0.01);
+    assert_near(qmat_surface_distance(surface, p, INFINITY, NULL, NULL), brute_distance_to_needles(surface, p, 1e-7),
+                1e-7);
+  }
+  release(surface);
+}
+
 /* --- points on the surface, ties, far away ------------------------------------------------------------------------ */
 
 static void test_points_on_vertices_edges_and_faces_have_distance_zero(void **state) {
@@ -679,6 +728,7 @@ int main(void) {
       cmocka_unit_test(test_sphere_without_an_octant_agrees_with_the_winding_number),
       cmocka_unit_test(test_flipped_triangle_agrees_with_the_winding_number),
       cmocka_unit_test(test_degenerate_triangles_change_nothing),
+      cmocka_unit_test(test_needles_and_specks_agree_with_brute_force),
       cmocka_unit_test(test_points_on_vertices_edges_and_faces_have_distance_zero),
       cmocka_unit_test(test_equally_close_triangles_give_the_smallest),
       cmocka_unit_test(test_both_triangles_of_an_edge_are_equally_far),
