@@ -102,7 +102,8 @@ typedef struct {
   qmat_point_grid samples;
 } answering;
 
-/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it. */
+/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it.
+ */
 static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
   double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
   for (size_t e = 0; e < complex->edge_count && reaches; e++) {
@@ -188,12 +189,13 @@ static void store(qmat_control_points *control, size_t i, const witness *w) {
   control->distances[i] = w->distance;
 }
 
-/* The best witness among what answers for `count` samples. */
-static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double epsilon,
+/* The best witness among what answers for `count` samples; the primitives around are only looked at where no sphere
+ * comes as close as is `content`. */
+static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double content,
                         witness *best) {
   *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
   for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
-  if (!(best->distance > content_with_sphere * epsilon)) return;
+  if (!(best->distance > content)) return;
   for (size_t k = 0; k < count; k++)
     for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
       const uint32_t v = a->spheres[i];
@@ -202,21 +204,21 @@ static void look_around(const answering *a, const double *point, const uint32_t 
     }
 }
 
-/* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where they
- * leave the point farther than `enough` the sample nearest to it is asked. */
-static void look_around_in_facet(const answering *a, const double *point, size_t facet, double epsilon, double enough,
+/* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where
+ * they leave the point farther than `enough` the sample nearest to it is asked. */
+static void look_around_in_facet(const answering *a, const double *point, size_t facet, double content, double enough,
                                  witness *best) {
-  look_around(a, point, &a->mesh->triangles[3 * facet], 3, epsilon, best);
+  look_around(a, point, &a->mesh->triangles[3 * facet], 3, content, best);
   if (best->distance <= enough) return;
   const uint32_t nearest = qmat_point_grid_nearest(&a->samples, point);
   witness other;
-  look_around(a, point, &nearest, 1, epsilon, &other);
+  look_around(a, point, &nearest, 1, content, &other);
   if (other.distance < best->distance) *best = other;
 }
 
 /* Also without a bound every point needs some witness. */
-static bool is_far(const qmat_control_points *control, size_t i, double epsilon) {
-  return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= content_with_star * epsilon);
+static bool is_far(const qmat_control_points *control, size_t i, double enough) {
+  return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= enough);
 }
 
 /* So many points or facets are done between two calls of the progress function. */
@@ -228,15 +230,15 @@ static qmat_status next_slice(qmat_context *context, size_t first, size_t count,
   return qmat_progress(context, first, count, "control points");
 }
 
-static size_t count_far(const qmat_control_points *control, double epsilon) {
+static size_t count_far(const qmat_control_points *control, double enough) {
   size_t far = 0;
-  for (size_t i = 0; i < control->count; i++) far += is_far(control, i, epsilon);
+  for (size_t i = 0; i < control->count; i++) far += is_far(control, i, enough);
   return far;
 }
 
 /* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
  * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
-static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double epsilon,
+static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double enough,
                                    qmat_control_points *control) {
   const qmat_complex *complex = a->complex;
   const int threads = qmat_threads(context);
@@ -245,7 +247,7 @@ static qmat_status ask_all_spheres(qmat_context *context, const answering *a, do
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t i = first; i < last; i++) {
-      if (!is_far(control, i, epsilon)) continue;
+      if (!is_far(control, i, enough)) continue;
       const double *p = &control->points[3 * i];
       witness best = {.distance = control->distances[i]};
       memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
@@ -292,7 +294,7 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
 }
 
 /* The same for many points: the nearest primitive of all. */
-static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double epsilon,
+static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double enough,
                                 qmat_control_points *control) {
   qmat_envelope *envelope;
   qmat_status status = envelope_of(context, complex, &envelope);
@@ -303,7 +305,7 @@ static qmat_status ask_envelope(qmat_context *context, const qmat_complex *compl
     if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
-      if (!is_far(control, i, epsilon)) continue;
+      if (!is_far(control, i, enough)) continue;
       const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
       store(control, i, &w);
     }
@@ -415,52 +417,54 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   return QMAT_OK;
 }
 
-qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                     size_t most, bool inside, qmat_control_points *control) {
-  qmat_arena *arena = &context->arena;
-  const qmat_mesh *mesh = qmat_surface_mesh(surface);
-  const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
-  size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
-  answering a = {.mesh = mesh, .complex = complex};
-  qmat_inner_points inner = {.count = 0};
-  double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
-  if (!starts || !unit_samples) return qmat_fail_memory(context, "control points");
-  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
-  qmat_status status = find_answering(context, samples, medial, &a);
-  if (status == QMAT_OK) status = qmat_point_grid_init(context, unit_samples, samples->count, &a.samples);
-  if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
-  shell_points shell = {.count = 0};
-  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
-  if (status != QMAT_OK) return status;
+/* The samples and what answers for them; `unit_samples` are in the unit frame. */
+static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
+                                  const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
+                                  answering *a) {
+  *a = (answering){.mesh = mesh, .complex = complex};
+  const qmat_status status = find_answering(context, samples, medial, a);
+  return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
+}
+
+/* Where each facet's grid starts behind the samples. The spacing grows until no more than `most` points are added. */
+static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
+                               size_t *starts, qmat_control_points *control) {
   for (;; control->spacing *= 1.25) {
-    if ((status = qmat_progress(context, 0, 0, "control points")) != QMAT_OK) return status;
+    const qmat_status status = qmat_progress(context, 0, 0, "control points");
+    if (status != QMAT_OK) return status;
     size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
       const grid g = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
-      starts[t] = samples->count + added;
+      starts[t] = control->sample_count + added;
       added += grid_points(&g, control->spacing);
     }
-    control->surface_count = samples->count + added;
-    if (added <= most) break;
+    control->surface_count = control->sample_count + added;
+    if (added <= most) return QMAT_OK;
   }
-  control->count = control->surface_count + inner.count + shell.count;
-  if ((status = allocate(context, control)) != QMAT_OK) return status;
-  memcpy(control->points, unit_samples, 3 * samples->count * sizeof *unit_samples);
+}
+
+/* The places on the surface, with witnesses of what answers around them. */
+static qmat_status look_on_surface(qmat_context *context, const answering *a, const double *positions,
+                                   const double *unit_samples, const size_t *starts, double content, double enough,
+                                   qmat_control_points *control) {
+  const qmat_mesh *mesh = a->mesh;
+  const size_t samples = control->sample_count;
+  memcpy(control->points, unit_samples, 3 * samples * sizeof *unit_samples);
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < samples->count; first = last) {
-    if ((status = next_slice(context, first, samples->count, &last)) != QMAT_OK) return status;
+  for (size_t first = 0, last; first < samples; first = last) {
+    const qmat_status status = next_slice(context, first, samples, &last);
+    if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t i = first; i < last; i++) {
       const uint32_t sample = (uint32_t)i;
       witness best;
-      look_around(&a, &control->points[3 * i], &sample, 1, epsilon, &best);
+      look_around(a, &control->points[3 * i], &sample, 1, content, &best);
       store(control, i, &best);
     }
   }
   for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
-    if ((status = next_slice(context, first, mesh->triangle_count, &last)) != QMAT_OK) return status;
+    const qmat_status status = next_slice(context, first, mesh->triangle_count, &last);
+    if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t t = first; t < last; t++) {
       const uint32_t *corners = &mesh->triangles[3 * t];
@@ -469,11 +473,64 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
       if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
         witness best;
-        look_around_in_facet(&a, &control->points[3 * i], t, epsilon, content_with_star * epsilon, &best);
+        look_around_in_facet(a, &control->points[3 * i], t, content, enough, &best);
         store(control, i, &best);
       }
     }
   }
+  return QMAT_OK;
+}
+
+static qmat_status ask_for_far_points(qmat_context *context, const answering *a, double enough,
+                                      qmat_control_points *control) {
+  const size_t far = count_far(control, enough);
+  if (far == 0) return QMAT_OK;
+  if (far * a->complex->vertex_count > most_sphere_looks) return ask_envelope(context, a->complex, enough, control);
+  return ask_all_spheres(context, a, enough, control);
+}
+
+qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
+                                     const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
+                                     const qmat_complex *complex, double spacing, size_t most, double enough,
+                                     qmat_control_points *control) {
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing};
+  size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
+  if (!starts) return qmat_fail_memory(context, "control points");
+  answering a;
+  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
+  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, control);
+  control->count = control->surface_count;
+  if (status == QMAT_OK) status = allocate(context, control);
+  if (status == QMAT_OK)
+    status = look_on_surface(context, &a, positions, unit_samples, starts, enough, enough, control);
+  return status == QMAT_OK ? ask_for_far_points(context, &a, enough, control) : status;
+}
+
+qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
+                                     size_t most, bool inside, qmat_control_points *control) {
+  qmat_arena *arena = &context->arena;
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
+  size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
+  answering a;
+  qmat_inner_points inner = {.count = 0};
+  double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
+  if (!starts || !unit_samples) return qmat_fail_memory(context, "control points");
+  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
+  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
+  if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
+  shell_points shell = {.count = 0};
+  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
+  if (status != QMAT_OK) return status;
+  if ((status = place_grids(context, mesh, positions, most, starts, control)) != QMAT_OK) return status;
+  control->count = control->surface_count + inner.count + shell.count;
+  if ((status = allocate(context, control)) != QMAT_OK) return status;
+  const double enough = content_with_star * epsilon;
+  status =
+      look_on_surface(context, &a, positions, unit_samples, starts, content_with_sphere * epsilon, enough, control);
+  if (status != QMAT_OK) return status;
   size_t next = control->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {
     const witness own = {inner.distances[i], {inner.spheres[i], QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
@@ -485,10 +542,7 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
     memcpy(&control->points[3 * next], shell.places[i].point, 3 * sizeof(double));
     store(control, next, &shell.places[i].witness);
   }
-  const size_t far = count_far(control, epsilon);
-  if (far == 0) return QMAT_OK;
-  if (far * complex->vertex_count > most_sphere_looks) return ask_envelope(context, complex, epsilon, control);
-  return ask_all_spheres(context, &a, epsilon, control);
+  return ask_for_far_points(context, &a, enough, control);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,

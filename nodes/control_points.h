@@ -29,6 +29,15 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
                                      const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                      size_t most, bool inside, qmat_control_points *control);
 
+/* The places on the surface alone: the samples and a grid that far apart on each facet, of `most` points at most as
+ * above. Their distances are no less than F, and F itself where that is more than `enough`. `positions` (3 doubles a
+ * vertex of the mesh) and `unit_samples` (3 a sample) are in the unit frame as are the lengths. QMAT_ERROR_MEMORY,
+ * QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples), QMAT_CANCELLED. All threads. */
+qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
+                                     const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
+                                     const qmat_complex *complex, double spacing, size_t most, double enough,
+                                     qmat_control_points *control);
+
 /* Further places: on the surface, and inside the solid. */
 typedef struct qmat_extra_points {
   size_t surface_count, inner_count;

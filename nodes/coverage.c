@@ -64,7 +64,9 @@ void qmat_coverage_uninit(qmat_coverage *coverage) {
   qmat_free(coverage->marks);
   qmat_free(coverage->found);
   qmat_free(coverage->star.items);
+  qmat_free(coverage->star.balls);
   qmat_free(coverage->link.items);
+  qmat_free(coverage->link.balls);
   *coverage = (qmat_coverage){0};
 }
 
@@ -83,49 +85,22 @@ static double witness_distance(const qmat_coverage *coverage, const qmat_complex
   return qmat_sphere_distance(s, &coverage->points[3 * point]);
 }
 
-/* A prepared slab or loose cone, and the ball that holds it. */
+/* A slab or loose cone of a star. */
 typedef struct qmat_star_part {
-  double centre[3], radius;
-  union {
-    qmat_slab slab;
-    qmat_cone cone;
-  };
+  qmat_primitive primitive;
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
 } star_part;
 
 static qmat_status add_part(qmat_context *context, qmat_star_parts *parts, const double *const spheres[3],
                             const uint32_t vertices[3]) {
-  if (qmat_grow((void **)&parts->items, &parts->capacity, parts->count + 1, sizeof *parts->items))
+  if (qmat_grow((void **)&parts->items, &parts->item_capacity, parts->count + 1, sizeof *parts->items) ||
+      qmat_grow((void **)&parts->balls, &parts->ball_capacity, parts->count + 1, sizeof *parts->balls))
     return qmat_fail_memory(context, "the star of a collapse");
-  star_part *part = &parts->items[parts->count++];
-  const int corners = vertices[2] == QMAT_NONE ? 2 : 3;
-  for (int k = 0; k < 3; k++) {
-    part->vertices[k] = vertices[k];
-    part->centre[k] = 0;
-    for (int c = 0; c < corners; c++) part->centre[k] += spheres[c][k] / corners;
-  }
-  part->radius = 0;
-  for (int c = 0; c < corners; c++)
-    part->radius = qmat_larger(part->radius, qmat_point_distance(part->centre, spheres[c]) + spheres[c][3]);
-  if (corners == 3)
-    qmat_slab_prepare(&part->slab, spheres[0], spheres[1], spheres[2]);
-  else
-    qmat_cone_prepare(&part->cone, spheres[0], spheres[1]);
+  star_part *part = &parts->items[parts->count];
+  memcpy(part->vertices, vertices, sizeof part->vertices);
+  qmat_primitive_prepare(spheres, vertices[2] == QMAT_NONE ? 2 : 3, &part->primitive, &parts->balls[parts->count]);
+  parts->count++;
   return QMAT_OK;
-}
-
-/* Whether no point of the part is as close as `best`: a look at its ball. */
-static inline bool is_farther(const star_part *part, const double *point, double best) {
-  double square = 0;
-  for (int k = 0; k < 3; k++) square += (point[k] - part->centre[k]) * (point[k] - part->centre[k]);
-  const double reach = best + part->radius;
-  return reach < 0 || square > reach * reach;
-}
-
-static double part_foot(const star_part *part, const double *point, double weights[3]) {
-  if (part->vertices[2] != QMAT_NONE) return qmat_slab_foot(&part->slab, point, weights);
-  weights[2] = 0;
-  return qmat_cone_foot(&part->cone, point, weights);
 }
 
 /* Collapses leave the vertices of the link where they are, so that `sphere` stands for both ends of the edge. */
@@ -199,10 +174,10 @@ static double search_star(const qmat_coverage *coverage, const qmat_collapse *co
   double best = qmat_sphere_distance(sphere, point);
   *witness = (new_witness){witness->point, {collapse->kept, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
   for (size_t i = 0; i < coverage->star.count; i++) {
-    const star_part *part = &coverage->star.items[i];
     double weights[3];
-    if (is_farther(part, point, best)) continue;
-    const double f = part_foot(part, point, weights);
+    if (qmat_primitive_is_farther(&coverage->star.balls[i], point, best)) continue;
+    const star_part *part = &coverage->star.items[i];
+    const double f = qmat_primitive_foot(&part->primitive, point, weights);
     if (!(f < best)) continue;
     best = f;
     memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
@@ -215,10 +190,10 @@ static double search_star(const qmat_coverage *coverage, const qmat_collapse *co
 static double search_link(const qmat_coverage *coverage, const double *point, double enough, new_witness *witness) {
   double best = INFINITY;
   for (size_t i = 0; i < coverage->link.count; i++) {
-    const star_part *part = &coverage->link.items[i];
     double weights[3];
-    if (is_farther(part, point, best)) continue;
-    const double f = part_foot(part, point, weights);
+    if (qmat_primitive_is_farther(&coverage->link.balls[i], point, best)) continue;
+    const star_part *part = &coverage->link.items[i];
+    const double f = qmat_primitive_foot(&part->primitive, point, weights);
     if (!(f < best)) continue;
     best = f;
     memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
@@ -308,6 +283,20 @@ qmat_status qmat_coverage_error(qmat_context *context, qmat_coverage *coverage, 
   return QMAT_OK;
 }
 
+/* What a look at the slot will read: the lists run through memory at random, and waiting for it takes longer than the
+ * look.
+ */
+static inline void fetch_ahead(const qmat_coverage *coverage, uint32_t slot) {
+  if (slot == QMAT_NONE) return;
+  const size_t point = slot / 3;
+  __builtin_prefetch(&coverage->next[slot]);
+  __builtin_prefetch(&coverage->marks[point]);
+  __builtin_prefetch(&coverage->limits[point]);
+  __builtin_prefetch(&coverage->witnesses[3 * point]);
+  __builtin_prefetch(&coverage->weights[3 * point]);
+  __builtin_prefetch(&coverage->points[3 * point]);
+}
+
 static bool touches(const qmat_coverage *coverage, const qmat_collapse *collapse, uint32_t point) {
   for (size_t k = 0; k < 3; k++) {
     const uint32_t vertex = coverage->witnesses[3 * (size_t)point + k];
@@ -327,9 +316,11 @@ qmat_status qmat_coverage_test(qmat_context *context, qmat_coverage *coverage, c
     status = test_point(context, coverage, complex, collapse, sphere, first, kept);
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = coverage->heads[ends[e]]; slot != QMAT_NONE && status == QMAT_OK && *kept;
-         slot = coverage->next[slot])
+    for (uint32_t slot = coverage->heads[ends[e]], next; slot != QMAT_NONE && status == QMAT_OK && *kept; slot = next) {
+      next = coverage->next[slot];
+      fetch_ahead(coverage, next);
       status = test_point(context, coverage, complex, collapse, sphere, slot / 3, kept);
+    }
   return status;
 }
 

@@ -3,12 +3,14 @@
 #define QMAT_NODES_COVERAGE_H
 
 #include "core/medial_complex.h"
-#include "core/medial_distance.h"
+#include "core/medial_primitive.h"
 
-/* A growing list of prepared primitives. */
+/* A growing list of prepared primitives, and the ball that holds each: beside them, since most are passed over by it.
+ */
 typedef struct qmat_star_parts {
   struct qmat_star_part *items;
-  size_t count, capacity;
+  qmat_primitive_ball *balls;
+  size_t count, item_capacity, ball_capacity;
 } qmat_star_parts;
 
 /* Holds the distance from the surface to the envelope while a medial mesh is simplified (eq. 9-12, with the signed F).

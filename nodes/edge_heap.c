@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/edge_heap.h"
 
-static bool comes_first(const qmat_edge_heap *h, uint32_t a, uint32_t b) {
-  if (h->costs[a] != h->costs[b]) return h->costs[a] < h->costs[b];
+/* Of two edges of the same cost. */
+static bool decide_tie(const qmat_edge_heap *h, uint32_t a, uint32_t b) {
   if (h->errors[a] != h->errors[b]) return h->errors[a] < h->errors[b];
   const uint32_t *p = &h->complex->edges[2 * (size_t)a], *q = &h->complex->edges[2 * (size_t)b];
   const uint32_t low_p = p[0] < p[1] ? p[0] : p[1], low_q = q[0] < q[1] ? q[0] : q[1];
@@ -10,44 +10,53 @@ static bool comes_first(const qmat_edge_heap *h, uint32_t a, uint32_t b) {
   return (p[0] < p[1] ? p[1] : p[0]) < (q[0] < q[1] ? q[1] : q[0]);
 }
 
-static void put(qmat_edge_heap *h, size_t place, uint32_t edge) {
-  h->edges[place] = edge;
-  h->places[edge] = (uint32_t)place;
+static inline bool comes_first(const qmat_edge_heap *h, const qmat_heap_entry *a, const qmat_heap_entry *b) {
+  return a->cost != b->cost ? a->cost < b->cost : decide_tie(h, a->edge, b->edge);
 }
 
+static void put(qmat_edge_heap *h, size_t place, qmat_heap_entry entry) {
+  h->entries[place] = entry;
+  h->places[entry.edge] = (uint32_t)place;
+}
+
+enum { BELOW = 4 };
+
 static void sift_up(qmat_edge_heap *h, size_t place) {
-  const uint32_t edge = h->edges[place];
-  for (; place > 0 && comes_first(h, edge, h->edges[(place - 1) / 2]); place = (place - 1) / 2)
-    put(h, place, h->edges[(place - 1) / 2]);
-  put(h, place, edge);
+  const qmat_heap_entry entry = h->entries[place];
+  for (size_t above; place > 0 && comes_first(h, &entry, &h->entries[above = (place - 1) / BELOW]); place = above)
+    put(h, place, h->entries[above]);
+  put(h, place, entry);
 }
 
 static void sift_down(qmat_edge_heap *h, size_t place) {
-  const uint32_t edge = h->edges[place];
+  const qmat_heap_entry entry = h->entries[place];
   for (;;) {
-    size_t child = 2 * place + 1;
-    if (child >= h->count) break;
-    if (child + 1 < h->count && comes_first(h, h->edges[child + 1], h->edges[child])) child++;
-    if (!comes_first(h, h->edges[child], edge)) break;
-    put(h, place, h->edges[child]);
-    place = child;
+    const size_t first = BELOW * place + 1, end = first + BELOW < h->count ? first + BELOW : h->count;
+    if (first >= h->count) break;
+    size_t least = first;
+    for (size_t i = first + 1; i < end; i++)
+      if (comes_first(h, &h->entries[i], &h->entries[least])) least = i;
+    if (!comes_first(h, &h->entries[least], &entry)) break;
+    put(h, place, h->entries[least]);
+    place = least;
   }
-  put(h, place, edge);
+  put(h, place, entry);
 }
 
 void qmat_edge_heap_remove(qmat_edge_heap *h, uint32_t edge) {
   const uint32_t place = h->places[edge];
   if (place == QMAT_NONE) return;
   h->places[edge] = QMAT_NONE;
-  const uint32_t last = h->edges[--h->count];
-  if (last == edge) return;
+  const qmat_heap_entry last = h->entries[--h->count];
+  if (last.edge == edge) return;
   put(h, place, last);
   sift_up(h, place);
-  sift_down(h, h->places[last]);
+  sift_down(h, h->places[last.edge]);
 }
 
 void qmat_edge_heap_update(qmat_edge_heap *h, uint32_t edge) {
-  if (h->places[edge] == QMAT_NONE) put(h, h->count++, edge);
+  if (h->places[edge] == QMAT_NONE) h->places[edge] = (uint32_t)h->count++;
+  put(h, h->places[edge], (qmat_heap_entry){h->costs[edge], edge});
   sift_up(h, h->places[edge]);
   sift_down(h, h->places[edge]);
 }
@@ -58,15 +67,15 @@ qmat_status qmat_edge_heap_init(qmat_context *context, qmat_edge_heap *h, const 
   *h = (qmat_edge_heap){.complex = complex};
   h->costs = qmat_arena_alloc(arena, count, sizeof *h->costs);
   h->errors = qmat_arena_alloc(arena, count, sizeof *h->errors);
-  h->edges = qmat_arena_alloc(arena, count, sizeof *h->edges);
+  h->entries = qmat_arena_alloc(arena, count, sizeof *h->entries);
   h->places = qmat_arena_alloc(arena, count, sizeof *h->places);
-  if (!h->costs || !h->errors || !h->edges || !h->places) return qmat_fail_memory(context, "the heap of edges");
+  if (!h->costs || !h->errors || !h->entries || !h->places) return qmat_fail_memory(context, "the heap of edges");
   for (size_t e = 0; e < count; e++) h->places[e] = QMAT_NONE;
   return QMAT_OK;
 }
 
 void qmat_edge_heap_fill(qmat_edge_heap *h) {
   h->count = h->complex->edge_count;
-  for (size_t e = 0; e < h->count; e++) put(h, e, (uint32_t)e);
-  for (size_t i = h->count / 2; i-- > 0;) sift_down(h, i);
+  for (size_t e = 0; e < h->count; e++) put(h, e, (qmat_heap_entry){h->costs[e], (uint32_t)e});
+  for (size_t i = (h->count + BELOW - 2) / BELOW; i-- > 0;) sift_down(h, i);
 }

@@ -8,6 +8,7 @@
 #include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
+#include "nodes/protrusion.h"
 #include "nodes/simplifier.h"
 #include "nodes/topology.h"
 
@@ -114,12 +115,13 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
 
 /* Collapses on from where `from` ended, of which `left` is what is left. */
 static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
-                             const qmat_medial *left, const qmat_extra_points *extra) {
+                             const qmat_medial *left, const qmat_extra_points *extra, bool patches) {
   s->newest = 1 - s->newest;
   qmat_simplification *round = &s->rounds[s->newest];
   qmat_simplification_uninit(round);
   *round = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
+  round->rules.patches = patches;
   if (status == QMAT_OK) status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
@@ -214,7 +216,7 @@ typedef struct {
   qmat_report *report;
   double fault;
   bool holds;    /* whether surface and envelope keep within epsilon of each other, as far as it was found */
-  size_t filled; /* how many spheres fill notches and voids */
+  size_t filled; /* how many spheres were added to fill notches and voids */
 } attempt;
 
 static const double topology_fault = 0.05;
@@ -232,49 +234,85 @@ static bool is_better(const attempt *a, const attempt *best) {
   return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
 }
 
-/* A round from where `from` ended, of which `left` is what is left; NULL: it is extracted. `found` are the errors
- * before hollows are filled. */
-static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
-                               const qmat_medial *left, const qmat_extra_points *extra, int round, attempt *a,
-                               qmat_medial_errors *found) {
-  *a = (attempt){.medial = qmat_medial_new(), .report = qmat_report_new(), .fault = INFINITY};
-  *found = (qmat_medial_errors){.surface_to_envelope = 0};
-  qmat_medial *extracted = left ? NULL : qmat_medial_new();
-  qmat_status status =
-      a->medial && a->report && (left || extracted) ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
-  if (status == QMAT_OK && !left) status = qmat_simplification_extract(from, extracted);
-  if (status == QMAT_OK) status = run_round(s, state, from, left ? left : extracted, extra);
-  qmat_value_release(extracted ? &extracted->base : NULL);
+/* What the newest round has left, with its hollows filled, and what is wrong with it. `found` are the errors before
+ * hollows are filled; `a->filled` tells how many spheres filled some before the round. */
+static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_medial_errors *found) {
   const qmat_simplification *done = &s->rounds[s->newest];
-  if (status == QMAT_OK) status = qmat_simplification_extract(done, a->medial);
+  qmat_status status = qmat_simplification_extract(done, a->medial);
   if (status == QMAT_OK) status = measure(s, a->medial, found);
   qmat_medial_errors after = *found;
-  if (status == QMAT_OK) status = fill_hollows(s, found, a->medial, &after, &a->filled);
+  size_t filled = 0;
+  if (status == QMAT_OK) status = fill_hollows(s, found, a->medial, &after, &filled);
+  a->filled += filled;
   if (status == QMAT_OK) status = make_report(s, a->medial, &after, round, a->filled, a->report);
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
   a->holds = status == QMAT_OK && a->fault == epsilon;
-  if (a->filled > 0) qmat_medial_errors_uninit(&after);
+  if (filled > 0) qmat_medial_errors_uninit(&after);
   if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
   return status;
+}
+
+static qmat_status start_attempt(const simplifier *s, size_t filled, attempt *a, qmat_medial_errors *found) {
+  *a = (attempt){.medial = qmat_medial_new(), .report = qmat_report_new(), .fault = INFINITY, .filled = filled};
+  *found = (qmat_medial_errors){.surface_to_envelope = 0};
+  return a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
+}
+
+/* A round from where `from` ended, of which `left` is what is left, `filled` of it spheres that fill hollows; NULL: it
+ * is extracted. `found` are the errors before hollows are filled. */
+static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
+                               const qmat_medial *left, size_t filled, const qmat_extra_points *extra, int round,
+                               attempt *a, qmat_medial_errors *found) {
+  qmat_status status = start_attempt(s, filled, a, found);
+  qmat_medial *extracted = left ? NULL : qmat_medial_new();
+  if (status == QMAT_OK && !left && !extracted) status = qmat_fail_memory(s->context, "the medial mesh");
+  if (status == QMAT_OK && !left) status = qmat_simplification_extract(from, extracted);
+  if (status == QMAT_OK) status = run_round(s, state, from, left ? left : extracted, extra, false);
+  qmat_value_release(extracted ? &extracted->base : NULL);
+  return status == QMAT_OK ? finish_attempt(s, round, a, found) : status;
 }
 
 /* Where hollows were filled, collapses go on from there, with their places held: what fills them may be a part of what
  * was there before. */
 static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *state, int round,
-                                   const qmat_medial_errors *found, attempt *best) {
+                                   const qmat_medial_errors *found, attempt *best, bool *gained) {
   qmat_extra_points hollows = {.held_depth = held_depth_share * s->params->epsilon};
   qmat_status status = append(s, &hollows.inner, &hollows.inner_count, found->hollows, found->hollow_count);
   if (status != QMAT_OK) return status;
   attempt a;
   qmat_medial_errors errors;
-  status = run_attempt(s, state, &s->rounds[s->newest], best->medial, &hollows, round, &a, &errors);
+  status = run_attempt(s, state, &s->rounds[s->newest], best->medial, best->filled, &hollows, round, &a, &errors);
   qmat_medial_errors_uninit(&errors);
-  if (status == QMAT_OK && is_better(&a, best)) {
+  *gained = status == QMAT_OK && is_better(&a, best);
+  if (*gained) {
     release(best);
     *best = a;
   } else {
     release(&a);
+  }
+  return status;
+}
+
+/* Goes on from a result that keeps within epsilon, which `base` of the rounds has left, with the spheres around each
+ * edge fitted at once. The result changes only to a better one. */
+static qmat_status squeeze(simplifier *s, const qmat_initial_medial *state, int round, int base, attempt *best) {
+  if (s->params->refits == 0 || best->medial->sphere_count <= (size_t)s->params->vertices) return QMAT_OK;
+  const qmat_extra_points none = {.held_depth = held_depth_share * s->params->epsilon};
+  attempt a;
+  qmat_medial_errors errors;
+  qmat_status status = start_attempt(s, best->filled, &a, &errors);
+  s->newest = base;
+  if (status == QMAT_OK) status = run_round(s, state, &s->rounds[base], best->medial, &none, true);
+  const bool fewer = status == QMAT_OK && s->rounds[s->newest].complex.live_vertices < best->medial->sphere_count;
+  if (fewer) status = finish_attempt(s, round, &a, &errors);
+  qmat_medial_errors_uninit(&errors);
+  if (fewer && status == QMAT_OK && is_better(&a, best)) {
+    release(best);
+    *best = a;
+  } else {
+    release(&a);
+    s->newest = base;
   }
   return status;
 }
@@ -338,6 +376,75 @@ static qmat_status open_voids(simplifier *s, attempt *a) {
   return QMAT_OK;
 }
 
+/* Puts a triangle into its place. */
+static qmat_status insert_triangle(qmat_context *context, qmat_medial *medial, const uint32_t corners[3],
+                                   size_t *place) {
+  size_t capacity = 3 * medial->triangle_count;
+  if (qmat_grow((void **)&medial->triangles, &capacity, 3 * (medial->triangle_count + 1), sizeof *corners))
+    return qmat_fail_memory(context, "medial slabs");
+  for (*place = 0; *place < medial->triangle_count; ++*place) {
+    const uint32_t *row = &medial->triangles[3 * *place];
+    if (row[0] != corners[0] ? row[0] > corners[0] : row[1] != corners[1] ? row[1] > corners[1] : row[2] > corners[2])
+      break;
+  }
+  restore_triangle(medial, *place, corners);
+  return QMAT_OK;
+}
+
+/* Closes a loop of the medial mesh that the solid has not: fills the first three edges without a slab that are such a
+ * loop, where the slab leaves the solid by no more than epsilon. `*closed`: whether there were any; `*protrusion` is
+ * then what the slab leaves it by. One that closes no loop would make a void. */
+static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *protrusion) {
+  const double epsilon = s->params->epsilon;
+  uint32_t *triangles;
+  size_t count;
+  *closed = false;
+  qmat_status status = qmat_topology_find_empty_triangles(s->context, unit, &triangles, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK && !*closed; i++) {
+    const uint32_t *corners = &triangles[3 * i];
+    const double *spheres[3];
+    for (size_t k = 0; k < 3; k++) spheres[k] = &unit->spheres[4 * (size_t)corners[k]];
+    *protrusion = qmat_protrusion_bound(s->surface, spheres, 3, least_reported * epsilon, error_tolerance * epsilon);
+    if (*protrusion > epsilon) continue;
+    size_t place = 0;
+    qmat_topology topology;
+    qmat_medial_errors errors = {.surface_to_envelope = 0};
+    status = insert_triangle(s->context, unit, corners, &place);
+    if (status != QMAT_OK) break;
+    status = qmat_topology_of_medial(s->context, unit, &topology);
+    if (status == QMAT_OK && topology.known && topology.loops < loops) {
+      status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, &errors);
+      *closed = status == QMAT_OK && errors.boundary_to_surface <= epsilon;
+      qmat_medial_errors_uninit(&errors);
+    }
+    if (!*closed) remove_triangle(unit, place);
+  }
+  return status;
+}
+
+/* Closes loops of a result that keeps within epsilon while it has more than the solid. A slab more brings the surface
+ * no farther away, but may leave the solid. */
+static qmat_status close_loops(simplifier *s, attempt *a) {
+  const qmat_simplification_rules *rules = &s->dense.rules;
+  if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  json_t *root = a->report->root;
+  for (;;) {
+    qmat_topology topology;
+    bool closed;
+    double protrusion;
+    qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
+    if (status != QMAT_OK || !topology.known || topology.loops == 0 || topology.euler >= rules->target_euler)
+      return status;
+    status = close_loop(s, a->medial, topology.loops, &closed, &protrusion);
+    if (status != QMAT_OK || !closed) return status;
+    const double before = json_real_value(json_object_get(root, "envelope_to_surface"));
+    int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
+    bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler + 1));
+    bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, protrusion + s->deviation)));
+    if (bad) return qmat_fail_memory(s->context, "the report");
+  }
+}
+
 /* Rounds of collapses until surface and envelope keep within epsilon of each other between the control points as they
  * do at them: places where the surface is farther from the envelope, or the envelope has a notch or is hollow, join
  * them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
@@ -350,11 +457,14 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     qmat_medial_errors errors;
     attempt a;
     const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
-    status = run_attempt(s, state, &s->dense, NULL, &extra, round, &a, &errors);
+    status = run_attempt(s, state, &s->dense, NULL, 0, &extra, round, &a, &errors);
     const bool is_good = a.holds && (double)a.filled <= most_filled * (double)a.medial->sphere_count;
     const bool is_done = is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a);
+    const int own = s->newest;
+    bool gained = false;
+    if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a, &gained);
+    if (status == QMAT_OK && is_done && a.holds) status = squeeze(s, state, round, gained ? s->newest : own, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
       *best = a;
@@ -439,6 +549,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   status = qmat_simplify_prepare(context, &held, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) status = open_voids(&s, &best);
+  if (status == QMAT_OK) status = close_loops(&s, &best);
   if (status == QMAT_OK) {
     double *spheres = best.medial->spheres;
     qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), spheres, best.medial->sphere_count, spheres);
@@ -510,7 +621,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 7,
+    .version = 8,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -526,7 +637,10 @@ const qmat_node qmat_node_medial_simplify = {
         "places between where the surface is too far from the envelope, and the collapses are repeated with these, and "
         "for "
         "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
-        "on. Of a mesh that only stands for a surface (mesh.subdivide), the deviation is taken from epsilon and added "
+        "on. What keeps within epsilon is tried for fewer spheres once more, each edge with the spheres around it "
+        "fitted "
+        "at once; the result counts where it is better. Of a mesh that only stands for a surface (mesh.subdivide), the "
+        "deviation is taken from epsilon and added "
         "to "
         "the errors of the report. "
         "With on_exceed=raise both errors are held to finest first, "

@@ -99,3 +99,19 @@ uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place
   }
   return best.point;
 }
+
+bool qmat_point_grid_has_within(const qmat_point_grid *grid, const double place[3], double reach) {
+  size_t first[3], last[3], cell[3];
+  for (size_t k = 0; k < 3; k++) {
+    first[k] = cell_along(grid, k, place[k] - reach);
+    last[k] = cell_along(grid, k, place[k] + reach);
+  }
+  nearest_point best = {INFINITY, UINT32_MAX};
+  for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++)
+    for (cell[1] = first[1]; cell[1] <= last[1]; cell[1]++)
+      for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++) {
+        look_into(grid, cell_index(grid, cell), place, &best);
+        if (best.square <= reach * reach) return true;
+      }
+  return false;
+}

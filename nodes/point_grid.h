@@ -21,4 +21,7 @@ qmat_status qmat_point_grid_init(qmat_context *context, const double *points, si
 /* The point nearest to `place` (3 doubles), of equally near ones the first. Quick where that is few cells away. */
 uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place[3]);
 
+/* Whether any point is no farther than `reach` from `place` (3 doubles). Quick where that is few cells. */
+bool qmat_point_grid_has_within(const qmat_point_grid *grid, const double place[3], double reach);
+
 #endif

@@ -23,15 +23,8 @@ typedef struct piece {
   int count;
 } piece;
 
-/* The bound of h over a piece by the Lipschitz constant from one point of known depth: convex, so largest at a corner.
- */
-static double bound_from(const piece *p, const double *centre, double depth) {
-  double bound = -INFINITY;
-  for (int j = 0; j < p->count; j++) bound = maximum(bound, p->spheres[j][3] - depth + distance(p->spheres[j], centre));
-  return bound;
-}
-
-/* The least of the bounds from the corners; for an edge the crossing of the bounds from both ends is tighter. */
+/* The least bound of h over a piece by the Lipschitz constant from a corner, where its depth is known: convex, so
+ * largest at a corner. For an edge the crossing of the bounds from both ends is tighter. */
 static double bound_from_corners(const piece *p) {
   if (p->count == 2) {
     const double length = distance(p->spheres[0], p->spheres[1]), change = p->spheres[1][3] - p->spheres[0][3];
@@ -42,8 +35,15 @@ static double bound_from_corners(const piece *p) {
     const double t = length > 0 ? (b - a + length - change) / (2 * length) : 0;
     return t > 0 && t < 1 ? maximum(ends, a + t * (length + change)) : ends;
   }
-  double bound = INFINITY;
-  for (int i = 0; i < p->count; i++) bound = minimum(bound, bound_from(p, p->spheres[i], p->depths[i]));
+  double sides[3], bound = INFINITY; /* each opposite a corner */
+  for (int k = 0; k < 3; k++) sides[k] = distance(p->spheres[(k + 1) % 3], p->spheres[(k + 2) % 3]);
+  for (int i = 0; i < 3; i++) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const double own = p->spheres[i][3] - p->depths[i];
+    const double one = p->spheres[j][3] - p->depths[i] + sides[k];
+    const double other = p->spheres[k][3] - p->depths[i] + sides[j];
+    bound = minimum(bound, maximum(own, maximum(one, other)));
+  }
   return bound;
 }
 
@@ -85,6 +85,7 @@ typedef struct search {
                                   a question to the surface where there is a lattice */
   double found;                /* the largest h found */
   double bound;                /* the largest bound of a finished piece */
+  double place[4];             /* the centre of the piece that was looked at last */
   double tolerance;            /* a piece whose bound is this close above `found` is done too */
 } search;
 
@@ -114,21 +115,23 @@ static bool search_piece(search *s, const piece *p, int level) {
     near = qmat_depth_lattice_near(s->lattice, centre, &gap);
     if (centre[3] - near - gap > s->limit) {
       s->found = centre[3] - near - gap;
+      memcpy(s->place, centre, sizeof centre);
       return false;
     }
     if (is_done(s, farthest - near + gap, size, last)) return true;
     ask = size <= s->smallest || last;
   }
   if (ask) {
-    const double depth =
-        s->lattice ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
-                   : -qmat_surface_signed_distance(s->surface, centre);
+    const double depth = s->lattice
+                             ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
+                             : -qmat_surface_signed_distance(s->surface, centre);
     if (depth == INFINITY) { /* deeper than that */
       s->bound = maximum(s->bound, s->content);
       return true;
     }
     const double h = centre[3] - depth;
     s->found = maximum(s->found, h);
+    memcpy(s->place, centre, sizeof centre);
     if (h > s->limit) return false;
     if (is_done(s, farthest - depth, size, last)) return true;
     if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
@@ -207,10 +210,25 @@ void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
   *protrusion = (qmat_protrusion){0};
 }
 
+/* Asks for what the tests of a star read, all at once. */
+static void fetch_bounds(const qmat_protrusion *protrusion, const qmat_complex *complex, const qmat_collapse *c) {
+  for (size_t t = 0; t < c->triangle_count; t++) {
+    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->kept_triangles[t]]);
+    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->removed_triangles[t]]);
+  }
+  for (size_t n = 0; n < c->neighbour_count; n++) {
+    __builtin_prefetch(&protrusion->depths[c->neighbours[n]]);
+    __builtin_prefetch(&complex->spheres[4 * (size_t)c->neighbours[n]]);
+    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->kept_edges[n]]);
+    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->removed_edges[n]]);
+  }
+}
+
 bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
                                  const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   double depth = -INFINITY, gap;
+  fetch_bounds(protrusion, complex, collapse);
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
     depth = maximum(depth, protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
   if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
@@ -239,9 +257,9 @@ bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_comp
   return true;
 }
 
-/* The bound that an old primitive's bound gives for its image, `from` having moved to the merged sphere. */
-static double carry(double bound, const double *from, const double *sphere) {
-  return bound + maximum(0, distance(from, sphere) + sphere[3] - from[3]);
+/* By how much h grows at most over a primitive of which a corner moves to another sphere. */
+static double growth(const double *from, const double *to) {
+  return maximum(0, distance(from, to) + to[3] - from[3]);
 }
 
 /* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
@@ -254,8 +272,9 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
       qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity, collapse->triangle_count,
                 sizeof(double)))
     return qmat_fail_memory(context, "protrusion bounds");
-  const double *old_kept = &complex->spheres[4 * (size_t)collapse->kept];
-  const double *old_removed = collapse->removed == QMAT_NONE ? NULL : &complex->spheres[4 * (size_t)collapse->removed];
+  const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
+  const double removed_growth =
+      collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
   search s = {.lattice = &protrusion->lattice,
               .content = content_share * protrusion->limit,
               .limit = protrusion->limit,
@@ -273,8 +292,8 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
     const double *bounds = is_edge ? protrusion->edge_bounds : protrusion->triangle_bounds;
     double *result = is_edge ? &protrusion->new_edge_bounds[id] : &protrusion->new_triangle_bounds[id];
     double bound = INFINITY;
-    if (mine != QMAT_NONE) bound = carry(bounds[mine], old_kept, sphere);
-    if (theirs != QMAT_NONE) bound = minimum(bound, carry(bounds[theirs], old_removed, sphere));
+    if (mine != QMAT_NONE) bound = bounds[mine] + kept_growth;
+    if (theirs != QMAT_NONE) bound = minimum(bound, bounds[theirs] + removed_growth);
     p.count = is_edge ? 2 : 3;
     for (int k = 1; k < p.count; k++) {
       const uint32_t v = is_edge ? collapse->neighbours[id] : collapse->triangle_pairs[2 * id + (size_t)k - 1];
@@ -288,9 +307,11 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
           bound = minimum(bound, protrusion->new_triangle_bounds[i / 2]);
     if (bound > protrusion->limit) {
       s.found = s.bound = -INFINITY;
+      memcpy(s.place, sphere, sizeof s.place);
       *kept = search_piece(&s, &p, 0);
       bound = s.bound;
       protrusion->failed = maximum(s.found, protrusion->limit);
+      memcpy(protrusion->failed_place, s.place, sizeof s.place);
     }
     *result = bound;
   }

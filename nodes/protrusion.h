@@ -20,7 +20,8 @@ typedef struct qmat_protrusion {
   double *triangle_bounds; /* per triangle */
   /* The bounds of the merged vertex's star, of the newest test. */
   double sphere_depth;
-  double failed; /* an h that the newest test found, or the limit, when it failed */
+  double failed;          /* an h that the newest test found, or the limit, when it failed */
+  double failed_place[4]; /* a medial sphere with an h above the limit, when it failed */
   double *new_edge_bounds, *new_triangle_bounds;
   size_t new_edge_capacity, new_triangle_capacity;
 } qmat_protrusion;

@@ -11,6 +11,8 @@
 enum { LEVELS = 8, REPORT_EVERY = 65536 };
 /* Normals look the same way when the cosine between them is at least this. */
 static const double same_way = 0.7;
+/* Cells are no narrower than this (unit frame), so that they can be numbered however small the radii are. */
+static const double narrowest = 1e-9;
 
 #define NONE UINT32_MAX
 
@@ -35,7 +37,7 @@ static size_t bucket_of(const sample_grid *grid, int level, const int64_t cell[3
 static qmat_status grid_init(qmat_context *context, sample_grid *grid, size_t count, double largest) {
   size_t buckets = 1024;
   while (buckets < 2 * count) buckets *= 2;
-  for (int level = 0; level < LEVELS; level++) grid->widths[level] = ldexp(2 * largest, -level);
+  for (int level = 0; level < LEVELS; level++) grid->widths[level] = fmax(ldexp(2 * largest, -level), narrowest);
   grid->bucket_mask = buckets - 1;
   grid->heads = qmat_arena_alloc(&context->arena, buckets, sizeof *grid->heads);
   grid->next = qmat_arena_alloc(&context->arena, count, LEVELS * sizeof *grid->next);
@@ -131,7 +133,8 @@ static void find_normals(const qmat_surface *surface, const qmat_samples *sample
 static const double thickness_share = 0.25, longest_reach = 0.01;
 
 qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                const double *points, const double *thickness, double detail, uint32_t *stand_ins) {
+                                const double *points, const double *thickness, double detail, const double *reaches,
+                                uint32_t *stand_ins) {
   const size_t count = samples->count;
   if (detail == 0) {
     for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
@@ -142,7 +145,9 @@ qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surfa
   if (!normals || !radii) return qmat_fail_memory(context, "samples");
   find_normals(surface, samples, normals);
   const double diagonal = qmat_surface_frame(surface)->diagonal;
-  for (size_t i = 0; i < count; i++)
+  for (size_t i = 0; i < count; i++) {
     radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), detail), longest_reach);
+    if (reaches) radii[i] = fmin(radii[i], reaches[i]);
+  }
   return qmat_samples_thin(context, points, normals, radii, count, longest_reach, detail, stand_ins);
 }

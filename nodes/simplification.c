@@ -192,6 +192,8 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
 void qmat_simplification_uninit(qmat_simplification *s) {
   qmat_collapse_uninit(&s->collapse);
   qmat_sphere_fit_uninit(&s->fit);
+  qmat_patch_fit_uninit(&s->patch);
+  qmat_free(s->saved);
   qmat_coverage_uninit(&s->coverage);
   qmat_protrusion_uninit(&s->protrusion);
   qmat_complex_uninit(&s->complex);
@@ -264,6 +266,9 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
 
 typedef enum { DONE, REFUSED, EXCEEDED } outcome;
 
+/* Why the newest test of a sphere failed. */
+typedef enum { BY_SPHERE, BY_MIDPOINT, BY_COVERAGE, BY_PROTRUSION } refusal;
+
 static bool holds_protrusion(const qmat_simplification *s) {
   return s->held < INFINITY && is_two_sided(s);
 }
@@ -284,8 +289,10 @@ static bool merges_feature(const qmat_simplification *s) {
 static outcome test_inside(qmat_simplification *s, const double *sphere) {
   const bool on_surface = merges_feature(s);
   const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) || on_surface;
+  s->refusal = BY_SPHERE;
   const bool inside = s->rules.published || on_surface || s->protrusion.sphere_depth > 0;
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
+  s->refusal = BY_MIDPOINT;
   if (!s->rules.published && !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere))
     return REFUSED;
   return kept || !(sphere[3] - s->protrusion.sphere_depth > s->protrusion.limit) ? DONE : EXCEEDED;
@@ -310,6 +317,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->refused_by_coverage++;
+      s->refusal = BY_COVERAGE;
       *asked = fmax(s->held, is_inner(s, s->coverage.failed_point) ? -s->control->distances[s->coverage.failed_point]
                                                                    : s->coverage.failed_distance);
       return QMAT_OK;
@@ -321,6 +329,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->refused_by_protrusion++;
+      s->refusal = BY_PROTRUSION;
       *asked = s->protrusion.failed;
       return QMAT_OK;
     }
@@ -355,6 +364,9 @@ static qmat_status commit(qmat_simplification *s, const double *sphere) {
 /* A sphere whose sampled error is this many times what is held is not worth a test. */
 static const double worth_testing = 1.1;
 
+/* Where the spheres were fitted before, a fit that starts badly is left sooner, at this share of what is held. */
+static const double less_hope = 0.6;
+
 /* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
  * look good as they are. */
 static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
@@ -370,8 +382,10 @@ static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   if (status == QMAT_OK)
-    status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, s->held, sphere, &error);
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse,
+                                 s->rules.patches ? less_hope * s->held : s->held, sphere, &error);
   s->fitted_errors[edge] = error;
+  memcpy(s->fitted, sphere, sizeof s->fitted);
   if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
   for (int i = 0; i < c->count && status == QMAT_OK && *result != DONE; i++) {
     if (!(errors[i] <= worth_testing * s->held)) continue;
@@ -381,10 +395,146 @@ static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_
   return status;
 }
 
+typedef struct qmat_patch_state {
+  double *at, value;
+} patch_state;
+
+static qmat_status save(qmat_simplification *s, double *values, size_t count) {
+  if (qmat_grow((void **)&s->saved, &s->saved_capacity, s->saved_count + count, sizeof *s->saved))
+    return qmat_fail_memory(s->context, "a patch");
+  for (size_t i = 0; i < count; i++) s->saved[s->saved_count++] = (patch_state){&values[i], values[i]};
+  return QMAT_OK;
+}
+
+/* Remembers a sphere and the bounds of what hangs on it. */
+static qmat_status save_star(qmat_simplification *s, uint32_t vertex) {
+  qmat_status status = save(s, &s->complex.spheres[4 * (size_t)vertex], 4);
+  if (status == QMAT_OK) status = save(s, &s->protrusion.depths[vertex], 1);
+  size_t count;
+  const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->protrusion.edge_bounds[at[i]], 1);
+  at = qmat_complex_triangles_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->protrusion.triangle_bounds[at[i]], 1);
+  return status;
+}
+
+static void restore(qmat_simplification *s) {
+  for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
+}
+
+/* Moves a sphere whatever is held; what is known of its protrusion stays true. */
+static qmat_status place(qmat_simplification *s, uint32_t vertex, const double *sphere, bool *inside) {
+  qmat_protrusion *protrusion = &s->protrusion;
+  const double limit = protrusion->limit;
+  bool kept;
+  qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
+  if (status != QMAT_OK) return status;
+  protrusion->limit = INFINITY;
+  *inside = qmat_protrusion_test_sphere(protrusion, &s->complex, &s->collapse, sphere);
+  if (*inside) {
+    status = qmat_protrusion_test(s->context, protrusion, &s->complex, &s->collapse, sphere, &kept);
+    if (status == QMAT_OK) qmat_protrusion_commit(protrusion, &s->collapse);
+  }
+  protrusion->limit = limit;
+  if (status == QMAT_OK && *inside) status = qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
+  return status;
+}
+
+/* What has been refused is asked for with this share of what is held to spare. */
+static const double margin = 0.02;
+
+/* Asks for what the newest test has refused. */
+static qmat_status ask_for_refused(qmat_simplification *s, const double *sphere, bool *asked) {
+  const double *centre = s->refusal == BY_SPHERE ? sphere : s->protrusion.failed_place;
+  *asked = true;
+  if (s->refusal == BY_COVERAGE) {
+    const size_t point = s->coverage.failed_point;
+    return qmat_patch_fit_add(s->context, &s->patch, &s->coverage.points[3 * point],
+                              is_inner(s, point) ? QMAT_PLACE_INSIDE : QMAT_PLACE_SURFACE,
+                              s->coverage.limits[point] - margin * s->held);
+  }
+  double closest[3];
+  uint32_t triangle;
+  *asked = s->refusal != BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
+  if (!*asked) return QMAT_OK;
+  qmat_surface_distance(s->surface, centre, INFINITY, closest, &triangle);
+  return qmat_patch_fit_add(s->context, &s->patch, closest, QMAT_PLACE_BORDER, (1 - margin) * s->held);
+}
+
+/* Tests the spheres of the patch, the collapse last, which is then the newest preview. */
+static qmat_status test_patch(qmat_simplification *s, uint32_t edge, uint32_t removed, outcome *result, bool *again) {
+  qmat_patch_fit *patch = &s->patch;
+  bool inside = true;
+  qmat_status status = QMAT_OK;
+  double asked;
+  *result = REFUSED;
+  *again = false;
+  for (int i = -1; i < patch->count && status == QMAT_OK; i++) {
+    status = place(s, i < 0 ? removed : patch->vertices[i], patch->spheres[i < 0 ? 0 : i], &inside);
+    if (!inside) return status;
+  }
+  for (int i = 1; i <= patch->count && status == QMAT_OK; i++) {
+    const bool last = i == patch->count;
+    const double *sphere = patch->spheres[last ? 0 : i];
+    status = last ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
+                  : qmat_complex_preview_move(s->context, &s->complex, patch->vertices[i], &s->collapse);
+    if (status == QMAT_OK) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+    if (status != QMAT_OK || *result == DONE) continue;
+    return ask_for_refused(s, sphere, again);
+  }
+  return status;
+}
+
+/* At most so often what a test refuses is asked for and the patch fitted again. */
+enum { MOST_FITS = 6 };
+
+/* Up to this error (of its own fit) a sphere is worth a fit of the patch, and up to that error a fit of the patch is
+ * worth a test, as shares of what is held. */
+static const double worth_a_patch = 1.3, worth_placing = 1.02;
+
+/* The collapse of the newest preview with the sphere around which its own fit ended, and with its neighbours fitted too
+ * unless it is left `alone`. Where it can be done they are placed, and it is the newest preview and test; else nothing
+ * has changed. */
+static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, outcome *result) {
+  const qmat_collapse *c = &s->collapse;
+  uint32_t others[QMAT_PATCH_SPHERES];
+  const uint32_t removed = c->removed;
+  size_t count = 0;
+  for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_PATCH_SPHERES; n++)
+    if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
+        !(s->protecting && is_protected(s, c->neighbours[n])))
+      others[count++] = c->neighbours[n];
+  qmat_status status = qmat_patch_fit_start(s->context, &s->patch, &s->coverage, &s->complex, c, s->fitted, others,
+                                            count, s->control->surface_count, s->held);
+  bool again = true;
+  for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != DONE; i++) {
+    double error;
+    qmat_patch_fit_run(&s->patch, &s->complex, i % 2 == 1, &error);
+    if (!(error <= worth_placing * s->held)) return status;
+    s->saved_count = 0;
+    status = save_star(s, removed);
+    for (int k = 0; k < s->patch.count && status == QMAT_OK; k++) status = save_star(s, s->patch.vertices[k]);
+    if (status == QMAT_OK) status = test_patch(s, edge, removed, result, &again);
+    if (status == QMAT_OK && *result == DONE) return status;
+    restore(s);
+    if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+  }
+  return status;
+}
+
+static qmat_status try_patches(qmat_simplification *s, uint32_t edge, outcome *result) {
+  qmat_status status = QMAT_OK;
+  if (s->fitted_errors[edge] <= worth_testing * s->held) status = try_patch(s, edge, true, result);
+  if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= worth_a_patch * s->held)
+    status = try_patch(s, edge, false, result);
+  return status;
+}
+
 /* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
 static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *result) {
   qmat_candidates c;
   *result = REFUSED;
+  s->patch.count = 0; /* that of an edge tried before is none of this one's */
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
   double asked;
@@ -424,6 +574,10 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   if (status == QMAT_OK && fits) {
     status = try_fitted(s, edge, &c, fitted, result);
     sphere = fitted;
+    if (s->rules.patches && status == QMAT_OK && *result != DONE) {
+      status = try_patches(s, edge, result);
+      sphere = s->patch.spheres[0];
+    }
   }
   if (status == QMAT_OK && *result == DONE) {
     s->euler += change;
@@ -478,11 +632,24 @@ static qmat_status report_progress(const qmat_simplification *s) {
   return qmat_progress(s->context, initial - s->complex.live_vertices, initial, "collapses");
 }
 
+/* Takes over what a test finds of a sphere of the patch that has been placed. */
+static qmat_status settle(qmat_simplification *s, uint32_t vertex) {
+  double sphere[4], asked;
+  outcome result;
+  memcpy(sphere, &s->complex.spheres[4 * (size_t)vertex], sizeof sphere);
+  qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
+  if (status == QMAT_OK) status = test_sphere(s, sphere, QMAT_NONE, &result, &asked);
+  if (status != QMAT_OK || result != DONE) return status;
+  status = commit(s, sphere);
+  update_neighbourhood(s);
+  return status;
+}
+
 /* Collapses until the heap is empty; `*ended` when the rules want no more. */
 static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
-    qmat_status status = attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
+    qmat_status status = s->rules.patches || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
     if (status != QMAT_OK) return status;
     const uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
@@ -501,6 +668,8 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
     if (result == DONE) {
       s->collapses++;
       update_neighbourhood(s);
+      for (int i = 1; i < s->patch.count && status == QMAT_OK; i++) status = settle(s, s->patch.vertices[i]);
+      if (status != QMAT_OK) return status;
     } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
       *ended = !hold_next(s);
       qmat_edge_heap_update(&s->heap, edge);
@@ -562,7 +731,7 @@ static void queue_raised(qmat_simplification *s) {
 
 qmat_status qmat_simplification_run(qmat_simplification *s) {
   bool ended = s->held > s->rules.limit; /* where even the lowest level is above it */
-  qmat_status status = collapse_edges(s, &ended);
+  qmat_status status = s->rules.patches ? QMAT_OK : collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
          hold_next(s)) {
     queue_raised(s);
@@ -576,7 +745,7 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     if (i == 0) queue_all(s);
     status = collapse_edges(s, &ended);
     if (status != QMAT_OK || ended) return status;
-    if (i > 0 && s->collapses == collapses) break;
+    if ((i > 0 || s->rules.patches) && s->collapses == collapses) break;
     if ((status = refit(s, &moved)) != QMAT_OK) return status;
   }
   /* What is left of the error is made small for its own sake. */

@@ -10,6 +10,7 @@
 #include "nodes/crease_guard.h"
 #include "nodes/edge_heap.h"
 #include "nodes/medial_quadrics.h"
+#include "nodes/patch_fit.h"
 #include "nodes/protrusion.h"
 #include "nodes/sphere_fit.h"
 
@@ -35,7 +36,8 @@ typedef struct qmat_simplification_rules {
   qmat_protection protect;
   qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
   double crease_share;        /* of what is held, how far points of a crease may be from what is left of it: above 0 */
-  int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
+  int refits;   /* how often spheres are fitted to the surface after the last collapse, to make room for more */
+  bool patches; /* edges are tried with the spheres around them fitted at once, where an earlier run was left without */
   const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
   bool has_target;     /* whether the solid's Euler characteristic is known */
   int64_t target_euler;
@@ -60,6 +62,10 @@ typedef struct qmat_simplification {
   qmat_protrusion protrusion;
   qmat_collapse collapse;
   qmat_sphere_fit fit;
+  double fitted[4]; /* what the newest fit of it has made of a collapse's sphere */
+  qmat_patch_fit patch;
+  struct qmat_patch_state *saved; /* what a patch was before it was tried */
+  size_t saved_count, saved_capacity;
   qmat_crease_guard creases;
   double held;             /* what both errors are held to now; INFINITY: nothing is held */
   int level;               /* of it, where it rises */
@@ -70,6 +76,7 @@ typedef struct qmat_simplification {
   double *fitted_errors;   /* per edge: of the sphere that was fitted last */
   uint8_t *settled;        /* per vertex: whether a fit did not move it, and nothing has moved around it since */
   bool protecting, fitting;
+  int refusal;   /* why the newest test of a sphere failed */
   int64_t euler; /* of the medial mesh */
   size_t collapses, moves, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
       refused_by_topology;

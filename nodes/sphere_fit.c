@@ -26,14 +26,19 @@ qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, 
   if (qmat_grow((void **)&fit->points, &fit->capacity, MOST_POINTS, sizeof *fit->points))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  size_t slots = 0, at = 0;
+  size_t slots = 0, skip = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += coverage->slot_counts[ends[e]];
   const size_t stride = (slots + MOST_POINTS - 1) / MOST_POINTS;
   fit->count = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot], at++)
-      if (at % stride == 0 && slot / 3 < surface_count && is_first_slot(coverage, collapse, slot))
-        fit->points[fit->count++] = slot / 3;
+    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot]) {
+      if (skip > 0) {
+        skip--;
+        continue;
+      }
+      skip = stride - 1;
+      if (slot / 3 < surface_count && is_first_slot(coverage, collapse, slot)) fit->points[fit->count++] = slot / 3;
+    }
   return QMAT_OK;
 }
 

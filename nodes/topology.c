@@ -202,6 +202,54 @@ qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *m
   return QMAT_OK;
 }
 
+static int compare_rows(const uint32_t *a, const uint32_t *b, size_t length) {
+  for (size_t k = 0; k < length; k++)
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
+/* The first of `count` sorted rows of `length` ids that is no less than `row`. */
+static size_t first_row(const uint32_t *rows, size_t count, size_t length, const uint32_t *row) {
+  size_t first = 0, last = count;
+  while (first < last) {
+    const size_t middle = first + (last - first) / 2;
+    if (compare_rows(&rows[length * middle], row, length) < 0)
+      first = middle + 1;
+    else
+      last = middle;
+  }
+  return first;
+}
+
+static bool has_row(const uint32_t *rows, size_t count, size_t length, const uint32_t *row) {
+  const size_t at = first_row(rows, count, length, row);
+  return at < count && compare_rows(&rows[length * at], row, length) == 0;
+}
+
+qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat_medial *medial, uint32_t **corners,
+                                               size_t *count) {
+  const uint32_t *edges = medial->edges;
+  for (int pass = 0;; pass++) {
+    *count = 0;
+    for (size_t e = 0; e < medial->edge_count; e++) {
+      const uint32_t lowest[2] = {edges[2 * e + 1], 0};
+      for (size_t next = first_row(edges, medial->edge_count, 2, lowest);
+           next < medial->edge_count && edges[2 * next] == lowest[0]; next++) {
+        const uint32_t triangle[3] = {edges[2 * e], lowest[0], edges[2 * next + 1]};
+        const uint32_t third[2] = {triangle[0], triangle[2]};
+        if (!has_row(edges, medial->edge_count, 2, third) ||
+            has_row(medial->triangles, medial->triangle_count, 3, triangle))
+          continue;
+        if (pass == 1) memcpy(&(*corners)[3 * *count], triangle, sizeof triangle);
+        ++*count;
+      }
+    }
+    if (pass == 1) return QMAT_OK;
+    *corners = qmat_arena_alloc(&context->arena, *count, 3 * sizeof **corners);
+    if (!*corners) return qmat_fail_memory(context, "the topology");
+  }
+}
+
 qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *medial, qmat_topology *topology) {
   *topology = (qmat_topology){.known = true, .components = medial->sphere_count};
   topology->euler = (int64_t)medial->sphere_count - (int64_t)medial->edge_count + (int64_t)medial->triangle_count;

@@ -24,6 +24,12 @@ qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *me
  * Linear but for finding edges. */
 qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *medial, uint32_t **walls, size_t *count);
 
+/* The triples of spheres whose three edges are there and their triangle is not, in rising order: the shortest loops,
+ * those among them that other triangles fill included. `*corners`: 3 ids for each of `*count`, in the context's arena.
+ * QMAT_ERROR_MEMORY. Cost: edges times edges at a sphere. */
+qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat_medial *medial, uint32_t **corners,
+                                               size_t *count);
+
 /* Of the solid within a closed and oriented surface: outward shells bound its components, inward ones its voids, and
  * the genus of either counts its loops. Shells that do not separate inside from outside (swallowed by another, or
  * without volume) are left out; shells that cross count as apart. Nothing is known of an open surface, nor of one with

@@ -118,6 +118,23 @@ fi
 holds "octopus: mat to 150 spheres" qmat mat models/octopus.off -o few.ma --vertices 150
 if [ -s few.ma ]; then holds "octopus: 150 spheres at most" test "$(spheres few.ma)" -le 150; fi
 
+# Parts that reach into each other are one solid: two boxes, one through a side of the other.
+awk 'BEGIN {
+  print "OFF\n16 24 0"
+  box("0 2 0 1 0 1"); box("1 3 0.25 0.75 0.5 2")
+  for (i = 0; i < 2; i++)
+    for (k = split("0 2 3 0 3 1 4 5 7 4 7 6 0 1 5 0 5 4 2 6 7 2 7 3 0 4 6 0 6 2 1 3 7 1 7 5", c); k > 0; k -= 3)
+      print 3, c[k - 2] + 8 * i, c[k - 1] + 8 * i, c[k] + 8 * i
+}
+function box(text, e, j) {
+  split(text, e)
+  for (j = 0; j < 8; j++) print e[1 + j % 2], e[3 + int(j / 2) % 2], e[5 + int(j / 4)]
+}' >parts.off
+holds "parts: mat" qmat mat parts.off -o parts.ma -o parts.glb --epsilon 2% --report parts.json
+judge "parts: two-sided error, one part, Euler characteristic" parts.off parts.ma --within 2% --components 1 --euler 1
+holds "parts: both were united" grep -q '"parts_united": 2' parts.json
+holds "parts: the errors hold" qmat info parts.glb --against parts.off
+
 # ---- Input that is no model ----
 
 # refused NAME FILE [OPTION...]: exit code 1, one line on stderr that names the file or the node that cannot work on what

@@ -122,7 +122,7 @@ static void test_a_mesh_in_memory_becomes_spheres_inside_it(void **state) {
   // Nothing that was not asked for has run.
   ok(job, qmat_job_run_report(job, &text));
   report = json_loads(text, 0, NULL);
-  assert_int_equal(json_array_size(json_object_get(report, "nodes")), 6);
+  assert_int_equal(json_array_size(json_object_get(report, "nodes")), 8);
   json_decref(report);
   qmat_text_free(text);
   qmat_job_free(job);

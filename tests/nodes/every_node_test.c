@@ -5,7 +5,6 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
-#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -20,6 +19,7 @@
 #include "examples/models.h"
 #include "nodes/nodes.h"
 #include "tests/shapes.h"
+#include "tests/shortage.h"
 
 /* A run at the bound of a parameter may ask for hours of work. It is stopped after this many seconds by its progress
  * function, which is then what was tested; after the request it has LATENCY seconds left to return. */
@@ -35,64 +35,6 @@ static double now(void) {
   struct timespec time;
   clock_gettime(CLOCK_MONOTONIC, &time);
   return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
-/* ---- running out of memory ----
- * The linker sends the allocations of the program's own objects here (CMakeLists.txt), those of header-only C++
- * libraries included; jansson is given its allocator. */
-
-static atomic_size_t asked;             /* allocations so far */
-static size_t first_refused = SIZE_MAX; /* refused from this one on... */
-static size_t refused_count = SIZE_MAX; /* ...so many of them */
-
-static bool refused(void) {
-  const size_t number = atomic_fetch_add_explicit(&asked, 1, memory_order_relaxed);
-  return number >= first_refused && number - first_refused < refused_count;
-}
-
-static void shortage(size_t first, size_t count) {
-  atomic_store(&asked, 0);
-  first_refused = first;
-  refused_count = count;
-}
-
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size) {
-  return refused() ? NULL : __real_aligned_alloc(alignment, size);
-}
-
-void *__real_malloc(size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_malloc(size_t size) {
-  return refused() ? NULL : __real_malloc(size);
-}
-
-void *__real_calloc(size_t count, size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_calloc(size_t count, size_t size) {
-  return refused() ? NULL : __real_calloc(count, size);
-}
-
-void *__real_realloc(void *memory, size_t size);
-void *__wrap_realloc(void *memory, size_t size);
-void *__wrap_realloc(void *memory, size_t size) {
-  return refused() ? NULL : __real_realloc(memory, size);
-}
-
-/* operator new(size_t), and what it throws. */
-_Noreturn void _ZSt17__throw_bad_allocv(void);
-void *__real__Znwm(size_t size);
-void *__wrap__Znwm(size_t size);
-void *__wrap__Znwm(size_t size) {
-  if (refused()) _ZSt17__throw_bad_allocv();
-  return __real__Znwm(size);
-}
-
-/* CGAL's containers lose a block when memory runs out between the block and the list of blocks. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) {
-  return "leak:CGAL::Compact_container";
 }
 
 /* ---- values for ports ---- */

@@ -84,6 +84,32 @@ static void test_walls_of_a_void_by_hand(void **state) {
   qmat_context_uninit(&context);
 }
 
+static void test_empty_triangles_by_hand(void **state) {
+  (void)state;
+  /* Of a tetrahedron's four triangles two are there, the third sphere has a loop of its own, and a square has none. */
+  static const uint32_t edges[] = {2, 3, 3, 4, 2, 4, 4, 5, 5, 6, 6, 7, 4, 7, 0, 3};
+  static const uint32_t triangles[] = {0, 1, 2, 1, 2, 3};
+  qmat_medial *medial = complex_of(8, edges, COUNT(edges) / 2, triangles, 2);
+  qmat_context context = {0};
+  uint32_t *corners;
+  size_t count;
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 3);
+  static const uint32_t expected[] = {0, 1, 3, 0, 2, 3, 2, 3, 4};
+  assert_memory_equal(corners, expected, sizeof expected);
+  qmat_value_release(&medial->base);
+  static const uint32_t ring[] = {0, 1, 1, 2, 2, 3, 0, 3};
+  medial = complex_of(4, ring, 4, NULL, 0);
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  medial = complex_of(1, NULL, 0, NULL, 0);
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_hollows_that_share_a_side_are_two(void **state) {
   (void)state;
   /* Tetrahedra over and under the triangle 0 1 2: their edges in common lie on three triangles. */
@@ -254,6 +280,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_small_complexes_by_hand),
       cmocka_unit_test(test_walls_of_a_void_by_hand),
+      cmocka_unit_test(test_empty_triangles_by_hand),
       cmocka_unit_test(test_hollows_that_share_a_side_are_two),
       cmocka_unit_test(test_surfaces_without_a_side_are_told_over_z2),
       cmocka_unit_test(test_random_complexes_have_the_rank_of_full_elimination),

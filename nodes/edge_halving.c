@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/refine_medial.h"
+#include "nodes/edge_halving.h"
 
 #include <math.h>
 #include <string.h>
@@ -121,7 +121,7 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   return qmat_medial_set_simplices(context, medial, new_edges, edge_count, new_triangles, triangle_count);
 }
 
-qmat_status qmat_refine_medial(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
+qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
                                double tolerance, size_t *added) {
   *added = 0;
   for (int round = 0; round < MOST_ROUNDS; round++) {

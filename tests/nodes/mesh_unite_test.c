@@ -1,0 +1,645 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/nodes/pipeline.h"
+#include "tests/random.h"
+#include "tests/shapes.h"
+#include "tests/shortage.h"
+
+/* ---- meshes ---- */
+
+/* Adds the triangles of `part` and releases it. */
+static void add(qmat_mesh *mesh, qmat_mesh *part) {
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  double *positions = qmat_alloc(mesh->vertex_count + part->vertex_count, 3 * sizeof *positions);
+  uint32_t *triangles = qmat_alloc(mesh->triangle_count + part->triangle_count, 3 * sizeof *triangles);
+  assert_true(positions && triangles);
+  if (mesh->vertex_count > 0) memcpy(positions, mesh->positions, 3 * mesh->vertex_count * sizeof *positions);
+  if (mesh->triangle_count > 0) memcpy(triangles, mesh->triangles, 3 * mesh->triangle_count * sizeof *triangles);
+  memcpy(positions + 3 * first, part->positions, 3 * part->vertex_count * sizeof *positions);
+  for (size_t i = 0; i < 3 * part->triangle_count; i++)
+    triangles[3 * mesh->triangle_count + i] = first + part->triangles[i];
+  qmat_free(mesh->positions);
+  qmat_free(mesh->triangles);
+  mesh->positions = positions;
+  mesh->triangles = triangles;
+  mesh->vertex_count += part->vertex_count;
+  mesh->triangle_count += part->triangle_count;
+  qmat_value_release(&part->base);
+}
+
+static qmat_mesh *sphere_at(double x, double y, double z, double radius, uint32_t rings) {
+  qmat_mesh *sphere = shape_sphere(radius, rings);
+  shape_map(sphere, 1, x, y, z);
+  return sphere;
+}
+
+/* Makes one vertex of those in one place, as reading a model does. */
+static void weld(qmat_mesh *mesh) {
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    const double *p = mesh->positions + 3 * (size_t)mesh->triangles[i];
+    for (uint32_t v = 0; v < mesh->triangles[i]; v++)
+      if (memcmp(mesh->positions + 3 * (size_t)v, p, 3 * sizeof *p) == 0) mesh->triangles[i] = v;
+  }
+}
+
+static double volume_of(const qmat_mesh *mesh) {
+  double six = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const double *a = mesh->positions + 3 * (size_t)mesh->triangles[3 * t],
+                 *b = mesh->positions + 3 * (size_t)mesh->triangles[3 * t + 1],
+                 *c = mesh->positions + 3 * (size_t)mesh->triangles[3 * t + 2];
+    six += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return six / 6;
+}
+
+static double area_of(const qmat_mesh *mesh) {
+  double area = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const double *a = mesh->positions + 3 * (size_t)mesh->triangles[3 * t],
+                 *b = mesh->positions + 3 * (size_t)mesh->triangles[3 * t + 1],
+                 *c = mesh->positions + 3 * (size_t)mesh->triangles[3 * t + 2];
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      const double n = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
+      square += n * n;
+    }
+    area += sqrt(square) / 2;
+  }
+  return area;
+}
+
+/* Vertices - edges + triangles, of a mesh whose edges all have two triangles. */
+static long euler_of(const qmat_mesh *mesh) {
+  return (long)mesh->vertex_count - (long)mesh->triangle_count / 2;
+}
+
+/* ---- the node ---- */
+
+typedef struct result {
+  qmat_mesh *from, *mesh;
+  qmat_report *report;
+} result;
+
+static void release(result *r) {
+  qmat_value_release(&r->from->base);
+  qmat_value_release(&r->mesh->base);
+  qmat_value_release(&r->report->base);
+}
+
+/* Seals the mesh and runs the node on it. Whatever comes out has every edge balanced, no vertex unused and no two
+ * vertices in one place where the input has none. */
+static result unite_with(qmat_mesh *mesh, const char *params) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  shape_seal(mesh);
+  pipeline_must_run(0, "mesh.unite", params, (const qmat_value *[]){&mesh->base}, outputs);
+  const result r = {mesh, (qmat_mesh *)outputs[0], (qmat_report *)outputs[1]};
+  qmat_mesh *copy = shape_new();
+  qmat_value_retain(&r.mesh->base);
+  add(copy, r.mesh);
+  shape_seal(copy);
+  assert_int_equal(copy->closed, mesh->closed);
+  assert_int_equal(copy->oriented, mesh->oriented);
+  assert_int_equal(r.mesh->closed, mesh->closed);
+  assert_int_equal(r.mesh->oriented, mesh->oriented);
+  assert_true(r.mesh->deviation == mesh->deviation);
+  qmat_value_release(&copy->base);
+  return r;
+}
+
+static result unite(qmat_mesh *mesh) {
+  return unite_with(mesh, "");
+}
+
+static void check_passes(qmat_mesh *mesh) {
+  result r = unite(mesh);
+  assert_ptr_equal(r.mesh, r.from);
+  assert_int_equal(pipeline_count(r.report, "parts_united"), 0);
+  assert_null(json_object_get(r.report->root, "warnings"));
+  release(&r);
+}
+
+/* A union whose volume, area and Euler characteristic are known. */
+static void check_union(qmat_mesh *mesh, double volume, double area, long euler) {
+  result r = unite(mesh);
+  assert_ptr_not_equal(r.mesh, r.from);
+  assert_near(volume_of(r.mesh), volume, 1e-12 * volume);
+  assert_near(area_of(r.mesh), area, 1e-12 * area);
+  assert_int_equal(euler_of(r.mesh), euler);
+  assert_null(json_object_get(r.report->root, "warnings"));
+  release(&r);
+}
+
+/* ---- by hand ---- */
+
+/* The second box stands out of one side of the first: its four long edges go through that, and nothing else is cut. */
+static void test_a_box_through_the_side_of_another(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 4, 4);
+  shape_add_box(mesh, 1, 1, 1, 5, 2, 2, false);
+  result r = unite(mesh);
+  assert_near(volume_of(r.mesh), 32 + 3, 1e-12);
+  assert_near(area_of(r.mesh), 2 * 16 + 4 * 8 + 4 * 3, 1e-12);
+  /* 8 corners of the first, 4 of the second, 4 on the cut and one where the side's diagonal enters it, or two. */
+  assert_int_equal(euler_of(r.mesh), 2);
+  assert_in_range(r.mesh->vertex_count, 16, 22);
+  assert_int_equal(pipeline_count(r.report, "parts"), 2);
+  assert_int_equal(pipeline_count(r.report, "parts_open"), 0);
+  assert_int_equal(pipeline_count(r.report, "parts_united"), 2);
+  assert_int_equal(pipeline_count(r.report, "triangles"), (int64_t)r.mesh->triangle_count);
+  assert_int_equal(pipeline_count(r.report, "vertices"), (int64_t)r.mesh->vertex_count);
+  for (size_t i = 0; i < r.mesh->vertex_count; i++) {
+    const double *p = r.mesh->positions + 3 * i;
+    assert_false(p[0] > 0 && p[0] < 2 && p[1] > 0 && p[1] < 4 && p[2] > 0 && p[2] < 4);
+  }
+  release(&r);
+}
+
+static void test_boxes_across_each_others_corner(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 1, 1, 1, 3, 3, 3, false);
+  check_union(mesh, 8 + 8 - 1, 24 + 24 - 6, 2);
+}
+
+static void test_boxes_that_share_a_face_become_one(void **state) {
+  (void)state;
+  for (int welded = 0; welded < 2; welded++) {
+    qmat_mesh *mesh = shape_box(1, 1, 1);
+    shape_add_box(mesh, 1, 0, 0, 2, 1, 1, false);
+    if (welded) weld(mesh);
+    result r = unite(mesh);
+    assert_near(volume_of(r.mesh), 2, 1e-15);
+    assert_near(area_of(r.mesh), 10, 1e-15);
+    assert_int_equal(r.mesh->vertex_count, 12);
+    assert_int_equal(r.mesh->triangle_count, 20);
+    release(&r);
+  }
+}
+
+/* A smaller side in the middle of a larger one, and one that hangs over its edge. */
+static void test_boxes_that_share_a_part_of_a_face(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 3, 3);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
+  check_union(mesh, 9 + 1, 2 * 9 + 4 * 3 + 4, 2);
+  mesh = shape_box(1, 3, 3);
+  shape_add_box(mesh, 1, 2, 1, 2, 4, 2, false);
+  check_union(mesh, 9 + 2, 2 * 9 + 4 * 3 + 2 * 1 + 4 * 2 - 2 * 1, 2);
+}
+
+/* Boxes in line whose sides lie in the same planes where they overlap. */
+static void test_boxes_with_sides_in_the_same_planes(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 1, 1);
+  shape_add_box(mesh, 1, 0, 0, 3, 1, 1, false);
+  check_union(mesh, 3, 14, 2);
+}
+
+static void test_a_part_within_another_vanishes(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(4, 4, 4);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
+  shape_add_box(mesh, 2.5, 2.5, 2.5, 3, 3, 3, false);
+  result r = unite(mesh);
+  assert_int_equal(r.mesh->vertex_count, 8);
+  assert_int_equal(r.mesh->triangle_count, 12);
+  assert_memory_equal(r.mesh->positions, mesh->positions, 24 * sizeof(double));
+  assert_memory_equal(r.mesh->triangles, mesh->triangles, 36 * sizeof(uint32_t));
+  assert_int_equal(pipeline_count(r.report, "parts_united"), 2);
+  assert_int_equal(pipeline_count(r.report, "triangles_cut"), 0);
+  release(&r);
+}
+
+static void test_cavities_and_what_is_in_them_stay(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(9, 9, 9);
+  shape_add_box(mesh, 1, 1, 1, 8, 8, 8, true);
+  shape_add_box(mesh, 2, 2, 2, 7, 7, 7, false);
+  shape_add_box(mesh, 3, 3, 3, 6, 6, 6, true);
+  check_passes(mesh);
+}
+
+/* A bar from outside into a cavity fills a part of it. */
+static void test_a_part_through_the_wall_of_a_cavity(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(9, 9, 9);
+  shape_add_box(mesh, 1, 1, 1, 8, 8, 8, true);
+  shape_add_box(mesh, 4, 4, 4, 12, 5, 5, false);
+  check_union(mesh, 729 - 343 + 4 + 3, 6 * 81 + 6 * 49 + 4 * 3 + 4 * 4, 4);
+}
+
+/* A cavity's shell that two solids wind around is filled by either. */
+static void test_a_cavity_within_another_solid_is_filled(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(9, 9, 9);
+  shape_add_box(mesh, 4, 4, 4, 5, 5, 5, true);
+  shape_add_box(mesh, 3, 3, 3, 6, 6, 6, false);
+  result r = unite(mesh);
+  assert_int_equal(r.mesh->triangle_count, 12);
+  assert_near(volume_of(r.mesh), 729, 0);
+  release(&r);
+}
+
+static void test_of_equal_parts_one_is_left(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_sphere(1, 8);
+  for (int i = 0; i < 3; i++) add(mesh, shape_sphere(1, 8));
+  qmat_mesh *one = shape_sphere(1, 8);
+  check_union(mesh, volume_of(one), area_of(one), 2);
+  qmat_value_release(&one->base);
+}
+
+/* Nothing is lost where parts only touch: in a point of a side, along an edge, in a corner that both name. */
+static void test_parts_that_touch_in_points_and_lines_stay(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 2, 2, 0, 4, 4, 2, false); /* along an edge */
+  check_passes(mesh);
+  mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 2, 2, 0, 4, 4, 2, false);
+  weld(mesh);
+  check_passes(mesh);
+  mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 2, 2, 2, 4, 4, 4, false); /* in a corner */
+  weld(mesh);
+  check_passes(mesh);
+  mesh = shape_box(2, 2, 2); /* a tetrahedron's corner on a side */
+  const uint32_t a = shape_vertex(mesh, 2, 0.5, 1.25), b = shape_vertex(mesh, 3, 0, 0), c = shape_vertex(mesh, 3, 1, 0),
+                 d = shape_vertex(mesh, 3, 0, 1);
+  shape_triangle(mesh, a, c, b);
+  shape_triangle(mesh, a, d, c);
+  shape_triangle(mesh, a, b, d);
+  shape_triangle(mesh, b, c, d);
+  const double volume = volume_of(mesh);
+  if (volume < 8)
+    for (size_t t = mesh->triangle_count - 4; t < mesh->triangle_count; t++) {
+      const uint32_t corner = mesh->triangles[3 * t];
+      mesh->triangles[3 * t] = mesh->triangles[3 * t + 1];
+      mesh->triangles[3 * t + 1] = corner;
+    }
+  check_passes(mesh);
+}
+
+static void test_one_part_and_parts_apart_pass(void **state) {
+  (void)state;
+  check_passes(shape_box(1, 2, 3));
+  check_passes(shape_torus(2, 0.5, 12, 8));
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  shape_add_box(mesh, 2, 0, 0, 3, 1, 1, false);
+  check_passes(mesh);
+  mesh = shape_torus(2, 0.5, 24, 12); /* boxes meet, parts do not */
+  add(mesh, sphere_at(0, 0, 0, 1.2, 6));
+  check_passes(mesh);
+}
+
+static void test_parts_are_kept_when_asked(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 1, 1, 1, 3, 3, 3, false);
+  result r = unite_with(mesh, "parts=keep");
+  assert_ptr_equal(r.mesh, r.from);
+  release(&r);
+}
+
+static void test_open_parts_stay_and_do_not_keep_others_from_uniting(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 2, 2);
+  shape_add_box(mesh, 1, 1, 1, 3, 3, 3, false);
+  const uint32_t a = shape_vertex(mesh, -1, 0.5, 0.5), b = shape_vertex(mesh, 4, 0.5, 0.5),
+                 c = shape_vertex(mesh, 1, 4, 0.5);
+  shape_triangle(mesh, a, b, c);
+  result r = unite(mesh);
+  assert_false(r.mesh->closed);
+  assert_int_equal(pipeline_count(r.report, "parts"), 3);
+  assert_int_equal(pipeline_count(r.report, "parts_open"), 1);
+  assert_int_equal(pipeline_count(r.report, "parts_united"), 2);
+  size_t found = 0;
+  for (size_t t = 0; t < r.mesh->triangle_count; t++) {
+    const double *p = r.mesh->positions + 3 * (size_t)r.mesh->triangles[3 * t],
+                 *q = r.mesh->positions + 3 * (size_t)r.mesh->triangles[3 * t + 1];
+    found += p[0] == -1 && q[0] == 4;
+  }
+  assert_int_equal(found, 1);
+  release(&r);
+}
+
+/* A bent bar that goes through itself: alone it passes; another part at its end frees it of that. */
+static qmat_mesh *knot(void) {
+  static const double path[6][2] = {{0, 0}, {4, 0}, {4, 3}, {2, 3}, {2, -3}, {2, -4}};
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < 6; i++)
+    for (int k = 0; k < 4; k++) {
+      const double out = k == 1 || k == 2 ? 0.25 : -0.25, up = k >= 2 ? 0.25 : -0.25;
+      const double *p = path[i], *to = path[i < 5 ? i + 1 : i], *from = path[i < 5 ? i : i - 1];
+      const double *last = path[i > 0 ? i - 1 : i];
+      const double length = hypot(to[0] - from[0], to[1] - from[1]);
+      double nx = -(to[1] - from[1]) / length, ny = (to[0] - from[0]) / length;
+      if (i > 0 && i < 5) { /* mitred; the way before is at a right angle or straight on */
+        const double before = hypot(p[0] - last[0], p[1] - last[1]);
+        const double mx = -(p[1] - last[1]) / before, my = (p[0] - last[0]) / before;
+        if (fabs(mx * nx + my * ny) < 0.5) nx += mx, ny += my;
+      }
+      shape_vertex(mesh, p[0] + out * nx, p[1] + out * ny, up + 0.1 * (i == 1 || i == 2));
+    }
+  shape_quad(mesh, 0, 1, 2, 3);
+  shape_quad(mesh, 23, 22, 21, 20);
+  for (uint32_t i = 0; i < 5; i++)
+    for (uint32_t k = 0; k < 4; k++)
+      shape_quad(mesh, 4 * i + k, 4 * i + 4 + k, 4 * i + 4 + (k + 1) % 4, 4 * i + (k + 1) % 4);
+  if (volume_of(mesh) < 0)
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+      const uint32_t corner = mesh->triangles[3 * t];
+      mesh->triangles[3 * t] = mesh->triangles[3 * t + 1];
+      mesh->triangles[3 * t + 1] = corner;
+    }
+  return mesh;
+}
+
+static void test_parts_that_meet_themselves(void **state) {
+  (void)state;
+  qmat_mesh *mesh = knot();
+  const double volume = volume_of(mesh);
+  check_passes(mesh);
+  mesh = knot();
+  shape_add_box(mesh, -1, -0.5, -0.5, 0, 0.5, 0.5, false); /* touches the bar's whole end from without */
+  result r = unite(mesh);
+  const double united = volume_of(r.mesh);
+  /* What the bar has in common with itself counts once: near 0.5 cubed. */
+  assert_in_range((unsigned long)(1e4 * (volume + 1 - united)), 1000, 1300);
+  assert_int_equal(euler_of(r.mesh), 0);
+  release(&r);
+}
+
+/* A triangle without area in a part, where an edge of one neighbour is two edges of others. */
+static void test_triangles_without_area_in_parts_that_meet(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 2, 2);
+  /* The side x = 2 (5, 7, 1, 3) gets a vertex in the middle of its edge from 1 to 5: one neighbour only knows of it. */
+  const uint32_t middle = shape_vertex(mesh, 2, 0, 1);
+  size_t found = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    uint32_t *c = mesh->triangles + 3 * t;
+    const double *p[3] = {mesh->positions + 3 * (size_t)c[0], mesh->positions + 3 * (size_t)c[1],
+                          mesh->positions + 3 * (size_t)c[2]};
+    if (p[0][0] < 2 || p[1][0] < 2 || p[2][0] < 2) continue;
+    for (int k = 0; k < 3; k++) {
+      const double *a = p[k], *b = p[(k + 1) % 3];
+      if (a[1] > 0 || b[1] > 0 || found > 0) continue;
+      const uint32_t from = c[k], to = c[(k + 1) % 3], top = c[(k + 2) % 3];
+      c[0] = from, c[1] = middle, c[2] = top;
+      shape_triangle(mesh, middle, to, top);
+      shape_triangle(mesh, from, to, middle);
+      found++;
+    }
+  }
+  assert_int_equal(found, 1);
+  shape_add_box(mesh, 1, -1, 0.5, 3, 1, 1.5, false);
+  check_union(mesh, 8 + 4 - 1, 24 + 2 * 2 + 2 * 2 + 2 * 4 - 2 * 3, 2);
+}
+
+/* ---- properties ---- */
+
+/* Boxes between whole numbers: all kinds of touching, and the union is counted in cells. */
+static void test_random_boxes_against_counted_cells(void **state) {
+  (void)state;
+  enum { SIZE = 6 };
+  for (uint64_t seed = 0; seed < 60; seed++) {
+    random_numbers random = {seed, 0};
+    bool filled[SIZE][SIZE][SIZE] = {0};
+    qmat_mesh *mesh = shape_new();
+    const int count = 2 + (int)random_index(&random, 7);
+    for (int i = 0; i < count; i++) {
+      int low[3], high[3];
+      for (int k = 0; k < 3; k++) {
+        low[k] = (int)random_index(&random, SIZE - 1);
+        high[k] = low[k] + 1 + (int)random_index(&random, SIZE - 1);
+        if (high[k] > SIZE) high[k] = SIZE;
+      }
+      shape_add_box(mesh, low[0], low[1], low[2], high[0], high[1], high[2], false);
+      for (int x = low[0]; x < high[0]; x++)
+        for (int y = low[1]; y < high[1]; y++)
+          for (int z = low[2]; z < high[2]; z++) filled[x][y][z] = true;
+    }
+    if (seed % 2) weld(mesh);
+    double cells = 0, faces = 0;
+    for (int x = 0; x < SIZE; x++)
+      for (int y = 0; y < SIZE; y++)
+        for (int z = 0; z < SIZE; z++) {
+          if (!filled[x][y][z]) continue;
+          cells++;
+          faces += x == 0 || !filled[x - 1][y][z];
+          faces += x == SIZE - 1 || !filled[x + 1][y][z];
+          faces += y == 0 || !filled[x][y - 1][z];
+          faces += y == SIZE - 1 || !filled[x][y + 1][z];
+          faces += z == 0 || !filled[x][y][z - 1];
+          faces += z == SIZE - 1 || !filled[x][y][z + 1];
+        }
+    if (seed % 3 == 0) shape_rotate(mesh); /* by rounded numbers: near misses instead of touching, and slivers */
+    result r = unite(mesh);
+    assert_null(json_object_get(r.report->root, "warnings"));
+    assert_near(volume_of(r.mesh), cells, 1e-9);
+    if (seed % 3 != 0) assert_near(area_of(r.mesh), faces, 1e-9);
+    release(&r);
+  }
+}
+
+/* Both spheres and what they have in common, a lens whose volume has a closed form. */
+static void test_the_volume_of_two_spheres(void **state) {
+  (void)state;
+  const double pi = 3.14159265358979323846, radius = 1, apart = 1.2, cap = radius - apart / 2;
+  const double lens = 2 * pi * cap * cap * (3 * radius - cap) / 3;
+  const double exact = 2 * 4 * pi / 3 - lens;
+  double before = INFINITY;
+  for (uint32_t rings = 8; rings <= 64; rings *= 2) {
+    qmat_mesh *mesh = sphere_at(0, 0, 0, radius, rings);
+    add(mesh, sphere_at(apart * 0.48, apart * 0.6, apart * 0.64, radius, rings));
+    result r = unite(mesh);
+    assert_int_equal(euler_of(r.mesh), 2);
+    const double error = fabs(volume_of(r.mesh) - exact) / exact;
+    assert_true(error < 5.0 / (rings * rings) && error < 0.5 * before);
+    before = error;
+    release(&r);
+  }
+}
+
+/* `count` spheres in a row, from the one of that number on. */
+static qmat_mesh *row_of_spheres(uint32_t count, uint32_t first) {
+  qmat_mesh *mesh = shape_new();
+  for (uint32_t i = 0; i < count; i++) {
+    const double k = (i + first) % count;
+    add(mesh, sphere_at(0.9 * k, 0.3 * sin(k), 0.2 * cos(3 * k), 0.7 + 0.05 * sin(5 * k), 7));
+  }
+  return mesh;
+}
+
+static void test_the_order_of_parts_and_runs_make_no_difference(void **state) {
+  (void)state;
+  result one = unite(row_of_spheres(5, 0));
+  assert_int_equal(euler_of(one.mesh), 2);
+  for (uint32_t first = 0; first < 5; first++) {
+    result other = unite(row_of_spheres(5, first));
+    assert_near(volume_of(other.mesh), volume_of(one.mesh), 1e-12);
+    assert_int_equal(other.mesh->vertex_count, one.mesh->vertex_count);
+    assert_int_equal(other.mesh->triangle_count, one.mesh->triangle_count);
+    if (first == 0) assert_memory_equal(&other.mesh->base.digest, &one.mesh->base.digest, sizeof(qmat_digest));
+    release(&other);
+  }
+  release(&one);
+}
+
+/* Each pair is a union of its own; those that meet nobody stay as they are. */
+static void test_hundreds_of_parts(void **state) {
+  (void)state;
+  enum { PAIRS = 120 };
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < PAIRS; i++) {
+    const double x = 4 * (i % 10), y = 4 * (i / 10);
+    shape_add_box(mesh, x, y, 0, x + 1, y + 1, 1, false);
+    if (i % 3 > 0) shape_add_box(mesh, x + 0.5, y + 0.25, 0.25, x + 2, y + 0.75, 0.75, false);
+  }
+  result r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "parts"), PAIRS * 5 / 3);
+  assert_int_equal(pipeline_count(r.report, "parts_united"), PAIRS * 4 / 3);
+  assert_near(volume_of(r.mesh), PAIRS + PAIRS * 2 / 3 * 0.25, 1e-9);
+  assert_int_equal(euler_of(r.mesh), 2 * PAIRS);
+  release(&r);
+}
+
+/* What is united is united: nothing is found to do in it again. */
+static void test_a_union_passes(void **state) {
+  (void)state;
+  result r = unite(row_of_spheres(4, 0));
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "mesh.unite", "", (const qmat_value *[]){&r.mesh->base}, outputs);
+  assert_ptr_equal(outputs[0], r.mesh);
+  qmat_value_release(outputs[0]);
+  qmat_value_release(outputs[1]);
+  release(&r);
+}
+
+/* Coordinates whose squares overflow or vanish. */
+static void test_units_of_any_size(void **state) {
+  (void)state;
+  static const double units[] = {0x1p-200, 0x1p-100, 0x1p100, 0x1p200};
+  for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+    qmat_mesh *mesh = shape_box(2, 2, 2);
+    shape_add_box(mesh, 1, 1, 1, 3, 3, 3, false);
+    shape_map(mesh, units[i], 0, 0, 0);
+    result r = unite(mesh);
+    assert_int_equal(euler_of(r.mesh), 2);
+    assert_near(volume_of(r.mesh) / units[i] / units[i] / units[i], 15, 1e-12);
+    release(&r);
+  }
+}
+
+/* ---- being stopped, and running out of memory ---- */
+
+static bool stop_at(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                    const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  size_t *left = user;
+  return (*left)-- > 0;
+}
+
+static void test_a_union_can_be_stopped(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_seal(row_of_spheres(6, 0));
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  size_t stopped = 0;
+  for (size_t calls = 0; calls < 100; calls++) {
+    size_t left = calls;
+    qmat_context context = {.progress = stop_at, .progress_user = &left};
+    const qmat_status status = pipeline_run(&context, "mesh.unite", "", (const qmat_value *[]){&mesh->base}, outputs);
+    qmat_context_uninit(&context);
+    if (status == QMAT_OK) {
+      qmat_value_release(outputs[0]);
+      qmat_value_release(outputs[1]);
+      break;
+    }
+    assert_int_equal(status, QMAT_CANCELLED);
+    assert_null(outputs[0]);
+    assert_null(outputs[1]);
+    stopped++;
+  }
+  assert_in_range(stopped, 4, 99);
+  qmat_value_release(&mesh->base);
+}
+
+/* Spheres that meet, boxes with sides in the same planes, and a sphere that vanishes. */
+static void test_a_shortage_of_memory_anywhere_is_an_error_or_makes_no_difference(void **state) {
+  (void)state;
+  enum { TRIES = 60 };
+  qmat_mesh *mesh = row_of_spheres(2, 0);
+  shape_add_box(mesh, 0, 0, 0, 1, 1, 1, false);
+  shape_add_box(mesh, 0.5, 0, 0, 2, 1, 0.5, false);
+  shape_add_box(mesh, 10, 0, 0, 13, 3, 3, false);
+  add(mesh, sphere_at(11.5, 1.5, 1.5, 1, 4));
+  shape_seal(mesh);
+  const qmat_value *inputs[] = {&mesh->base};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  qmat_context context = {0};
+  shortage(SIZE_MAX, 0);
+  assert_int_equal(pipeline_run(&context, "mesh.unite", "", inputs, outputs), QMAT_OK);
+  const size_t needed = atomic_load(&asked);
+  const qmat_digest digest = outputs[0]->digest;
+  qmat_value_release(outputs[0]);
+  qmat_value_release(outputs[1]);
+  size_t failures = 0;
+  for (size_t k = 0; k < TRIES; k++) {
+    shortage(k / 2 * needed / (TRIES / 2), k % 2 ? 1 : SIZE_MAX); /* one allocation, or all from there on */
+    const qmat_status status = pipeline_run(&context, "mesh.unite", "", inputs, outputs);
+    shortage(SIZE_MAX, 0);
+    if (status == QMAT_OK) {
+      assert_memory_equal(&outputs[0]->digest, &digest, sizeof digest);
+      qmat_value_release(outputs[0]);
+      qmat_value_release(outputs[1]);
+    } else {
+      assert_int_equal(status, QMAT_ERROR_MEMORY);
+      assert_null(outputs[0]);
+      assert_null(outputs[1]);
+      failures++;
+    }
+  }
+  assert_true(needed > 1000 && failures >= TRIES / 2);
+  qmat_context_uninit(&context);
+  qmat_value_release(&mesh->base);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_a_box_through_the_side_of_another),
+      cmocka_unit_test(test_boxes_across_each_others_corner),
+      cmocka_unit_test(test_boxes_that_share_a_face_become_one),
+      cmocka_unit_test(test_boxes_that_share_a_part_of_a_face),
+      cmocka_unit_test(test_boxes_with_sides_in_the_same_planes),
+      cmocka_unit_test(test_a_part_within_another_vanishes),
+      cmocka_unit_test(test_cavities_and_what_is_in_them_stay),
+      cmocka_unit_test(test_a_part_through_the_wall_of_a_cavity),
+      cmocka_unit_test(test_a_cavity_within_another_solid_is_filled),
+      cmocka_unit_test(test_of_equal_parts_one_is_left),
+      cmocka_unit_test(test_parts_that_touch_in_points_and_lines_stay),
+      cmocka_unit_test(test_one_part_and_parts_apart_pass),
+      cmocka_unit_test(test_parts_are_kept_when_asked),
+      cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
+      cmocka_unit_test(test_parts_that_meet_themselves),
+      cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),
+      cmocka_unit_test(test_random_boxes_against_counted_cells),
+      cmocka_unit_test(test_the_volume_of_two_spheres),
+      cmocka_unit_test(test_the_order_of_parts_and_runs_make_no_difference),
+      cmocka_unit_test(test_hundreds_of_parts),
+      cmocka_unit_test(test_a_union_passes),
+      cmocka_unit_test(test_units_of_any_size),
+      cmocka_unit_test(test_a_union_can_be_stopped),
+      cmocka_unit_test(test_a_shortage_of_memory_anywhere_is_an_error_or_makes_no_difference),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
