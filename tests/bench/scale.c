@@ -205,7 +205,7 @@ static qmat_status time_cgal(qmat_context *context, const qmat_mesh *mesh, const
   } else {
     qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, points);
     qmat_thickness_of_samples(mesh, thickness, samples, values);
-    status = qmat_stand_ins_find(context, surface, samples, points, values, detail_of_delaunay(), stand_ins);
+    status = qmat_stand_ins_find(context, surface, samples, points, values, detail_of_delaunay(), NULL, stand_ins);
   }
   if (status == QMAT_OK) {
     seconds[1] = qmat_plain_delaunay_seconds(points, samples->count);
