@@ -17,7 +17,7 @@ typedef qmat_simplify_params medial_simplify_params;
 /* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
  * is repeated, at most this often, with control points in the places found. Notches and voids of the envelope are
  * filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
-enum { MOST_ROUNDS = 8, MOST_FILLINGS = 6 };
+enum { MOST_ROUNDS = 8, MOST_SQUEEZES = 3, MOST_FILLINGS = 6 };
 enum { MOST_CONTROL_POINTS = 600000 };
 
 typedef struct {
@@ -113,15 +113,16 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   return status == QMAT_OK ? qmat_simplification_run(dense) : status;
 }
 
-/* Collapses on from where `from` ended, of which `left` is what is left. */
+/* Collapses on from where `from` ended, of which `left` is what is left; with `patches` after rounds without. */
 static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
-                             const qmat_medial *left, const qmat_extra_points *extra, bool patches) {
+                             const qmat_medial *left, const qmat_extra_points *extra, bool patches, bool polish) {
   s->newest = 1 - s->newest;
   qmat_simplification *round = &s->rounds[s->newest];
   qmat_simplification_uninit(round);
   *round = (qmat_simplification){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
   round->rules.patches = patches;
+  round->rules.polish = polish;
   if (status == QMAT_OK) status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
@@ -259,61 +260,57 @@ static qmat_status start_attempt(const simplifier *s, size_t filled, attempt *a,
   return a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
 }
 
-/* A round from where `from` ended, of which `left` is what is left, `filled` of it spheres that fill hollows; NULL: it
- * is extracted. `found` are the errors before hollows are filled. */
-static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
-                               const qmat_medial *left, size_t filled, const qmat_extra_points *extra, int round,
-                               attempt *a, qmat_medial_errors *found) {
-  qmat_status status = start_attempt(s, filled, a, found);
-  qmat_medial *extracted = left ? NULL : qmat_medial_new();
-  if (status == QMAT_OK && !left && !extracted) status = qmat_fail_memory(s->context, "the medial mesh");
-  if (status == QMAT_OK && !left) status = qmat_simplification_extract(from, extracted);
-  if (status == QMAT_OK) status = run_round(s, state, from, left ? left : extracted, extra, false);
-  qmat_value_release(extracted ? &extracted->base : NULL);
+/* A round from where the dense part ended. `found` are the errors before hollows are filled. */
+static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra,
+                               int round, bool is_last, attempt *a, qmat_medial_errors *found) {
+  qmat_medial *left = qmat_medial_new();
+  qmat_status status = start_attempt(s, 0, a, found);
+  if (status == QMAT_OK && !left) status = qmat_fail_memory(s->context, "the medial mesh");
+  if (status == QMAT_OK) status = qmat_simplification_extract(&s->dense, left);
+  if (status == QMAT_OK) status = run_round(s, state, &s->dense, left, extra, false, is_last);
+  qmat_value_release(left ? &left->base : NULL);
   return status == QMAT_OK ? finish_attempt(s, round, a, found) : status;
 }
 
-/* Where hollows were filled, collapses go on from there, with their places held: what fills them may be a part of what
- * was there before. */
-static qmat_status collapse_filled(simplifier *s, const qmat_initial_medial *state, int round,
-                                   const qmat_medial_errors *found, attempt *best, bool *gained) {
-  qmat_extra_points hollows = {.held_depth = held_depth_share * s->params->epsilon};
-  qmat_status status = append(s, &hollows.inner, &hollows.inner_count, found->hollows, found->hollow_count);
-  if (status != QMAT_OK) return status;
-  attempt a;
-  qmat_medial_errors errors;
-  status = run_attempt(s, state, &s->rounds[s->newest], best->medial, best->filled, &hollows, round, &a, &errors);
-  qmat_medial_errors_uninit(&errors);
-  *gained = status == QMAT_OK && is_better(&a, best);
-  if (*gained) {
-    release(best);
-    *best = a;
-  } else {
-    release(&a);
-  }
-  return status;
+/* Places that were found between the control points are held in the next try. */
+static qmat_status hold_found(simplifier *s, const qmat_medial_errors *found, qmat_extra_points *extra) {
+  qmat_status status = QMAT_OK;
+  if (found->surface_to_envelope > s->params->epsilon)
+    status = append(s, &extra->surface, &extra->surface_count, found->cover.points, found->cover.count);
+  return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->hollows, found->hollow_count)
+                           : status;
 }
 
-/* Goes on from a result that keeps within epsilon, which `base` of the rounds has left, with the spheres around each
- * edge fitted at once. The result changes only to a better one. */
-static qmat_status squeeze(simplifier *s, const qmat_initial_medial *state, int round, int base, attempt *best) {
+/* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where hollows were
+ * filled, of those in `found`, their places are held: what fills them may be a part of what was there before. What
+ * does not keep within epsilon is tried again with the places held that were found. The result changes only where that
+ * makes it no worse. */
+static qmat_status squeeze(simplifier *s, const qmat_initial_medial *state, int round, const qmat_medial_errors *found,
+                           attempt *best) {
   if (s->params->refits == 0 || best->medial->sphere_count <= (size_t)s->params->vertices) return QMAT_OK;
-  const qmat_extra_points none = {.held_depth = held_depth_share * s->params->epsilon};
-  attempt a;
-  qmat_medial_errors errors;
-  qmat_status status = start_attempt(s, best->filled, &a, &errors);
-  s->newest = base;
-  if (status == QMAT_OK) status = run_round(s, state, &s->rounds[base], best->medial, &none, true);
-  const bool fewer = status == QMAT_OK && s->rounds[s->newest].complex.live_vertices < best->medial->sphere_count;
-  if (fewer) status = finish_attempt(s, round, &a, &errors);
-  qmat_medial_errors_uninit(&errors);
-  if (fewer && status == QMAT_OK && is_better(&a, best)) {
-    release(best);
-    *best = a;
-  } else {
-    release(&a);
+  qmat_extra_points extra = {.held_depth = held_depth_share * s->params->epsilon};
+  const int base = s->newest;
+  qmat_status status = QMAT_OK;
+  if (best->filled > 0) status = append(s, &extra.inner, &extra.inner_count, found->hollows, found->hollow_count);
+  bool ended = false;
+  for (int i = 0; i < MOST_SQUEEZES && status == QMAT_OK && !ended; i++) {
+    attempt a;
+    qmat_medial_errors errors;
     s->newest = base;
+    status = start_attempt(s, best->filled, &a, &errors);
+    if (status == QMAT_OK) status = run_round(s, state, &s->rounds[base], best->medial, &extra, true, true);
+    if (status == QMAT_OK) status = finish_attempt(s, round, &a, &errors);
+    ended = a.holds;
+    if (status == QMAT_OK && !ended) status = hold_found(s, &errors, &extra);
+    qmat_medial_errors_uninit(&errors);
+    if (status == QMAT_OK && !is_better(best, &a)) {
+      release(best);
+      *best = a;
+      return QMAT_OK;
+    }
+    release(&a);
   }
+  s->newest = base;
   return status;
 }
 
@@ -457,24 +454,18 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     qmat_medial_errors errors;
     attempt a;
     const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
-    status = run_attempt(s, state, &s->dense, NULL, 0, &extra, round, &a, &errors);
+    status = run_attempt(s, state, &extra, round, is_last, &a, &errors);
     const bool is_good = a.holds && (double)a.filled <= most_filled * (double)a.medial->sphere_count;
     const bool is_done = is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    const int own = s->newest;
-    bool gained = false;
-    if (status == QMAT_OK && is_done && a.filled > 0) status = collapse_filled(s, state, round, &errors, &a, &gained);
-    if (status == QMAT_OK && is_done && a.holds) status = squeeze(s, state, round, gained ? s->newest : own, &a);
+    if (status == QMAT_OK && is_done && (a.holds || a.filled > 0)) status = squeeze(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
       *best = a;
     } else {
       release(&a);
     }
-    if (status == QMAT_OK && !is_done && errors.surface_to_envelope > epsilon)
-      status = append(s, &extra.surface, &extra.surface_count, errors.cover.points, errors.cover.count);
-    if (status == QMAT_OK && !is_done)
-      status = append(s, &extra.inner, &extra.inner_count, errors.hollows, errors.hollow_count);
+    if (status == QMAT_OK && !is_done) status = hold_found(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status != QMAT_OK || is_done) return status;
     if (!again) continue;

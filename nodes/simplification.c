@@ -749,7 +749,7 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     if ((status = refit(s, &moved)) != QMAT_OK) return status;
   }
   /* What is left of the error is made small for its own sake. */
-  size_t moved = 1;
+  size_t moved = s->rules.polish;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++) status = refit(s, &moved);
   return status;
 }

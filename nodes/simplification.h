@@ -38,6 +38,7 @@ typedef struct qmat_simplification_rules {
   double crease_share;        /* of what is held, how far points of a crease may be from what is left of it: above 0 */
   int refits;   /* how often spheres are fitted to the surface after the last collapse, to make room for more */
   bool patches; /* edges are tried with the spheres around them fitted at once, where an earlier run was left without */
+  bool polish;  /* at the end spheres are fitted for the sake of a smaller error, too */
   const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
   bool has_target;     /* whether the solid's Euler characteristic is known */
   int64_t target_euler;
