@@ -331,6 +331,7 @@ typedef struct search {
   const qmat_envelope *envelope;
   double epsilon;
   double lo[2], target[2], smallest; /* either side, outside */
+  uint8_t sides;                     /* what is wanted */
   bool last;                         /* nothing is split any more */
 } search;
 
@@ -475,7 +476,10 @@ static finding look_at(const search *s, const patch *p) {
   if (!open) return result;
   uint8_t sides = p->sides;
   if (s->last || reach < s->target[0]) {
-    const double d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL), bound = d + reach;
+    /* Where only one bound is wanted the surface is not looked for farther than that allows. */
+    const bool is_short = !s->last && sides == SIDES_EITHER;
+    double d = qmat_surface_distance(s->surface, middle, is_short ? s->target[0] - reach : INFINITY, NULL, NULL);
+    const double bound = d + reach;
     for (int side = 0; side < 2; side++)
       if ((sides >> side & 1) && bound <= s->target[side]) {
         result.bound[side] = bound;
@@ -483,13 +487,14 @@ static finding look_at(const search *s, const patch *p) {
       }
     if (!sides) return result;
     if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
+    if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
     const bool inside = (sides & SIDES_OUT) && qmat_surface_inside(s->surface, middle);
     if (inside && d > reach) sides &= SIDES_EITHER;
     if (d > minimum(s->lo[0], s->epsilon) || ((sides & SIDES_OUT) && !inside && d > s->lo[1]))
       find(s, is_cell, middle, sides, &result);
     if (s->last || reach <= s->smallest) {
       for (int side = 0; side < 2; side++)
-        if (sides >> side & 1) result.bound[side] = bound;
+        if (sides >> side & 1) result.bound[side] = d + reach;
       result.undecided = !(result.found[0] > s->epsilon) && d > s->epsilon;
       if (result.undecided) memcpy(result.place, middle, sizeof result.place);
       return result;
@@ -564,8 +569,8 @@ static void split(const features *f, const patch *p, const finding *found, patch
     split_triangle_in_two(p, children);
 }
 
-static void add_roots(const features *f, size_t feature, patch_list *list) {
-  patch root = {.feature = (uint32_t)feature, .sides = SIDES_EITHER | SIDES_OUT};
+static void add_roots(const features *f, size_t feature, uint8_t sides, patch_list *list) {
+  patch root = {.feature = (uint32_t)feature, .sides = sides};
   if (feature < f->sphere_count) {
     for (int octant = 0; octant < 8; octant++) {
       for (int i = 0; i < 3; i++) root.at[4 * i] = octant >> i & 1 ? -1 : 1;
@@ -635,8 +640,8 @@ static qmat_status search_level(qmat_context *context, const search *s, const pa
 }
 
 /* The cube around all spheres. */
-static patch whole_space(const features *f) {
-  patch root = {.feature = CELL, .sides = SIDES_EITHER | SIDES_OUT};
+static patch whole_space(const features *f, uint8_t sides) {
+  patch root = {.feature = CELL, .sides = sides};
   for (int k = 0; k < 3; k++) {
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < f->sphere_count; i++) {
@@ -662,8 +667,8 @@ static qmat_status search_pieces(qmat_context *context, search *s, double epsilo
   qmat_status status = QMAT_OK;
   if (qmat_grow((void **)&lists[0].items, &lists[0].capacity, 8 * (in_space ? 1 : count), sizeof *lists[0].items))
     status = qmat_fail_memory(context, "pieces of the envelope's boundary");
-  for (size_t i = 0; !in_space && i < count && status == QMAT_OK; i++) add_roots(s->features, i, &lists[0]);
-  if (in_space && status == QMAT_OK) lists[0].items[lists[0].count++] = whole_space(s->features);
+  for (size_t i = 0; !in_space && i < count && status == QMAT_OK; i++) add_roots(s->features, i, s->sides, &lists[0]);
+  if (in_space && status == QMAT_OK) lists[0].items[lists[0].count++] = whole_space(s->features, s->sides);
   for (int level = 0; status == QMAT_OK && lists[level & 1].count > 0; level++) {
     const patch_list *from = &lists[level & 1];
     const double lo = result->either_side.lo;
@@ -691,14 +696,19 @@ static qmat_bounds closed_bounds(qmat_bounds b) {
 
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, size_t sample_count, qmat_boundary_distance *result) {
+                                           double tolerance, bool outside, size_t sample_count,
+                                           qmat_boundary_distance *result) {
   *result = (qmat_boundary_distance){.sample_count = 0};
   features f;
   qmat_status status = join_features(context, unit, &f);
   if (status == QMAT_OK && feature_count(&f) > UINT32_MAX)
     status = qmat_fail_memory(context, "the envelope's boundary");
   if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, sample_count, result);
-  search s = {.features = &f, .surface = surface, .envelope = envelope, .epsilon = epsilon};
+  search s = {.features = &f,
+              .surface = surface,
+              .envelope = envelope,
+              .epsilon = epsilon,
+              .sides = outside ? SIDES_EITHER | SIDES_OUT : SIDES_EITHER};
   if (status == QMAT_OK) status = search_pieces(context, &s, epsilon, tolerance, sample_count, result);
   result->either_side = closed_bounds(result->either_side);
   result->outside = closed_bounds(result->outside);

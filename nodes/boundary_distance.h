@@ -13,7 +13,7 @@ typedef struct qmat_bounds {
 /* How far the boundary of an envelope lies from a surface. */
 typedef struct qmat_boundary_distance {
   qmat_bounds either_side; /* of the distance from a point of the boundary to the surface */
-  qmat_bounds outside;     /* the same over the points that lie out of the solid; 0 where there is none */
+  qmat_bounds outside;     /* the same over the points that lie out of the solid; 0 where there is none, or unasked */
   double largest, mean;    /* over the sampled points, to either side; 0 without one */
   size_t sample_count;     /* of the samples that lie on the boundary */
   size_t looks;            /* pieces of the boundary that were looked at */
@@ -32,19 +32,22 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  * QMAT_BOUNDARY_SKIN within the envelope is no part of the boundary: within a neighbour whose support is larger
  * along all of its normals, or within a primitive that holds its middle deeper than its reach. Where all but
  * a twentieth of the samples are buried, or of more than 10,000 spheres, edges and sheets, cells of space are searched
- * instead, of which those that may meet the boundary count. Pieces are taken level by level, and all of a level are compared with the one `lo` of the levels before, so that the answer does
- * not depend on threads.
+ * instead, of which those that may meet the boundary count. Pieces are taken level by level, and all of a level are
+ * compared with the one `lo` of the levels before, so that the answer does not depend on threads.
+ *
+ * Without `outside` what lies out of the solid is not told apart: quicker.
  *
  * hi - lo is at most `tolerance` (a share of `epsilon` or of lo, the larger), and less where that decides whether hi is
  * at most `epsilon`; but hi may be five times the tolerated share of epsilon where the truth is less. Where two
  * primitives meet so that the boundary between them is undecided down to the smallest pieces, or where the work would
  * be too much, hi is higher, and still no point of the boundary is farther. Of the places that were found farther than
  * epsilon, and of those that are as far and may or may not lie on the boundary, some are told, the farthest among them:
- * free them with qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product is taken for 1e-5 at least. QMAT_ERROR_MEMORY,
- * QMAT_CANCELLED. All threads. */
+ * free them with qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product
+ * is taken for 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, size_t sample_count, qmat_boundary_distance *result);
+                                           double tolerance, bool outside, size_t sample_count,
+                                           qmat_boundary_distance *result);
 
 /* Points that lie this deep in the envelope, in diagonals, count as its boundary too, for hi: what a file in single
  * precision or a judge with samples cannot tell from it. */

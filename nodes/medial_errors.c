@@ -78,7 +78,8 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   qmat_boundary_distance boundary;
-  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, 0, &boundary);
+  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false, 0,
+                                          &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->hollow_count = 0;

@@ -296,7 +296,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = sample_surface(&e);
   if (status == QMAT_OK) status = bound_surface_to_envelope(&e);
   if (status == QMAT_OK)
-    status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance,
+    status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance, true,
                                             (size_t)params->samples, &e.boundary);
   if (status == QMAT_OK) status = qmat_topology_of_medial(context, &e.unit, &e.topology);
   if (status == QMAT_OK) status = qmat_topology_of_solid(context, e.surface, &e.solid_topology);
