@@ -29,8 +29,9 @@ static const double beside_surface = 1e-5;
  * digits. */
 static const double farthest_sphere = 1e6;
 
-/* Searches of the surface, each from what the one before has found. */
-enum { MOST_SEARCHES = 4 };
+/* Searches of the surface, each from what the one before has found; those from the third on leave only a sixteenth of
+ * what is left to epsilon undecided, lest they creep up to it. */
+enum { MOST_SEARCHES = 4, CREEPING = 2 };
 
 typedef struct evaluation {
   qmat_context *context;
@@ -162,7 +163,8 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
   double known = e->largest_gap;
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
-    const double tolerance = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    const double left = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    const double tolerance = search < CREEPING ? left : left / 16;
     qmat_cover cover;
     status =
         qmat_cover_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance, INFINITY, &cover);
@@ -355,7 +357,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 2,
+    .version = 3,
     .summary = "Proves how far a medial mesh and a surface are apart",
     .doc =
         "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
