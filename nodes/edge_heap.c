@@ -74,8 +74,12 @@ qmat_status qmat_edge_heap_init(qmat_context *context, qmat_edge_heap *h, const 
   return QMAT_OK;
 }
 
-void qmat_edge_heap_fill(qmat_edge_heap *h) {
-  h->count = h->complex->edge_count;
-  for (size_t e = 0; e < h->count; e++) put(h, e, (qmat_heap_entry){h->costs[e], (uint32_t)e});
+void qmat_edge_heap_fill(qmat_edge_heap *h, const uint8_t *locked) {
+  h->count = 0;
+  for (size_t e = 0; e < h->complex->edge_count; e++) {
+    const uint32_t *ends = &h->complex->edges[2 * e];
+    if (!locked || !(locked[ends[0]] || locked[ends[1]]))
+      put(h, h->count++, (qmat_heap_entry){h->costs[e], (uint32_t)e});
+  }
   for (size_t i = (h->count + BELOW - 2) / BELOW; i-- > 0;) sift_down(h, i);
 }

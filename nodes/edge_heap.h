@@ -24,8 +24,9 @@ typedef struct qmat_heap_entry {
 /* Makes room for the complex's edges; the heap is empty. QMAT_ERROR_MEMORY. */
 qmat_status qmat_edge_heap_init(qmat_context *context, qmat_edge_heap *heap, const qmat_complex *complex);
 
-/* Puts all edges in; their costs and errors are set. Cost: linear. */
-void qmat_edge_heap_fill(qmat_edge_heap *heap);
+/* Puts all edges in whose costs and errors are set; `locked` (per vertex; NULL: none) leaves out those that have a
+ * locked end. Cost: linear. */
+void qmat_edge_heap_fill(qmat_edge_heap *heap, const uint8_t *locked);
 
 /* The cheapest edge; the heap is not empty. */
 static inline uint32_t qmat_edge_heap_first(const qmat_edge_heap *heap) {

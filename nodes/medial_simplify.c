@@ -5,6 +5,7 @@
 
 #include "core/json_text.h"
 #include "core/node.h"
+#include "nodes/collapse_in_parts.h"
 #include "nodes/hollow_filling.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_errors.h"
@@ -27,6 +28,7 @@ typedef struct {
   qmat_surface *surface;
   qmat_control_points control; /* of `dense` */
   qmat_simplification dense;   /* where each round starts */
+  size_t initial_count;        /* spheres before the first collapse */
   /* Of the newest round, and of the one that it went on from. */
   qmat_control_points round_controls[2];
   qmat_simplification rounds[2];
@@ -109,7 +111,11 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   }
   dense->rules.share = dense_share;
   dense->rules.refits = 0;
-  if (status == QMAT_OK) status = qmat_simplification_init(dense, &s->control, state->depths);
+  s->initial_count = dense->complex.vertex_count;
+  if (status == QMAT_OK)
+    status = qmat_can_collapse_in_parts(&dense->rules, &dense->complex)
+                 ? qmat_collapse_in_parts(dense, &s->control, state->depths)
+                 : qmat_simplification_init(dense, &s->control, state->depths);
   return status == QMAT_OK ? qmat_simplification_run(dense) : status;
 }
 
@@ -173,7 +179,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
                                int rounds, size_t filled, qmat_report *report) {
   const qmat_simplification *run = &s->rounds[s->newest];
   json_t *root = report->root;
-  int bad = report_run(root, run, s->dense.complex.vertex_count, unit);
+  int bad = report_run(root, run, s->initial_count, unit);
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
   bad |= qmat_json_set_count(root, "filled", filled);
   bad |= qmat_json_set_count(root, "moves", run->moves);
@@ -227,9 +233,6 @@ static void release(attempt *a) {
   qmat_value_release(a->report ? &a->report->base : NULL);
   *a = (attempt){.fault = INFINITY};
 }
-
-/* Where more than this share of the spheres fill hollows, another round does with fewer. */
-static const double most_filled = 0.05;
 
 static bool is_better(const attempt *a, const attempt *best) {
   return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
@@ -453,12 +456,12 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
   for (int round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors;
     attempt a;
-    const bool is_last = round == MOST_ROUNDS || !(epsilon > 0) || !starts_within(s, epsilon);
+    const bool is_within = epsilon > 0 && starts_within(s, epsilon), is_last = round == MOST_ROUNDS || !is_within;
     status = run_attempt(s, state, &extra, round, is_last, &a, &errors);
-    const bool is_good = a.holds && (double)a.filled <= most_filled * (double)a.medial->sphere_count;
-    const bool is_done = is_last || is_good || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    if (status == QMAT_OK && is_done && (a.holds || a.filled > 0)) status = squeeze(s, state, round, &errors, &a);
+    if (status == QMAT_OK && is_done && (a.holds || a.filled > 0 || is_within))
+      status = squeeze(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
       *best = a;
@@ -612,7 +615,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 8,
+    .version = 9,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -620,17 +623,20 @@ const qmat_node qmat_node_medial_simplify = {
         "errors stay below epsilon: from the surface to the envelope at the samples and a grid of control points, and "
         "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
         "deep "
-        "stay inside the envelope, so that it has no hollow. Spheres of radius zero are sharp features: corners stay, "
+        "stay inside the envelope, so that it has no hollow. The first collapses of a large medial mesh are done in "
+        "parts, "
+        "side by side, as long as each has a quarter of its spheres left. Spheres of radius zero are sharp features: "
+        "corners stay, "
         "creases between them are thinned as polylines that keep within a share of epsilon. When no edge is left, each "
         "is tried "
         "with a sphere that is "
         "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
         "places between where the surface is too far from the envelope, and the collapses are repeated with these, and "
         "for "
-        "notches and voids of the envelope, which are filled by spheres joined to the nearest ones; then collapses go "
-        "on. What keeps within epsilon is tried for fewer spheres once more, each edge with the spheres around it "
-        "fitted "
-        "at once; the result counts where it is better. Of a mesh that only stands for a surface (mesh.subdivide), the "
+        "notches and voids of the envelope, which are filled by spheres joined to the nearest ones. From there "
+        "collapses "
+        "go on, each edge with the spheres around it fitted at once; the result counts where it is better. Of a mesh "
+        "that only stands for a surface (mesh.subdivide), the "
         "deviation is taken from epsilon and added "
         "to "
         "the errors of the report. "

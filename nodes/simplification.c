@@ -122,7 +122,7 @@ static qmat_status fill_heap(qmat_simplification *s) {
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (size_t e = 0; e < count; e++) set_cost(s, (uint32_t)e);
   }
-  qmat_edge_heap_fill(&s->heap);
+  qmat_edge_heap_fill(&s->heap, s->locked);
   return status;
 }
 
@@ -591,8 +591,13 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
  * moves, only for one that goes. */
 static const double worth_another_fit = 2;
 
+static bool is_locked(const qmat_simplification *s, uint32_t edge) {
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  return s->locked && (s->locked[ends[0]] || s->locked[ends[1]]);
+}
+
 static void queue_again(qmat_simplification *s, uint32_t edge) {
-  if (s->heap.places[edge] != QMAT_NONE) return;
+  if (s->heap.places[edge] != QMAT_NONE || is_locked(s, edge)) return;
   if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > worth_another_fit * s->held) return;
   qmat_edge_heap_update(&s->heap, edge);
 }

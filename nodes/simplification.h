@@ -76,6 +76,7 @@ typedef struct qmat_simplification {
   uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
   double *fitted_errors;   /* per edge: of the sphere that was fitted last */
   uint8_t *settled;        /* per vertex: whether a fit did not move it, and nothing has moved around it since */
+  const uint8_t *locked;   /* per vertex: whether its edges stay, in a part of a larger medial mesh; NULL: none do */
   bool protecting, fitting;
   int refusal;   /* why the newest test of a sphere failed */
   int64_t euler; /* of the medial mesh */
