@@ -213,6 +213,31 @@ static void test_certified_exactly_where_epsilon_holds(void **state) {
   subject_free(&s);
 }
 
+/* Looks at middles of pieces only come closer and closer to the farthest place, where several primitives are as near:
+ * an epsilon that is further above it than a sixteenth of the tolerance is told from it. */
+static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
+  (void)state;
+  random_numbers random = {.seed = 11};
+  for (int i = 0; i < 40; i++) {
+    double balls[4 * 12];
+    for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
+    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_of(balls, 12, NULL, 0, NULL, 0));
+    qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001", 1);
+    const double truth = pipeline_number(close, "surface_to_envelope");
+    qmat_value_release(&close->base);
+    for (int share = 4; share <= 40; share += 4) {
+      char params[64];
+      const double epsilon = truth * (1 + 0.001 * share);
+      snprintf(params, sizeof params, "epsilon=%.12f samples=16", epsilon);
+      qmat_report *report = evaluate(&s, params, 1);
+      if (!(pipeline_number(report, "surface_to_envelope") <= epsilon))
+        fail_msg("%.9f is not told from %.9f", pipeline_number(report, "surface_to_envelope"), epsilon);
+      qmat_value_release(&report->base);
+    }
+    subject_free(&s);
+  }
+}
+
 static void test_an_open_surface_is_never_certified(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
@@ -497,6 +522,7 @@ int main(void) {
       cmocka_unit_test(test_the_groove_between_two_balls_is_the_farthest),
       cmocka_unit_test(test_a_hollow_in_the_envelope_counts),
       cmocka_unit_test(test_certified_exactly_where_epsilon_holds),
+      cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
       cmocka_unit_test(test_an_open_surface_is_never_certified),
       cmocka_unit_test(test_odd_spheres_cones_and_slabs_are_counted),
       cmocka_unit_test(test_random_medial_meshes_against_dense_samples),
