@@ -5,8 +5,13 @@
 #include <string.h>
 
 #include "core/hash.h"
+#include "core/vector.h"
 
-enum { FIRST_CAPACITY = 1 << 14 };
+enum { FIRST_CAPACITY = 1 << 14, PLACES = 1 << 14 };
+
+/* Of the spacing, how wide the cubes are of which a place is remembered. */
+static const double cube_share = 0.5;
+
 /* By this much more than it is far a node has to be deep to tell a neighbour's side: far more than a side is unsure by.
  */
 static const double side_margin = 1e-6;
@@ -19,13 +24,15 @@ qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *l
   /* No finer than the keys can number. */
   *lattice = (qmat_depth_lattice){.surface = surface, .spacing = fmax(spacing, 4 * reach / (double)key_offset)};
   lattice->nodes = qmat_calloc(FIRST_CAPACITY, sizeof *lattice->nodes);
-  if (!lattice->nodes) return qmat_fail_memory(context, "depths");
+  lattice->places = qmat_calloc(PLACES, sizeof *lattice->places);
+  if (!lattice->nodes || !lattice->places) return qmat_fail_memory(context, "depths");
   lattice->capacity = FIRST_CAPACITY;
   return QMAT_OK;
 }
 
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
   qmat_free(lattice->nodes);
+  qmat_free(lattice->places);
   *lattice = (qmat_depth_lattice){0};
 }
 
@@ -63,12 +70,40 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
   return inside ? depth : -depth;
 }
 
+/* The cube that a point lies in, and where it is remembered. */
+static qmat_lattice_place *find_place(const qmat_depth_lattice *lattice, const double point[3], uint64_t *key) {
+  const double side = cube_share * lattice->spacing;
+  *key = 1;
+  for (int k = 0; k < 3; k++) *key = qmat_hash_mix(*key + (uint64_t)(int64_t)floor(point[k] / side));
+  return &lattice->places[*key & (PLACES - 1)];
+}
+
+static void remember(const qmat_depth_lattice *lattice, const double point[3], double least_depth) {
+  uint64_t key;
+  qmat_lattice_place *place = find_place(lattice, point, &key);
+  place->key = key;
+  memcpy(place->point, point, sizeof place->point);
+  place->least_depth = least_depth;
+}
+
+double qmat_depth_lattice_least(const qmat_depth_lattice *lattice, const double point[3]) {
+  uint64_t key;
+  const qmat_lattice_place *place = find_place(lattice, point, &key);
+  return place->key == key ? place->least_depth - qmat_point_distance(place->point, point) : -INFINITY;
+}
+
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth) {
   const double gap = distance * (1 + 1e-9) + side_margin;
-  if (!(near > gap && depth < near + gap)) return qmat_depth_lattice_exact_near(lattice, point, near, distance);
-  lattice->questions++;
-  return qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
+  double found;
+  if (near > gap && depth < near + gap) {
+    lattice->questions++;
+    found = qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
+  } else {
+    found = qmat_depth_lattice_exact_near(lattice, point, near, distance);
+  }
+  remember(lattice, point, found < INFINITY ? found : depth);
+  return found;
 }
 
 /* The depth at a node; from a neighbour where one is known. */

@@ -10,14 +10,21 @@ typedef struct qmat_lattice_node {
   double depth;
 } qmat_lattice_node;
 
+/* The newest place in a cube between the nodes that was asked. */
+typedef struct qmat_lattice_place {
+  uint64_t key; /* of the cube; 0: none */
+  double point[3], least_depth;
+} qmat_lattice_place;
+
 /* Depths (the distance to the surface, negative outside) remembered at the nodes of a cubic lattice, each asked of the
  * surface when it is first wanted. Depth is 1-Lipschitz, so a node bounds it everywhere around. What it answers depends
- * on the place alone, never on what was asked before. One thread at a time. */
+ * on the place alone, never on what was asked before, but for qmat_depth_lattice_least. One thread at a time. */
 typedef struct qmat_depth_lattice {
   const qmat_surface *surface;
   double spacing;
   size_t count, capacity; /* capacity: a power of two */
   qmat_lattice_node *nodes;
+  qmat_lattice_place *places; /* by the lowest bits of the hash of their keys */
   uint64_t questions; /* how often the surface was asked */
 } qmat_depth_lattice;
 
@@ -41,5 +48,9 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
 /* The same, but INFINITY where it is known to be more than `depth`: quicker there. */
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth);
+
+/* A lower bound of the depth at `point`, by the newest place that qmat_depth_lattice_exact_up_to was asked nearby;
+ * -INFINITY where none is known. */
+double qmat_depth_lattice_least(const qmat_depth_lattice *lattice, const double point[3]);
 
 #endif
