@@ -142,6 +142,35 @@ static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
+static void test_places_that_were_asked_bound_depths_around_them(void **state) {
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, 0.02);
+  random_numbers random = {.seed = 3};
+  size_t known = 0, inside = 0;
+  for (int round = 0; round < 6000; round++) {
+    double point[3], beside[3], gap;
+    random_point(&random, 0.3, point);
+    for (int k = 0; k < 3; k++) beside[k] = point[k] + random_between(&random, -0.002, 0.002);
+    const double near = qmat_depth_lattice_near(&lattice, point, &gap), most = random_between(&random, 0, 0.1);
+    const double asked = qmat_depth_lattice_exact_up_to(&lattice, point, near, gap, most);
+    const double depth = qmat_depth_lattice_exact(&lattice, point);
+    if (asked < INFINITY)
+      assert_near(asked, depth, 1e-12);
+    else
+      assert_true(depth > most);
+    assert_near(qmat_depth_lattice_least(&lattice, point), asked < INFINITY ? depth : most, 1e-12);
+    const double least = qmat_depth_lattice_least(&lattice, beside);
+    const double truth = qmat_depth_lattice_exact(&lattice, beside);
+    assert_true(least <= truth + 1e-12);
+    known += least > -INFINITY;
+    inside += least > 0;
+  }
+  assert_true(known > 3000 && inside > 100);
+  static const double elsewhere[3] = {0.9, 0.9, 0.9};
+  assert_true(qmat_depth_lattice_least(&lattice, elsewhere) == -INFINITY);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
 static void test_corners_of_the_lattice_have_keys_of_their_own(void **state) {
   /* The finest spacing that the keys can number, and the farthest nodes. */
   static const double spacings[] = {0, 1e-6, 0.01};
@@ -167,6 +196,7 @@ int main(void) {
       cmocka_unit_test(test_nodes_are_exact),
       cmocka_unit_test(test_answers_do_not_depend_on_what_was_asked_before),
       cmocka_unit_test(test_points_beyond_the_lattice_are_asked_exactly),
+      cmocka_unit_test(test_places_that_were_asked_bound_depths_around_them),
       cmocka_unit_test(test_corners_of_the_lattice_have_keys_of_their_own),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);
