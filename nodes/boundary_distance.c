@@ -340,6 +340,7 @@ typedef struct finding {
   double place[3];           /* where found[0] is attained, unless that is 0, or what is undecided */
   double found[2], bound[2]; /* either side, outside: an attained distance, and a bound of what is done with */
   int children;
+  bool doubtful;  /* whether `place` is tolerated, but may be farther than epsilon */
   bool undecided; /* whether `place`, farther than epsilon, may or may not lie on the boundary */
   uint8_t sides;  /* what the children are wanted for */
 } finding;
@@ -480,13 +481,18 @@ static finding look_at(const search *s, const patch *p) {
     const bool is_short = !s->last && sides == SIDES_EITHER;
     double d = qmat_surface_distance(s->surface, middle, is_short ? s->target[0] - reach : INFINITY, NULL, NULL);
     const double bound = d + reach;
+    result.doubtful = bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (sides & SIDES_EITHER);
+    if (result.doubtful) {
+      if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
+      memcpy(result.place, middle, sizeof result.place);
+    }
     for (int side = 0; side < 2; side++)
       if ((sides >> side & 1) && bound <= s->target[side]) {
         result.bound[side] = bound;
         sides &= (uint8_t) ~(1 << side);
       }
     if (!sides) return result;
-    if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
+    if (!result.doubtful && is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
     if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
     const bool inside = (sides & SIDES_OUT) && qmat_surface_inside(s->surface, middle);
     if (inside && d > reach) sides &= SIDES_EITHER;
@@ -593,17 +599,24 @@ static void add_roots(const features *f, size_t feature, uint8_t sides, patch_li
 }
 
 /* One level: looks at every patch of `from` and puts the children into `to`. */
-static int add_far_point(qmat_boundary_distance *result, const double point[3]) {
-  if (qmat_grow((void **)&result->far_points, &result->far_capacity, result->far_count + 1, 3 * sizeof(double)))
-    return -1;
-  memcpy(&result->far_points[3 * result->far_count++], point, 3 * sizeof(double));
+static int add_point(double **points, size_t *count, size_t *capacity, const double point[3]) {
+  if (qmat_grow((void **)points, capacity, *count + 1, 3 * sizeof **points)) return -1;
+  memcpy(&(*points)[3 * (*count)++], point, 3 * sizeof **points);
   return 0;
+}
+
+/* Keeps the place of a finding that is, or may be, farther than epsilon. */
+static int take_place(qmat_boundary_distance *result, const finding *found, double epsilon) {
+  if (found->found[0] > epsilon || found->undecided)
+    return add_point(&result->far_points, &result->far_count, &result->far_capacity, found->place);
+  return found->doubtful ? add_point(&result->doubts, &result->doubt_count, &result->doubt_capacity, found->place) : 0;
 }
 
 void qmat_boundary_distance_uninit(qmat_boundary_distance *result) {
   qmat_free(result->far_points);
-  result->far_points = NULL;
-  result->far_count = result->far_capacity = 0;
+  qmat_free(result->doubts);
+  result->far_points = result->doubts = NULL;
+  result->far_count = result->far_capacity = result->doubt_count = result->doubt_capacity = 0;
 }
 
 static qmat_status search_level(qmat_context *context, const search *s, const patch_list *from, patch_list *to,
@@ -626,8 +639,7 @@ static qmat_status search_level(qmat_context *context, const search *s, const pa
       bounds[side]->hi = maximum(bounds[side]->hi, findings[i].bound[side]);
     }
     to->count += (size_t)findings[i].children;
-    if ((findings[i].found[0] > s->epsilon || findings[i].undecided) && add_far_point(result, findings[i].place))
-      return qmat_fail_memory(context, "the envelope's boundary");
+    if (take_place(result, &findings[i], s->epsilon)) return qmat_fail_memory(context, "the envelope's boundary");
   }
   if (qmat_grow((void **)&to->items, &to->capacity, to->count, sizeof *to->items))
     return qmat_fail_memory(context, "pieces of the envelope's boundary");

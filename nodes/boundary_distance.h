@@ -17,8 +17,9 @@ typedef struct qmat_boundary_distance {
   double largest, mean;    /* over the sampled points, to either side; 0 without one */
   size_t sample_count;     /* of the samples that lie on the boundary */
   size_t looks;            /* pieces of the boundary that were looked at */
-  size_t far_count, far_capacity;
+  size_t far_count, far_capacity, doubt_count, doubt_capacity;
   double *far_points; /* 3 each: places farther than epsilon from the surface that are, or may be, on the boundary */
+  double *doubts;     /* 3 each: places for which hi is above epsilon although none was found that is as far */
 } qmat_boundary_distance;
 
 void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
@@ -41,9 +42,9 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  * at most `epsilon`; but hi may be five times the tolerated share of epsilon where the truth is less. Where two
  * primitives meet so that the boundary between them is undecided down to the smallest pieces, or where the work would
  * be too much, hi is higher, and still no point of the boundary is farther. Of the places that were found farther than
- * epsilon, and of those that are as far and may or may not lie on the boundary, some are told, the farthest among them:
- * free them with qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product
- * is taken for 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+ * epsilon, and of those that are as far and may or may not lie on the boundary, some are told, the farthest among them,
+ * and of those that may be as far: free them with qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0
+ * and `tolerance` > 0; their product is taken for 1e-5 at least. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
                                            double tolerance, bool outside, size_t sample_count,

@@ -69,6 +69,14 @@ qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_sur
   return qmat_progress(context, 0, 0, "primitives measured");
 }
 
+/* Leaves the points that lie in the solid; how many they are. */
+static size_t keep_inside(const qmat_surface *surface, double *points, size_t count) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (qmat_surface_inside(surface, &points[3 * i])) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
+  return kept;
+}
+
 /* How closely the boundary is looked at, as a share of epsilon. */
 static const double boundary_tolerance = 0.15;
 
@@ -82,16 +90,16 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
                                           &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
-  errors->hollow_count = 0;
   errors->hollows = boundary.far_points;
-  for (size_t i = 0; i < boundary.far_count; i++)
-    if (qmat_surface_inside(surface, &boundary.far_points[3 * i]))
-      memmove(&errors->hollows[3 * errors->hollow_count++], &boundary.far_points[3 * i], 3 * sizeof(double));
+  errors->hollow_count = keep_inside(surface, errors->hollows, boundary.far_count);
+  errors->doubts = boundary.doubts;
+  errors->doubt_count = keep_inside(surface, errors->doubts, boundary.doubt_count);
   return status;
 }
 
 void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
   qmat_free(errors->hollows);
-  errors->hollows = NULL;
-  errors->hollow_count = 0;
+  qmat_free(errors->doubts);
+  errors->hollows = errors->doubts = NULL;
+  errors->hollow_count = errors->doubt_count = 0;
 }

@@ -10,8 +10,9 @@ typedef struct qmat_medial_errors {
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
   qmat_cover cover;           /* where the surface is farther than the threshold */
   double boundary_to_surface; /* of the distance of the envelope's boundary, on either side; 0: not measured */
-  size_t hollow_count;
+  size_t hollow_count, doubt_count;
   double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
+  double *doubts;  /* 3 each: places in the solid that may be as deep, though none was found that is */
 } qmat_medial_errors;
 
 /* `unit` is a medial mesh in the unit frame, sealed or not. Each measures by branch and bound on all threads, and its
@@ -34,7 +35,7 @@ qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_sur
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                          double epsilon, qmat_medial_errors *errors);
 
-/* Frees the hollows. */
+/* Frees the places. */
 void qmat_medial_errors_uninit(qmat_medial_errors *errors);
 
 #endif

@@ -73,8 +73,8 @@ static qmat_status fill_hollows(const simplifier *s, const qmat_medial_errors *f
     *filled += added;
     left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
-    left->hollows = NULL; /* those of `found` stay its own */
-    left->hollow_count = 0;
+    left->hollows = left->doubts = NULL; /* those of `found` stay its own */
+    left->hollow_count = left->doubt_count = 0;
     status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
   return status;
@@ -252,7 +252,13 @@ static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_med
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
   a->holds = status == QMAT_OK && a->fault == epsilon;
-  if (filled > 0) qmat_medial_errors_uninit(&after);
+  if (filled > 0) { /* what is in doubt by now is to be held, too */
+    double *const doubts = found->doubts;
+    found->doubts = after.doubts;
+    found->doubt_count = after.doubt_count;
+    after.doubts = doubts;
+    qmat_medial_errors_uninit(&after);
+  }
   if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
   return status;
 }
@@ -280,8 +286,8 @@ static qmat_status hold_found(simplifier *s, const qmat_medial_errors *found, qm
   qmat_status status = QMAT_OK;
   if (found->surface_to_envelope > s->params->epsilon)
     status = append(s, &extra->surface, &extra->surface_count, found->cover.points, found->cover.count);
-  return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->hollows, found->hollow_count)
-                           : status;
+  if (status == QMAT_OK) status = append(s, &extra->inner, &extra->inner_count, found->hollows, found->hollow_count);
+  return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->doubts, found->doubt_count) : status;
 }
 
 /* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where hollows were
