@@ -119,7 +119,7 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   return status == QMAT_OK ? qmat_simplification_run(dense) : status;
 }
 
-/* Collapses on from where `from` ended, of which `left` is what is left; with `patches` after rounds without. */
+/* Collapses on from where `from` ended, of which `left` is what is left; `patches` and `polish` as in the rules. */
 static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
                              const qmat_medial *left, const qmat_extra_points *extra, bool patches, bool polish) {
   s->newest = 1 - s->newest;
