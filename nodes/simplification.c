@@ -267,7 +267,7 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
 typedef enum { DONE, REFUSED, EXCEEDED } outcome;
 
 /* Why the newest test of a sphere failed. */
-typedef enum { BY_SPHERE, BY_MIDPOINT, BY_COVERAGE, BY_PROTRUSION } refusal;
+typedef enum { BY_NOTHING, BY_SPHERE, BY_MIDPOINT, BY_COVERAGE, BY_PROTRUSION } refusal;
 
 static bool holds_protrusion(const qmat_simplification *s) {
   return s->held < INFINITY && is_two_sided(s);
@@ -381,6 +381,7 @@ static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_
     if (errors[i] < errors[least]) least = i;
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
+  s->refusal = BY_NOTHING;
   if (status == QMAT_OK)
     status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse,
                                  s->rules.patches ? less_hope * s->held : s->held, sphere, &error);
@@ -522,8 +523,10 @@ static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, 
   return status;
 }
 
+/* A cone that leaves the solid in its middle does so wherever the spheres move that little. */
 static qmat_status try_patches(qmat_simplification *s, uint32_t edge, outcome *result) {
   qmat_status status = QMAT_OK;
+  if (s->refusal == BY_MIDPOINT) return status;
   if (s->fitted_errors[edge] <= worth_testing * s->held) status = try_patch(s, edge, true, result);
   if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= worth_a_patch * s->held)
     status = try_patch(s, edge, false, result);
