@@ -462,26 +462,36 @@ static qmat_status ask_for_refused(qmat_simplification *s, const double *sphere,
   return qmat_patch_fit_add(s->context, &s->patch, closest, QMAT_PLACE_BORDER, (1 - margin) * s->held);
 }
 
-/* Tests the spheres of the patch, the collapse last, which is then the newest preview. */
-static qmat_status test_patch(qmat_simplification *s, uint32_t edge, uint32_t removed, outcome *result, bool *again) {
+/* Tests a sphere of the patch, which is placed; number 0 is the collapse's. */
+static qmat_status test_in_patch(qmat_simplification *s, uint32_t edge, int number, outcome *result) {
+  double asked;
+  const qmat_status status =
+      number == 0 ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
+                  : qmat_complex_preview_move(s->context, &s->complex, s->patch.vertices[number], &s->collapse);
+  return status == QMAT_OK ? test_sphere(s, s->patch.spheres[number], QMAT_NONE, result, &asked) : status;
+}
+
+/* Tests the spheres of the patch: `*suspect` first, which becomes the one that is refused, and the collapse last, which
+ * is then the newest preview. */
+static qmat_status test_patch(qmat_simplification *s, uint32_t edge, uint32_t removed, int *suspect, outcome *result,
+                              bool *again) {
   qmat_patch_fit *patch = &s->patch;
   bool inside = true;
   qmat_status status = QMAT_OK;
-  double asked;
   *result = REFUSED;
   *again = false;
   for (int i = -1; i < patch->count && status == QMAT_OK; i++) {
     status = place(s, i < 0 ? removed : patch->vertices[i], patch->spheres[i < 0 ? 0 : i], &inside);
     if (!inside) return status;
   }
-  for (int i = 1; i <= patch->count && status == QMAT_OK; i++) {
-    const bool last = i == patch->count;
-    const double *sphere = patch->spheres[last ? 0 : i];
-    status = last ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
-                  : qmat_complex_preview_move(s->context, &s->complex, patch->vertices[i], &s->collapse);
-    if (status == QMAT_OK) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  const int first = *suspect;
+  for (int i = 0; i <= patch->count && status == QMAT_OK; i++) {
+    const int number = i == 0 ? first : i % patch->count;
+    if (i > 0 && number == first && (number > 0 || patch->count == 1)) continue;
+    status = test_in_patch(s, edge, number, result);
     if (status != QMAT_OK || *result == DONE) continue;
-    return ask_for_refused(s, sphere, again);
+    *suspect = number;
+    return ask_for_refused(s, patch->spheres[number], again);
   }
   return status;
 }
@@ -508,6 +518,7 @@ static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, 
   qmat_status status = qmat_patch_fit_start(s->context, &s->patch, &s->coverage, &s->complex, c, s->fitted, others,
                                             count, s->control->surface_count, s->held);
   bool again = true;
+  int suspect = 0;
   for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != DONE; i++) {
     double error;
     qmat_patch_fit_run(&s->patch, &s->complex, i % 2 == 1, &error);
@@ -515,7 +526,7 @@ static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, 
     s->saved_count = 0;
     status = save_star(s, removed);
     for (int k = 0; k < s->patch.count && status == QMAT_OK; k++) status = save_star(s, s->patch.vertices[k]);
-    if (status == QMAT_OK) status = test_patch(s, edge, removed, result, &again);
+    if (status == QMAT_OK) status = test_patch(s, edge, removed, &suspect, result, &again);
     if (status == QMAT_OK && *result == DONE) return status;
     restore(s);
     if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
