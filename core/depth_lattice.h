@@ -25,7 +25,7 @@ typedef struct qmat_depth_lattice {
   size_t count, capacity; /* capacity: a power of two */
   qmat_lattice_node *nodes;
   qmat_lattice_place *places; /* by the lowest bits of the hash of their keys */
-  uint64_t questions; /* how often the surface was asked */
+  uint64_t questions;         /* how often the surface was asked */
 } qmat_depth_lattice;
 
 /* Starts empty. `spacing` is in the unit frame, at least 1e-6. QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit,

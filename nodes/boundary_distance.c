@@ -598,7 +598,6 @@ static void add_roots(const features *f, size_t feature, uint8_t sides, patch_li
   }
 }
 
-/* One level: looks at every patch of `from` and puts the children into `to`. */
 static int add_point(double **points, size_t *count, size_t *capacity, const double point[3]) {
   if (qmat_grow((void **)points, capacity, *count + 1, 3 * sizeof **points)) return -1;
   memcpy(&(*points)[3 * (*count)++], point, 3 * sizeof **points);
@@ -619,6 +618,7 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result) {
   result->far_count = result->far_capacity = result->doubt_count = result->doubt_capacity = 0;
 }
 
+/* One level: looks at every patch of `from` and puts the children into `to`. */
 static qmat_status search_level(qmat_context *context, const search *s, const patch_list *from, patch_list *to,
                                 finding *findings, qmat_boundary_distance *result) {
   const int threads = qmat_threads(context);
