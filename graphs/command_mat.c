@@ -14,12 +14,12 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   const qmat_graph *graph = &invocation->graph;
   for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
     const qmat_graph_input *input = &graph->inputs[i];
-    const qmat_node *type = graph->nodes[input->params[0].node].type;
-    const qmat_param *param = &type->params[input->params[0].param];
+    const qmat_graph_node *node = &graph->nodes[input->params[0].node];
+    const qmat_param *param = &node->type->params[input->params[0].param];
     char *doc = invocation->docs[invocation->option_count];
     int length = snprintf(doc, QMAT_OPTION_DOC_SIZE, "%s: ", param->doc);
     if (length > 0 && length < QMAT_OPTION_DOC_SIZE)
-      qmat_param_describe(type, param, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
+      qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
     status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
   }
   for (size_t i = 0; i < graph->output_count && status == QMAT_OK; i++) {

@@ -51,7 +51,7 @@ static void print_page(const qmat_node *type) {
   if (qmat_param_count(type) > 0) printf("\nParameters:\n");
   for (size_t i = 0; i < qmat_param_count(type); i++) {
     char takes[512], text[1024];
-    qmat_param_describe(type, &type->params[i], takes, sizeof takes);
+    qmat_param_describe(type, &type->params[i], NULL, takes, sizeof takes);
     snprintf(text, sizeof text, "%s\n%s", type->params[i].doc ? type->params[i].doc : "", takes);
     print_row(type->params[i].name, width, text);
   }

@@ -142,7 +142,7 @@ __attribute__((format(printf, 2, 3))) static void put(piece_writer *writer, cons
   if (length > 0) writer->used += (size_t)length;
 }
 
-void qmat_param_describe(const qmat_node *type, const qmat_param *param, char *text, size_t size) {
+void qmat_param_describe(const qmat_node *type, const qmat_param *param, const void *params, char *text, size_t size) {
   static const char *const words[] = {"true or false", "whole number", "number", "", "text", "path"};
   piece_writer writer = {.text = text, .size = size};
   if (size) text[0] = 0;
@@ -163,11 +163,11 @@ void qmat_param_describe(const qmat_node *type, const qmat_param *param, char *t
     put(&writer, ", required");
     return;
   }
-  void *defaults = qmat_calloc(1, type->params_size);
-  if (!defaults) return;
-  qmat_params_default(type, defaults);
+  void *defaults = params ? NULL : qmat_calloc(1, type->params_size);
+  if (!params && !defaults) return;
+  if (defaults) qmat_params_default(type, defaults);
   char value[256];
-  qmat_param_format(param, defaults, value, sizeof value);
+  qmat_param_format(param, params ? params : defaults, value, sizeof value);
   bool is_text = param->type == QMAT_PARAM_STRING || param->type == QMAT_PARAM_PATH;
   if (*value || !is_text) put(&writer, ", default %s", value);
   qmat_free(defaults);

@@ -73,6 +73,7 @@ for command in mat run batch watch why cache check info extract dot nodes node v
 done
 expect 0 "--epsilon" "$qmat" help mat
 expect 0 "0.01" "$qmat" mat --help
+expect 0 "default none" "$qmat" mat --help # the graph's, not that of medial.features
 expect 2 "did you mean '--threads'?" "$qmat" run g.yaml --thread 2
 expect 2 "did you mean '--epsilon'?" "$qmat" mat box.off -o x.glb --epsilom 1%
 expect 2 "needs a value" "$qmat" run g.yaml --set
