@@ -482,17 +482,15 @@ static finding look_at(const search *s, const patch *p) {
     double d = qmat_surface_distance(s->surface, middle, is_short ? s->target[0] - reach : INFINITY, NULL, NULL);
     const double bound = d + reach;
     result.doubtful = bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (sides & SIDES_EITHER);
-    if (result.doubtful) {
-      if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
-      memcpy(result.place, middle, sizeof result.place);
-    }
     for (int side = 0; side < 2; side++)
       if ((sides >> side & 1) && bound <= s->target[side]) {
         result.bound[side] = bound;
         sides &= (uint8_t) ~(1 << side);
       }
+    if (!sides && !result.doubtful) return result;
+    if (is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
+    if (result.doubtful) memcpy(result.place, middle, sizeof result.place);
     if (!sides) return result;
-    if (!result.doubtful && is_off_boundary(s, is_cell, middle, reach)) return (finding){.found = {0, 0}};
     if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
     const bool inside = (sides & SIDES_OUT) && qmat_surface_inside(s->surface, middle);
     if (inside && d > reach) sides &= SIDES_EITHER;

@@ -37,7 +37,8 @@ typedef struct part_rest {
   size_t edge_count, triangle_count;
   uint32_t *edges, *triangles;
   double *edge_bounds, *triangle_bounds;
-  size_t collapses, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_topology, questions;
+  qmat_collapse_counts counts;
+  size_t questions;
 } part_rest;
 
 typedef struct divided {
@@ -271,11 +272,7 @@ static qmat_status end_part(divided *d, size_t part, const qmat_simplification *
       d->control->witnesses[3 * (size_t)points[i] + k] = vertex == QMAT_NONE ? QMAT_NONE : vertices[vertex];
       d->control->weights[3 * (size_t)points[i] + k] = own->coverage.weights[3 * i + k];
     }
-  rest->collapses = own->collapses;
-  rest->refused_by_surface = own->refused_by_surface;
-  rest->refused_by_coverage = own->refused_by_coverage;
-  rest->refused_by_protrusion = own->refused_by_protrusion;
-  rest->refused_by_topology = own->refused_by_topology;
+  rest->counts = own->counts;
   rest->questions = own->protrusion.lattice.questions;
   if (take_rows(vertices, c->edge_alive, c->edges, own->protrusion.edge_bounds, c->edge_count, 2, &rest->edge_count,
                 &rest->edges, &rest->edge_bounds) ||
@@ -386,19 +383,17 @@ static qmat_status join(const divided *d, const uint32_t *ids, qmat_medial *medi
 
 /* What the parts know of the protrusion of their edges and triangles, where it is more than their corners say. */
 static void carry_bounds(const divided *d, const uint32_t *ids) {
-  const qmat_complex *c = &d->whole->complex;
-  qmat_protrusion *protrusion = &d->whole->protrusion;
+  qmat_simplification *whole = d->whole;
   for (size_t p = 0; p < d->part_count; p++) {
     const part_rest *rest = &d->rests[p];
     for (size_t i = 0; i < rest->edge_count; i++) {
       const uint32_t *ends = &rest->edges[2 * i];
-      double *bound = &protrusion->edge_bounds[qmat_complex_find_edge(c, ids[ends[0]], ids[ends[1]])];
-      *bound = fmin(*bound, rest->edge_bounds[i]);
+      qmat_protrusion_bound_edge(&whole->protrusion, &whole->complex, ids[ends[0]], ids[ends[1]], rest->edge_bounds[i]);
     }
     for (size_t i = 0; i < rest->triangle_count; i++) {
       const uint32_t *t = &rest->triangles[3 * i];
-      double *bound = &protrusion->triangle_bounds[qmat_complex_find_triangle(c, ids[t[0]], ids[t[1]], ids[t[2]])];
-      *bound = fmin(*bound, rest->triangle_bounds[i]);
+      qmat_protrusion_bound_triangle(&whole->protrusion, &whole->complex, ids[t[0]], ids[t[1]], ids[t[2]],
+                                     rest->triangle_bounds[i]);
     }
   }
 }
@@ -407,11 +402,11 @@ static void add_counts(const divided *d) {
   qmat_simplification *whole = d->whole;
   for (size_t p = 0; p < d->part_count; p++) {
     const part_rest *rest = &d->rests[p];
-    whole->collapses += rest->collapses;
-    whole->refused_by_surface += rest->refused_by_surface;
-    whole->refused_by_coverage += rest->refused_by_coverage;
-    whole->refused_by_protrusion += rest->refused_by_protrusion;
-    whole->refused_by_topology += rest->refused_by_topology;
+    whole->counts.collapses += rest->counts.collapses;
+    whole->counts.refused_by_surface += rest->counts.refused_by_surface;
+    whole->counts.refused_by_coverage += rest->counts.refused_by_coverage;
+    whole->counts.refused_by_protrusion += rest->counts.refused_by_protrusion;
+    whole->counts.refused_by_topology += rest->counts.refused_by_topology;
     whole->protrusion.lattice.questions += rest->questions;
   }
 }

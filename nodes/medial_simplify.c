@@ -160,13 +160,13 @@ static int report_run(json_t *root, const qmat_simplification *run, size_t initi
   bad |= qmat_json_set_count(root, "spheres", unit->sphere_count);
   bad |= qmat_json_set_count(root, "edges", unit->edge_count);
   bad |= qmat_json_set_count(root, "triangles", unit->triangle_count);
-  bad |= qmat_json_set_count(root, "collapses", run->collapses);
+  bad |= qmat_json_set_count(root, "collapses", run->counts.collapses);
   bad |= qmat_json_set_count(root, "control_points", run->control->count);
-  bad |= qmat_json_set_count(root, "refused_by_surface", run->refused_by_surface);
-  bad |= qmat_json_set_count(root, "refused_by_coverage", run->refused_by_coverage);
-  bad |= qmat_json_set_count(root, "refused_by_protrusion", run->refused_by_protrusion);
-  bad |= qmat_json_set_count(root, "refused_by_protection", run->refused_by_protection);
-  bad |= qmat_json_set_count(root, "refused_by_topology", run->refused_by_topology);
+  bad |= qmat_json_set_count(root, "refused_by_surface", run->counts.refused_by_surface);
+  bad |= qmat_json_set_count(root, "refused_by_coverage", run->counts.refused_by_coverage);
+  bad |= qmat_json_set_count(root, "refused_by_protrusion", run->counts.refused_by_protrusion);
+  bad |= qmat_json_set_count(root, "refused_by_protection", run->counts.refused_by_protection);
+  bad |= qmat_json_set_count(root, "refused_by_topology", run->counts.refused_by_topology);
   bad |= report_features(run, root);
   bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
   if (run->rules.has_target)

@@ -332,6 +332,18 @@ void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *co
   }
 }
 
+void qmat_protrusion_bound_edge(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                double bound) {
+  double *known = &protrusion->edge_bounds[qmat_complex_find_edge(complex, a, b)];
+  *known = minimum(*known, bound);
+}
+
+void qmat_protrusion_bound_triangle(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                    uint32_t c, double bound) {
+  double *known = &protrusion->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
+  *known = minimum(*known, bound);
+}
+
 double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex) {
   double largest = 0;
   for (size_t v = 0; v < complex->vertex_count; v++)

@@ -51,6 +51,13 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
 /* Takes the newest successful test over: call it before the complex changes. */
 void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse);
 
+/* Takes over what is known from elsewhere of the live edge (triangle) of these vertices: h over it is at most `bound`.
+ * Cost: linear in a star. */
+void qmat_protrusion_bound_edge(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                double bound);
+void qmat_protrusion_bound_triangle(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                    uint32_t c, double bound);
+
 /* An upper bound of h over all spheres, edges and triangles that are left of the complex. */
 double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex);
 

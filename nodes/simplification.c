@@ -307,7 +307,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
   *result = test_inside(s, sphere);
   *asked = sphere[3] - s->protrusion.sphere_depth;
   if (*result != DONE) {
-    s->refused_by_surface++;
+    s->counts.refused_by_surface++;
     return QMAT_OK;
   }
   *result = EXCEEDED;
@@ -316,7 +316,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
         qmat_coverage_test(s->context, &s->coverage, &s->complex, &s->collapse, sphere, first, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
-      s->refused_by_coverage++;
+      s->counts.refused_by_coverage++;
       s->refusal = BY_COVERAGE;
       *asked = fmax(s->held, is_inner(s, s->coverage.failed_point) ? -s->control->distances[s->coverage.failed_point]
                                                                    : s->coverage.failed_distance);
@@ -328,7 +328,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
         qmat_protrusion_test(s->context, &s->protrusion, &s->complex, &s->collapse, sphere, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
-      s->refused_by_protrusion++;
+      s->counts.refused_by_protrusion++;
       s->refusal = BY_PROTRUSION;
       *asked = s->protrusion.failed;
       return QMAT_OK;
@@ -556,20 +556,20 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->held, &c, &asked);
   asked /= share;
   if (bound && c.count == 0) {
-    s->refused_by_protection++;
+    s->counts.refused_by_protection++;
     s->asked[edge] = asked;
     if (asked < INFINITY) *result = EXCEEDED;
     return QMAT_OK;
   }
   if (!bound && s->protecting && !apply_protection(s, edge, &c, &bound)) {
-    s->refused_by_protection++;
+    s->counts.refused_by_protection++;
     return QMAT_OK;
   }
   status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
   if (status != QMAT_OK) return status;
   int64_t change;
   if (!keeps_topology(s, &change)) {
-    s->refused_by_topology++;
+    s->counts.refused_by_topology++;
     return QMAT_OK;
   }
   bool exceeded = false;
@@ -578,9 +578,9 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   const bool fits = s->fitting && !bound;
   for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
     sphere = c.spheres[i];
-    const size_t refused = s->refused_by_coverage;
+    const size_t refused = s->counts.refused_by_coverage;
     status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
-    if (s->refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
+    if (s->counts.refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
     if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
     exceeded |= *result == EXCEEDED;
   }
@@ -685,7 +685,7 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
     status = try_collapse(s, edge, &result);
     if (status != QMAT_OK) return status;
     if (result == DONE) {
-      s->collapses++;
+      s->counts.collapses++;
       update_neighbourhood(s);
       for (int i = 1; i < s->patch.count && status == QMAT_OK; i++) status = settle(s, s->patch.vertices[i]);
       if (status != QMAT_OK) return status;
@@ -758,13 +758,13 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
   }
   if (status != QMAT_OK || ended || in_order(s) || !(s->rules.limit < INFINITY)) return status;
   for (int i = 0; i < s->rules.refits && !ended; i++) {
-    const size_t collapses = s->collapses;
+    const size_t collapses = s->counts.collapses;
     size_t moved;
     s->fitting = true;
     if (i == 0) queue_all(s);
     status = collapse_edges(s, &ended);
     if (status != QMAT_OK || ended) return status;
-    if ((i > 0 || s->rules.patches) && s->collapses == collapses) break;
+    if ((i > 0 || s->rules.patches) && s->counts.collapses == collapses) break;
     if ((status = refit(s, &moved)) != QMAT_OK) return status;
   }
   /* What is left of the error is made small for its own sake. */
@@ -826,17 +826,14 @@ static void carry_bounds(const qmat_simplification *from, const uint32_t *ids, q
   for (size_t e = 0; e < from->complex.edge_count; e++) {
     if (!from->complex.edge_alive[e]) continue;
     const uint32_t *ends = &from->complex.edges[2 * e];
-    const uint32_t edge = qmat_complex_find_edge(&to->complex, ids[ends[0]], ids[ends[1]]);
-    double *bound = &to->protrusion.edge_bounds[edge];
-    *bound = fmin(*bound, from->protrusion.edge_bounds[e]);
+    qmat_protrusion_bound_edge(&to->protrusion, &to->complex, ids[ends[0]], ids[ends[1]],
+                               from->protrusion.edge_bounds[e]);
   }
   for (size_t t = 0; t < from->complex.triangle_count; t++) {
     if (!from->complex.triangle_alive[t]) continue;
     const uint32_t *corners = &from->complex.triangles[3 * t];
-    const uint32_t triangle =
-        qmat_complex_find_triangle(&to->complex, ids[corners[0]], ids[corners[1]], ids[corners[2]]);
-    double *bound = &to->protrusion.triangle_bounds[triangle];
-    *bound = fmin(*bound, from->protrusion.triangle_bounds[t]);
+    qmat_protrusion_bound_triangle(&to->protrusion, &to->complex, ids[corners[0]], ids[corners[1]], ids[corners[2]],
+                                   from->protrusion.triangle_bounds[t]);
   }
 }
 
@@ -870,11 +867,6 @@ qmat_status qmat_simplification_resume(const qmat_simplification *from, const qm
   if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);
   if (status != QMAT_OK) return status;
   carry_bounds(from, ids, to);
-  to->collapses = from->collapses;
-  to->refused_by_surface = from->refused_by_surface;
-  to->refused_by_coverage = from->refused_by_coverage;
-  to->refused_by_protrusion = from->refused_by_protrusion;
-  to->refused_by_protection = from->refused_by_protection;
-  to->refused_by_topology = from->refused_by_topology;
+  to->counts = from->counts;
   return QMAT_OK;
 }

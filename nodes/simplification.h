@@ -20,6 +20,12 @@ typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_p
 typedef enum { QMAT_FEATURES_NONE, QMAT_FEATURES_SHARP } qmat_feature_rule;
 typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
 
+/* What was done, and what was refused by which test. */
+typedef struct qmat_collapse_counts {
+  size_t collapses, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
+      refused_by_topology;
+} qmat_collapse_counts;
+
 /* What collapses are allowed, and when they end. */
 typedef struct qmat_simplification_rules {
   double limit;     /* what both errors are held to at the control points, unit frame; INFINITY: nothing is held */
@@ -80,8 +86,8 @@ typedef struct qmat_simplification {
   bool protecting, fitting;
   int refusal;   /* why the newest test of a sphere failed */
   int64_t euler; /* of the medial mesh */
-  size_t collapses, moves, refused_by_surface, refused_by_coverage, refused_by_protrusion, refused_by_protection,
-      refused_by_topology;
+  size_t moves;
+  qmat_collapse_counts counts;
 } qmat_simplification;
 
 /* Sets the quadrics, the heap, the coverage and the protrusion of a complex up. The caller has made `complex` (unit

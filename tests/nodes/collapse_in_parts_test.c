@@ -152,7 +152,7 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
   collapse(s, 2);
   const qmat_complex *c = &s->run.complex;
   assert_int_equal(c->live_vertices, c->vertex_count);
-  assert_int_equal(s->run.collapses, SPHERES - c->vertex_count);
+  assert_int_equal(s->run.counts.collapses, SPHERES - c->vertex_count);
   assert_true(c->vertex_count >= SPHERES / 4 && c->vertex_count <= SPHERES / 4 + 8);
   /* A sheet it was, and a sheet it is. */
   assert_int_equal(s->run.euler, 1);
