@@ -361,6 +361,9 @@ static qmat_status commit(qmat_simplification *s, const double *sphere) {
   return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
 }
 
+/* A fit looks at so many control points at most, and at so many when it polishes what is left. */
+enum { FITTED_POINTS = 256, POLISHED_POINTS = 1024 };
+
 /* A sphere whose sampled error is this many times what is held is not worth a test. */
 static const double worth_testing = 1.1;
 
@@ -374,7 +377,7 @@ static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
   int least = 0;
   qmat_status status =
-      qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
+      qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count, FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
     status =
         qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], &errors[i]);
@@ -701,8 +704,8 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
 static const double least_gain = 0.02;
 
 /* Fits every sphere to the surface where that lowers its largest error; not those that did not move and whose
- * neighbours have not moved since. */
-static qmat_status refit(qmat_simplification *s, size_t *moved) {
+ * neighbours have not moved since. Each looks at `most` control points. */
+static qmat_status refit(qmat_simplification *s, size_t most, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
     if (!s->complex.vertex_alive[v] || s->settled[v] || (s->protecting && is_protected(s, v)) ||
@@ -712,7 +715,7 @@ static qmat_status refit(qmat_simplification *s, size_t *moved) {
     qmat_status status = report_progress(s);
     if (status == QMAT_OK) status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count);
+      status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count, most);
     double sphere[4], before, after;
     memcpy(sphere, &s->complex.spheres[4 * (size_t)v], sizeof sphere);
     if (status == QMAT_OK)
@@ -765,11 +768,12 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     status = collapse_edges(s, &ended);
     if (status != QMAT_OK || ended) return status;
     if ((i > 0 || s->rules.patches) && s->counts.collapses == collapses) break;
-    if ((status = refit(s, &moved)) != QMAT_OK) return status;
+    if ((status = refit(s, FITTED_POINTS, &moved)) != QMAT_OK) return status;
   }
   /* What is left of the error is made small for its own sake. */
   size_t moved = s->rules.polish;
-  for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++) status = refit(s, &moved);
+  for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
+    status = refit(s, POLISHED_POINTS, &moved);
   return status;
 }
 

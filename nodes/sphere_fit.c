@@ -7,8 +7,6 @@
 #include "core/quadric.h"
 #include "core/vector.h"
 
-enum { MOST_POINTS = 256 };
-
 void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   qmat_free(fit->points);
   *fit = (qmat_sphere_fit){0};
@@ -22,13 +20,13 @@ static bool is_first_slot(const qmat_coverage *coverage, const qmat_collapse *co
 }
 
 qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_coverage *coverage,
-                                   const qmat_collapse *collapse, size_t surface_count) {
-  if (qmat_grow((void **)&fit->points, &fit->capacity, MOST_POINTS, sizeof *fit->points))
+                                   const qmat_collapse *collapse, size_t surface_count, size_t most) {
+  if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   size_t slots = 0, skip = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += coverage->slot_counts[ends[e]];
-  const size_t stride = (slots + MOST_POINTS - 1) / MOST_POINTS;
+  const size_t stride = (slots + most - 1) / most;
   fit->count = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
     for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot]) {
