@@ -3,6 +3,7 @@
 #include "core/thickness.h"
 #include "nodes/libraries.h"
 #include "nodes/medial_dual.h"
+#include "nodes/sampled_solid.h"
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
@@ -35,9 +36,7 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
-    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
-    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
+    QMAT_SAMPLED_SOLID_INPUTS,
     {0},
 };
 

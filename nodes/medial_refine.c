@@ -13,6 +13,7 @@
 #include "nodes/medial_dual.h"
 #include "nodes/point_grid.h"
 #include "nodes/sample_spacing.h"
+#include "nodes/sampled_solid.h"
 
 typedef struct {
   qmat_dual_params dual;
@@ -396,9 +397,7 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},
-    {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},
-    {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"},
+    QMAT_SAMPLED_SOLID_INPUTS,
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh of these samples, from medial.delaunay"},
     {0},
 };

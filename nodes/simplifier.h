@@ -3,6 +3,7 @@
 #define QMAT_NODES_SIMPLIFIER_H
 
 #include "core/node.h"
+#include "nodes/sampled_solid.h"
 #include "nodes/simplification.h"
 
 typedef enum { QMAT_COMPAT_OFF, QMAT_COMPAT_QMAT } qmat_compatibility;
@@ -118,11 +119,9 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
   }
 
 /* The inputs of both nodes. */
-#define QMAT_SIMPLIFY_INPUTS                                                                         \
-  {.name = "mesh", .type = QMAT_MESH, .doc = "The closed surface"},                                  \
-      {.name = "thickness", .type = QMAT_FIELD, .doc = "Thickness per facet, from mesh.sdf"},        \
-      {.name = "samples", .type = QMAT_SAMPLES, .doc = "Points on the surface, from mesh.sample"}, { \
-    .name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh"                          \
+#define QMAT_SIMPLIFY_INPUTS                                                \
+  QMAT_SAMPLED_SOLID_INPUTS, {                                              \
+    .name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh" \
   }
 
 /* The initial medial mesh in the unit frame, in the context's arena. */
