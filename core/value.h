@@ -106,7 +106,7 @@ typedef struct qmat_medial {
 } qmat_medial;
 
 /* A medial mesh and the edge collapses that simplify it, in their order: after the first n of them sphere_count - n
- * spheres are left (nodes/collapse_chain.h). */
+ * spheres are left (nodes/simplify/collapse_chain.h). */
 typedef struct qmat_chain {
   qmat_value base;
   size_t sphere_count, edge_count, triangle_count; /* of the initial medial mesh */

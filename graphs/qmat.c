@@ -7,9 +7,9 @@
 
 #include "core/json_text.h"
 #include "graphs/built_in.h"
-#include "graphs/graph_run.h"
+#include "graphs/run/graph_run.h"
 #include "graphs/node_json.h"
-#include "graphs/run_report.h"
+#include "graphs/run/run_report.h"
 #include "io/soup.h"
 #include "nodes/nodes.h"
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/medial_build.h"
+#include "core/geometry/medial_build.h"
 #include "core/node.h"
 #include "io/draco_draco.h"
 

@@ -6,10 +6,10 @@
 
 #include "io/base64.h"
 #include "io/draco.h"
-#include "io/gltf_asset.h"
-#include "io/ma.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/mesh/ma.h"
 #include "io/model.h"
-#include "io/usd_medial.h"
+#include "io/usd/usd_medial.h"
 
 static qmat_status take_facts(qmat_context *context, const json_t *extras, json_t *facts) {
   const char *key;

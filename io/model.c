@@ -3,11 +3,11 @@
 
 #include <string.h>
 
-#include "io/gltf.h"
-#include "io/gltf_asset.h"
-#include "io/ma.h"
-#include "io/mesh_formats.h"
-#include "io/usd_scene.h"
+#include "io/gltf/gltf.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/mesh/ma.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/usd/usd_scene.h"
 
 static const struct {
   const char *title; /* as people write it */

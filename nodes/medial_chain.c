@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "core/json_text.h"
-#include "nodes/collapse_chain.h"
-#include "nodes/libraries.h"
-#include "nodes/simplifier.h"
+#include "nodes/simplify/collapse_chain.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/simplify/simplifier.h"
 
 static void *copy_of(const void *array, size_t count, size_t size) {
   void *copy = qmat_alloc(count, size);

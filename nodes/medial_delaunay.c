@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.delaunay: the initial medial mesh from the Delaunay tetrahedra of surface samples (Algorithm 1). */
-#include "core/thickness.h"
-#include "nodes/libraries.h"
-#include "nodes/medial_dual.h"
-#include "nodes/sampled_solid.h"
+#include "core/geometry/thickness.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/initial/medial_dual.h"
+#include "nodes/descriptor/sampled_solid.h"
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {

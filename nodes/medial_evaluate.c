@@ -7,11 +7,11 @@
 
 #include "core/hash.h"
 #include "core/json_text.h"
-#include "core/medial_distance.h"
+#include "core/geometry/medial_distance.h"
 #include "core/node.h"
-#include "nodes/boundary_distance.h"
-#include "nodes/cover.h"
-#include "nodes/topology.h"
+#include "nodes/measure/boundary_distance.h"
+#include "nodes/measure/cover.h"
+#include "nodes/measure/topology.h"
 
 typedef struct medial_evaluate_params {
   double epsilon;   /* 0: nothing is to be certified */

@@ -3,12 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/envelope.h"
-#include "core/frame.h"
+#include "core/geometry/envelope.h"
+#include "core/geometry/frame.h"
 #include "core/json_text.h"
-#include "core/medial_build.h"
-#include "core/vector.h"
-#include "nodes/creases.h"
+#include "core/geometry/medial_build.h"
+#include "core/geometry/vector.h"
+#include "nodes/initial/creases.h"
 
 typedef enum { FEATURES_NONE, FEATURES_SHARP } feature_kind;
 

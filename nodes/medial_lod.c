@@ -2,7 +2,7 @@
 /* medial.lod: one level of detail of a chain of collapses. */
 #include "core/json_text.h"
 #include "core/node.h"
-#include "nodes/collapse_chain.h"
+#include "nodes/simplify/collapse_chain.h"
 
 typedef struct medial_lod_params {
   int64_t vertices;

@@ -5,15 +5,15 @@
 
 #include "core/hash.h"
 #include "core/json_text.h"
-#include "core/medial_complex.h"
-#include "core/thickness.h"
-#include "core/vector.h"
-#include "nodes/control_points.h"
-#include "nodes/libraries.h"
-#include "nodes/medial_dual.h"
-#include "nodes/point_grid.h"
-#include "nodes/sample_spacing.h"
-#include "nodes/sampled_solid.h"
+#include "core/geometry/medial_complex.h"
+#include "core/geometry/thickness.h"
+#include "core/geometry/vector.h"
+#include "nodes/measure/control_points.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/initial/medial_dual.h"
+#include "nodes/measure/point_grid.h"
+#include "nodes/initial/sample_spacing.h"
+#include "nodes/descriptor/sampled_solid.h"
 
 typedef struct {
   qmat_dual_params dual;

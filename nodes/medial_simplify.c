@@ -5,13 +5,13 @@
 
 #include "core/json_text.h"
 #include "core/node.h"
-#include "nodes/collapse_in_parts.h"
-#include "nodes/hollow_filling.h"
-#include "nodes/libraries.h"
-#include "nodes/medial_errors.h"
-#include "nodes/protrusion.h"
-#include "nodes/simplifier.h"
-#include "nodes/topology.h"
+#include "nodes/simplify/collapse_in_parts.h"
+#include "nodes/simplify/hollow_filling.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/measure/medial_errors.h"
+#include "nodes/measure/protrusion.h"
+#include "nodes/simplify/simplifier.h"
+#include "nodes/measure/topology.h"
 
 typedef qmat_simplify_params medial_simplify_params;
 

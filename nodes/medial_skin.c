@@ -4,12 +4,12 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/envelope.h"
-#include "core/frame.h"
+#include "core/geometry/envelope.h"
+#include "core/geometry/frame.h"
 #include "core/node.h"
-#include "nodes/envelope_surface.h"
-#include "nodes/libraries.h"
-#include "nodes/skin_surface_cgal.h"
+#include "nodes/skin/envelope_surface.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/skin/skin_surface_cgal.h"
 
 /* What CGAL's skin surface is given at most: it may take 45 seconds for as many. */
 static const size_t MOST_BALLS = 3000;

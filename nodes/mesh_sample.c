@@ -4,12 +4,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/frame.h"
+#include "core/geometry/frame.h"
 #include "core/hash.h"
 #include "core/node.h"
-#include "core/thickness.h"
-#include "core/triangle.h"
-#include "nodes/sample_spacing.h"
+#include "core/geometry/thickness.h"
+#include "core/geometry/triangle.h"
+#include "nodes/initial/sample_spacing.h"
 
 #define MOST_PER_FACET 64
 #define MOST_SITES (MOST_PER_FACET + 3)

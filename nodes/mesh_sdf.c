@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "core/node.h"
-#include "core/surface.h"
-#include "core/triangle.h"
-#include "nodes/libraries.h"
-#include "nodes/sample_thinning.h"
+#include "core/geometry/surface.h"
+#include "core/geometry/triangle.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/initial/sample_thinning.h"
 
 #define MOST_RAYS 1024
 /* Rays start at the facet; its own plane is met at a distance of rounding. In the unit frame. */

@@ -5,11 +5,11 @@
 
 #include "core/json_text.h"
 #include "core/node.h"
-#include "core/surface.h"
-#include "core/vector.h"
+#include "core/geometry/surface.h"
+#include "core/geometry/vector.h"
 #include "io/soup.h"
-#include "nodes/libraries.h"
-#include "nodes/subdivision_osd.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/mesh/subdivision_osd.h"
 
 typedef struct mesh_subdivide_params {
   int64_t level;     /* 0: from epsilon */

@@ -5,11 +5,11 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/frame.h"
+#include "core/geometry/frame.h"
 #include "core/json_text.h"
 #include "core/node.h"
-#include "nodes/libraries.h"
-#include "nodes/union_cgal.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/mesh/union_cgal.h"
 
 typedef enum parts_choice { PARTS_UNION, PARTS_KEEP } parts_choice;
 

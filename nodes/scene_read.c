@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/node.h"
 #include "io/model.h"
-#include "nodes/libraries.h"
+#include "nodes/descriptor/libraries.h"
 
 typedef struct scene_read_params {
   const char *path;

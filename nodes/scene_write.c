@@ -3,11 +3,11 @@
 #include <math.h>
 
 #include "core/node.h"
-#include "io/gltf_write.h"
-#include "io/ma.h"
-#include "io/mesh_formats.h"
-#include "io/usd_write.h"
-#include "nodes/libraries.h"
+#include "io/gltf/gltf_write.h"
+#include "io/mesh/ma.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/usd/usd_write.h"
+#include "nodes/descriptor/libraries.h"
 
 /* Quantisation spends this part of epsilon at most; without a report epsilon is taken for this part of the diagonal. */
 #define PART_OF_EPSILON 0.05

@@ -15,11 +15,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/thickness.h"
+#include "core/geometry/thickness.h"
 #include "examples/models.h"
 #include "io/model.h"
 #include "nodes/nodes.h"
-#include "nodes/sample_thinning.h"
+#include "nodes/initial/sample_thinning.h"
 #include "tests/bench/plain_delaunay_cgal.h"
 
 enum { MILLION = 1000000, GENERATED_RESOLUTION = 40 };

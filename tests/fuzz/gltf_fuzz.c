@@ -7,10 +7,10 @@
 
 #include "io/base64.h"
 #include "io/extract.h"
-#include "io/gltf_asset.h"
-#include "io/gltf_write.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_write.h"
 #include "io/model.h"
-#include "tests/io/gltf_assets.h"
+#include "tests/io/gltf/gltf_assets.h"
 #include "tests/io/medial_examples.h"
 
 #define DATA "../shared/data/gltf/"

@@ -3,13 +3,13 @@
  * from its number alone, so that a failure can be found again: the last line names it. Ends with an error where a
  * reader takes more memory at once than the file justifies, or more seconds than any of them needs; crashes are for the
  * sanitizers to find. */
-#include "io/usd_medial.h"
-#include "io/usd_scene.h"
-#include "io/usdz.h"
+#include "io/usd/usd_medial.h"
+#include "io/usd/usd_scene.h"
+#include "io/usd/usdz.h"
 #include "tests/fuzz/fuzz.h"
-#include "tests/io/crate_writer.h"
-#include "tests/io/usd_examples.h"
-#include "tests/io/usd_layers.h"
+#include "tests/io/usd/crate_writer.h"
+#include "tests/io/usd/usd_examples.h"
+#include "tests/io/usd/usd_layers.h"
 
 #define DATA "../shared/data/usd/"
 

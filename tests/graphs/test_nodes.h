@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_TESTS_TEST_NODES_H
-#define QMAT_TESTS_TEST_NODES_H
+#ifndef QMAT_TESTS_GRAPHS_TEST_NODES_H
+#define QMAT_TESTS_GRAPHS_TEST_NODES_H
 
 /* Small nodes for the tests of graphs: numbers travel as reports {"value": x}. Include after cmocka. */
 
@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "graphs/graph_run.h"
+#include "graphs/run/graph_run.h"
 
 typedef struct number_params {
   double value;

@@ -4,9 +4,9 @@
 #include <math.h>
 
 #include "core/json_text.h"
-#include "io/gltf_write.h"
-#include "io/ma.h"
-#include "io/usd_write.h"
+#include "io/gltf/gltf_write.h"
+#include "io/mesh/ma.h"
+#include "io/usd/usd_write.h"
 #include "tests/io/files.h"
 #include "tests/io/medial_examples.h"
 

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/medial_build.h"
+#include "core/geometry/medial_build.h"
 
 static inline qmat_medial *example_build(const double *spheres, size_t sphere_count, const uint32_t *edges,
                                          size_t edge_count, const uint32_t *triangles, size_t triangle_count) {

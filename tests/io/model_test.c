@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/model.h"
 
-#include "io/ma.h"
+#include "io/mesh/ma.h"
 #include "tests/io/files.h"
 
 static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

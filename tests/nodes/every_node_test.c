@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-#include "core/medial_build.h"
+#include "core/geometry/medial_build.h"
 #include "examples/models.h"
 #include "nodes/nodes.h"
 #include "tests/shapes.h"

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/surface.h"
+#include "core/geometry/surface.h"
 #include "tests/nodes/pipeline.h"
 
 /* The tetrahedra's own spheres: nothing that is near is merged, nothing is refined. */

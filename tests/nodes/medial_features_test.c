@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "nodes/topology.h"
+#include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
 
 static const char *const sampling = "spacing=12% n_f=0", *const no_division = "spacing=100%";

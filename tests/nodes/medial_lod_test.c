@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "nodes/collapse_chain.h"
+#include "nodes/simplify/collapse_chain.h"
 #include "tests/nodes/pipeline.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/envelope.h"
+#include "core/geometry/envelope.h"
 #include "core/hash.h"
 #include "tests/nodes/pipeline.h"
 

@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "core/envelope.h"
-#include "core/medial_build.h"
-#include "core/surface.h"
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_build.h"
+#include "core/geometry/surface.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 

@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "core/envelope.h"
+#include "core/geometry/envelope.h"
 #include "core/hash.h"
-#include "core/medial_build.h"
+#include "core/geometry/medial_build.h"
 #include "core/node.h"
 #include "tests/shapes.h"
 

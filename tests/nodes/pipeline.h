@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/frame.h"
+#include "core/geometry/frame.h"
 #include "core/node.h"
 #include "examples/models.h"
 #include "nodes/nodes.h"

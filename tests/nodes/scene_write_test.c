@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/medial_build.h"
+#include "core/geometry/medial_build.h"
 #include "io/base64.h"
 #include "io/draco.h"
-#include "io/ma.h"
+#include "io/mesh/ma.h"
 #include "nodes/nodes.h"
 #include "tests/shapes.h"
 

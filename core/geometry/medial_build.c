@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/geometry/medial_build.h"
+
+#include <string.h>
+
+#define MOST_ROWS ((size_t)1 << 40) /* keeps 3 * count and count * 12 bytes far from overflow */
+
+static void put_ids_in_order(uint32_t *row, size_t width) {
+  for (size_t i = 1; i < width; i++) {
+    for (size_t j = i; j > 0 && row[j] < row[j - 1]; j--) {
+      uint32_t swap = row[j];
+      row[j] = row[j - 1];
+      row[j - 1] = swap;
+    }
+  }
+}
+
+static bool names_a_sphere_twice(const uint32_t *row, size_t width) {
+  for (size_t i = 1; i < width; i++) {
+    if (row[i] == row[i - 1]) return true;
+  }
+  return false;
+}
+
+static qmat_status check_ids(qmat_context *context, const char *kind, const uint32_t *ids, size_t count, size_t width,
+                             size_t sphere_count) {
+  for (size_t i = 0; i < count * width; i++) {
+    if (ids[i] >= sphere_count) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "names sphere %u of %zu", ids[i], sphere_count);
+      return qmat_fail_element(context, kind, (int64_t)(i / width));
+    }
+  }
+  return QMAT_OK;
+}
+
+/* One stable pass per column, last column first, leaves the rows in dictionary order. `swap` has the rows' size,
+ * `starts` sphere_count + 1 elements. The sorted rows are in `rows`, without repeats; returns how many. */
+static size_t sort_rows(uint32_t *rows, uint32_t *swap, size_t *starts, size_t count, size_t width,
+                        size_t sphere_count) {
+  uint32_t *from = rows, *to = swap;
+  for (size_t column = width; column-- > 0;) {
+    memset(starts, 0, (sphere_count + 1) * sizeof *starts);
+    for (size_t i = 0; i < count; i++) starts[from[i * width + column] + 1]++;
+    for (size_t i = 0; i < sphere_count; i++) starts[i + 1] += starts[i];
+    for (size_t i = 0; i < count; i++) {
+      size_t place = starts[from[i * width + column]]++;
+      memcpy(to + place * width, from + i * width, width * sizeof *to);
+    }
+    uint32_t *turn = from;
+    from = to;
+    to = turn;
+  }
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *row = from + i * width;
+    if (i > 0 && memcmp(row, row - width, width * sizeof *row) == 0) continue;
+    if (from != rows || kept != i) memcpy(rows + kept * width, row, width * sizeof *row);
+    kept++;
+  }
+  return kept;
+}
+
+qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial, const uint32_t *edges,
+                                      size_t edge_count, const uint32_t *triangles, size_t triangle_count) {
+  size_t sphere_count = medial->sphere_count;
+  if (edge_count > MOST_ROWS || triangle_count > MOST_ROWS || sphere_count > UINT32_MAX) {
+    return qmat_fail_memory(context, "the edges and triangles of a medial mesh");
+  }
+  qmat_status status = check_ids(context, "edge", edges, edge_count, 2, sphere_count);
+  if (status != QMAT_OK) return status;
+  status = check_ids(context, "triangle", triangles, triangle_count, 3, sphere_count);
+  if (status != QMAT_OK) return status;
+
+  size_t all_edges = edge_count + 3 * triangle_count;
+  size_t largest = 2 * all_edges > 3 * triangle_count ? 2 * all_edges : 3 * triangle_count;
+  uint32_t *new_triangles = qmat_alloc(triangle_count, 3 * sizeof *new_triangles);
+  uint32_t *new_edges = qmat_alloc(all_edges, 2 * sizeof *new_edges);
+  uint32_t *swap = qmat_alloc(largest, sizeof *swap);
+  size_t *starts = qmat_alloc(sphere_count + 2, sizeof *starts);
+  if (!new_triangles || !new_edges || !swap || !starts) {
+    status = qmat_fail_memory(context, "the edges and triangles of a medial mesh");
+    goto done;
+  }
+
+  size_t kept = 0;
+  for (size_t i = 0; i < triangle_count; i++) {
+    uint32_t *row = new_triangles + 3 * kept;
+    memcpy(row, triangles + 3 * i, 3 * sizeof *row);
+    put_ids_in_order(row, 3);
+    if (!names_a_sphere_twice(row, 3)) kept++;
+  }
+  size_t new_triangle_count = sort_rows(new_triangles, swap, starts, kept, 3, sphere_count);
+
+  kept = 0;
+  for (size_t i = 0; i < edge_count; i++) {
+    uint32_t *row = new_edges + 2 * kept;
+    memcpy(row, edges + 2 * i, 2 * sizeof *row);
+    put_ids_in_order(row, 2);
+    if (!names_a_sphere_twice(row, 2)) kept++;
+  }
+  for (size_t i = 0; i < new_triangle_count; i++) {
+    const uint32_t *t = new_triangles + 3 * i;
+    const uint32_t sides[6] = {t[0], t[1], t[0], t[2], t[1], t[2]};
+    memcpy(new_edges + 2 * kept, sides, sizeof sides);
+    kept += 3;
+  }
+  size_t new_edge_count = sort_rows(new_edges, swap, starts, kept, 2, sphere_count);
+
+  qmat_free(medial->edges);
+  qmat_free(medial->triangles);
+  medial->edges = new_edges;
+  medial->edge_count = new_edge_count;
+  medial->triangles = new_triangles;
+  medial->triangle_count = new_triangle_count;
+  new_edges = NULL;
+  new_triangles = NULL;
+
+done:
+  qmat_free(starts);
+  qmat_free(swap);
+  qmat_free(new_edges);
+  qmat_free(new_triangles);
+  return status;
+}

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_GEOMETRY_MEDIAL_COMPLEX_H
+#define QMAT_CORE_GEOMETRY_MEDIAL_COMPLEX_H
+
+#include "core/value.h"
+
+#define QMAT_NONE UINT32_MAX
+
+/* The rows of a growing table of lists, in one pool. */
+typedef struct qmat_rows {
+  uint32_t *items;
+  size_t used, capacity;
+  size_t *starts;           /* per row */
+  uint32_t *counts, *rooms; /* per row: items held, items that fit in place */
+} qmat_rows;
+
+/* A medial mesh that can be changed by edge collapses: a simplicial complex of vertices, edges and triangles, in
+ * general not a manifold. Ids never change; what a collapse removes is marked as dead. Spheres are in whatever frame
+ * the caller chose. */
+typedef struct qmat_complex {
+  size_t vertex_count, edge_count, triangle_count; /* ids ever given */
+  size_t live_vertices, live_edges, live_triangles;
+  double *spheres;          /* 4 per vertex */
+  uint32_t *edges;          /* 2 per edge */
+  uint32_t *edge_triangles; /* per edge: how many live triangles it bounds */
+  uint32_t *triangles;      /* 3 per triangle */
+  uint32_t *triangle_edges; /* 3 per triangle: the edge opposite corner k */
+  uint8_t *vertex_alive, *edge_alive, *triangle_alive;
+  qmat_rows vertex_edges, vertex_triangles; /* the live edges and triangles at each vertex */
+  /* Scratch of qmat_complex_preview. */
+  uint32_t *mark_of_vertex, *edge_to_vertex; /* per vertex */
+  uint32_t *mark_of_edge, *triangle_at_edge; /* per edge */
+  uint32_t stamp;
+} qmat_complex;
+
+/* What the star of the merged vertex will be after edge (u, v) collapses: vertex `kept` stays, `removed` goes. Of a
+ * vertex that only moves it is the star as it is: `edge` and `removed` are QMAT_NONE. */
+typedef struct qmat_collapse {
+  uint32_t edge, kept, removed;
+  size_t neighbour_count, neighbour_capacity;
+  uint32_t *neighbours;    /* the link's vertices */
+  uint32_t *kept_edges;    /* per neighbour: its edge to `kept`, or QMAT_NONE */
+  uint32_t *removed_edges; /* per neighbour: its edge to `removed`, or QMAT_NONE */
+  size_t triangle_count, triangle_capacity;
+  uint32_t *triangle_pairs;    /* 2 per new triangle: its corners other than the merged vertex */
+  uint32_t *kept_triangles;    /* per new triangle: the one it was at `kept`, or QMAT_NONE */
+  uint32_t *removed_triangles; /* per new triangle: the one it was at `removed`, or QMAT_NONE */
+  size_t vanishing_count, vanishing_capacity;
+  uint32_t *vanishing; /* triangles on the edge itself, which become edges */
+} qmat_collapse;
+
+/* Makes a complex of a medial mesh; `spheres` (4 * sphere_count doubles) replace its own, NULL keeps them. Freed with
+ * qmat_complex_uninit, also after a failure. QMAT_ERROR_MEMORY. Cost: linear. */
+qmat_status qmat_complex_init(qmat_context *context, qmat_complex *complex, const qmat_medial *medial,
+                              const double *spheres);
+void qmat_complex_uninit(qmat_complex *complex);
+
+/* Looks at what collapsing a live edge would do; changes nothing but scratch. The arrays of `collapse` grow as needed
+ * and are reused; zero it before the first use and free it with qmat_collapse_uninit. Cost: linear in both stars. */
+qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *collapse);
+void qmat_collapse_uninit(qmat_collapse *collapse);
+
+/* The same for moving a vertex, which changes no simplex: its star. */
+qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *complex, uint32_t vertex,
+                                      qmat_collapse *collapse);
+
+/* Does what the newest preview says, with the merged sphere (4 doubles). Afterwards the edges at `kept` that were also
+ * at `removed` are one: the one at `kept` lives on. */
+qmat_status qmat_complex_collapse(qmat_context *context, qmat_complex *complex, const qmat_collapse *collapse,
+                                  const double sphere[4]);
+
+/* The edge between two live vertices, or QMAT_NONE. Cost: linear in the smaller star. */
+uint32_t qmat_complex_find_edge(const qmat_complex *complex, uint32_t a, uint32_t b);
+
+/* The triangle of three live vertices, or QMAT_NONE. Cost: linear in the first one's star. */
+uint32_t qmat_complex_find_triangle(const qmat_complex *complex, uint32_t a, uint32_t b, uint32_t c);
+
+/* The live edges (triangles) at a vertex. */
+static inline const uint32_t *qmat_complex_edges_at(const qmat_complex *complex, uint32_t vertex, size_t *count) {
+  *count = complex->vertex_edges.counts[vertex];
+  return complex->vertex_edges.items + complex->vertex_edges.starts[vertex];
+}
+static inline const uint32_t *qmat_complex_triangles_at(const qmat_complex *complex, uint32_t vertex, size_t *count) {
+  *count = complex->vertex_triangles.counts[vertex];
+  return complex->vertex_triangles.items + complex->vertex_triangles.starts[vertex];
+}
+
+/* The other end of an edge. */
+static inline uint32_t qmat_complex_other_end(const qmat_complex *complex, uint32_t edge, uint32_t vertex) {
+  const uint32_t *ends = &complex->edges[2 * (size_t)edge];
+  return ends[0] == vertex ? ends[1] : ends[0];
+}
+
+#endif

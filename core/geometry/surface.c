@@ -1,0 +1,511 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/geometry/surface.h"
+
+#include <embree3/rtcore.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/triangle_blocks.h"
+#include "core/geometry/vector.h"
+
+/* Embree stores single precision. In the unit frame coordinates are at most 1/2 and rays at most about 2 long, so that
+ * its hits are within a few 1e-7 of the triangle's plane; TIE is well above that. */
+#define TIE 4e-6
+/* How far along the ray the double precision hit may be from the single precision one. */
+#define LONGEST_CORRECTION 1e-4
+/* Barycentric coordinate and cosine below which a ray that counts crossings may have met an edge. */
+#define GRAZING 1e-4f
+#define RAY_COUNT 7
+#define LEAF_SIZE 8
+/* Nodes farther away than this many of their radii are taken as one dipole (Barill et al. 2018, section 3). */
+#define DIPOLE_BETA 2.3
+
+/* A node of the winding number tree: its triangles as one dipole. */
+typedef struct winding_node {
+  double centre[3];
+  double area_vector[3];
+  double radius; /* of a ball around the centre that holds all its triangles */
+} winding_node;
+
+struct qmat_surface {
+  const qmat_mesh *mesh;
+  qmat_frame frame;
+  double *positions;
+  double low[3], high[3];
+  RTCDevice device;
+  RTCScene scene;
+  qmat_triangle_blocks *blocks; /* for distances */
+  /* The winding number tree, for surfaces that are not closed and oriented: node 1 is the root, node k has the children
+   * 2 k and 2 k + 1, leaf k (node leaf_count + k) holds order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
+  size_t leaf_count; /* a power of two; 0: no tree */
+  winding_node *nodes;
+  uint32_t *order;
+};
+
+typedef enum query_kind { COUNT_CROSSINGS, NEAREST_HIT } query_kind;
+
+/* Embree hands the context that it was given to the filter function. */
+typedef struct query_context {
+  struct RTCIntersectContext base;
+  query_kind kind;
+  int winding; /* COUNT_CROSSINGS: +1 for each triangle left through its back, -1 entered through its front */
+  bool grazing;
+  const double *origin, *direction; /* NEAREST_HIT, in double */
+  double offset, start;             /* origin of the single precision ray along the ray, and what hits must exceed */
+  double distance;                  /* the nearest so far */
+  uint32_t triangle;
+} query_context;
+
+typedef struct device_message {
+  char text[256];
+} device_message;
+
+static const double *corner_position(const qmat_surface *surface, uint32_t triangle, int corner) {
+  return surface->positions + 3 * (size_t)surface->mesh->triangles[3 * (size_t)triangle + (size_t)corner];
+}
+
+/* Twice the area vector. */
+static void triangle_normal(const qmat_surface *surface, uint32_t triangle, double normal[3]) {
+  double e[3], f[3];
+  const double *a = corner_position(surface, triangle, 0);
+  qmat_subtract(corner_position(surface, triangle, 1), a, e);
+  qmat_subtract(corner_position(surface, triangle, 2), a, f);
+  qmat_cross(e, f, normal);
+}
+
+/* --- rays ------------------------------------------------------------------------------------------------------- */
+
+/* The distance at which the ray meets the triangle's plane; what single precision found where the ray runs so close to
+ * along the plane that the plane says nothing. */
+static double refine_hit(const qmat_surface *surface, const query_context *query, uint32_t triangle, double found) {
+  double normal[3], to_plane[3];
+  triangle_normal(surface, triangle, normal);
+  qmat_subtract(corner_position(surface, triangle, 0), query->origin, to_plane);
+  const double slope = qmat_dot(query->direction, normal);
+  const double distance = qmat_dot(to_plane, normal) / slope, correction = fabs(distance - found);
+  const bool meets_plane = correction * fabs(slope) <= TIE * sqrt(qmat_dot(normal, normal));
+  return meets_plane && correction <= LONGEST_CORRECTION ? distance : found;
+}
+
+/* Sees every hit of an occlusion ray and refuses it, so that Embree goes on: which hits come does not depend on the
+ * layout of the tree, only their order does. Single rays only, so that N is 1. */
+static void see_hit(const struct RTCFilterFunctionNArguments *args) {
+  const qmat_surface *surface = args->geometryUserPtr;
+  query_context *query = (query_context *)(void *)args->context;
+  const struct RTCRay *ray = (const struct RTCRay *)(const void *)args->ray;
+  const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
+  args->valid[0] = 0;
+  if (query->kind == NEAREST_HIT) {
+    const uint32_t triangle = hit->primID;
+    const double found = query->offset + (double)ray->tfar;
+    if (found > query->distance + LONGEST_CORRECTION) return;
+    const double distance = refine_hit(surface, query, triangle, found);
+    if (distance > query->start &&
+        (distance < query->distance || (distance == query->distance && triangle < query->triangle))) {
+      query->distance = distance;
+      query->triangle = triangle;
+    }
+    return;
+  }
+  const float side = hit->Ng_x * ray->dir_x + hit->Ng_y * ray->dir_y + hit->Ng_z * ray->dir_z;
+  const float square = hit->Ng_x * hit->Ng_x + hit->Ng_y * hit->Ng_y + hit->Ng_z * hit->Ng_z;
+  query->winding += (side > 0) - (side < 0);
+  query->grazing |= fminf(fminf(hit->u, hit->v), 1 - hit->u - hit->v) < GRAZING;
+  query->grazing |= side * side <= GRAZING * GRAZING * square;
+}
+
+static void set_ray(struct RTCRay *ray, const double origin[3], const double direction[3], double offset, float near,
+                    float far) {
+  ray->org_x = (float)(origin[0] + offset * direction[0]);
+  ray->org_y = (float)(origin[1] + offset * direction[1]);
+  ray->org_z = (float)(origin[2] + offset * direction[2]);
+  ray->tnear = near;
+  ray->dir_x = (float)direction[0];
+  ray->dir_y = (float)direction[1];
+  ray->dir_z = (float)direction[2];
+  ray->time = 0;
+  ray->tfar = far;
+  ray->mask = (unsigned)-1;
+  ray->id = 0;
+  ray->flags = 0;
+}
+
+bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], const double direction[3], double start,
+                       double *distance, uint32_t *triangle, double *normal) {
+  query_context query;
+  rtcInitIntersectContext(&query.base);
+  query.kind = NEAREST_HIT;
+  query.origin = origin;
+  query.direction = direction;
+  query.start = start;
+
+  /* Single precision starts a little before `start`, and never far from the unit ball that holds the model. */
+  const double foot = -qmat_dot(origin, direction);
+  query.offset = start - TIE;
+  if (foot - 1 > query.offset) query.offset = foot - 1;
+  if (!(foot + 1 > query.offset)) return false;
+
+  /* All hits in one go: a look at the nearest one first, and at its equals after, takes longer. */
+  struct RTCRay ray;
+  query.distance = INFINITY;
+  query.triangle = UINT32_MAX;
+  set_ray(&ray, origin, direction, query.offset, 0, INFINITY);
+  rtcOccluded1(surface->scene, &query.base, &ray);
+  if (query.triangle == UINT32_MAX) return false;
+  if (distance != NULL) *distance = query.distance;
+  if (triangle != NULL) *triangle = query.triangle;
+  if (normal != NULL) {
+    triangle_normal(surface, query.triangle, normal);
+    const double length = sqrt(qmat_dot(normal, normal));
+    for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
+  }
+  return true;
+}
+
+/* --- inside ----------------------------------------------------------------------------------------------------- */
+
+/* In exact arithmetic a ray that meets no edge counts how often a closed oriented surface winds around its origin.
+ * Directions in general position, near the axes first because models tend to be axis-aligned and rays then short. */
+static const double ray_directions[RAY_COUNT][3] = {
+    {0.98632441, 0.13298071, 0.09771263},  {-0.11407731, 0.98765432, 0.10754219}, {0.09135721, -0.12643157, 0.98776113},
+    {0.57391847, 0.61173295, 0.54451219},  {-0.60357124, 0.52117943, 0.60331877}, {0.55127391, -0.58719213, 0.59270351},
+    {0.62183517, 0.53172941, -0.57497823},
+};
+
+static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
+  int score = 0;
+  for (int i = 0; i < RAY_COUNT && abs(score) < 4; i++) {
+    /* Away from the centre, where less of the model lies. */
+    const double sign = qmat_dot(point, ray_directions[i]) < 0 ? -1 : 1;
+    const double direction[3] = {sign * ray_directions[i][0], sign * ray_directions[i][1], sign * ray_directions[i][2]};
+    query_context query;
+    rtcInitIntersectContext(&query.base);
+    query.kind = COUNT_CROSSINGS;
+    query.winding = 0;
+    query.grazing = false;
+    struct RTCRay ray;
+    set_ray(&ray, point, direction, 0, 0, INFINITY);
+    rtcOccluded1(surface->scene, &query.base, &ray);
+    const int weight = query.grazing ? 1 : 2;
+    score += query.winding > 0 ? weight : -weight;
+  }
+  return score > 0;
+}
+
+/* The solid angle of a triangle as seen from a point, over 4 pi (van Oosterom and Strackee 1983). */
+static double solid_angle(const qmat_surface *surface, uint32_t triangle, const double point[3]) {
+  double a[3], b[3], c[3], bc[3];
+  qmat_subtract(corner_position(surface, triangle, 0), point, a);
+  qmat_subtract(corner_position(surface, triangle, 1), point, b);
+  qmat_subtract(corner_position(surface, triangle, 2), point, c);
+  qmat_cross(b, c, bc);
+  const double la = sqrt(qmat_dot(a, a)), lb = sqrt(qmat_dot(b, b)), lc = sqrt(qmat_dot(c, c));
+  const double y = qmat_dot(a, bc), x = la * lb * lc + qmat_dot(a, b) * lc + qmat_dot(b, c) * la + qmat_dot(c, a) * lb;
+  return y == 0 ? 0 : atan2(y, x) * 0.159154943091895335769; /* 2 / (4 pi) */
+}
+
+static void leaf_range(const qmat_surface *surface, size_t leaf, size_t *begin, size_t *end) {
+  const size_t n = surface->mesh->triangle_count;
+  /* leaf * n / leaf_count without overflow. */
+  const size_t share = n / surface->leaf_count, rest = n % surface->leaf_count;
+  *begin = leaf * share + leaf * rest / surface->leaf_count;
+  *end = (leaf + 1) * share + (leaf + 1) * rest / surface->leaf_count;
+}
+
+static double winding_number(const qmat_surface *surface, const double point[3]) {
+  size_t stack[72];
+  int depth = 0;
+  stack[depth++] = 1;
+  double winding = 0;
+  while (depth > 0) {
+    const size_t index = stack[--depth];
+    const winding_node *node = surface->nodes + index;
+    double offset[3];
+    qmat_subtract(node->centre, point, offset);
+    const double square = qmat_dot(offset, offset);
+    if (square > DIPOLE_BETA * DIPOLE_BETA * node->radius * node->radius) {
+      winding +=
+          qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * 0.0795774715459476678844; /* 1 / (4 pi) */
+    } else if (index >= surface->leaf_count) {
+      size_t begin, end;
+      leaf_range(surface, index - surface->leaf_count, &begin, &end);
+      for (size_t i = begin; i < end; i++) winding += solid_angle(surface, surface->order[i], point);
+    } else {
+      stack[depth++] = 2 * index + 1;
+      stack[depth++] = 2 * index;
+    }
+  }
+  return winding;
+}
+
+bool qmat_surface_inside(const qmat_surface *surface, const double point[3]) {
+  for (int axis = 0; axis < 3; axis++) {
+    if (!(point[axis] >= surface->low[axis] && point[axis] <= surface->high[axis])) return false;
+  }
+  return surface->leaf_count > 0 ? winding_number(surface, point) > 0.5 : inside_by_rays(surface, point);
+}
+
+void qmat_surface_inside_many(const qmat_surface *surface, const double *points, size_t count, uint8_t *inside,
+                              int threads) {
+#pragma omp parallel for schedule(dynamic, 256) num_threads(threads)
+  for (size_t i = 0; i < count; i++) inside[i] = qmat_surface_inside(surface, points + 3 * i);
+}
+
+/* --- distance --------------------------------------------------------------------------------------------------- */
+
+double qmat_surface_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
+                             uint32_t *triangle) {
+  return qmat_triangle_blocks_distance(surface->blocks, point, limit, closest, triangle);
+}
+
+double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]) {
+  const double distance = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
+  return qmat_surface_inside(surface, point) ? -distance : distance;
+}
+
+/* --- building --------------------------------------------------------------------------------------------------- */
+
+typedef struct sort_item {
+  uint64_t code;
+  uint32_t triangle;
+} sort_item;
+
+static int compare_items(const void *left, const void *right) {
+  const sort_item *a = left, *b = right;
+  if (a->code != b->code) return a->code < b->code ? -1 : 1;
+  return a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
+}
+
+/* Every third bit of the result holds a bit of a 21-bit number. */
+static uint64_t spread_bits(uint64_t x) {
+  x &= 0x1fffff;
+  x = (x | x << 32) & 0x1f00000000ffff;
+  x = (x | x << 16) & 0x1f0000ff0000ff;
+  x = (x | x << 8) & 0x100f00f00f00f00f;
+  x = (x | x << 4) & 0x10c30c30c30c30c3;
+  return (x | x << 2) & 0x1249249249249249;
+}
+
+static void area_and_centroid(const qmat_surface *surface, uint32_t triangle, double area_vector[3],
+                              double centroid[3]) {
+  triangle_normal(surface, triangle, area_vector);
+  const double *a = corner_position(surface, triangle, 0), *b = corner_position(surface, triangle, 1),
+               *c = corner_position(surface, triangle, 2);
+  for (int i = 0; i < 3; i++) {
+    area_vector[i] *= 0.5;
+    centroid[i] = (a[i] + b[i] + c[i]) / 3;
+  }
+}
+
+static double farthest_corner(const qmat_surface *surface, size_t begin, size_t end, const double centre[3]) {
+  double square = 0;
+  for (size_t i = begin; i < end; i++) {
+    for (int corner = 0; corner < 3; corner++) {
+      double offset[3];
+      qmat_subtract(corner_position(surface, surface->order[i], corner), centre, offset);
+      square = fmax(square, qmat_dot(offset, offset));
+    }
+  }
+  return sqrt(square);
+}
+
+/* Area-weighted centre, dipole and radius of the triangles of one leaf. */
+static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t begin, size_t end, double *area) {
+  double vector[3], centroid[3], mean[3] = {0, 0, 0};
+  *area = 0;
+  memset(node, 0, sizeof *node);
+  for (size_t i = begin; i < end; i++) {
+    area_and_centroid(surface, surface->order[i], vector, centroid);
+    const double weight = sqrt(qmat_dot(vector, vector));
+    *area += weight;
+    for (int k = 0; k < 3; k++) {
+      node->area_vector[k] += vector[k];
+      node->centre[k] += weight * centroid[k];
+      mean[k] += centroid[k] / (double)(end - begin);
+    }
+  }
+  for (int k = 0; k < 3; k++) node->centre[k] = *area > 0 ? node->centre[k] / *area : mean[k];
+  node->radius = farthest_corner(surface, begin, end, node->centre);
+}
+
+static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
+  const size_t n = surface->mesh->triangle_count;
+  size_t leaf_count = 1;
+  while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
+  sort_item *items = qmat_alloc(n, sizeof *items);
+  double *areas = qmat_alloc(2 * leaf_count, sizeof *areas);
+  surface->order = qmat_alloc(n, sizeof *surface->order);
+  surface->nodes = qmat_alloc(2 * leaf_count, sizeof *surface->nodes);
+  qmat_status status = QMAT_OK;
+  if (items == NULL || areas == NULL || surface->order == NULL || surface->nodes == NULL) {
+    status = qmat_fail_memory(context, "the winding number tree");
+    goto done;
+  }
+  surface->leaf_count = leaf_count;
+  for (size_t i = 0; i < n; i++) {
+    double vector[3], centroid[3];
+    area_and_centroid(surface, (uint32_t)i, vector, centroid);
+    uint64_t code = 0;
+    for (int k = 0; k < 3; k++) {
+      const double cell = (centroid[k] + 0.5) * 2097151; /* 2^21 - 1 */
+      code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 2097151)) << k;
+    }
+    items[i] = (sort_item){code, (uint32_t)i};
+  }
+  qsort(items, n, sizeof *items, compare_items);
+  for (size_t i = 0; i < n; i++) surface->order[i] = items[i].triangle;
+
+  memset(surface->nodes, 0, sizeof *surface->nodes); /* node 0 is not used */
+  for (size_t leaf = 0; leaf < leaf_count; leaf++) {
+    size_t begin, end;
+    leaf_range(surface, leaf, &begin, &end);
+    fill_leaf(surface, surface->nodes + leaf_count + leaf, begin, end, areas + leaf_count + leaf);
+  }
+  for (size_t index = leaf_count - 1; index > 0; index--) {
+    const winding_node *left = surface->nodes + 2 * index, *right = left + 1;
+    winding_node *node = surface->nodes + index;
+    const double left_area = areas[2 * index], right_area = areas[2 * index + 1], area = left_area + right_area;
+    areas[index] = area;
+    const double share = area > 0 ? left_area / area : 0.5;
+    for (int k = 0; k < 3; k++) {
+      node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
+      node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
+    }
+    /* From the corners and not from the children's balls, which would be twice too large further up. */
+    size_t first = index, last = index + 1, begin, end, unused;
+    while (first < leaf_count) first *= 2, last *= 2;
+    leaf_range(surface, first - leaf_count, &begin, &unused);
+    leaf_range(surface, last - 1 - leaf_count, &unused, &end);
+    node->radius = farthest_corner(surface, begin, end, node->centre);
+  }
+done:
+  qmat_free(items);
+  qmat_free(areas);
+  return status;
+}
+
+static void keep_message(void *user, enum RTCError code, const char *text) {
+  (void)code;
+  device_message *message = user;
+  if (message->text[0] == '\0') snprintf(message->text, sizeof message->text, "%s", text != NULL ? text : "");
+}
+
+/* Embree's newest error as a status. */
+static qmat_status embree_status(qmat_context *context, RTCDevice device, const device_message *message) {
+  const enum RTCError code = rtcGetDeviceError(device);
+  if (code == RTC_ERROR_NONE) return QMAT_OK;
+  if (code == RTC_ERROR_OUT_OF_MEMORY) return qmat_fail_memory(context, "Embree's search tree");
+  return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree failed (error %d): %s", (int)code, message->text);
+}
+
+static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
+  const qmat_mesh *mesh = surface->mesh;
+  device_message message = {""};
+  RTCGeometry geometry = NULL;
+  /* Settings of the user's own Embree files must not change results. */
+  char config[64];
+  snprintf(config, sizeof config, "ignore_config_files=1,threads=%d", qmat_threads(context));
+  surface->device = rtcNewDevice(config);
+  if (surface->device == NULL) {
+    return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree cannot start (error %d)", (int)rtcGetDeviceError(NULL));
+  }
+  rtcSetDeviceErrorFunction(surface->device, keep_message, &message);
+  qmat_status status = QMAT_OK;
+  if (!rtcGetDeviceProperty(surface->device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED)) {
+    status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "this Embree was built without filter functions");
+    goto done;
+  }
+  surface->scene = rtcNewScene(surface->device);
+  geometry = rtcNewGeometry(surface->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  if (surface->scene == NULL || geometry == NULL) goto check;
+  rtcSetSceneFlags(surface->scene, RTC_SCENE_FLAG_ROBUST);
+  /* High quality would split triangles, and a ray would then cross them twice. */
+  rtcSetSceneBuildQuality(surface->scene, RTC_BUILD_QUALITY_MEDIUM);
+  rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
+  float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                            mesh->vertex_count);
+  if (vertices == NULL) goto check;
+  for (size_t i = 0; i < 3 * mesh->vertex_count; i++) vertices[i] = (float)surface->positions[i];
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh->triangles, 0,
+                             3 * sizeof(uint32_t), mesh->triangle_count);
+  rtcSetGeometryUserData(geometry, surface);
+  rtcSetGeometryOccludedFilterFunction(geometry, see_hit);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(surface->scene, geometry);
+  rtcCommitScene(surface->scene);
+  status = qmat_triangle_blocks_new(context, surface->device, surface->positions, mesh->triangles, mesh->triangle_count,
+                                    &surface->blocks);
+check:
+  if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
+  if (status == QMAT_OK && (surface->scene == NULL || geometry == NULL)) {
+    status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree made no scene");
+  }
+done:
+  if (geometry != NULL) rtcReleaseGeometry(geometry);
+  rtcSetDeviceErrorFunction(surface->device, NULL, NULL);
+  return status;
+}
+
+qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
+  *surface = NULL;
+  qmat_surface *made = qmat_calloc(1, sizeof *made);
+  if (made == NULL) return qmat_fail_memory(context, "a surface");
+  made->mesh = mesh;
+  qmat_status status = qmat_frame_of_mesh(context, mesh, &made->frame);
+  if (status != QMAT_OK) goto failed;
+  made->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *made->positions);
+  if (made->positions == NULL) {
+    status = qmat_fail_memory(context, "the vertices");
+    goto failed;
+  }
+  qmat_frame_to_unit(&made->frame, mesh->positions, mesh->vertex_count, made->positions);
+  for (int axis = 0; axis < 3; axis++) {
+    made->low[axis] = INFINITY;
+    made->high[axis] = -INFINITY;
+  }
+  for (size_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
+    const double *p = made->positions + 3 * (size_t)mesh->triangles[corner];
+    for (int axis = 0; axis < 3; axis++) {
+      made->low[axis] = fmin(made->low[axis], p[axis]);
+      made->high[axis] = fmax(made->high[axis], p[axis]);
+    }
+  }
+  status = build_scene(context, made);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
+  if (status != QMAT_OK) goto failed;
+  if (!(mesh->closed && mesh->oriented)) {
+    status = build_winding_tree(context, made);
+    if (status != QMAT_OK) goto failed;
+  }
+  *surface = made;
+  return QMAT_OK;
+failed:
+  qmat_surface_free(made);
+  return status;
+}
+
+void qmat_surface_free(qmat_surface *surface) {
+  if (surface == NULL) return;
+  qmat_triangle_blocks_free(surface->blocks);
+  if (surface->scene != NULL) rtcReleaseScene(surface->scene);
+  if (surface->device != NULL) rtcReleaseDevice(surface->device);
+  qmat_free(surface->positions);
+  qmat_free(surface->nodes);
+  qmat_free(surface->order);
+  qmat_free(surface);
+}
+
+const qmat_frame *qmat_surface_frame(const qmat_surface *surface) {
+  return &surface->frame;
+}
+
+const double *qmat_surface_positions(const qmat_surface *surface) {
+  return surface->positions;
+}
+
+const qmat_mesh *qmat_surface_mesh(const qmat_surface *surface) {
+  return surface->mesh;
+}

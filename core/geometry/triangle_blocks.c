@@ -1,0 +1,380 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/geometry/triangle_blocks.h"
+
+#include <embree3/rtcore.h>
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+
+enum { LANES = 8 };
+
+/* Where single precision is not spent on the triangles any more. */
+static const double far_away = 1e4;
+
+/* Eight triangles in single precision, each in a disc around its centre; in a ball where its normal is zero. */
+typedef struct block {
+  float centre[3][LANES], normal[3][LANES], radius[LANES];
+  uint32_t triangles[LANES];
+} block;
+
+struct qmat_triangle_blocks {
+  const double *positions;
+  const uint32_t *triangles;
+  size_t count, block_count;
+  block *blocks;
+  RTCScene scene; /* of a user geometry: the blocks */
+};
+
+static void corners_of(const qmat_triangle_blocks *blocks, uint32_t triangle, const double *corners[3]) {
+  for (size_t i = 0; i < 3; i++)
+    corners[i] = blocks->positions + 3 * (size_t)blocks->triangles[3 * (size_t)triangle + i];
+}
+
+/* Where the sine of an angle is below this, rounding turns the plane by as much as the triangle is thin. */
+static const double least_sine = 1e-8;
+
+/* Twice the area vector, and its square; false where the triangle is so thin that it says nothing of a plane. */
+static bool find_normal(const double *const corners[3], double normal[3], double *square) {
+  double side[3], other_side[3];
+  qmat_subtract(corners[1], corners[0], side);
+  qmat_subtract(corners[2], corners[0], other_side);
+  qmat_cross(side, other_side, normal);
+  *square = qmat_dot(normal, normal);
+  return *square > least_sine * least_sine * qmat_dot(side, side) * qmat_dot(other_side, other_side);
+}
+
+/* --- one triangle ----------------------------------------------------------------------------------------------- */
+
+static void closest_on_segment(const double a[3], const double b[3], const double point[3], double closest[3]) {
+  double ab[3], ap[3];
+  qmat_subtract(b, a, ab);
+  qmat_subtract(point, a, ap);
+  const double length = qmat_dot(ab, ab);
+  const double t = length > 0 ? fmin(fmax(qmat_dot(ap, ab) / length, 0), 1) : 0;
+  for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
+}
+
+/* A plane is surely farther than a distance when its square is larger by this factor. */
+static const double surely_farther = 1 + 1e-9;
+
+/* The squared distance to a triangle: to its plane where the foot is inside, else to the edges that face the point.
+ * INFINITY where the plane alone is farther than the square `enough`. */
+static double closest_on_triangle(const qmat_triangle_blocks *blocks, uint32_t triangle, const double point[3],
+                                  double enough, double closest[3]) {
+  const uint32_t *ids = blocks->triangles + 3 * (size_t)triangle;
+  const double *corners[3];
+  corners_of(blocks, triangle, corners);
+  double normal[3], square, from_corner[3];
+  const bool has_plane = find_normal(corners, normal, &square);
+  qmat_subtract(point, corners[0], from_corner);
+  const double height = qmat_dot(from_corner, normal);
+  if (has_plane && height * height > surely_farther * enough * square) return INFINITY;
+
+  double nearest = INFINITY;
+  bool facing = false;
+  for (int i = 0; i < 3; i++) {
+    const int j = (i + 1) % 3;
+    double edge[3], to_point[3], outward[3];
+    qmat_subtract(corners[j], corners[i], edge);
+    qmat_subtract(point, corners[i], to_point);
+    qmat_cross(edge, normal, outward);
+    if (has_plane && qmat_dot(outward, to_point) <= 0) continue;
+    facing = true;
+    /* The same order of ends for both triangles of an edge, so that both get the same bits. */
+    const bool rising = ids[i] < ids[j];
+    double candidate[3], offset[3];
+    closest_on_segment(corners[rising ? i : j], corners[rising ? j : i], point, candidate);
+    qmat_subtract(point, candidate, offset);
+    const double distance = qmat_dot(offset, offset);
+    if (distance < nearest) {
+      nearest = distance;
+      memcpy(closest, candidate, sizeof candidate);
+    }
+  }
+  if (facing) return nearest;
+  for (int i = 0; i < 3; i++) closest[i] = point[i] - height / square * normal[i];
+  return height / square * height;
+}
+
+/* --- the nearest ------------------------------------------------------------------------------------------------ */
+
+typedef struct nearest_query {
+  const qmat_triangle_blocks *blocks;
+  const double *point;
+  double slack;         /* by how much single precision may misplace the point or a triangle */
+  double square, reach; /* of the nearest so far: the squared distance and the distance */
+  float square_limit;   /* discs that are surely farther than that have a larger bound */
+  double closest[3];
+  uint32_t triangle;
+} nearest_query;
+
+/* Where what single precision knows of a triangle says no more than this, it has to be looked at. */
+static float square_limit(const nearest_query *query) {
+  const double limit = (query->reach + 2 * query->slack) * (1 + 1e-6);
+  return (float)(limit * limit);
+}
+
+/* Looks at one triangle; true when it is the nearest so far. */
+static bool try_triangle(nearest_query *query, uint32_t triangle) {
+  double closest[3];
+  const double square = closest_on_triangle(query->blocks, triangle, query->point, query->square, closest);
+  if (!(square < query->square || (square == query->square && triangle < query->triangle))) return false;
+  query->square = square;
+  query->reach = sqrt(square);
+  query->square_limit = square_limit(query);
+  query->triangle = triangle;
+  memcpy(query->closest, closest, sizeof closest);
+  return true;
+}
+
+static float search_radius(const nearest_query *query, double distance) {
+  return nextafterf((float)(distance * (1 + 1e-6) + query->slack), INFINITY);
+}
+
+/* By how much of the squared distance to a disc's centre single precision may be wrong about its parts: a few dozen
+ * roundings of 6e-8. */
+static const float misjudged = 2e-6f;
+
+/* A lower bound of the squared distance to each triangle of a block. */
+static void bound_block(const block *b, float x, float y, float z, float bounds[LANES]) {
+  for (int k = 0; k < LANES; k++) {
+    const float dx = x - b->centre[0][k], dy = y - b->centre[1][k], dz = z - b->centre[2][k];
+    const float square = dx * dx + dy * dy + dz * dz, doubt = misjudged * square;
+    const float height = dx * b->normal[0][k] + dy * b->normal[1][k] + dz * b->normal[2][k];
+    const float across_square = square - height * height - doubt;
+    const float across = sqrtf(across_square > 0 ? across_square : 0) - b->radius[k];
+    const float beside = across > 0 ? across : 0;
+    bounds[k] = beside * beside + height * height - doubt;
+  }
+}
+
+static bool see_block(struct RTCPointQueryFunctionArguments *args) {
+  nearest_query *query = args->userPtr;
+  const block *b = &query->blocks->blocks[args->primID];
+  const size_t left = query->blocks->count - LANES * (size_t)args->primID, count = left < LANES ? left : LANES;
+  float bounds[LANES];
+  bound_block(b, args->query->x, args->query->y, args->query->z, bounds);
+  size_t first = 0; /* likely the nearest, so that few of the others are left to be tried */
+  for (size_t k = 1; k < count; k++)
+    if (bounds[k] < bounds[first]) first = k;
+  if (bounds[first] > query->square_limit) return false;
+  bool nearer = try_triangle(query, b->triangles[first]);
+  for (size_t k = 0; k < count; k++)
+    if (k != first && !(bounds[k] > query->square_limit)) nearer |= try_triangle(query, b->triangles[k]);
+  if (!nearer) return false;
+  const float radius = search_radius(query, query->reach);
+  if (!(radius < args->query->radius)) return false;
+  args->query->radius = radius;
+  return true;
+}
+
+double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const double point[3], double limit,
+                                     double *closest, uint32_t *triangle) {
+  const double size = fmax(fmax(fabs(point[0]), fabs(point[1])), fabs(point[2]));
+  nearest_query query = {.blocks = blocks,
+                         .point = point,
+                         .slack = 4 * (double)FLT_EPSILON * (1 + size),
+                         .square = surely_farther * limit * limit,
+                         .reach = surely_farther * limit,
+                         .triangle = UINT32_MAX};
+  query.square_limit = square_limit(&query);
+  if (size < far_away) {
+    struct RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    struct RTCPointQuery ball = {.x = (float)point[0],
+                                 .y = (float)point[1],
+                                 .z = (float)point[2],
+                                 .time = 0,
+                                 .radius = limit < 4 * far_away ? search_radius(&query, limit) : INFINITY};
+    rtcPointQuery(blocks->scene, &ball, &context, see_block, &query);
+  } else {
+    for (size_t i = 0; i < blocks->count; i++) try_triangle(&query, (uint32_t)i);
+  }
+  const double distance = sqrt(query.square);
+  if (query.triangle == UINT32_MAX || !(distance <= limit)) return INFINITY;
+  if (closest != NULL) memcpy(closest, query.closest, sizeof query.closest);
+  if (triangle != NULL) *triangle = query.triangle;
+  return distance;
+}
+
+/* --- building --------------------------------------------------------------------------------------------------- */
+
+static double farthest_corner(const double *const corners[3], const double centre[3]) {
+  double square = 0;
+  for (int i = 0; i < 3; i++) {
+    double offset[3];
+    qmat_subtract(corners[i], centre, offset);
+    square = fmax(square, qmat_dot(offset, offset));
+  }
+  return sqrt(square);
+}
+
+static void centroid(const double *const corners[3], double centre[3]) {
+  for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
+}
+
+/* The disc around a triangle, about its centre as it is when it is rounded; that its plane is rounded, too, moves no
+ * corner by as much as points are misplaced. */
+static void fill_lane(const qmat_triangle_blocks *blocks, block *b, size_t lane, uint32_t triangle) {
+  const double *corners[3];
+  double centre[3], normal[3], square;
+  corners_of(blocks, triangle, corners);
+  centroid(corners, centre);
+  const bool has_plane = find_normal(corners, normal, &square);
+  for (int k = 0; k < 3; k++) {
+    b->centre[k][lane] = (float)centre[k];
+    b->normal[k][lane] = has_plane ? (float)(normal[k] / sqrt(square)) : 0;
+    centre[k] = (double)b->centre[k][lane];
+  }
+  b->radius[lane] = nextafterf((float)farthest_corner(corners, centre), INFINITY);
+  b->triangles[lane] = triangle;
+}
+
+/* The box of a block, rounded outwards. */
+static void bound_for_embree(const struct RTCBoundsFunctionArguments *args) {
+  const qmat_triangle_blocks *blocks = args->geometryUserPtr;
+  const size_t first = LANES * (size_t)args->primID, left = blocks->count - first;
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t lane = 0; lane < left && lane < LANES; lane++) {
+    const double *corners[3];
+    corners_of(blocks, blocks->blocks[args->primID].triangles[lane], corners);
+    for (int i = 0; i < 3; i++)
+      for (int k = 0; k < 3; k++) {
+        low[k] = fmin(low[k], corners[i][k]);
+        high[k] = fmax(high[k], corners[i][k]);
+      }
+  }
+  float *out = &args->bounds_o->lower_x;
+  for (int k = 0; k < 3; k++) out[k] = nextafterf((float)low[k], -INFINITY);
+  out = &args->bounds_o->upper_x;
+  for (int k = 0; k < 3; k++) out[k] = nextafterf((float)high[k], INFINITY);
+}
+
+/* Fails without a word: the device knows why. */
+static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
+  blocks->scene = rtcNewScene(device);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  if (blocks->scene != NULL && geometry != NULL) {
+    rtcSetSceneFlags(blocks->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(blocks->scene, RTC_BUILD_QUALITY_MEDIUM);
+    rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)blocks->block_count);
+    rtcSetGeometryUserData(geometry, blocks);
+    rtcSetGeometryBoundsFunction(geometry, bound_for_embree, NULL);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(blocks->scene, geometry);
+    rtcCommitScene(blocks->scene);
+  }
+  if (geometry != NULL) rtcReleaseGeometry(geometry);
+}
+
+/* A triangle to be put into a block. */
+typedef struct item {
+  double centre[3];
+  uint32_t triangle;
+} item;
+
+static bool comes_first(const item *a, const item *b, int axis) {
+  return a->centre[axis] != b->centre[axis] ? a->centre[axis] < b->centre[axis] : a->triangle < b->triangle;
+}
+
+static void swap_items(item *a, item *b) {
+  const item swap = *a;
+  *a = *b;
+  *b = swap;
+}
+
+/* Puts the first `few` along the axis before the others (Hoare's selection). */
+static void select_first(item *items, size_t count, size_t few, int axis) {
+  size_t low = 0, high = count; /* the border lies between */
+  while (high - low > 1) {
+    const item *a = &items[low], *b = &items[low + (high - low) / 2], *c = &items[high - 1];
+    const bool a_b = comes_first(a, b, axis), b_c = comes_first(b, c, axis), a_c = comes_first(a, c, axis);
+    const item pivot = a_b == b_c ? *b : a_b == a_c ? *c : *a;
+    size_t i = low, j = high - 1;
+    for (;;) {
+      while (comes_first(&items[i], &pivot, axis)) i++;
+      while (comes_first(&pivot, &items[j], axis)) j--;
+      if (i >= j) break;
+      swap_items(&items[i++], &items[j--]);
+    }
+    if (few <= i)
+      high = i;
+    else
+      low = i;
+    if (few == low || few == high) return;
+  }
+}
+
+static int widest_axis(const item *items, size_t count) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < count; i++)
+    for (int k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], items[i].centre[k]);
+      high[k] = fmax(high[k], items[i].centre[k]);
+    }
+  int axis = 0;
+  for (int k = 1; k < 3; k++)
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  return axis;
+}
+
+/* More than so many are divided by a thread each. */
+enum { WORTH_A_THREAD = 1 << 13 };
+
+/* Halves them across their widest side, at a whole number of blocks, until each block has its own. */
+static void divide(item *items, size_t count) {
+  if (count <= LANES) return;
+  const size_t few = LANES * (((count + LANES - 1) / LANES) / 2);
+  select_first(items, count, few, widest_axis(items, count));
+#pragma omp task if (few > WORTH_A_THREAD)
+  divide(items, few);
+  divide(items + few, count - few);
+}
+
+static qmat_status fill_blocks(qmat_context *context, qmat_triangle_blocks *blocks) {
+  const size_t count = blocks->count;
+  item *items = qmat_alloc(count, sizeof *items);
+  blocks->blocks = qmat_calloc(blocks->block_count, sizeof *blocks->blocks);
+  const bool made = items && blocks->blocks;
+  if (made) {
+    const int threads = qmat_threads(context);
+#pragma omp parallel num_threads(threads)
+    {
+#pragma omp for schedule(static)
+      for (size_t t = 0; t < count; t++) {
+        const double *corners[3];
+        corners_of(blocks, (uint32_t)t, corners);
+        centroid(corners, items[t].centre);
+        items[t].triangle = (uint32_t)t;
+      }
+#pragma omp single
+      divide(items, count);
+#pragma omp for schedule(static)
+      for (size_t t = 0; t < count; t++) fill_lane(blocks, &blocks->blocks[t / LANES], t % LANES, items[t].triangle);
+    }
+  }
+  qmat_free(items);
+  return made ? QMAT_OK : qmat_fail_memory(context, "the triangles");
+}
+
+qmat_status qmat_triangle_blocks_new(qmat_context *context, struct RTCDeviceTy *device, const double *positions,
+                                     const uint32_t *triangles, size_t count, qmat_triangle_blocks **blocks) {
+  qmat_triangle_blocks *made = qmat_calloc(1, sizeof *made);
+  *blocks = made;
+  if (made == NULL) return qmat_fail_memory(context, "the triangles");
+  *made = (qmat_triangle_blocks){
+      .positions = positions, .triangles = triangles, .count = count, .block_count = (count + LANES - 1) / LANES};
+  const qmat_status status = fill_blocks(context, made);
+  if (status == QMAT_OK) build_scene(made, device);
+  return status;
+}
+
+void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks) {
+  if (blocks == NULL) return;
+  if (blocks->scene != NULL) rtcReleaseScene(blocks->scene);
+  qmat_free(blocks->blocks);
+  qmat_free(blocks);
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_GEOMETRY_VECTOR_H
+#define QMAT_CORE_GEOMETRY_VECTOR_H
+
+#include <math.h>
+
+/* The distance of two points (3 doubles each; of spheres, their centres). */
+static inline double qmat_point_distance(const double *a, const double *b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return sqrt(x * x + y * y + z * z);
+}
+
+/* Of vectors of 3 doubles: a - b, the scalar and the vector product. */
+static inline void qmat_subtract(const double a[3], const double b[3], double out[3]) {
+  for (int k = 0; k < 3; k++) out[k] = a[k] - b[k];
+}
+static inline double qmat_dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+static inline void qmat_cross(const double a[3], const double b[3], double out[3]) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* A maximum and minimum that compile to one instruction; the second operand where the first is not a number. */
+static inline double qmat_larger(double a, double b) {
+  return a > b ? a : b;
+}
+static inline double qmat_smaller(double a, double b) {
+  return a < b ? a : b;
+}
+
+#endif

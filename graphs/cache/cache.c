@@ -1,0 +1,687 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/cache/cache.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "core/json_text.h"
+#include "graphs/cache/cache_key.h"
+#include "io/bytes.h"
+
+static const char *const kind_folders[QMAT_CACHE_KIND_COUNT] = {"ac/", "cas/", "tmp/", "bad/"};
+
+static const char tag_text[] =
+    "Signature: 8a477f597d28d172789f06886806bc55\n"
+    "# This folder is a cache of qmat: whatever is in it can be made again.\n"
+    "# What a cache directory tag is: https://bford.info/cachedir/\n";
+
+// A line that follows a record's JSON holds the digest of that JSON.
+static const char record_end[] = "\nsha256 ";
+
+/* ---- paths and files ---- */
+
+static char *path_of(const qmat_cache *cache, qmat_cache_kind kind, const char *name) {
+  size_t folder = strlen(cache->folder), size = folder + strlen(kind_folders[kind]) + strlen(name) + 1;
+  char *path = qmat_alloc(size, 1);
+  if (path) snprintf(path, size, "%s%s%s", cache->folder, kind_folders[kind], name);
+  return path;
+}
+
+static char *path_of_digest(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
+  char hex[65];
+  qmat_digest_hex(digest, hex);
+  return path_of(cache, kind, hex);
+}
+
+static void warn(qmat_cache *cache, const char *what, const char *path, int number) {
+  const char *reason = strerrordesc_np(number);
+  if (!*cache->warning)
+    snprintf(cache->warning, sizeof cache->warning, "the cache cannot be written: %s %s: %s", what, path,
+             reason ? reason : "unknown error");
+}
+
+// Makes a folder and those above it.
+static bool make_folders(char *path) {
+  if (mkdir(path, 0777) == 0 || errno == EEXIST) return true;
+  char *slash = strrchr(path, '/');
+  if (errno != ENOENT || !slash || slash == path) return false;
+  *slash = 0;
+  bool made = make_folders(path);
+  *slash = '/';
+  return made && (mkdir(path, 0777) == 0 || errno == EEXIST);
+}
+
+static bool write_all(int file, const void *bytes, size_t size) {
+  const char *at = bytes;
+  while (size > 0) {
+    ssize_t done = write(file, at, size < (size_t)1 << 30 ? size : (size_t)1 << 30);
+    if (done < 0 && errno == EINTR) continue;
+    if (done < 0) return false;
+    at += done;
+    size -= (size_t)done;
+  }
+  return true;
+}
+
+// Makes a temporary that carries a lock for as long as its writer lives; -1 with errno.
+static int make_temporary(qmat_cache *cache, char **path) {
+  for (int attempt = 0; attempt < 1000; attempt++) {
+    char name[64];
+    struct timespec time;
+    clock_gettime(CLOCK_REALTIME, &time);
+    snprintf(name, sizeof name, "%ld-%lld%09ld-%u", (long)getpid(), (long long)time.tv_sec, time.tv_nsec,
+             cache->temporaries++);
+    *path = path_of(cache, QMAT_CACHE_TEMPORARY, name);
+    if (!*path) {
+      errno = ENOMEM;
+      return -1;
+    }
+    int file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    // File systems without locks have no sweepers that hold one either.
+    if (file >= 0 && (flock(file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)) return file;
+    int number = errno;
+    if (file >= 0) close(file);
+    qmat_free(*path);
+    *path = NULL;
+    errno = number;
+    if (number != EEXIST && number != EWOULDBLOCK) return -1;
+  }
+  return -1;
+}
+
+// Puts a whole file in its place, or nothing.
+static bool place_file(qmat_cache *cache, const char *path, const void *bytes, size_t size) {
+  char *temporary = NULL;
+  bool done = false;
+  // A sweep may take a temporary in the moment before it is locked: then once more.
+  for (int attempt = 0; attempt < 3 && !done; attempt++) {
+    int file = make_temporary(cache, &temporary);
+    done = file >= 0 && write_all(file, bytes, size) && (fsync(file) == 0 || errno == EINVAL) &&
+           rename(temporary, path) == 0;
+    int number = errno;
+    if (!done && temporary) unlink(temporary);
+    if (file >= 0) close(file);
+    qmat_free(temporary);
+    temporary = NULL;
+    if (done || number == ENOENT) continue;
+    warn(cache, "storing", path, number);
+    return false;
+  }
+  if (!done) warn(cache, "storing", path, ENOENT);
+  if (done) cache->stored += size;
+  return done;
+}
+
+// Makes the folders when they are needed first.
+static bool make_ready(qmat_cache *cache) {
+  if (cache->ready) return true;
+  if (cache->read_only) return false;
+  for (int kind = 0; kind < QMAT_CACHE_KIND_COUNT; kind++) {
+    char *folder = path_of(cache, (qmat_cache_kind)kind, "");
+    if (!folder) return false;
+    folder[strlen(folder) - 1] = 0;
+    bool made = make_folders(folder);
+    if (!made) warn(cache, "making the folder", folder, errno);
+    qmat_free(folder);
+    if (!made) return false;
+  }
+  size_t size = strlen(cache->folder) + sizeof "CACHEDIR.TAG";
+  char *tag = qmat_alloc(size, 1);
+  if (!tag) return false;
+  snprintf(tag, size, "%sCACHEDIR.TAG", cache->folder);
+  cache->ready = true;
+  if (access(tag, F_OK) != 0) cache->ready = place_file(cache, tag, tag_text, sizeof tag_text - 1);
+  qmat_free(tag);
+  qmat_cache_collect(cache, UINT64_MAX, false);
+  return cache->ready;
+}
+
+static bool read_file(const char *path, qmat_bytes *bytes) {
+  qmat_context nobody = {0};  // a missing file is no error here
+  return qmat_bytes_read_file(&nobody, path, bytes) == QMAT_OK;
+}
+
+/* ---- opening and closing ---- */
+
+qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *options, qmat_cache *cache) {
+  struct stat about;
+  *cache = (qmat_cache){.read_only = options->read_only,
+                        .most_size = options->most_size ? options->most_size : QMAT_CACHE_SIZE};
+  size_t length = strlen(options->folder);
+  cache->folder = qmat_alloc(length + 2, 1);
+  if (!cache->folder) return qmat_fail_memory(context, "cache");
+  snprintf(cache->folder, length + 2, "%s%s", options->folder,
+           length > 0 && options->folder[length - 1] == '/' ? "" : "/");
+  if (stat(options->folder, &about) == 0 && !S_ISDIR(about.st_mode)) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the cache has to be a folder, but this is a file");
+    return qmat_fail_at(context, options->folder, 0, 0);
+  }
+  if (stat(options->folder, &about) == 0 && access(options->folder, W_OK) != 0) cache->read_only = true;
+  if (!options->remote) return QMAT_OK;
+  if (strncmp(options->remote, "http://", 7) != 0 && strncmp(options->remote, "https://", 8) != 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "a remote cache is at http://... or https://..., not '%.200s'",
+              options->remote);
+    return QMAT_ERROR_USAGE;
+  }
+  cache->remote = qmat_remote_open(options->remote, options->read_only || options->remote_read_only);
+  return cache->remote ? QMAT_OK : qmat_fail_memory(context, "remote cache");
+}
+
+void qmat_cache_close(qmat_cache *cache) {
+  if (cache->stored > 0) qmat_cache_collect(cache, cache->most_size, false);
+  qmat_remote_close(cache->remote);
+  qmat_free(cache->folder);
+  qmat_free(cache->bad);
+  *cache = (qmat_cache){0};
+}
+
+bool qmat_cache_is_writable(const qmat_cache *cache) {
+  return !cache->read_only || qmat_remote_is_writable(cache->remote);
+}
+
+const char *qmat_cache_warning(const qmat_cache *cache) {
+  return *cache->warning || !cache->remote ? cache->warning : qmat_remote_warning(cache->remote);
+}
+
+char *qmat_cache_default_folder(void) {
+  const char *base = getenv("XDG_CACHE_HOME"), *below = "/qmat";
+  if (!base || *base != '/') {
+    base = getenv("HOME");
+    below = "/.cache/qmat";
+  }
+  if (!base || *base != '/') return NULL;
+  size_t size = strlen(base) + strlen(below) + 1;
+  char *folder = qmat_alloc(size, 1);
+  if (folder) snprintf(folder, size, "%s%s", base, below);
+  return folder;
+}
+
+/* ---- reading ---- */
+
+static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
+  for (size_t i = 0; i < cache->bad_count; i++)
+    if (qmat_digest_equal(&cache->bad[i], digest)) return true;
+  return false;
+}
+
+// Moves what is not what it should be out of the way; where that cannot be, it is remembered for as long as this lasts.
+static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
+  char *from = path_of_digest(cache, kind, digest), *to = path_of_digest(cache, QMAT_CACHE_BAD, digest);
+  bool moved = from && to && !cache->read_only && (rename(from, to) == 0 || unlink(from) == 0);
+  qmat_free(from);
+  qmat_free(to);
+  if (moved) return;
+  if (qmat_grow((void **)&cache->bad, &cache->bad_capacity, cache->bad_count + 1, sizeof *cache->bad) == 0)
+    cache->bad[cache->bad_count++] = *digest;
+}
+
+// The JSON of a record's bytes when they are whole and belong to that key.
+static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest *key) {
+  const size_t tail = sizeof record_end - 1 + 64 + 1;
+  qmat_digest wanted, digest;
+  char hex[65];
+  if (size <= tail || bytes[size - 1] != '\n') return NULL;
+  size_t length = size - tail;
+  if (memcmp(bytes + length, record_end, sizeof record_end - 1) != 0) return NULL;
+  memcpy(hex, bytes + size - 65, 64);
+  hex[64] = 0;
+  if (!qmat_digest_parse(hex, &wanted) || qmat_digest_of(bytes, length, &digest) != QMAT_OK ||
+      !qmat_digest_equal(&wanted, &digest))
+    return NULL;
+  json_t *record = json_loadb((const char *)bytes, length, JSON_REJECT_DUPLICATES, NULL);
+  if (qmat_key_digest(json_object_get(record, "key"), &digest) && qmat_digest_equal(&digest, key)) return record;
+  json_decref(record);
+  return NULL;
+}
+
+// Stores bytes in the folder.
+static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
+                       size_t size) {
+  char *path = path_of_digest(cache, kind, digest);
+  bool kept = path && make_ready(cache) && place_file(cache, path, bytes, size);
+  qmat_free(path);
+  return kept;
+}
+
+static void warn_of_lie(qmat_cache *cache, const char *what) {
+  if (!*cache->warning)
+    snprintf(cache->warning, sizeof cache->warning, "the remote cache has %s that is not what its name says", what);
+}
+
+static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
+  const uint64_t most_size = (uint64_t)1 << 24;
+  qmat_writer body = {0};
+  json_t *record = NULL;
+  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_RECORD], key, most_size, &body)) {
+    record = parse_record(body.bytes, body.size, key);
+    if (record)
+      keep_bytes(cache, QMAT_CACHE_RECORD, key, body.bytes, body.size);
+    else
+      warn_of_lie(cache, "a record");
+  }
+  qmat_writer_uninit(&body);
+  return record;
+}
+
+json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
+  qmat_bytes bytes = {0};
+  char *path = path_of_digest(cache, QMAT_CACHE_RECORD, key);
+  json_t *record = NULL;
+  if (path && !is_bad(cache, key) && read_file(path, &bytes)) {
+    record = parse_record(bytes.data, bytes.size, key);
+    if (!record) set_aside(cache, QMAT_CACHE_RECORD, key);
+  }
+  qmat_bytes_uninit(&bytes);
+  qmat_free(path);
+  return record ? record : remote_record(cache, key);
+}
+
+static bool has_locally(const qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
+  struct stat about;
+  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  bool there = path && !is_bad(cache, digest) && stat(path, &about) == 0 && (uint64_t)about.st_size == size;
+  qmat_free(path);
+  return there;
+}
+
+static bool has_blob(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
+  return has_locally(cache, digest, size) ||
+         qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
+}
+
+// The blobs that the items of a list are in. Items are no lists themselves.
+typedef struct list_items {
+  qmat_cache *cache;
+  bool missing; /* one of them is not there, or not what it should be: that is not the list's fault */
+} list_items;
+
+// The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
+// twice.
+static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest,
+                               const qmat_value_source *items) {
+  qmat_context nobody = {0};  // bad bytes are no error here
+  qmat_value *value;
+  if (qmat_value_deserialize(&nobody, bytes, size, items, &value) != QMAT_OK) return NULL;
+  if (qmat_digest_equal(&value->digest, digest)) return value;
+  qmat_value_release(value);
+  return NULL;
+}
+
+static qmat_value *local_value(qmat_cache *cache, const qmat_digest *digest, const qmat_value_source *items) {
+  qmat_value *value = NULL;
+  qmat_bytes bytes = {0};
+  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  if (path && !is_bad(cache, digest) && read_file(path, &bytes)) {
+    value = parse_value(bytes.data, bytes.size, digest, items);
+    const list_items *list = items ? items->user : NULL;
+    if (!value && !(list && list->missing)) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  }
+  qmat_bytes_uninit(&bytes);
+  qmat_free(path);
+  return value;
+}
+
+static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size,
+                                const qmat_value_source *items) {
+  qmat_writer body = {0};
+  qmat_value *value = NULL;
+  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size, &body)) {
+    value = body.size == size ? parse_value(body.bytes, body.size, digest, items) : NULL;
+    const list_items *list = items ? items->user : NULL;
+    if (value)
+      keep_bytes(cache, QMAT_CACHE_BLOB, digest, body.bytes, body.size);
+    else if (!(list && list->missing))
+      warn_of_lie(cache, "a blob");
+  }
+  qmat_writer_uninit(&body);
+  return value;
+}
+
+static qmat_value *find_item(void *user, const qmat_digest *digest, uint64_t size) {
+  list_items *list = user;
+  qmat_value *item = local_value(list->cache, digest, NULL);
+  if (!item) item = remote_value(list->cache, digest, size, NULL);
+  if (!item) list->missing = true;
+  return item;
+}
+
+qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint64_t size, qmat_value_type type) {
+  list_items list = {.cache = cache};
+  const qmat_value_source source = {find_item, &list}, *items = type == QMAT_LIST ? &source : NULL;
+  qmat_value *value = local_value(cache, digest, items);
+  if (!value && !list.missing) value = remote_value(cache, digest, size, items);
+  if (!value || value->type == type) return value;
+  qmat_value_release(value);
+  return NULL;
+}
+
+static void touch(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
+  char *path = cache->read_only ? NULL : path_of_digest(cache, kind, digest);
+  if (path) (void)utimensat(AT_FDCWD, path, NULL, 0);
+  qmat_free(path);
+}
+
+void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key) {
+  touch(cache, QMAT_CACHE_RECORD, key);
+}
+
+/* ---- writing ---- */
+
+// Sends bytes to the remote cache. Of a blob it is enough that it is there; a record may be newer than the one that is.
+static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
+                       size_t size) {
+  const char *folder = kind_folders[kind];
+  if (!qmat_remote_is_writable(cache->remote)) return false;
+  return (kind == QMAT_CACHE_BLOB && qmat_remote_has(cache->remote, folder, digest, size)) ||
+         qmat_remote_put(cache->remote, folder, digest, bytes, size);
+}
+
+// Whether the blob is there as it should be. One that was damaged goes: a value that was made anew would not be stored.
+static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
+  if (!has_locally(cache, digest, size)) return false;
+  qmat_digest found;
+  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  bool sound = path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
+  qmat_free(path);
+  if (!sound) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  return sound;
+}
+
+// Stores the binary form of a value; gives what a record says of it.
+static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added) {
+  qmat_context nobody = {0};
+  const qmat_digest *digest = &value->digest;
+  uint8_t *bytes;
+  size_t size;
+  if (!qmat_cache_is_writable(cache) || qmat_value_serialize(&nobody, value, &bytes, &size) != QMAT_OK) return NULL;
+  bool kept = is_kept(cache, digest, size);
+  if (!kept) kept = *added = keep_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
+  bool sent = send_bytes(cache, QMAT_CACHE_BLOB, digest, bytes, size);
+  qmat_free(bytes);
+  char hex[65];
+  qmat_digest_hex(digest, hex);
+  return kept || sent ? json_pack("{s:s, s:I}", "digest", hex, "blob", (json_int_t)size) : NULL;
+}
+
+json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *added) {
+  *added = false;
+  json_t *items = value->type == QMAT_LIST ? json_array() : NULL;
+  bool done = value->type != QMAT_LIST || items;
+  for (size_t i = 0; items && i < qmat_value_count(value) && done; i++)
+    done = json_array_append_new(items, put_blob(cache, qmat_value_at(value, i), added)) == 0;
+  json_t *stored = done ? put_blob(cache, value, added) : NULL;
+  if (stored && items && json_object_set(stored, "items", items) != 0) {
+    json_decref(stored);
+    stored = NULL;
+  }
+  json_decref(items);
+  return stored;
+}
+
+// The blobs that a record names for one value: its own, and those of a list's items.
+static size_t blob_count(const json_t *stored) {
+  return 1 + json_array_size(json_object_get(stored, "items"));
+}
+
+static bool blob_at(const json_t *stored, size_t index, qmat_digest *digest, uint64_t *size) {
+  const json_t *blob = index == 0 ? stored : json_array_get(json_object_get(stored, "items"), index - 1);
+  const char *hex = json_string_value(json_object_get(blob, "digest"));
+  const json_int_t bytes = json_integer_value(json_object_get(blob, "blob"));
+  *size = (uint64_t)bytes;
+  return hex && qmat_digest_parse(hex, digest) && bytes > 0;
+}
+
+bool qmat_cache_has_stored(qmat_cache *cache, const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (!blob_at(stored, i, &digest, &size) || !has_blob(cache, &digest, size)) return false;
+  return true;
+}
+
+void qmat_cache_touch_stored(qmat_cache *cache, const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (blob_at(stored, i, &digest, &size)) touch(cache, QMAT_CACHE_BLOB, &digest);
+}
+
+uint64_t qmat_cache_stored_size(const json_t *stored) {
+  qmat_digest digest;
+  uint64_t size, total = 0;
+  for (size_t i = 0; i < blob_count(stored); i++)
+    if (blob_at(stored, i, &digest, &size)) total += size;
+  return total;
+}
+
+bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record) {
+  qmat_digest digest;
+  char hex[66];
+  size_t length;
+  if (!qmat_cache_is_writable(cache)) return false;
+  char *text = qmat_json_text(record, JSON_COMPACT | JSON_SORT_KEYS, &length);
+  qmat_writer writer = {0};
+  bool done = text && qmat_digest_of(text, length, &digest) == QMAT_OK;
+  if (done) {
+    qmat_digest_hex(&digest, hex);
+    qmat_put_bytes(&writer, text, length);
+    qmat_put_text(&writer, record_end);
+    qmat_put_text(&writer, hex);
+    qmat_put_text(&writer, "\n");
+    bool kept = !writer.failed && keep_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    bool sent = !writer.failed && send_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    done = kept || sent;
+  }
+  qmat_writer_uninit(&writer);
+  qmat_free(text);
+  return done;
+}
+
+/* ---- looking after it ---- */
+
+typedef struct entry_list {
+  qmat_cache_entry *entries;
+  size_t count, capacity;
+} entry_list;
+
+// Whether a file of this name is one that the cache makes.
+static bool is_ours(qmat_cache_kind kind, const char *name, qmat_digest *digest) {
+  if (kind == QMAT_CACHE_TEMPORARY) return *name && strspn(name, "0123456789-") == strlen(name) && strlen(name) < 64;
+  return qmat_digest_parse(name, digest);
+}
+
+static bool list_kind(const qmat_cache *cache, qmat_cache_kind kind, entry_list *list) {
+  char *path = path_of(cache, kind, "");
+  DIR *folder = path ? opendir(path) : NULL;
+  bool done = path != NULL;
+  qmat_free(path);
+  for (struct dirent *file; folder && done && (file = readdir(folder));) {
+    qmat_cache_entry entry = {.kind = kind};
+    struct stat about;
+    if (!is_ours(kind, file->d_name, &entry.digest) || fstatat(dirfd(folder), file->d_name, &about, 0) != 0 ||
+        !S_ISREG(about.st_mode))
+      continue;
+    snprintf(entry.name, sizeof entry.name, "%.*s", (int)sizeof entry.name - 1, file->d_name);
+    entry.size = (uint64_t)about.st_size;
+    entry.used = (int64_t)about.st_mtim.tv_sec * 1000000000 + about.st_mtim.tv_nsec;
+    done = qmat_grow((void **)&list->entries, &list->capacity, list->count + 1, sizeof *list->entries) == 0;
+    if (done) list->entries[list->count++] = entry;
+  }
+  if (folder) closedir(folder);
+  return done;
+}
+
+static int by_kind_and_name(const void *a, const void *b) {
+  const qmat_cache_entry *first = a, *second = b;
+  return first->kind != second->kind ? (first->kind > second->kind) - (first->kind < second->kind)
+                                     : strcmp(first->name, second->name);
+}
+
+static int by_last_use(const void *a, const void *b) {
+  const qmat_cache_entry *first = a, *second = b;
+  return first->used != second->used ? (first->used > second->used) - (first->used < second->used)
+                                     : by_kind_and_name(a, b);
+}
+
+bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t *count) {
+  entry_list list = {0};
+  bool done = true;
+  for (int kind = 0; kind < QMAT_CACHE_KIND_COUNT && done; kind++)
+    done = list_kind(cache, (qmat_cache_kind)kind, &list);
+  if (!done) {
+    qmat_free(list.entries);
+    list = (entry_list){0};
+  }
+  if (list.count > 0) qsort(list.entries, list.count, sizeof *list.entries, by_kind_and_name);
+  *entries = list.entries;
+  *count = list.count;
+  return done;
+}
+
+static void delete_entry(const qmat_cache *cache, const qmat_cache_entry *entry, qmat_cache_sweep *sweep) {
+  char *path = path_of(cache, entry->kind, entry->name);
+  if (path && unlink(path) == 0) {
+    sweep->deleted++;
+    sweep->freed += entry->size;
+  }
+  qmat_free(path);
+}
+
+// Whether a temporary is one that nobody writes any more.
+static bool is_abandoned(const qmat_cache *cache, const qmat_cache_entry *entry) {
+  char *path = path_of(cache, entry->kind, entry->name);
+  int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
+  bool abandoned = file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0;
+  if (file >= 0) close(file);
+  qmat_free(path);
+  return abandoned;
+}
+
+static int64_t now_nanoseconds(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_REALTIME, &time);
+  return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
+}
+
+// The blob entry of that digest among those sorted by kind and name.
+static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, const qmat_digest *digest) {
+  qmat_cache_entry wanted = {.kind = QMAT_CACHE_BLOB};
+  if (count == 0) return NULL;
+  qmat_digest_hex(digest, wanted.name);
+  return bsearch(&wanted, entries, count, sizeof *entries, by_kind_and_name);
+}
+
+// Marks the blobs that a record names for one value; false when one of them is missing.
+static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t count, bool *named) {
+  bool complete = true;
+  for (size_t i = 0; i < blob_count(stored); i++) {
+    qmat_digest digest;
+    uint64_t size;
+    qmat_cache_entry *blob = blob_at(stored, i, &digest, &size) ? find_blob(entries, count, &digest) : NULL;
+    if (blob)
+      named[blob - entries] = true;
+    else
+      complete = false;
+  }
+  return complete;
+}
+
+// Marks the blobs that records name (by their use), and deletes records of which one is missing.
+static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t count, qmat_cache_sweep *sweep) {
+  const int64_t hour = (int64_t)3600 * 1000000000, now = now_nanoseconds();
+  bool *named = qmat_calloc(count, sizeof *named);
+  if (!named) return;
+  for (size_t i = 0; i < count && entries[i].kind == QMAT_CACHE_RECORD; i++) {
+    json_t *record = qmat_cache_record(cache, &entries[i].digest);
+    const json_t *outputs = json_object_get(record, "outputs");
+    bool complete = record != NULL;
+    for (size_t k = 0; k < json_array_size(outputs); k++)
+      if (!mark_named(json_array_get(outputs, k), entries, count, named)) complete = false;
+    // Another process may have stored the blobs since they were listed.
+    if (record && !complete && now - entries[i].used > hour) delete_entry(cache, &entries[i], sweep);
+    json_decref(record);
+  }
+  for (size_t i = 0; i < count; i++) {
+    bool unnamed = entries[i].kind == QMAT_CACHE_BLOB && !named[i] && now - entries[i].used > hour;
+    if (unnamed || entries[i].kind == QMAT_CACHE_BAD) delete_entry(cache, &entries[i], sweep);
+  }
+  qmat_free(named);
+}
+
+qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool thorough) {
+  qmat_cache_sweep sweep = {0};
+  if (cache->read_only) return sweep;
+  entry_list list = {0};
+  if (most_size == UINT64_MAX && !thorough) {
+    list_kind(cache, QMAT_CACHE_TEMPORARY, &list);
+  } else if (!qmat_cache_list(cache, &list.entries, &list.count)) {
+    return sweep;
+  }
+  for (size_t i = 0; i < list.count; i++)
+    if (list.entries[i].kind == QMAT_CACHE_TEMPORARY && is_abandoned(cache, &list.entries[i]))
+      delete_entry(cache, &list.entries[i], &sweep);
+  if (thorough) {
+    collect_unnamed(cache, list.entries, list.count, &sweep);
+    qmat_free(list.entries);
+    if (!qmat_cache_list(cache, &list.entries, &list.count)) return sweep;
+  }
+  uint64_t total = 0;
+  for (size_t i = 0; i < list.count; i++)
+    if (list.entries[i].kind <= QMAT_CACHE_BLOB) total += list.entries[i].size;
+  if (total > most_size) {
+    // Somewhat below the limit, so that not every run after this one has to do it again.
+    uint64_t wanted = most_size - most_size / 10;
+    qsort(list.entries, list.count, sizeof *list.entries, by_last_use);
+    for (size_t i = 0; i < list.count && total > wanted; i++) {
+      if (list.entries[i].kind > QMAT_CACHE_BLOB) continue;
+      delete_entry(cache, &list.entries[i], &sweep);
+      total -= list.entries[i].size;
+    }
+  }
+  qmat_free(list.entries);
+  return sweep;
+}
+
+qmat_cache_sweep qmat_cache_clear(qmat_cache *cache) {
+  qmat_cache_sweep sweep = {0};
+  qmat_cache_entry *entries;
+  size_t count;
+  if (cache->read_only || !qmat_cache_list(cache, &entries, &count)) return sweep;
+  // Records first: they are sorted so, and nobody then reads one whose blobs go.
+  for (size_t i = 0; i < count; i++)
+    if (entries[i].kind != QMAT_CACHE_TEMPORARY || is_abandoned(cache, &entries[i]))
+      delete_entry(cache, &entries[i], &sweep);
+  qmat_free(entries);
+  return sweep;
+}
+
+static qmat_cache_health check_record(qmat_cache *cache, const qmat_cache_entry *entry) {
+  json_t *record = qmat_cache_record(cache, &entry->digest);
+  if (!record) return QMAT_CACHE_BROKEN;
+  const json_t *outputs = json_object_get(record, "outputs");
+  qmat_cache_health health = QMAT_CACHE_SOUND;
+  for (size_t i = 0; i < json_array_size(outputs); i++)
+    if (!qmat_cache_has_stored(cache, json_array_get(outputs, i))) health = QMAT_CACHE_INCOMPLETE;
+  json_decref(record);
+  return health;
+}
+
+qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *entry) {
+  if (entry->kind == QMAT_CACHE_RECORD) return check_record(cache, entry);
+  if (entry->kind != QMAT_CACHE_BLOB) return QMAT_CACHE_SOUND;
+  qmat_digest digest;
+  char *path = path_of(cache, entry->kind, entry->name);
+  bool sound = path && qmat_digest_of_file(path, &digest) == QMAT_OK && qmat_digest_equal(&digest, &entry->digest);
+  qmat_free(path);
+  if (sound) return QMAT_CACHE_SOUND;
+  set_aside(cache, entry->kind, &entry->digest);
+  return QMAT_CACHE_BROKEN;
+}

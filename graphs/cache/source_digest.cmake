@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# cmake -DSOURCE=FOLDER -DOUTPUT=FILE.c -DENABLED=ON -P source_digest.cmake
+# Writes qmat_source_digest, the SHA-256 over the names and bytes of all sources that results come from.
+set(digest "")
+if(ENABLED)
+  file(GLOB_RECURSE sources RELATIVE ${SOURCE} ${SOURCE}/core/*.[ch] ${SOURCE}/io/*.[ch] ${SOURCE}/io/*.cpp ${SOURCE}/nodes/*.[ch]
+    ${SOURCE}/nodes/*.cpp)
+  list(SORT sources)
+  set(list "")
+  foreach(source IN LISTS sources)
+    file(SHA256 ${SOURCE}/${source} one)
+    string(APPEND list "${one} ${source}\n")
+  endforeach()
+  string(SHA256 digest "${list}")
+endif()
+file(CONFIGURE OUTPUT ${OUTPUT} @ONLY CONTENT [[
+/* Written by source_digest.cmake. */
+#include "graphs/cache/source_digest.h"
+const char qmat_source_digest[] = "@digest@";
+]])
+file(TOUCH ${OUTPUT})

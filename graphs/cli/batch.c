@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/cli/batch.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <glob.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "io/bytes.h"
+#include "io/model.h"
+
+static double now(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+/* ---- finding ---- */
+
+static qmat_status add_asset(qmat_context *context, qmat_batch *batch, const char *folder, size_t folder_length,
+                             const char *path, size_t length) {
+  if (*path == '/') folder_length = 0;
+  char *input = qmat_alloc(folder_length + length + 1, 1);
+  if (!input || qmat_grow((void **)&batch->assets, &batch->capacity, batch->count + 1, sizeof *batch->assets) != 0) {
+    qmat_free(input);
+    return qmat_fail_memory(context, "assets");
+  }
+  memcpy(input, folder, folder_length);
+  memcpy(input + folder_length, path, length);
+  input[folder_length + length] = 0;
+  qmat_asset *asset = &batch->assets[batch->count++];
+  *asset = (qmat_asset){.input = input, .stem = qmat_model_name(input)};
+  return asset->stem ? QMAT_OK : qmat_fail_memory(context, "assets");
+}
+
+// Whether a folder's error is one to stop at: a folder that is not there holds no match.
+static int is_unreadable(const char *folder, int number) {
+  (void)folder;
+  return number != ENOENT && number != ENOTDIR;
+}
+
+static qmat_status find_matches(qmat_context *context, const char *pattern, qmat_batch *batch) {
+  glob_t found;
+  int result = glob(pattern, 0, is_unreadable, &found);
+  if (result == GLOB_NOMATCH) return qmat_fail(context, QMAT_ERROR_USAGE, "no file matches '%s'", pattern);
+  if (result != 0)
+    return qmat_fail(context, result == GLOB_NOSPACE ? QMAT_ERROR_MEMORY : QMAT_ERROR_IO,
+                     "the folders of '%s' cannot be read", pattern);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < found.gl_pathc && status == QMAT_OK; i++)
+    status = add_asset(context, batch, "", 0, found.gl_pathv[i], strlen(found.gl_pathv[i]));
+  globfree(&found);
+  return status;
+}
+
+static qmat_status read_list(qmat_context *context, const char *path, qmat_batch *batch) {
+  qmat_bytes bytes = {0};
+  qmat_status status = qmat_bytes_read_file(context, path, &bytes);
+  const char *slash = strrchr(path, '/'), *line = (const char *)bytes.data;
+  size_t folder_length = slash ? (size_t)(slash - path) + 1 : 0;
+  for (const char *end = line + bytes.size; status == QMAT_OK && line < end;) {
+    size_t length = strcspn(line, "\r\n");
+    if (memchr(line, 0, length + 1) && line + length < end) {
+      qmat_fail(context, QMAT_ERROR_FORMAT, "this is no list of paths: it holds a zero byte");
+      status = qmat_fail_at(context, path, 0, 0);
+    } else if (length > 0 && *line != '#') {
+      status = add_asset(context, batch, path, folder_length, line, length);
+    }
+    line += length + 1;
+  }
+  qmat_bytes_uninit(&bytes);
+  if (status == QMAT_OK && batch->count == 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the list names no file");
+    status = qmat_fail_at(context, path, 0, 0);
+  }
+  return status;
+}
+
+static int by_stem(const void *a, const void *b) {
+  return strcmp((*(const qmat_asset *const *)a)->stem, (*(const qmat_asset *const *)b)->stem);
+}
+
+static qmat_status check_stems(qmat_context *context, const qmat_batch *batch) {
+  const qmat_asset **sorted = qmat_alloc(batch->count, sizeof *sorted);
+  if (!sorted) return qmat_fail_memory(context, "assets");
+  for (size_t i = 0; i < batch->count; i++) sorted[i] = &batch->assets[i];
+  qsort(sorted, batch->count, sizeof *sorted, by_stem);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 1; i < batch->count && status == QMAT_OK; i++)
+    if (strcmp(sorted[i - 1]->stem, sorted[i]->stem) == 0)
+      status = qmat_fail(context, QMAT_ERROR_USAGE, "the results of '%s' and '%s' would have one name",
+                         sorted[i - 1]->input, sorted[i]->input);
+  qmat_free(sorted);
+  return status;
+}
+
+qmat_status qmat_batch_find(qmat_context *context, const char *inputs, qmat_batch *batch) {
+  *batch = (qmat_batch){0};
+  qmat_status status =
+      strpbrk(inputs, "*?[") ? find_matches(context, inputs, batch) : read_list(context, inputs, batch);
+  return status == QMAT_OK ? check_stems(context, batch) : status;
+}
+
+void qmat_batch_uninit(qmat_batch *batch) {
+  for (size_t i = 0; i < batch->count; i++) {
+    qmat_asset *asset = &batch->assets[i];
+    for (size_t k = 0; asset->words && asset->words[k]; k++) qmat_free(asset->words[k]);
+    qmat_free(asset->words);
+    qmat_free(asset->input);
+    qmat_free(asset->stem);
+    qmat_free(asset->report);
+    json_decref(asset->result);
+  }
+  qmat_free(batch->assets);
+  *batch = (qmat_batch){0};
+}
+
+/* ---- running ---- */
+
+static bool start(qmat_asset *asset) {
+  extern char **environ;
+  posix_spawn_file_actions_t actions;
+  if (posix_spawn_file_actions_init(&actions) != 0) return false;
+  // What there is to say stands in the report.
+  int result = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  if (result == 0) result = posix_spawn(&asset->process, asset->words[0], &actions, NULL, asset->words, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  asset->started = now();
+  asset->state = result == 0 ? QMAT_ASSET_RUNNING : QMAT_ASSET_FAILED;
+  return result == 0;
+}
+
+static void end(qmat_asset *asset, int status) {
+  asset->seconds = now() - asset->started;
+  asset->exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  asset->signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  asset->state = asset->exit_code == 0 ? QMAT_ASSET_DONE : QMAT_ASSET_FAILED;
+  asset->result = json_load_file(asset->report, 0, NULL);
+}
+
+// Waits for a while for any process to end; NULL: none has.
+static qmat_asset *wait_for_one(qmat_batch *batch) {
+  for (size_t i = 0; i < batch->count; i++) {
+    qmat_asset *asset = &batch->assets[i];
+    int status;
+    if (asset->state != QMAT_ASSET_RUNNING || waitpid(asset->process, &status, WNOHANG) != asset->process) continue;
+    end(asset, status);
+    return asset;
+  }
+  nanosleep(&(struct timespec){.tv_nsec = 10000000}, NULL);
+  return NULL;
+}
+
+qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, bool (*stop)(void),
+                           qmat_batch_observer *observer, void *user) {
+  int running = 0;
+  bool stopped = false;
+  for (size_t next = 0; next < batch->count || running > 0;) {
+    if (!stopped && stop()) {
+      stopped = true;
+      for (size_t i = 0; i < batch->count; i++)
+        if (batch->assets[i].state == QMAT_ASSET_RUNNING) kill(batch->assets[i].process, SIGTERM);
+    }
+    if (stopped && running == 0) break;
+    if (!stopped && running < jobs && next < batch->count) {
+      qmat_asset *asset = &batch->assets[next++];
+      if (start(asset))
+        running++;
+      else
+        observer(user, batch, asset);
+      continue;
+    }
+    qmat_asset *asset = wait_for_one(batch);
+    if (!asset) continue;
+    running--;
+    observer(user, batch, asset);
+  }
+  return stopped ? qmat_fail(context, QMAT_CANCELLED, "cancelled") : QMAT_OK;
+}
+
+/* ---- results ---- */
+
+void qmat_asset_error(const qmat_asset *asset, char *text, size_t size) {
+  const char *told = json_string_value(json_object_get(json_object_get(asset->result, "error"), "text"));
+  if (asset->state != QMAT_ASSET_FAILED)
+    snprintf(text, size, "%s", asset->state == QMAT_ASSET_DONE ? "" : "not run");
+  else if (told)
+    snprintf(text, size, "%s", told);
+  else if (asset->signal)
+    snprintf(text, size, "ended by signal %d (%s)", asset->signal, strsignal(asset->signal));
+  else
+    snprintf(text, size, asset->exit_code < 0 ? "it ended without a result" : "exit code %d without a report",
+             asset->exit_code);
+}
+
+json_t *qmat_asset_json(const qmat_asset *asset) {
+  static const char *const results[] = {"not run", "running", "ok", "failed"};
+  char error[2048];
+  qmat_asset_error(asset, error, sizeof error);
+  json_t *json = json_object(), *path = json_string(asset->input);
+  json_object_set_new(json, "input", path ? path : json_string("(not UTF-8)"));
+  json_object_set_new(json, "result", json_string(results[asset->state]));
+  json_object_set_new(json, "exit_code", json_integer(asset->exit_code));
+  json_object_set_new(json, "seconds", json_real(asset->seconds));
+  json_object_set_new(json, "nodes",
+                      json_integer((json_int_t)json_array_size(json_object_get(asset->result, "nodes"))));
+  json_object_set_new(
+      json, "hits", json_integer(json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits"))));
+  static const char *const kept[] = {"outputs", "summary"};
+  for (int i = 0; i < 2; i++) {
+    json_t *value = json_object_get(asset->result, kept[i]);
+    json_object_set_new(json, kept[i], value ? json_incref(value) : json_null());
+  }
+  json_t *text = *error ? json_string(error) : json_null();
+  json_object_set_new(json, "error", text ? text : json_string("(not UTF-8)"));
+  return json;
+}

@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "graphs/cli/batch.h"
+#include "io/bytes.h"
+
+// A word that a shell takes as it is.
+static void put_quoted(qmat_writer *writer, const char *word) {
+  qmat_put_text(writer, "'");
+  for (; *word; word++) {
+    if (*word == '\'')
+      qmat_put_text(writer, "'\\''");
+    else
+      qmat_put_bytes(writer, word, 1);
+  }
+  qmat_put_text(writer, "' ");
+}
+
+// Puts FOLDER/NAME, quoted.
+static void put_path(qmat_writer *writer, const char *folder, const char *name) {
+  char path[4200];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  put_quoted(writer, path);
+}
+
+// A script whose n-th task runs the command of asset n and leaves its exit code as FOLDER/n.exit, in one piece. A task
+// whose machine dies leaves none, and Slurm starts it again.
+static qmat_status write_script(qmat_context *context, const qmat_batch *batch, const char *folder) {
+  qmat_writer writer = {0};
+  qmat_file *file = NULL;
+  char path[4200];
+  qmat_put_text(&writer, "#!/bin/sh\ncase $SLURM_ARRAY_TASK_ID in\n");
+  for (size_t i = 0; i < batch->count; i++) {
+    qmat_put_integer(&writer, (int64_t)i);
+    qmat_put_text(&writer, ") ");
+    for (char **word = batch->assets[i].words; *word; word++) put_quoted(&writer, *word);
+    qmat_put_text(&writer, ";;\n");
+  }
+  qmat_put_text(&writer, "esac\ncode=$?\ncd ");
+  put_quoted(&writer, folder);
+  qmat_put_text(&writer,
+                "&& echo $code >\"$SLURM_ARRAY_TASK_ID.new\" && mv \"$SLURM_ARRAY_TASK_ID.new\" "
+                "\"$SLURM_ARRAY_TASK_ID.exit\"\n");
+  snprintf(path, sizeof path, "%s/array.sh", folder);
+  qmat_status status = qmat_writer_to_file(context, &writer, "sh", &file);
+  if (status == QMAT_OK) status = qmat_file_save(context, file, path);
+  if (file) qmat_value_release(&file->base);
+  return status;
+}
+
+// Runs a command of Slurm's and takes its first line; false when it fails.
+static bool ask(qmat_writer *command, char *line, size_t size) {
+  qmat_put_bytes(command, "", 1);
+  line[0] = 0;
+  FILE *pipe = command->failed ? NULL : popen((const char *)command->bytes, "re");
+  qmat_writer_uninit(command);
+  if (!pipe) return false;
+  if (!fgets(line, (int)size, pipe)) line[0] = 0;
+  char rest[256];
+  while (fgets(rest, sizeof rest, pipe)) continue;
+  return pclose(pipe) == 0;
+}
+
+static bool submit(const qmat_batch *batch, int jobs, int threads, const char *folder, char *job, size_t size) {
+  qmat_writer command = {0};
+  char options[160];
+  snprintf(options, sizeof options,
+           "sbatch --parsable --requeue --job-name=qmat --output=/dev/null --nodes=1 --ntasks=1 --cpus-per-task=%d "
+           "--array=0-%zu",
+           threads, batch->count - 1);
+  qmat_put_text(&command, options);
+  if (jobs > 0) {
+    qmat_put_text(&command, "%");
+    qmat_put_integer(&command, jobs);
+  }
+  qmat_put_text(&command, " ");
+  put_path(&command, folder, "array.sh");
+  if (!ask(&command, job, size)) return false;
+  job[strspn(job, "0123456789")] = 0;  // "12;cluster"
+  return *job != 0;
+}
+
+// Whether Slurm still has tasks of the job.
+static bool is_alive(const char *job) {
+  qmat_writer command = {0};
+  char line[64];
+  qmat_put_text(&command, "squeue --noheader --format=%i --jobs=");
+  qmat_put_text(&command, job);
+  qmat_put_text(&command, " 2>/dev/null");
+  // A job that is over for a while is not known any more, which is an error to squeue.
+  return ask(&command, line, sizeof line) && *line;
+}
+
+static void cancel(const char *job) {
+  qmat_writer command = {0};
+  char line[64];
+  qmat_put_text(&command, "scancel ");
+  qmat_put_text(&command, job);
+  ask(&command, line, sizeof line);
+}
+
+static void exit_path(const char *folder, size_t index, char path[4200]) {
+  snprintf(path, 4200, "%s/%zu.exit", folder, index);
+}
+
+// Takes what a task has left; false when it has not ended.
+static bool collect(qmat_asset *asset, size_t index, const char *folder) {
+  char path[4200];
+  exit_path(folder, index, path);
+  FILE *file = fopen(path, "re");
+  if (!file) return false;
+  if (fscanf(file, "%d", &asset->exit_code) != 1) asset->exit_code = -1;
+  fclose(file);
+  unlink(path);
+  // The shell tells of a signal like this.
+  asset->signal = asset->exit_code > 128 ? asset->exit_code - 128 : 0;
+  asset->result = json_load_file(asset->report, 0, NULL);
+  asset->seconds = json_real_value(json_object_get(asset->result, "seconds"));
+  asset->state = asset->exit_code == 0 ? QMAT_ASSET_DONE : QMAT_ASSET_FAILED;
+  return true;
+}
+
+qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int jobs, int threads, const char *folder,
+                                 bool (*stop)(void), qmat_batch_observer *observer, void *user) {
+  char job[64], path[4200];
+  qmat_status status = write_script(context, batch, folder);
+  if (status == QMAT_OK && !submit(batch, jobs, threads, folder, job, sizeof job)) {
+    qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Slurm does not take the job: sbatch failed");
+    status = qmat_fail_hint(context, "without --engine slurm the batch runs here");
+  }
+  size_t left = status == QMAT_OK ? batch->count : 0;
+  // Files may be seen somewhat later than the end of the job, where folders are shared.
+  for (int patience = 10; left > 0 && patience > 0;) {
+    if (stop()) {
+      cancel(job);
+      status = qmat_fail(context, QMAT_CANCELLED, "cancelled");
+      break;
+    }
+    nanosleep(&(struct timespec){.tv_nsec = 500000000}, NULL);
+    bool alive = is_alive(job);
+    for (size_t i = 0; i < batch->count; i++) {
+      qmat_asset *asset = &batch->assets[i];
+      if (asset->state != QMAT_ASSET_WAITING || !collect(asset, i, folder)) continue;
+      left--;
+      observer(user, batch, asset);
+    }
+    if (!alive) patience--;
+  }
+  for (size_t i = 0; i < batch->count && status == QMAT_OK; i++) {
+    qmat_asset *asset = &batch->assets[i];
+    if (asset->state != QMAT_ASSET_WAITING) continue;
+    asset->state = QMAT_ASSET_FAILED;
+    asset->exit_code = -1;
+    observer(user, batch, asset);
+  }
+  // Tasks that were cancelled may have ended since.
+  for (size_t i = 0; i < batch->count; i++) {
+    exit_path(folder, i, path);
+    unlink(path);
+  }
+  snprintf(path, sizeof path, "%s/array.sh", folder);
+  unlink(path);
+  return status;
+}

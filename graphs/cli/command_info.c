@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/node.h"
+#include "graphs/cli/command.h"
+#include "io/extract.h"
+#include "io/model.h"
+#include "nodes/nodes.h"
+
+// Control characters in a file's texts are not for the terminal.
+static void print_text(const char *key, const char *text) {
+  printf("  %s: ", key);
+  for (; *text; text++) putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
+  putchar('\n');
+}
+
+static void print_object(const json_t *object) {
+  const char *key;
+  json_t *value;
+  json_object_foreach((json_t *)(uintptr_t)object, key, value) {
+    if (json_is_array(value)) {
+      for (size_t i = 0; i < json_array_size(value); i++) {
+        const char *text = json_string_value(json_array_get(value, i));
+        if (text) print_text(key, text);
+      }
+    } else if (json_is_string(value)) {
+      printf("  %s: %s\n", key, qmat_show(json_string_value(value)).text);
+    } else if (json_is_boolean(value)) {
+      printf("  %s: %s\n", key, json_is_true(value) ? "yes" : "no");
+    } else if (json_is_number(value)) {
+      char number[32];
+      qmat_format_number(json_number_value(value), number, sizeof number);
+      printf("  %s: %s\n", key, number);
+    }
+  }
+}
+
+static double number_of(const json_t *object, const char *key) {
+  const json_t *value = json_object_get(object, key);
+  return json_is_number(value) ? json_number_value(value) : (double)NAN;
+}
+
+// Whether what the file states is refuted: the error is larger for certain.
+static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured) {
+  const struct {
+    const char *title, *stated, *most, *least;
+  } rows[] = {
+      {"surface to envelope", "qmat_error_out", "surface_to_envelope", "surface_to_envelope_at_least"},
+      {"envelope to surface", "qmat_error_in", "envelope_to_surface", "envelope_to_surface_at_least"},
+  };
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < 2; i++) {
+    const double stated = number_of(facts, rows[i].stated), least = number_of(measured, rows[i].least);
+    printf("  %s: between %.6g and %.6g of the diagonal", rows[i].title, least, number_of(measured, rows[i].most));
+    if (isnan(stated)) {
+      printf("; the file states none\n");
+      continue;
+    }
+    const bool holds = !(least > stated);
+    printf("; stated %.6g: %s\n", stated, holds ? "not refuted" : "REFUTED");
+    if (!holds) {
+      status =
+          qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states", rows[i].title);
+    }
+  }
+  return status;
+}
+
+// Runs a node with default parameters. `outputs` holds one pointer per port.
+static qmat_status run_node(qmat_context *context, const char *name, const qmat_value *const inputs[],
+                            qmat_value *outputs[]) {
+  const qmat_node *node = qmat_node_find(name);
+  void *params = qmat_calloc(1, node->params_size);
+  if (!params) return qmat_fail_memory(context, "parameters");
+  qmat_params_default(node, params);
+  const qmat_status status = qmat_node_run(context, node, params, inputs, outputs);
+  qmat_free(params);
+  return status;
+}
+
+// Makes of a mesh as it was read what the shipped graph takes as the solid's surface, in its place.
+static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
+  static const char *const nodes[] = {"mesh.subdivide", "mesh.unite"};
+  for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
+    qmat_value *outputs[2] = {NULL};
+    const qmat_status status = run_node(context, nodes[i], (const qmat_value *const[]){*mesh}, outputs);
+    if (status != QMAT_OK) return status;
+    qmat_value_release(outputs[1]);
+    qmat_value_release(*mesh);
+    *mesh = outputs[0];
+  }
+  return QMAT_OK;
+}
+
+// `mesh_choice` is the number of the mesh that the medial mesh describes, where the model is glTF, too; else "merged".
+static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
+                                 const qmat_medial *medial, const json_t *facts) {
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
+  qmat_scene *scene;
+  qmat_value *mesh;
+  qmat_report *read;
+  qmat_value *output = NULL;
+  qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
+  if (status == QMAT_OK) {
+    status = make_solid(context, &mesh);
+    if (status == QMAT_OK)
+      status = run_node(context, "medial.evaluate", (const qmat_value *const[]){mesh, &medial->base}, &output);
+    if (status == QMAT_OK) {
+      printf("against %s\n", path);
+      status = compare(context, facts, ((const qmat_report *)output)->root);
+      if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
+    }
+    qmat_value_release(output);
+    qmat_value_release(&scene->base);
+    qmat_value_release(mesh);
+    qmat_value_release(&read->base);
+  }
+  return status;
+}
+
+// Prints what the file carries: the medial mesh of node `name`, or the only one. `carrier` (NULL: not known) tells
+// which mesh it is of.
+static qmat_status print_medial(qmat_context *context, const char *path, const char *name, const json_t *carrier,
+                                const char *against) {
+  qmat_medial *medial;
+  json_t *facts = json_object();
+  if (!facts) return qmat_fail_memory(context, "facts");
+  qmat_status status = qmat_medial_extract(context, path, name, &medial, facts);
+  if (status == QMAT_OK) {
+    printf("%s: a medial mesh of %zu spheres, %zu cones, %zu slabs", path, medial->sphere_count, medial->edge_count,
+           medial->triangle_count);
+    if (name) printf(" on node %s", qmat_show(name).text);
+    printf("\n");
+    print_object(facts);
+    if (against) {
+      const json_t *mesh = json_object_get(carrier, "mesh");
+      const qmat_format format = qmat_format_of_name(against);
+      const bool by_mesh = mesh && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF);
+      char number[24] = "merged";
+      if (by_mesh) snprintf(number, sizeof number, "%lld", (long long)json_integer_value(mesh));
+      status = check_against(context, against, number, medial, facts);
+    }
+    qmat_value_release(&medial->base);
+  }
+  json_decref(facts);
+  return status;
+}
+
+// The one of that node, or all.
+static qmat_status print_medials(qmat_context *context, const char *path, const char *name, const char *against) {
+  json_t *carriers = qmat_medial_carriers(context, path);
+  if (!carriers) return context->error.status;
+  const size_t count = json_array_size(carriers);
+  qmat_status status = QMAT_OK;
+  if (name || count < 2) {
+    const json_t *carrier = count == 1 ? json_array_get(carriers, 0) : NULL;
+    for (size_t i = 0; i < count && name; i++) {
+      const json_t *other = json_array_get(carriers, i);
+      if (strcmp(json_string_value(json_object_get(other, "node")), name) == 0) carrier = other;
+    }
+    status = print_medial(context, path, name, carrier, against);
+  }
+  for (size_t i = 0; !name && count >= 2 && i < count; i++) {
+    const json_t *carrier = json_array_get(carriers, i);
+    const qmat_error before = context->error;
+    const qmat_status of_one =
+        print_medial(context, path, json_string_value(json_object_get(carrier, "node")), carrier, against);
+    // The first error is told; the others are looked at all the same.
+    if (status != QMAT_OK)
+      context->error = before;
+    else
+      status = of_one;
+  }
+  json_decref(carriers);
+  return status;
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  const char *path = invocation->arguments[0], *against = qmat_invocation_value(invocation, "against");
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &report);
+  const bool has_surface = status == QMAT_OK;
+  if (has_surface) {
+    printf("%s: a surface\n", path);
+    print_object(report->root);
+    qmat_value_release(&scene->base);
+    qmat_value_release(&mesh->base);
+    qmat_value_release(&report->base);
+  }
+  const qmat_error first = context->error;
+  const qmat_status carried = print_medials(context, path, qmat_invocation_value(invocation, "node"), against);
+  if (carried == QMAT_OK) {
+    status = QMAT_OK;
+  } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
+    status = carried;  // it has one that cannot be told apart or read, or should have one
+  } else if (!has_surface) {
+    context->error = first;
+  }
+  return status;
+}
+
+static const qmat_option options[] = {
+    {"against", 0, "MODEL", "Bound the errors of the medial mesh to this model anew, and compare with what is stated"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh is meant, where several have one"},
+    {0},
+};
+
+const qmat_command qmat_command_info = {
+    .name = "info",
+    .arguments = "FILE",
+    .summary = "Tell what a model's file holds",
+    .doc =
+        "Prints what reading the file finds: counts, units, what was left out. Of a file that carries medial "
+        "meshes, the counts of each and what the file says of it. With --against, its errors are bounded anew, with "
+        "subdivision surfaces at their limit and parts that reach into each other as their union, and the "
+        "exit code is 1 where one is for certain larger than stated; where both files are glTF, each is compared with "
+        "the mesh of the number that its node carries, in that mesh's own space.",
+    .options = options,
+    .least = 1,
+    .most = 1,
+    .run = run,
+};

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/built_in.h"
+#include "graphs/cli/command.h"
+#include "graphs/node_json.h"
+#include "io/model.h"
+
+// The first input of the built-in graph is the argument, the others are options: one of each name.
+static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
+  qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, &invocation->graph);
+  if (status != QMAT_OK) return status;
+  const qmat_graph *graph = &invocation->graph;
+  for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
+    const qmat_graph_input *input = &graph->inputs[i];
+    const qmat_graph_node *node = &graph->nodes[input->params[0].node];
+    const qmat_param *param = &node->type->params[input->params[0].param];
+    char *doc = invocation->docs[invocation->option_count];
+    int length = snprintf(doc, QMAT_OPTION_DOC_SIZE, "%s: ", param->doc);
+    if (length > 0 && length < QMAT_OPTION_DOC_SIZE)
+      qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
+    status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
+  }
+  for (size_t i = 0; i < graph->output_count && status == QMAT_OK; i++) {
+    const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
+    if (!format) continue;
+    char *doc = invocation->docs[invocation->option_count];
+    size_t used =
+        (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE, "Save the result; may be repeated. The ending chooses the format:");
+    for (int k = 0; format->choices[k] && used < QMAT_OPTION_DOC_SIZE; k++)
+      used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", k ? "," : "", format->choices[k]);
+    return qmat_invocation_add_option(context, invocation, (qmat_option){"output", 'o', "[NAME=]PATH", doc});
+  }
+  return status;
+}
+
+// Whether a file is to be saved that can hold a medial mesh for each mesh of a scene.
+static bool saves_scene(const qmat_invocation *invocation) {
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    if (strcmp(invocation->given[i].name, "output") != 0) continue;
+    const qmat_format format = qmat_format_of_name(invocation->given[i].value);
+    if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
+  }
+  return false;
+}
+
+static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
+  qmat_graph *graph = &invocation->graph;
+  qmat_status status = qmat_graph_set_named(context, graph, graph->inputs[0].name, invocation->arguments[0]);
+  // The other formats hold one medial mesh, so that the meshes of a scene are taken as one.
+  if (status == QMAT_OK && !saves_scene(invocation)) status = qmat_graph_assign(context, graph, "model.mesh=merged");
+  // Whoever asks for a number of spheres wants that number, whatever the distance.
+  if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
+      !qmat_invocation_value(invocation, "epsilon"))
+    status = qmat_graph_set_named(context, graph, "epsilon", "0");
+  for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
+    const char *value = qmat_invocation_value(invocation, graph->inputs[i].name);
+    if (value) status = qmat_graph_set_named(context, graph, graph->inputs[i].name, value);
+  }
+  return status;
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  if (!qmat_invocation_value(invocation, "output")) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "where to save the result is not given");
+    return qmat_fail_hint(context, "-o PATH");
+  }
+  return qmat_execute(context, invocation, set_inputs, NULL, NULL);
+}
+
+const qmat_command qmat_command_mat = {
+    .name = "mat",
+    .arguments = "INPUT -o OUTPUT",
+    .summary = "Describe a model by medial spheres, cones and slabs",
+    .doc =
+        "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
+        "0, which means no bound on the distance. A glTF scene that is saved as glTF goes on with all that is in it, "
+        "and each of its meshes gains a medial mesh; for other formats its meshes are taken as one "
+        "(model.mesh=merged). Every other parameter is reached by --set; 'qmat nodes' lists the nodes and 'qmat node "
+        "NAME' their parameters.",
+    .common = qmat_common_options,
+    .caching = qmat_cache_option_rows,
+    .least = 1,
+    .most = 1,
+    .add_options = add_options,
+    .run = run,
+};

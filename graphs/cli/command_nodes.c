@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+
+#include "graphs/cli/command.h"
+#include "graphs/node_json.h"
+
+static void print_ports(const qmat_port *ports, size_t count) {
+  for (size_t i = 0; i < count; i++) printf("%s%s%s", i ? ", " : "", ports[i].name, ports[i].optional ? "?" : "");
+  if (count == 0) printf("nothing");
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  const qmat_registry *registry = &invocation->registry;
+  if (qmat_invocation_value(invocation, "json")) return qmat_print_json(context, qmat_registry_json(registry));
+  for (size_t i = 0; i < registry->count; i++) {
+    const qmat_node *type = registry->nodes[i];
+    printf("%-18s%s\n%18s", type->name, type->summary, "");
+    print_ports(type->inputs, qmat_input_count(type));
+    printf(" -> ");
+    print_ports(type->outputs, qmat_output_count(type));
+    putchar('\n');
+  }
+  return QMAT_OK;
+}
+
+static const qmat_option options[] = {
+    {"json", 0, NULL, "Print everything that is known of the nodes as JSON"},
+    {0},
+};
+
+const qmat_command qmat_command_nodes = {
+    .name = "nodes",
+    .arguments = "",
+    .summary = "List the nodes that a graph may use",
+    .doc =
+        "Lists the types of nodes, each with its inputs and outputs. A '?' marks an input that may stay unconnected.",
+    .options = options,
+    .run = run,
+};

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/cli/command.h"
+#include "graphs/cli/progress.h"
+#include "graphs/run/run_report.h"
+
+const qmat_option qmat_common_options[] = {
+    {"set", 0, "NAME=VALUE", "Set a parameter: node.parameter=value, or input=value; may be repeated"},
+    {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},
+    {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"},
+    {"report", 0, "FILE", "Write what was done, or the error, as JSON"},
+    {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
+    {"dry-run", 0, NULL, "Print which nodes would run and which results the cache has, and stop there"},
+    {"depfile", 0, "FILE", "Write what the saved files depend on as a rule for Make or Ninja"},
+    {"quiet", 'q', NULL, "Print nothing but errors"},
+    {0},
+};
+
+static qmat_status read_threads(qmat_context *context, const char *text) {
+  double number = 0;
+  if (!text) return QMAT_OK;
+  if (!qmat_parse_number(text, &number) || strchr(text, '%') || number < 0 || number > 1024 ||
+      number != (double)(int)number) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "a whole number from 0 to 1024 belongs here, not '%s'", qmat_show(text).text);
+    return qmat_fail_field(context, "--threads");
+  }
+  context->threads = (int)number;
+  return QMAT_OK;
+}
+
+// Reads "NAME=PATH", or "PATH" when only one output of the graph is a file.
+static qmat_status read_save(qmat_context *context, const qmat_graph *graph, const char *text, qmat_run_save *save) {
+  const char *equals = strchr(text, '=');
+  char name[QMAT_GRAPH_NAME_SIZE];
+  if (equals && (size_t)(equals - text) < sizeof name && !memchr(text, '/', (size_t)(equals - text)) &&
+      !memchr(text, '.', (size_t)(equals - text))) {
+    memcpy(name, text, (size_t)(equals - text));
+    name[equals - text] = 0;
+    save->path = equals + 1;
+    return qmat_graph_find_output(context, graph, name, &save->output);
+  }
+  size_t files = 0;
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    if (graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE) continue;
+    save->output = i;
+    files++;
+  }
+  save->path = text;
+  if (files == 1) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' does not say which output it is for: the graph makes %zu files",
+            qmat_show(text).text, files);
+  if (files > 0)
+    qmat_fail_hint(context, "-o %s=%s", graph->outputs[save->output].name, qmat_show(text).text);
+  else if (graph->output_count > 0)
+    qmat_fail_hint(context, "-o %s=PATH saves output '%s'", graph->outputs[0].name, graph->outputs[0].name);
+  return context->error.status;
+}
+
+static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
+  qmat_run_options options = {.saves = planned->saves,
+                              .to_node = qmat_invocation_value(invocation, "to"),
+                              .cache = planned->cached ? &planned->cache : NULL,
+                              .forced = planned->forced};
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    const char *name = invocation->given[i].name, *value = invocation->given[i].value;
+    qmat_status status = QMAT_OK;
+    if (strcmp(name, "force") == 0 && !*value) options.force_all = true;
+    if (strcmp(name, "force") == 0 && *value) {
+      status = qmat_graph_find_node(context, &invocation->graph, value, &planned->forced[options.forced_count++]);
+      if (status != QMAT_OK) return qmat_fail_field(context, "--force");
+    }
+    if (strcmp(name, "output") == 0) {
+      status = read_save(context, &invocation->graph, value, &planned->saves[options.save_count++]);
+      if (status != QMAT_OK) return qmat_fail_field(context, "--output");
+    }
+  }
+  return qmat_run_plan(context, &invocation->graph, &options, &planned->run);
+}
+
+qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
+                                 qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                                 qmat_planned_run *planned) {
+  *planned = (qmat_planned_run){0};
+  planned->saves = qmat_calloc(invocation->given_count, sizeof *planned->saves);
+  planned->forced = qmat_calloc(invocation->given_count, sizeof *planned->forced);
+  if (!planned->saves || !planned->forced) return qmat_fail_memory(context, "options");
+  qmat_status status = prepare(context, invocation);
+  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
+    if (strcmp(invocation->given[i].name, "set") == 0) {
+      status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
+      if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
+    }
+  if (status == QMAT_OK) status = qmat_open_cache(context, invocation, &planned->cache, &planned->cached);
+  return status == QMAT_OK ? plan(context, invocation, planned) : status;
+}
+
+void qmat_planned_run_uninit(qmat_planned_run *planned) {
+  qmat_run_uninit(&planned->run);
+  qmat_cache_close(&planned->cache);
+  qmat_free(planned->saves);
+  qmat_free(planned->forced);
+  *planned = (qmat_planned_run){0};
+}
+
+qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation) {
+  return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
+}
+
+// A report of a failure must not replace what the run would have read or written, however early it failed.
+static bool may_write_error(const qmat_invocation *invocation, const char *path) {
+  for (size_t i = 0; i < invocation->argument_count; i++)
+    if (qmat_same_file(path, invocation->arguments[i])) return false;
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    const char *value = invocation->given[i].value, *equals = strchr(value, '=');
+    if (strcmp(invocation->given[i].name, "output") != 0 && strcmp(invocation->given[i].name, "set") != 0) continue;
+    if (qmat_same_file(path, value) || (equals && qmat_same_file(path, equals + 1))) return false;
+  }
+  const qmat_graph *graph = &invocation->graph;
+  for (size_t i = 0; i < graph->node_count; i++)
+    for (size_t row = 0; row < qmat_param_count(graph->nodes[i].type); row++) {
+      const char *text = graph->nodes[i].texts[row];
+      bool is_path = graph->nodes[i].type->params[row].type == QMAT_PARAM_PATH;
+      if (is_path && text && qmat_same_file(path, text)) return false;
+    }
+  for (size_t i = 0; i < graph->output_count; i++)
+    if (graph->outputs[i].path && qmat_same_file(path, graph->outputs[i].path)) return false;
+  return true;
+}
+
+// Whether a step before has told the same of the same mesh: what failed once is missing in all that comes after it.
+static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
+  for (size_t i = 0; i < step; i++) {
+    const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
+    const char *before = json_string_value(json_object_get(of_mesh, "failure"));
+    if (before && strcmp(before, failure) == 0) return true;
+  }
+  return false;
+}
+
+// What readers of files left out, say: strings in the reports of steps that ran; and meshes that could not be
+// described.
+static void print_warnings(const qmat_run *run) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    const char *id = run->graph->nodes[run->steps[i].node].id;
+    const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
+    for (size_t k = 0; k < json_array_size(warnings); k++) {
+      const char *text = json_string_value(json_array_get(warnings, k));
+      if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", id, text);
+    }
+    const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
+    for (size_t k = 0; k < json_array_size(meshes); k++) {
+      const json_t *of_mesh = json_array_get(meshes, k);
+      const char *name = json_string_value(json_object_get(of_mesh, "name"));
+      const char *failure = json_string_value(json_object_get(of_mesh, "failure"));
+      if (name && failure && !was_told(run, i, k, failure))
+        fprintf(stderr, "qmat: warning: mesh '%s' cannot be described: %s\n", qmat_show(name).text, failure);
+    }
+  }
+}
+
+qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
+                         qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
+                         void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
+  const char *report_path = qmat_invocation_value(invocation, "report");
+  bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
+  bool dry = qmat_invocation_value(invocation, "dry-run") != NULL;
+  const char *mode = qmat_invocation_value(invocation, "progress");
+  qmat_progress_view view = {0};
+  qmat_run_observer observer;
+  qmat_planned_run planned = {0};
+  qmat_run *run = &planned.run;
+  qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
+  if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
+  if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, &planned);
+  if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
+  if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
+    status = qmat_run_check_path(context, run, "the depfile", qmat_invocation_value(invocation, "depfile"));
+  bool ready = status == QMAT_OK, reported = false;
+  if (ready && dry) {
+    qmat_run_foresee(run);
+    qmat_run_print_plan(run, stdout);
+  }
+  if (ready && !dry) {
+    qmat_progress_view_connect(&view, context, &observer);
+    status = qmat_run_execute(context, run, &observer);
+    qmat_progress_view_end(&view);
+    context->progress = NULL;
+    if (status == QMAT_OK) status = qmat_run_write(context, run);
+  }
+  const char *depfile = qmat_invocation_value(invocation, "depfile");
+  if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
+  if (status == QMAT_OK && report_path && !dry) {
+    json_t *report = qmat_run_report(context, run);
+    status = qmat_save_json(context, report, report_path);
+    json_decref(report);
+    reported = true;
+  }
+  if (status == QMAT_OK && !quiet && !dry) qmat_run_print(run, stdout);
+  if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
+    // The first error is the one to be told, also when its report cannot be written.
+    const qmat_error error = context->error;
+    json_t *report = qmat_error_report(&error);
+    qmat_save_json(context, report, report_path);
+    json_decref(report);
+    context->error = error;
+  }
+  if (ready && !quiet && !dry) print_warnings(run);
+  const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
+  if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
+  if (finished) finished(user, &invocation->graph, run);
+  qmat_planned_run_uninit(&planned);
+  return status;
+}

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <locale.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "graphs/cli/command.h"
+#include "graphs/cli/progress.h"
+#include "nodes/nodes.h"
+
+static qmat_status call(qmat_context *context, const char *name, char *const *words, size_t count) {
+  const qmat_registry registry = {qmat_nodes, qmat_node_count};
+  const qmat_command *command;
+  qmat_status status = qmat_command_find(context, name, &command);
+  if (status != QMAT_OK) return status;
+  qmat_invocation *invocation = qmat_calloc(1, sizeof *invocation);
+  if (!invocation) return qmat_fail_memory(context, "options");
+  status = qmat_invocation_init(context, command, &registry, invocation);
+  if (status == QMAT_OK) status = qmat_invocation_parse(context, invocation, words, count);
+  if (status == QMAT_OK) {
+    if (invocation->help)
+      qmat_command_print_help(invocation);
+    else
+      status = command->run(context, invocation);
+  }
+  qmat_invocation_uninit(invocation);
+  qmat_free(invocation);
+  return status;
+}
+
+int main(int argc, char **argv) {
+  // Only what tells which characters the terminal shows: numbers stay those of the C locale.
+  setlocale(LC_CTYPE, "");
+  qmat_catch_interrupts();
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not the end of the program
+  qmat_context context = {0};
+  const char *name = argc > 1 ? argv[1] : "help";
+  if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";
+  if (strcmp(name, "--version") == 0) name = "version";
+  size_t count = argc > 2 ? (size_t)argc - 2 : 0;
+  qmat_status status = call(&context, name, argv + (argc > 2 ? 2 : argc), count);
+  if (status == QMAT_OK && argc < 2) {
+    qmat_fail(&context, QMAT_ERROR_USAGE, "no command is given");
+    status = QMAT_ERROR_USAGE;
+  }
+  if (fflush(stdout) != 0 && status == QMAT_OK)
+    status = qmat_fail(&context, QMAT_ERROR_IO, "the standard output cannot be written");
+  if (status != QMAT_OK) {
+    char line[2048];
+    qmat_error_format(&context.error, line, sizeof line);
+    fprintf(stderr, "qmat: %s\n", line);
+  }
+  qmat_context_uninit(&context);
+  return qmat_status_exit_code(status);
+}

@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/cli/progress.h"
+
+#include <langinfo.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "core/json_text.h"
+#include "graphs/run/run_report.h"
+
+// The one variable of the program that can change: a signal has no other way to tell.
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int number) {
+  (void)number;
+  interrupted = 1;
+}
+
+void qmat_catch_interrupts(void) {
+  struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)(SA_RESETHAND | SA_RESTART)};
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+}
+
+bool qmat_interrupted(void) {
+  return interrupted != 0;
+}
+
+static double now(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+static int terminal_width(void) {
+  struct winsize size;
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
+qmat_status qmat_progress_view_init(qmat_context *context, const char *mode, qmat_progress_view *view) {
+  static const char *const modes[] = {"off", "tty", "json"};
+  *view = (qmat_progress_view){0};
+  const char *term = getenv("TERM"), *no_colour = getenv("NO_COLOR");
+  bool can_redraw = isatty(STDERR_FILENO) && term && *term && strcmp(term, "dumb") != 0;
+  view->mode = can_redraw ? QMAT_PROGRESS_TTY : QMAT_PROGRESS_OFF;
+  view->unicode = strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
+  view->colour = can_redraw && !(no_colour && *no_colour);
+  if (!mode) return QMAT_OK;
+  for (int i = 0; i < 3; i++)
+    if (strcmp(mode, modes[i]) == 0) {
+      view->mode = (qmat_progress_mode)i;
+      return QMAT_OK;
+    }
+  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is no way to show progress", qmat_show(mode).text);
+  const char *nearest = qmat_nearest_name(mode, modes, 3);
+  if (nearest) return qmat_fail_hint(context, "did you mean '%s'?", nearest);
+  return qmat_fail_hint(context, "tty, json or off");
+}
+
+/* ---- a line of JSON ---- */
+
+static void print_event(const qmat_progress_view *view, const char *event, json_t *more) {
+  json_t *line = json_object();
+  json_object_set_new(line, "event", json_string(event));
+  json_object_set_new(line, "node", json_string(view->id));
+  json_object_set_new(line, "type", json_string(view->type));
+  json_object_set_new(line, "step", json_integer((json_int_t)view->step + 1));
+  json_object_set_new(line, "steps", json_integer((json_int_t)view->step_count));
+  if (more) json_object_update(line, more);
+  char *text = qmat_json_text(line, JSON_COMPACT | JSON_REAL_PRECISION(9), NULL);
+  // In one piece, so that lines stay whole when others write to the same terminal.
+  if (text) fprintf(stderr, "%s\n", text);
+  qmat_free(text);
+  json_decref(line);
+  json_decref(more);
+}
+
+/* ---- a line on a terminal ---- */
+
+// One line that never reaches the last column, so that the terminal does not wrap it.
+typedef struct line_writer {
+  char bytes[1024];
+  size_t size;
+  int column, width;
+} line_writer;
+
+static void put_code(line_writer *line, const char *code) {
+  size_t length = strlen(code);
+  if (line->size + length >= sizeof line->bytes) return;
+  memcpy(line->bytes + line->size, code, length);
+  line->size += length;
+}
+
+// Text of one column a character, cut at the width. Node ids and types are ASCII, units nearly always.
+static void put_text(line_writer *line, const char *text) {
+  for (; *text && line->column < line->width && line->size + 1 < sizeof line->bytes; text++) {
+    line->bytes[line->size++] = *text;
+    if (((unsigned char)*text & 0xc0) != 0x80) line->column++;
+  }
+}
+
+static void put_bar(line_writer *line, const qmat_progress_view *view, double fraction, int cells) {
+  static const char *const eighths[] = {"", "▏", "▎", "▍", "▌", "▋", "▊", "▉"};
+  if (line->column + cells > line->width || line->size + (size_t)cells * 3 + 32 >= sizeof line->bytes) return;
+  int filled = (int)(fraction * cells * 8);
+  if (view->colour) put_code(line, "\x1b[36m");
+  int whole = filled / 8, part = filled % 8;
+  for (int i = 0; i < cells; i++) {
+    if (!view->unicode)
+      put_code(line, i < whole ? "#" : ".");
+    else if (i < whole)
+      put_code(line, "█");
+    else
+      put_code(line, i == whole && part > 0 ? eighths[part] : view->colour ? " " : "░");
+  }
+  if (view->colour) put_code(line, "\x1b[0m");
+  line->column += cells;
+}
+
+static void draw(qmat_progress_view *view, uint64_t done, uint64_t total, const char *unit, bool finished) {
+  line_writer line = {.width = terminal_width() - 1};
+  char text[160], count[32];
+  put_code(&line, "\r");
+  snprintf(text, sizeof text, "[%zu/%zu] %-10s %-16s ", view->step + 1, view->step_count, view->id, view->type);
+  put_text(&line, text);
+  double fraction = finished ? 1 : total > 0 && done <= total ? (double)done / (double)total : 0;
+  int cells = line.width - line.column - 34;
+  if (cells > 30) cells = 30;
+  if (cells >= 6) put_bar(&line, view, fraction, cells);
+  if (finished || total > 0) {
+    snprintf(text, sizeof text, " %3d %%", (int)(fraction * 100));
+    put_text(&line, text);
+  }
+  snprintf(text, sizeof text, " %7.1f s", now() - view->started);
+  put_text(&line, text);
+  if (!finished && done > 0) {
+    qmat_format_count(done, count);
+    snprintf(text, sizeof text, "  %s %s", count, unit);
+    put_text(&line, text);
+  }
+  put_code(&line, "\x1b[K");
+  if (finished) put_code(&line, "\n");
+  view->line_open = !finished;
+  fwrite(line.bytes, 1, line.size, stderr);
+  fflush(stderr);
+}
+
+/* ---- callbacks ---- */
+
+static bool on_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                        const char *unit) {
+  (void)node_id;
+  (void)node_type;
+  qmat_progress_view *view = user;
+  // The runner asks once between nodes, without anything to tell.
+  bool tells = done > 0 || total > 0;
+  if (view->mode == QMAT_PROGRESS_TTY && tells) draw(view, done, total, unit, false);
+  if (view->mode == QMAT_PROGRESS_JSON && tells)
+    print_event(view, "progress",
+                json_pack("{s:I, s:I, s:s, s:f}", "done", (json_int_t)done, "total", (json_int_t)total, "unit", unit,
+                          "seconds", now() - view->started));
+  return !interrupted;
+}
+
+static void on_started(void *user, const qmat_run *run, size_t step) {
+  qmat_progress_view *view = user;
+  const qmat_graph_node *node = &run->graph->nodes[run->steps[step].node];
+  view->step = step;
+  view->step_count = run->step_count;
+  view->id = node->id;
+  view->type = node->type->name;
+  view->started = now();
+  if (view->mode == QMAT_PROGRESS_TTY) draw(view, 0, 0, "", false);
+  if (view->mode == QMAT_PROGRESS_JSON) print_event(view, "start", NULL);
+}
+
+static void on_done(void *user, const qmat_run *run, size_t step) {
+  qmat_progress_view *view = user;
+  if (view->mode == QMAT_PROGRESS_TTY) draw(view, 0, 0, "", true);
+  if (view->mode == QMAT_PROGRESS_JSON)
+    print_event(view, "done", json_pack("{s:f}", "seconds", run->steps[step].seconds));
+}
+
+void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context, qmat_run_observer *observer) {
+  context->progress = on_progress;
+  context->progress_user = view;
+  *observer = (qmat_run_observer){.user = view, .started = on_started, .done = on_done};
+}
+
+void qmat_progress_view_end(qmat_progress_view *view) {
+  if (view->line_open) fputc('\n', stderr);
+  view->line_open = false;
+}

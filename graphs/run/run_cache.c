@@ -1,0 +1,360 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/run/run_cache.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "graphs/cache/cache_key.h"
+
+/* ---- files ---- */
+
+static bool add_file(struct qmat_run_file_digest **files, size_t *count, size_t *capacity, const char *path,
+                     const qmat_digest *digest) {
+  char *copy = qmat_strdup(path);
+  if (!copy || qmat_grow((void **)files, capacity, *count + 1, sizeof **files) != 0) {
+    qmat_free(copy);
+    return false;
+  }
+  struct qmat_run_file_digest *file = &(*files)[(*count)++];
+  *file = (struct qmat_run_file_digest){.path = copy, .readable = digest != NULL};
+  if (digest) file->digest = *digest;
+  return true;
+}
+
+static const struct qmat_run_file_digest *find_file(const struct qmat_run_file_digest *files, size_t count,
+                                                    const char *path) {
+  for (size_t i = 0; i < count; i++)
+    if (strcmp(files[i].path, path) == 0) return &files[i];
+  return NULL;
+}
+
+void qmat_step_note_read(void *user, const char *path, const uint8_t *bytes, size_t size) {
+  qmat_step_reads *reads = user;
+  qmat_digest digest;
+  if (bytes && qmat_digest_of(bytes, size, &digest) != QMAT_OK) {
+    reads->incomplete = true;
+    return;
+  }
+  const struct qmat_run_file_digest *known = find_file(reads->files, reads->count, path);
+  if (!known) {
+    if (!add_file(&reads->files, &reads->count, &reads->capacity, path, bytes ? &digest : NULL))
+      reads->incomplete = true;
+  } else if (known->readable != (bytes != NULL) || (bytes && !qmat_digest_equal(&known->digest, &digest))) {
+    reads->incomplete = true;
+  }
+}
+
+void qmat_step_reads_uninit(qmat_step_reads *reads) {
+  for (size_t i = 0; i < reads->count; i++) qmat_free(reads->files[i].path);
+  qmat_free(reads->files);
+  *reads = (qmat_step_reads){0};
+}
+
+void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads) {
+  for (size_t i = 0; i < reads->count; i++) {
+    const struct qmat_run_file_digest *file = &reads->files[i];
+    if (!find_file(run->hashed, run->hashed_count, file->path))
+      add_file(&run->hashed, &run->hashed_count, &run->hashed_capacity, file->path,
+               file->readable ? &file->digest : NULL);
+  }
+}
+
+// What is known of a file; it is hashed when it is asked for first. NULL when memory is short.
+static const struct qmat_run_file_digest *digest_file(qmat_run *run, const char *path) {
+  const struct qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, path);
+  if (known) return known;
+  qmat_digest digest;
+  bool readable = qmat_digest_of_file(path, &digest) == QMAT_OK;
+  if (!add_file(&run->hashed, &run->hashed_count, &run->hashed_capacity, path, readable ? &digest : NULL)) return NULL;
+  return &run->hashed[run->hashed_count - 1];
+}
+
+/* ---- keys ---- */
+
+static const qmat_node *type_of(const qmat_run *run, const qmat_run_step *step) {
+  return run->graph->nodes[step->node].type;
+}
+
+// The items that need nothing but what is known before the step runs. NULL when a file cannot be read.
+static json_t *make_items(qmat_run *run, const qmat_run_step *step) {
+  const qmat_node *type = type_of(run, step);
+  size_t params = qmat_param_count(type), ports = qmat_input_count(type);
+  qmat_digest *digests = qmat_alloc(params, sizeof *digests);
+  const qmat_digest **files = qmat_calloc(params, sizeof *files), **inputs = qmat_calloc(ports, sizeof *inputs);
+  json_t *items = NULL;
+  bool known = digests && files && inputs;
+  for (size_t row = 0; row < params && known; row++) {
+    const char *path = qmat_param_input_file(type, row, step->params);
+    if (!path) continue;
+    const struct qmat_run_file_digest *file = digest_file(run, path);
+    known = file && file->readable;
+    if (!known) continue;
+    digests[row] = file->digest;
+    files[row] = &digests[row];
+  }
+  for (size_t port = 0; port < ports && known; port++)
+    if (step->inputs[port] != SIZE_MAX) inputs[port] = &run->slots[step->inputs[port]].digest;
+  if (known) items = qmat_key_items(type, step->params, inputs, files);
+  qmat_free(digests);
+  qmat_free(files);
+  qmat_free(inputs);
+  return items;
+}
+
+// The path of a side file that a record names: beside the file of that parameter.
+static char *side_path(const qmat_node *type, const qmat_run_step *step, const char *param, const char *name) {
+  for (size_t row = 0; row < qmat_param_count(type); row++) {
+    const char *main_file = qmat_param_input_file(type, row, step->params);
+    if (!main_file || strcmp(type->params[row].name, param) != 0) continue;
+    size_t folder = *name == '/' ? 0 : qmat_folder_length(main_file), length = strlen(name);
+    char *path = qmat_alloc(folder + length + 1, 1);
+    if (!path) return NULL;
+    memcpy(path, main_file, folder);
+    memcpy(path + folder, name, length + 1);
+    return path;
+  }
+  return NULL;
+}
+
+// Adds the files that the step read when it ran last with these items, with the bytes that they have now.
+static bool add_sides(qmat_run *run, const qmat_run_step *step, const json_t *sides, json_t *items) {
+  for (size_t i = 0; i < json_array_size(sides); i++) {
+    const json_t *side = json_array_get(sides, i);
+    const char *param = json_string_value(json_array_get(side, 0)), *name = json_string_value(json_array_get(side, 1));
+    char *path = param && name ? side_path(type_of(run, step), step, param, name) : NULL;
+    const struct qmat_run_file_digest *file = path ? digest_file(run, path) : NULL;
+    bool added = file && qmat_key_add_side_file(items, param, name, file->readable ? &file->digest : NULL);
+    qmat_free(path);
+    if (!added) return false;
+  }
+  return true;
+}
+
+/* ---- records ---- */
+
+static bool read_output(const json_t *output, const qmat_port *port, qmat_run_made *made) {
+  const char *name = json_string_value(json_object_get(output, "port"));
+  const char *type = json_string_value(json_object_get(output, "type"));
+  const char *hex = json_string_value(json_object_get(output, "digest"));
+  const json_t *counts = json_object_get(output, "counts");
+  json_int_t size = json_integer_value(json_object_get(output, "blob"));
+  json_int_t bytes = json_integer_value(json_object_get(output, "bytes"));
+  const size_t items = json_array_size(json_object_get(output, "items"));
+  const char *expected = qmat_value_type_name(items > 1 ? QMAT_LIST : port->type);
+  if (!name || strcmp(name, port->name) != 0 || !type || strcmp(type, expected) != 0 || !hex ||
+      !qmat_digest_parse(hex, &made->digest) || size <= 0 || bytes < 0)
+    return false;
+  made->items = items > 1 ? items : 1;
+  made->blob_size = (uint64_t)size;
+  made->bytes = (size_t)bytes;
+  for (size_t i = 0; i < 3; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
+  return true;
+}
+
+// Whether a record tells of the outputs of this node type.
+static bool record_fits(const qmat_node *type, const json_t *record) {
+  const json_t *outputs = json_object_get(record, "outputs");
+  size_t count = qmat_output_count(type);
+  if (json_array_size(outputs) != count) return false;
+  for (size_t port = 0; port < count; port++) {
+    qmat_run_made made;
+    if (!read_output(json_array_get(outputs, port), &type->outputs[port], &made)) return false;
+  }
+  return true;
+}
+
+// Takes what a record says the step makes, if all of it is there.
+static bool take_record(qmat_run *run, size_t index, const json_t *record) {
+  qmat_run_step *step = &run->steps[index];
+  const qmat_node *type = type_of(run, step);
+  if (!record || !record_fits(type, record)) return false;
+  const json_t *outputs = json_object_get(record, "outputs");
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port]);
+    if (!qmat_cache_has_stored(run->cache, json_array_get(outputs, port))) return false;
+  }
+  // Reports are small, and the summary of the run is made of them.
+  for (size_t port = 0; port < qmat_output_count(type) && !step->report; port++) {
+    if (type->outputs[port].type != QMAT_REPORT) continue;
+    qmat_value *value = qmat_run_load(run, index, port);
+    if (!value) return false;
+    step->report = qmat_report_json(value);
+    run->slots[step->first_slot + port].value = value;
+  }
+  for (size_t port = 0; port < qmat_output_count(type); port++) {
+    qmat_run_slot *slot = &run->slots[step->first_slot + port];
+    slot->digest = step->made[port].digest;
+    slot->known = true;
+    qmat_cache_touch_stored(run->cache, json_array_get(outputs, port));
+  }
+  qmat_cache_touch_record(run->cache, &step->key);
+  return true;
+}
+
+bool qmat_run_look_up(qmat_run *run, size_t index) {
+  qmat_run_step *step = &run->steps[index];
+  if (!run->cache) return false;
+  json_decref(step->key_items);
+  step->key_items = make_items(run, step);
+  step->keyed = step->key_items && qmat_key_digest(step->key_items, &step->key);
+  if (!step->keyed) return false;
+  step->first_key = step->key;
+  json_t *record = qmat_cache_record(run->cache, &step->key);
+  const json_t *sides = json_object_get(record, "sides");
+  if (sides) {
+    bool whole = add_sides(run, step, sides, step->key_items) && qmat_key_digest(step->key_items, &step->key);
+    json_decref(record);
+    record = whole ? qmat_cache_record(run->cache, &step->key) : NULL;
+  }
+  bool hit = !step->forced && !run->bypass && take_record(run, index, record);
+  json_decref(record);
+  if (hit) step->state = QMAT_STEP_HIT;
+  return hit;
+}
+
+qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
+  const qmat_run_step *step = &run->steps[index];
+  const qmat_run_made *made = &step->made[port];
+  qmat_value_type type = made->items > 1 ? QMAT_LIST : type_of(run, step)->outputs[port].type;
+  return run->cache ? qmat_cache_value(run->cache, &made->digest, made->blob_size, type) : NULL;
+}
+
+/* ---- storing ---- */
+
+// A file that was read besides those that parameters name: the parameter that it belongs to, and its path from there.
+typedef struct side_file {
+  const char *param, *path;
+  const struct qmat_run_file_digest *file;
+} side_file;
+
+static int by_name(const void *a, const void *b) {
+  const side_file *first = a, *second = b;
+  int order = strcmp(first->param, second->param);
+  return order ? order : strcmp(first->path, second->path);
+}
+
+// Sorts what was read into the files that the key holds already and those beside them. False when a file was not what
+// the key says, or cannot be named.
+static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qmat_step_reads *reads, side_file *sides,
+                       size_t *count) {
+  const qmat_node *type = type_of(run, step);
+  *count = 0;
+  for (size_t i = 0; i < reads->count; i++) {
+    const struct qmat_run_file_digest *file = &reads->files[i];
+    side_file side = {.file = file};
+    bool is_main = false;
+    for (size_t row = 0; row < qmat_param_count(type) && !is_main; row++) {
+      const char *path = qmat_param_input_file(type, row, step->params);
+      if (!path) continue;
+      is_main = strcmp(path, file->path) == 0;
+      // A path that is neither below the folder nor absolute would be looked for elsewhere the next time.
+      size_t folder = qmat_folder_length(path);
+      bool below = strncmp(file->path, path, folder) == 0 && file->path[folder] != '/';
+      if (below ? !side.param || *side.path == '/' : !side.param && *file->path == '/') {
+        side.param = type->params[row].name;
+        side.path = file->path + (below ? folder : 0);
+      }
+    }
+    if (is_main) {
+      const struct qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, file->path);
+      if (!file->readable || !known || !qmat_digest_equal(&known->digest, &file->digest)) return false;
+    } else if (!side.param || !qmat_is_utf8(side.path)) {
+      return false;
+    } else {
+      sides[(*count)++] = side;
+    }
+  }
+  if (*count > 1) qsort(sides, *count, sizeof *sides, by_name);
+  return true;
+}
+
+static json_t *start_record(const json_t *items, double seconds) {
+  struct timespec time;
+  clock_gettime(CLOCK_REALTIME, &time);
+  return json_pack("{s:s, s:I, s:f, s:O}", "qmat", QMAT_VERSION, "made",
+                   (json_int_t)time.tv_sec * 1000 + time.tv_nsec / 1000000, "seconds", seconds, "key", items);
+}
+
+// Stores the values; gives the record's list of them.
+static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) {
+  const qmat_node *type = type_of(run, step);
+  json_t *outputs = json_array();
+  bool done = outputs != NULL;
+  for (size_t port = 0; port < qmat_output_count(type) && done; port++) {
+    qmat_run_made *made = &step->made[port];
+    const qmat_value *value = run->slots[step->first_slot + port].value;
+    bool added;
+    json_t *stored = qmat_cache_put_value(run->cache, value, &added);
+    *any_added = *any_added || added;
+    made->blob_size = (uint64_t)json_integer_value(json_object_get(stored, "blob"));
+    json_t *output = json_pack("{s:s, s:s, s:I, s:[I, I, I]}", "port", type->outputs[port].name, "type",
+                               qmat_value_type_name(value->type), "bytes", (json_int_t)made->bytes, "counts",
+                               (json_int_t)made->counts[0], (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
+    done = stored && output && json_object_update(output, stored) == 0;
+    json_decref(stored);
+    done = json_array_append_new(outputs, output) == 0 && done;
+  }
+  if (done) return outputs;
+  json_decref(outputs);
+  return NULL;
+}
+
+// The same key must always give the same bytes; where it does not, the node's version should have been raised.
+static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  json_t *record = qmat_cache_record(run->cache, &step->key);
+  if (record && record_fits(node->type, record)) {
+    for (size_t port = 0; port < qmat_output_count(node->type); port++) {
+      qmat_run_made made;
+      read_output(json_array_get(json_object_get(record, "outputs"), port), &node->type->outputs[port], &made);
+      if (!qmat_digest_equal(&made.digest, &step->made[port].digest) && !*run->cache->warning)
+        snprintf(run->cache->warning, sizeof run->cache->warning,
+                 "node '%s' (%s) has made another '%s' than the cache has from the same inputs", node->id,
+                 node->type->name, node->type->outputs[port].name);
+    }
+  }
+  json_decref(record);
+}
+
+// The names of the side files under the key that is known without them.
+static bool put_sides(qmat_run *run, const qmat_run_step *step, const side_file *sides, size_t count, json_t *items) {
+  json_t *record = start_record(items, step->seconds), *names = json_array();
+  bool done = record && names;
+  for (size_t i = 0; i < count && done; i++)
+    done = json_array_append_new(names, json_pack("[s, s]", sides[i].param, sides[i].path)) == 0;
+  done = done && json_object_set(record, "sides", names) == 0 &&
+         qmat_cache_put_record(run->cache, &step->first_key, record);
+  json_decref(names);
+  json_decref(record);
+  return done;
+}
+
+void qmat_run_store(qmat_run *run, size_t index, const qmat_step_reads *reads) {
+  qmat_run_step *step = &run->steps[index];
+  if (!run->cache || !step->keyed || !qmat_cache_is_writable(run->cache) || reads->incomplete) return;
+  side_file *sides = qmat_alloc(reads->count, sizeof *sides);
+  size_t side_count;
+  json_t *first_items = make_items(run, step), *items = json_deep_copy(first_items);
+  bool done = sides && items && find_sides(run, step, reads, sides, &side_count), any_added = false;
+  for (size_t i = 0; done && i < side_count; i++)
+    done = qmat_key_add_side_file(items, sides[i].param, sides[i].path,
+                                  sides[i].file->readable ? &sides[i].file->digest : NULL);
+  done = done && qmat_key_digest(items, &step->key);
+  if (done) {
+    json_decref(step->key_items);
+    step->key_items = json_incref(items);
+    compare_with_record(run, step);
+    json_t *outputs = put_outputs(run, step, &any_added), *record = start_record(items, step->seconds);
+    if (outputs && record && json_object_set(record, "outputs", outputs) == 0 &&
+        (side_count == 0 || put_sides(run, step, sides, side_count, first_items)) &&
+        qmat_cache_put_record(run->cache, &step->key, record) && !any_added)
+      step->state = QMAT_STEP_SAME;
+    json_decref(outputs);
+    json_decref(record);
+  }
+  json_decref(first_items);
+  json_decref(items);
+  qmat_free(sides);
+}

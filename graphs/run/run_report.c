@@ -1,0 +1,396 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/run/run_report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/json_text.h"
+#include "graphs/node_json.h"
+#include "graphs/run/run_cache.h"
+#include "io/bytes.h"
+
+/* ---- JSON ---- */
+
+// A text that may not be UTF-8, as a path may be: JSON has no way to say it, so foreign bytes become '?'.
+static json_t *text_json(const char *text) {
+  json_t *json = json_string(text);
+  if (json) return json;
+  char *copy = qmat_strdup(text);
+  if (!copy) return NULL;
+  for (char *c = copy; *c; c++)
+    if ((unsigned char)*c >= 0x80) *c = '?';
+  json = json_string(copy);
+  qmat_free(copy);
+  return json;
+}
+
+static json_t *digest_json(const qmat_digest *digest) {
+  char hex[65];
+  qmat_digest_hex(digest, hex);
+  return json_string(hex);
+}
+
+static json_t *output_json(const qmat_port *port, const qmat_run_made *made) {
+  json_t *output = json_object();
+  json_object_set_new(output, "type", json_string(qmat_value_type_name(port->type)));
+  if (made->items > 1) json_object_set_new(output, "items", json_integer((json_int_t)made->items));
+  json_object_set_new(output, "digest", digest_json(&made->digest));
+  json_object_set_new(output, "bytes", json_integer((json_int_t)made->bytes));
+  const char *const *names = qmat_value_count_names(port->type);
+  for (int i = 0; names[i]; i++) json_object_set_new(output, names[i], json_integer((json_int_t)made->counts[i]));
+  return output;
+}
+
+static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  const qmat_node *type = node->type;
+  json_t *params = json_object(), *outputs = json_object(), *json = json_object();
+  for (size_t i = 0; i < qmat_param_count(type); i++)
+    json_object_set_new(params, type->params[i].name, qmat_param_json(&type->params[i], step->params));
+  for (size_t i = 0; i < qmat_output_count(type); i++)
+    json_object_set_new(outputs, type->outputs[i].name, output_json(&type->outputs[i], &step->made[i]));
+  json_object_set_new(json, "id", json_string(node->id));
+  json_object_set_new(json, "type", json_string(type->name));
+  json_object_set_new(json, "version", json_integer((json_int_t)type->version));
+  if (run->cache) json_object_set_new(json, "cache", json_string(qmat_step_state_name(step->state)));
+  if (step->keyed) json_object_set_new(json, "key", digest_json(&step->key));
+  json_object_set_new(json, "seconds", json_real(step->seconds));
+  if (step->lifted > 0) {
+    json_object_set_new(json, "runs",
+                        json_integer((json_int_t)(step->lifted - step->lifted_hits - step->lifted_left_out)));
+    json_object_set_new(json, "hits", json_integer((json_int_t)step->lifted_hits));
+    if (step->lifted_left_out > 0)
+      json_object_set_new(json, "left_out", json_integer((json_int_t)step->lifted_left_out));
+  }
+  json_object_set_new(json, "params", params);
+  json_object_set_new(json, "outputs", outputs);
+  if (step->report) json_object_set(json, "report", step->report);
+  return json;
+}
+
+static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
+  const qmat_value *value = run->slots[file->slot].value;
+  const qmat_file *made = value->type == QMAT_FILE ? (const qmat_file *)value : NULL;
+  json_t *json = json_object();
+  json_object_set_new(json, "name", json_string(run->graph->outputs[file->output].name));
+  json_object_set_new(json, "path", text_json(file->path));
+  json_object_set_new(json, "format", json_string(made ? made->format : "json"));
+  json_object_set_new(json, "bytes", json_integer((json_int_t)file->bytes));
+  json_object_set_new(json, "sha256", digest_json(&file->sha256));
+  if (made && made->part_count > 1) {
+    json_t *parts = json_array();
+    for (size_t i = 1; i < made->part_count; i++) {
+      json_t *part = json_object();
+      json_object_set_new(part, "name", text_json(made->parts[i].name));
+      json_object_set_new(part, "bytes", json_integer((json_int_t)made->parts[i].size));
+      json_array_append_new(parts, part);
+    }
+    json_object_set_new(json, "parts", parts);
+  }
+  return json;
+}
+
+// The first file that the run reads, or null.
+static json_t *input_json(const qmat_run *run) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_node *type = run->graph->nodes[run->steps[i].node].type;
+    for (size_t row = 0; row < qmat_param_count(type); row++)
+      if (type->params[row].type == QMAT_PARAM_PATH && (type->params[row].flags & QMAT_PARAM_INPUT_FILE)) {
+        const char *path;
+        memcpy(&path, (const char *)run->steps[i].params + type->params[row].offset, sizeof path);
+        if (path) return text_json(path);
+      }
+  }
+  return json_null();
+}
+
+// Where results are kept, or null.
+static json_t *cache_json(const qmat_run *run) {
+  if (!run->cache) return json_null();
+  size_t hits = 0;
+  for (size_t i = 0; i < run->step_count; i++)
+    if (run->steps[i].state == QMAT_STEP_HIT) hits++;
+  json_t *json = json_object();
+  json_object_set_new(json, "folder", text_json(run->cache->folder));
+  json_object_set_new(json, "read_only", json_boolean(run->cache->read_only));
+  json_object_set_new(json, "hits", json_integer((json_int_t)hits));
+  json_object_set_new(json, "warning",
+                      *qmat_cache_warning(run->cache) ? text_json(qmat_cache_warning(run->cache)) : json_null());
+  return json;
+}
+
+// jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for.
+json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
+  json_t *nodes = json_array(), *outputs = json_array(), *report = json_object(), *brief = json_null();
+  for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
+  for (size_t i = 0; i < run->file_count; i++) json_array_append_new(outputs, file_json(run, &run->files[i]));
+  qmat_run_summary summary;
+  if (qmat_run_summarise(run, &summary)) {
+    char text[512];
+    qmat_summary_format(run, &summary, text, sizeof text);
+    brief = json_object();
+    json_object_set_new(brief, "name", text_json(run->name));
+    json_object_set_new(brief, "node", json_string(run->graph->nodes[run->steps[summary.step].node].id));
+    json_object_set_new(brief, "spheres", json_integer((json_int_t)summary.spheres));
+    json_object_set_new(brief, "triangles", json_integer((json_int_t)summary.triangles));
+    if (summary.meshes + summary.failures > 1)
+      json_object_set_new(brief, "meshes", json_integer((json_int_t)summary.meshes));
+    if (summary.failures > 0) json_object_set_new(brief, "failures", json_integer((json_int_t)summary.failures));
+    json_object_set_new(brief, "epsilon", json_real(summary.epsilon));
+    json_object_set_new(brief, "surface_to_envelope", json_real(summary.surface_to_envelope));
+    json_object_set_new(brief, "envelope_to_surface", json_real(summary.envelope_to_surface));
+    if (summary.evaluated) json_object_set_new(brief, "certified", json_boolean(summary.certified));
+    json_object_set_new(brief, "text", text_json(text));
+  }
+  bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
+  if (json_object_set_new(report, "qmat", json_string(QMAT_VERSION)) != 0) whole = false;
+  if (json_object_set_new(report, "graph", text_json(run->graph->file)) != 0) whole = false;
+  if (json_object_set_new(report, "input", input_json(run)) != 0) whole = false;
+  if (json_object_set_new(report, "seconds", json_real(run->seconds)) != 0) whole = false;
+  if (json_object_set_new(report, "threads", json_integer(qmat_threads(context))) != 0) whole = false;
+  if (json_object_set_new(report, "cache", cache_json(run)) != 0) whole = false;
+  if (json_object_set_new(report, "nodes", nodes) != 0) whole = false;
+  if (json_object_set_new(report, "outputs", outputs) != 0) whole = false;
+  if (json_object_set_new(report, "summary", brief) != 0) whole = false;
+  if (whole) return report;
+  json_decref(report);
+  return NULL;
+}
+
+json_t *qmat_error_report(const qmat_error *error) {
+  char line[2048];
+  qmat_error_format(error, line, sizeof line);
+  json_t *fields = json_object(), *report = json_object();
+  json_object_set_new(fields, "status", json_string(qmat_status_name(error->status)));
+  json_object_set_new(fields, "exit_code", json_integer(qmat_status_exit_code(error->status)));
+  json_object_set_new(fields, "node", error->node_id[0] ? text_json(error->node_id) : json_null());
+  json_object_set_new(fields, "type", error->node_type[0] ? text_json(error->node_type) : json_null());
+  json_object_set_new(fields, "field", error->field[0] ? text_json(error->field) : json_null());
+  json_object_set_new(fields, "element_kind", error->element_kind[0] ? text_json(error->element_kind) : json_null());
+  json_object_set_new(fields, "element", error->element >= 0 ? json_integer(error->element) : json_null());
+  json_object_set_new(fields, "file", error->file[0] ? text_json(error->file) : json_null());
+  json_object_set_new(fields, "line", error->line > 0 ? json_integer(error->line) : json_null());
+  json_object_set_new(fields, "column", error->column > 0 ? json_integer(error->column) : json_null());
+  json_object_set_new(fields, "message", text_json(error->message));
+  json_object_set_new(fields, "hint", error->hint[0] ? text_json(error->hint) : json_null());
+  json_object_set_new(fields, "text", text_json(line));
+  if (json_object_set_new(report, "error", fields) == 0) return report;
+  json_decref(report);
+  return NULL;
+}
+
+qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path) {
+  char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
+  if (!text) return qmat_fail_memory(context, "report");
+  size_t length = strlen(text);
+  text[length] = '\n';  // takes the place of the terminating zero
+  qmat_file_part part = {.name = (char *)"", .size = length + 1, .bytes = (uint8_t *)text};
+  const qmat_file file = {.base = {.type = QMAT_FILE}, .part_count = 1, .parts = &part};
+  qmat_status status = qmat_file_save(context, &file, path);
+  qmat_free(text);
+  return status;
+}
+
+/* ---- depfile ---- */
+
+// A path as Make and Ninja read it in a depfile.
+static void put_escaped(qmat_writer *writer, const char *path) {
+  for (; *path; path++) {
+    if (*path == ' ' || *path == '#' || *path == '\\') qmat_put_text(writer, "\\");
+    if (*path == '$') qmat_put_text(writer, "$");
+    qmat_put_bytes(writer, path, 1);
+  }
+}
+
+qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path) {
+  qmat_writer writer = {0};
+  qmat_file *file = NULL;
+  for (size_t i = 0; i < run->file_count; i++) {
+    if (i > 0) qmat_put_text(&writer, " ");
+    put_escaped(&writer, run->files[i].path);
+  }
+  qmat_put_text(&writer, ": ");
+  put_escaped(&writer, run->graph->file);
+  for (size_t i = 0; i < run->hashed_count; i++) {
+    // A file that was looked for and is not there cannot be waited for.
+    if (!run->hashed[i].readable) continue;
+    qmat_put_text(&writer, " \\\n  ");
+    put_escaped(&writer, run->hashed[i].path);
+  }
+  qmat_put_text(&writer, "\n");
+  qmat_status status = qmat_writer_to_file(context, &writer, "d", &file);
+  if (status == QMAT_OK) status = qmat_file_save(context, file, path);
+  if (file) qmat_value_release(&file->base);
+  return status;
+}
+
+/* ---- text ---- */
+
+void qmat_format_count(uint64_t count, char *text) {
+  char digits[24];
+  int length = snprintf(digits, sizeof digits, "%llu", (unsigned long long)count);
+  char *out = text;
+  for (int i = 0; i < length; i++) {
+    if (i > 0 && (length - i) % 3 == 0) *out++ = ',';
+    *out++ = digits[i];
+  }
+  *out = 0;
+}
+
+void qmat_format_bytes(uint64_t bytes, char *text) {
+  static const char *const units[] = {"kB", "MB", "GB", "TB"};
+  if (bytes < 1000) {
+    snprintf(text, 32, "%u byte%s", (unsigned)bytes, bytes == 1 ? "" : "s");
+    return;
+  }
+  double size = (double)bytes / 1000;
+  int unit = 0;
+  while (size >= 999.5 && unit < 3) {
+    size /= 1000;
+    unit++;
+  }
+  char number[40];
+  qmat_format_number(size < 9.95 ? round(size * 10) / 10 : round(size), number, sizeof number);
+  snprintf(text, 32, "%.20s %s", number, units[unit]);
+}
+
+void qmat_format_bound(double fraction, char *text) {
+  double percent = fraction * 100;
+  if (!(percent > 0)) {
+    snprintf(text, 48, "0 %%");
+    return;
+  }
+  // Rounding up must not make 0.98 % of what is 0.98 % but for the last bit.
+  double digits = floor(1 - floor(log10(percent)));
+  double scale = pow(10, digits > 0 ? digits : 0);
+  char number[40];
+  qmat_format_number(ceil(percent * scale * (1 - 1e-12)) / scale, number, sizeof number);
+  snprintf(text, 48, "%s %%", number);
+}
+
+void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size) {
+  char spheres[32], triangles[32], out[48], in[48], model[144];
+  qmat_format_count(summary->spheres, spheres);
+  qmat_format_count(summary->triangles, triangles);
+  qmat_format_bound(summary->surface_to_envelope, out);
+  qmat_format_bound(summary->envelope_to_surface, in);
+  char what[48] = "the model";
+  if (summary->triangles > 0)
+    snprintf(what, sizeof what, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
+  if (summary->failures > 0)
+    snprintf(model, sizeof model, "%zu of the %zu meshes of %s", summary->meshes, summary->meshes + summary->failures,
+             what);
+  else if (summary->meshes > 1)
+    snprintf(model, sizeof model, "%s of %zu meshes", what, summary->meshes);
+  else
+    snprintf(model, sizeof model, "%s", what);
+  bool one = summary->spheres == 1;
+  const char *between =
+      summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
+  const char *end = summary->evaluated ? " from the surface" : "", *proof = "";
+  if (summary->certified)
+    proof = " (certified)";
+  else if (summary->estimate)
+    proof = " (an estimate: the surface is not closed)";
+  else if (summary->evaluated && summary->epsilon > 0)
+    proof = " (not certified)";
+  snprintf(text, size,
+           "%s: %s sphere%s describe%s %s; no surface point is farther than %s of the %s from the envelope, and "
+           "%s %s%s%s.",
+           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out,
+           summary->meshes > 1 ? "mesh's diagonal" : "diagonal", between, in, end, proof);
+}
+
+// "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted.
+static void describe_made(const qmat_port *port, const qmat_run_made *made, char *text, size_t size) {
+  text[0] = 0;
+  char number[32];
+  if (port->type == QMAT_FILE) {
+    qmat_format_bytes(made->bytes, number);
+    snprintf(text, size, "%s", number);
+    return;
+  }
+  const char *const *names = qmat_value_count_names(port->type);
+  size_t used = 0;
+  for (int i = port->type == QMAT_MESH ? 1 : 0; names[i] && used < size; i++) {
+    qmat_format_count(made->counts[i], number);
+    int letters = (int)strlen(names[i]) - (made->counts[i] == 1 ? 1 : 0);
+    used += (size_t)snprintf(text + used, size - used, "%s%s %.*s", used ? " " : "", number, letters, names[i]);
+  }
+}
+
+static int widest(int width, const char *text) {
+  int length = (int)strlen(text);
+  return length > width ? length : width;
+}
+
+// The columns that identify a step.
+static void print_step(const qmat_run *run, const qmat_run_step *step, FILE *out) {
+  int id_width = 0, type_width = 0;
+  for (size_t i = 0; i < run->step_count; i++) {
+    id_width = widest(id_width, run->graph->nodes[run->steps[i].node].id);
+    type_width = widest(type_width, run->graph->nodes[run->steps[i].node].type->name);
+  }
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  fprintf(out, "%-*s  %-*s", id_width, node->id, type_width, node->type->name);
+  if (!run->cache) return;
+  char key[65] = "";
+  if (step->keyed) qmat_digest_hex(&step->key, key);
+  fprintf(out, "  %-7s  %-12.12s", qmat_step_state_name(step->state), key);
+}
+
+void qmat_run_print_plan(const qmat_run *run, FILE *out) {
+  for (size_t i = 0; i < run->step_count; i++) {
+    print_step(run, &run->steps[i], out);
+    fputc('\n', out);
+  }
+  if (!run->cache) fprintf(out, "There is no cache: every node would run.\n");
+}
+
+void qmat_run_print(const qmat_run *run, FILE *out) {
+  const qmat_graph *graph = run->graph;
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_run_step *step = &run->steps[i];
+    const qmat_graph_node *node = &graph->nodes[step->node];
+    print_step(run, step, out);
+    fprintf(out, "  %8.2f s", step->seconds);
+    if (run->cache) {
+      char size[32];
+      size_t bytes = 0;
+      for (size_t port = 0; port < qmat_output_count(node->type); port++) bytes += step->made[port].bytes;
+      qmat_format_bytes(bytes, size);
+      fprintf(out, "  %9s", size);
+    }
+    const char *joint = "  ";
+    for (size_t port = 0; port < qmat_output_count(node->type); port++) {
+      char made[128];
+      describe_made(&node->type->outputs[port], &step->made[port], made, sizeof made);
+      // The size of a file has been told already.
+      if (!*made || (run->cache && node->type->outputs[port].type == QMAT_FILE)) continue;
+      fprintf(out, "%s%s", joint, made);
+      joint = ", ";
+    }
+    const qmat_param *format = qmat_output_format_param(node->type);
+    if (format) fprintf(out, "%s%s", joint, format->choices[step->format]);
+    if (step->lifted_hits > 0) fprintf(out, "%s%zu of %zu from the cache", joint, step->lifted_hits, step->lifted);
+    fputc('\n', out);
+  }
+  for (size_t i = 0; i < run->file_count; i++) {
+    char size[32];
+    qmat_format_bytes(run->files[i].bytes, size);
+    fprintf(out, "%s -> %s (%s)\n", graph->outputs[run->files[i].output].name, run->files[i].path, size);
+  }
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    bool saved = graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE, made = false;
+    for (size_t k = 0; k < run->file_count; k++) saved = saved || run->files[k].output == i;
+    for (size_t k = 0; k < run->step_count; k++) made = made || run->steps[k].node == output->node;
+    if (made && !saved) fprintf(out, "%s was not saved (-o %s=PATH)\n", output->name, output->name);
+  }
+  qmat_run_summary summary;
+  if (!qmat_run_summarise(run, &summary)) return;
+  char text[512];
+  qmat_summary_format(run, &summary, text, sizeof text);
+  fprintf(out, "%s\n", text);
+}

@@ -1,0 +1,252 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/hash.h"
+
+#define FREE_BYTES ((size_t)1 << 24)
+#define BYTES_PER_BYTE 256
+#define MOST_FIELDS 4096 /* of a spec: looking for one is linear */
+#define CHUNK_SIZE ((size_t)16 << 10)
+#define ALIGNMENT 16
+
+qmat_status qmat_usd_layer_init(qmat_context *context, qmat_usd_layer *layer, const char *path, size_t size) {
+  *layer = (qmat_usd_layer){.path = path, .allowance = FREE_BYTES + BYTES_PER_BYTE * size};
+  layer->path = qmat_usd_copy(context, layer, path, strlen(path));
+  if (!layer->path) return context->error.status;
+  layer->root = qmat_usd_alloc(context, layer, 1, sizeof *layer->root);
+  if (!layer->root) return context->error.status;
+  layer->root->name = "";
+  return QMAT_OK;
+}
+
+void qmat_usd_layer_uninit(qmat_usd_layer *layer) {
+  qmat_free(layer->slots);
+  qmat_arena_uninit(&layer->arena);
+  *layer = (qmat_usd_layer){0};
+}
+
+void *qmat_usd_alloc(qmat_context *context, qmat_usd_layer *layer, size_t count, size_t size) {
+  size_t bytes;
+  if (__builtin_mul_overflow(count, size, &bytes) || bytes > layer->allowance) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the values of the file take more memory than a file of its size justifies");
+    qmat_fail_at(context, layer->path, 0, 0);
+    return NULL;
+  }
+  layer->allowance -= bytes;
+  bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+  if (bytes <= layer->chunk_left) {
+    uint8_t *memory = layer->chunk;
+    layer->chunk += bytes;
+    layer->chunk_left -= bytes;
+    return memory;
+  }
+  void *memory;
+  if (bytes >= CHUNK_SIZE / 4) {
+    memory = qmat_arena_calloc(&layer->arena, bytes, 1);
+  } else {
+    memory = layer->chunk = qmat_arena_calloc(&layer->arena, CHUNK_SIZE, 1);
+    layer->chunk_left = 0;
+    if (memory) {
+      layer->chunk += bytes;
+      layer->chunk_left = CHUNK_SIZE - bytes;
+    }
+  }
+  if (!memory) {
+    qmat_fail_memory(context, "a USD layer");
+    qmat_fail_at(context, layer->path, 0, 0);
+  }
+  return memory;
+}
+
+const char *qmat_usd_copy(qmat_context *context, qmat_usd_layer *layer, const char *text, size_t length) {
+  char *copy = qmat_usd_alloc(context, layer, length + 1, 1);
+  if (copy) memcpy(copy, text, length);
+  return copy;
+}
+
+/* ---- specs ---- */
+
+static size_t slot_of(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind, const char *name) {
+  uint64_t hash = qmat_hash_mix((uint64_t)(uintptr_t)parent + (uint64_t)kind);
+  for (; *name; name++) hash = (hash ^ (uint8_t)*name) * UINT64_C(0x100000001b3);
+  return qmat_hash_mix(hash) & (layer->slot_count - 1);
+}
+
+/* Where the spec stands, or where it would be put. */
+static size_t find_slot(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
+                        const char *name) {
+  size_t slot = slot_of(layer, parent, kind, name);
+  for (; layer->slots[slot]; slot = (slot + 1) & (layer->slot_count - 1)) {
+    const qmat_usd_spec *spec = layer->slots[slot];
+    if (spec->parent == parent && spec->kind == kind && strcmp(spec->name, name) == 0) break;
+  }
+  return slot;
+}
+
+static bool grow_slots(qmat_usd_layer *layer) {
+  size_t count = layer->slot_count ? 2 * layer->slot_count : 64;
+  qmat_usd_spec **older = layer->slots, **slots = qmat_calloc(count, sizeof(qmat_usd_spec *));
+  size_t older_count = layer->slot_count;
+  if (!slots) return false;
+  layer->slots = slots;
+  layer->slot_count = count;
+  for (size_t i = 0; i < older_count; i++) {
+    qmat_usd_spec *spec = older[i];
+    if (spec) slots[find_slot(layer, spec->parent, spec->kind, spec->name)] = spec;
+  }
+  qmat_free(older);
+  return true;
+}
+
+qmat_usd_spec *qmat_usd_child(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
+                              const char *name) {
+  return layer->slot_count ? layer->slots[find_slot(layer, parent, kind, name)] : NULL;
+}
+
+qmat_usd_spec *qmat_usd_add_child(qmat_context *context, qmat_usd_layer *layer, qmat_usd_spec *parent,
+                                  qmat_usd_kind kind, const char *name) {
+  if (parent->depth >= QMAT_USD_DEEPEST) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "prims are nested more than %d deep", QMAT_USD_DEEPEST);
+    qmat_fail_at(context, layer->path, 0, 0);
+    return NULL;
+  }
+  if (2 * layer->spec_count >= layer->slot_count && !grow_slots(layer)) {
+    qmat_fail_memory(context, "a USD layer");
+    return NULL;
+  }
+  qmat_usd_spec *spec = qmat_usd_alloc(context, layer, 1, sizeof *spec);
+  if (!spec) return NULL;
+  spec->kind = kind;
+  spec->name = name;
+  spec->parent = parent;
+  spec->depth = parent->depth + 1;
+  if (parent->last_child) {
+    parent->last_child->next = spec;
+  } else {
+    parent->first_child = spec;
+  }
+  parent->last_child = spec;
+  layer->slots[find_slot(layer, parent, kind, name)] = spec;
+  layer->spec_count++;
+  return spec;
+}
+
+qmat_status qmat_usd_set_field(qmat_context *context, qmat_usd_layer *layer, qmat_usd_spec *spec, const char *name,
+                               const qmat_usd_value *value) {
+  for (size_t i = 0; i < spec->field_count; i++) {
+    if (strcmp(spec->fields[i].name, name) != 0) continue;
+    spec->fields[i].value = value;
+    return QMAT_OK;
+  }
+  if (spec->field_count == MOST_FIELDS) {
+    qmat_fail(context, QMAT_ERROR_FORMAT, "more than %d fields in one spec", MOST_FIELDS);
+    return qmat_fail_at(context, layer->path, spec->line, spec->column);
+  }
+  if (spec->field_count == spec->field_capacity) {
+    size_t capacity = spec->field_capacity ? 2 * spec->field_capacity : 4;
+    qmat_usd_field *fields = qmat_usd_alloc(context, layer, capacity, sizeof *fields);
+    if (!fields) return context->error.status;
+    if (spec->field_count > 0) memcpy(fields, spec->fields, spec->field_count * sizeof *fields);
+    spec->fields = fields;
+    spec->field_capacity = capacity;
+  }
+  spec->fields[spec->field_count++] = (qmat_usd_field){.name = name, .value = value};
+  return QMAT_OK;
+}
+
+const qmat_usd_value *qmat_usd_text_value(qmat_context *context, qmat_usd_layer *layer, qmat_usd_type type,
+                                          const char *text) {
+  qmat_usd_value *value = qmat_usd_alloc(context, layer, 1, sizeof *value);
+  const char **texts = value ? qmat_usd_alloc(context, layer, 1, sizeof *texts) : NULL;
+  if (!texts) return NULL;
+  *texts = text;
+  *value = (qmat_usd_value){.type = type, .components = 1, .count = 1, .texts = texts};
+  return value;
+}
+
+const qmat_usd_value *qmat_usd_bool_value(qmat_context *context, qmat_usd_layer *layer, bool truth) {
+  qmat_usd_value *value = qmat_usd_alloc(context, layer, 1, sizeof *value);
+  int64_t *integers = value ? qmat_usd_alloc(context, layer, 1, sizeof *integers) : NULL;
+  if (!integers) return NULL;
+  *integers = truth;
+  *value = (qmat_usd_value){.type = QMAT_USD_BOOL, .components = 1, .count = 1, .integers = integers};
+  return value;
+}
+
+/* ---- looking things up ---- */
+
+const qmat_usd_value *qmat_usd_field_value(const qmat_usd_spec *spec, const char *name) {
+  for (size_t i = 0; i < spec->field_count; i++) {
+    if (strcmp(spec->fields[i].name, name) == 0) return spec->fields[i].value;
+  }
+  return NULL;
+}
+
+const qmat_usd_value *qmat_usd_entry(const qmat_usd_value *dictionary, const char *name) {
+  if (!dictionary || dictionary->type != QMAT_USD_DICTIONARY) return NULL;
+  for (size_t i = 0; i < dictionary->count; i++) {
+    if (strcmp(dictionary->entries[i].name, name) == 0) return dictionary->entries[i].value;
+  }
+  return NULL;
+}
+
+bool qmat_usd_is_integer(qmat_usd_type type) {
+  return type >= QMAT_USD_BOOL && type <= QMAT_USD_UINT64;
+}
+
+bool qmat_usd_is_number(qmat_usd_type type) {
+  return type >= QMAT_USD_HALF && type <= QMAT_USD_TIMECODE;
+}
+
+bool qmat_usd_is_text(qmat_usd_type type) {
+  return type >= QMAT_USD_STRING && type <= QMAT_USD_PATH;
+}
+
+static bool is_single(const qmat_usd_value *value) {
+  return value && !value->is_array && value->count == 1 && value->components == 1;
+}
+
+const char *qmat_usd_text(const qmat_usd_value *value) {
+  return is_single(value) && qmat_usd_is_text(value->type) ? value->texts[0] : NULL;
+}
+
+double qmat_usd_number(const qmat_usd_value *value, double otherwise) {
+  if (!is_single(value)) return otherwise;
+  if (qmat_usd_is_integer(value->type)) return (double)value->integers[0];
+  return qmat_usd_is_number(value->type) ? value->numbers[0] : otherwise;
+}
+
+bool qmat_usd_truth(const qmat_usd_value *value, bool otherwise) {
+  return qmat_usd_number(value, otherwise ? 1 : 0) != 0;
+}
+
+/* ---- numbers ---- */
+
+/* Half precision has 10 bits after the leading one and exponents of -14 and more. */
+static double round_to_half(double number) {
+  if (!isfinite(number) || number == 0) return number;
+  int exponent;
+  frexp(number, &exponent);
+  double step = ldexp(1, exponent - 11 < -24 ? -24 : exponent - 11);
+  double rounded = rint(number / step) * step;
+  return fabs(rounded) > 65504 ? copysign(INFINITY, number) : rounded;
+}
+
+double qmat_usd_round(qmat_usd_type type, double number) {
+  if (type == QMAT_USD_FLOAT) return (double)(float)number;
+  if (type == QMAT_USD_HALF) return round_to_half((double)(float)number);
+  return number;
+}
+
+/* ---- reading ---- */
+
+qmat_status qmat_usd_layer_read(qmat_context *context, const qmat_bytes *bytes, const char *path,
+                                qmat_usd_layer *layer) {
+  if (bytes->size >= 8 && memcmp(bytes->data, "PXR-USDC", 8) == 0) {
+    return qmat_usdc_read(context, bytes, path, layer);
+  }
+  return qmat_usda_read(context, bytes, path, layer);
+}

@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_medial.h"
+
+#include <string.h>
+
+#include "core/geometry/medial_build.h"
+#include "io/usd/usd_stage.h"
+
+typedef struct reader {
+  qmat_context *context;
+  qmat_usd_stage *stage;
+  json_t *facts;
+  const char *name;    /* of the prim that is wanted, or NULL */
+  size_t carriers;     /* prims that have one */
+  qmat_medial *medial; /* NULL until the one is found */
+} reader;
+
+/* Whether the prim has a child of this name, which is then composed. */
+static qmat_status find_child(reader *r, qmat_usd_prim *prim, const char *name, qmat_usd_prim *child, bool *found) {
+  const char *const *names;
+  size_t count;
+  *found = false;
+  qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK && !*found; i++) {
+    if (strcmp(names[i], name) != 0) continue;
+    *found = true;
+    status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], child);
+  }
+  return status;
+}
+
+static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim) {
+  const qmat_usd_value *points, *radii;
+  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, "points", &points);
+  if (status == QMAT_OK) status = qmat_usd_prim_attribute(r->context, r->stage, prim, "primvars:radius", &radii);
+  if (status != QMAT_OK) return status;
+  const bool good = points && radii && points->is_array && radii->is_array && qmat_usd_is_number(points->type) &&
+                    qmat_usd_is_number(radii->type) && points->components == 3 && radii->components == 1 &&
+                    points->count == radii->count && points->count <= UINT32_MAX;
+  if (!good) return qmat_usd_prim_fail(r->context, r->stage, prim, "the points or radii of the spheres are broken");
+  r->medial->spheres = qmat_alloc(points->count, 4 * sizeof *r->medial->spheres);
+  if (!r->medial->spheres) return qmat_fail_memory(r->context, "a medial mesh");
+  r->medial->sphere_count = points->count;
+  for (size_t i = 0; i < points->count; i++) {
+    memcpy(r->medial->spheres + 4 * i, points->numbers + 3 * i, 3 * sizeof(double));
+    r->medial->spheres[4 * i + 3] = radii->numbers[i];
+  }
+  return QMAT_OK;
+}
+
+/* The ids of `corners` spheres each that the child `name` has in its attribute; none without that child. The caller
+ * frees them. */
+static qmat_status read_ids(reader *r, qmat_usd_prim *prim, const char *name, const char *attribute, size_t corners,
+                            uint32_t **ids, size_t *count) {
+  qmat_usd_prim child = {0};
+  const qmat_usd_value *value;
+  bool found;
+  *ids = NULL;
+  *count = 0;
+  qmat_status status = find_child(r, prim, name, &child, &found);
+  if (status == QMAT_OK && found) {
+    status = qmat_usd_prim_attribute(r->context, r->stage, &child, attribute, &value);
+    if (status == QMAT_OK &&
+        (!value || !value->is_array || !qmat_usd_is_integer(value->type) || value->count % corners != 0)) {
+      status = qmat_usd_prim_fail(r->context, r->stage, &child, "%s is not what it has to be", attribute);
+    }
+    if (status == QMAT_OK) {
+      *ids = qmat_alloc(value->count, sizeof **ids);
+      if (!*ids) status = qmat_fail_memory(r->context, "a medial mesh");
+    }
+    for (size_t i = 0; status == QMAT_OK && i < value->count; i++) {
+      const int64_t id = value->integers[i];
+      if (id < 0 || (uint64_t)id >= r->medial->sphere_count) {
+        status = qmat_usd_prim_fail(r->context, r->stage, &child, "%s names sphere %lld, but there are %zu", attribute,
+                                    (long long)id, r->medial->sphere_count);
+        break;
+      }
+      (*ids)[i] = (uint32_t)id;
+    }
+    if (status == QMAT_OK) *count = value->count / corners;
+  }
+  qmat_usd_prim_uninit(&child);
+  return status;
+}
+
+static qmat_status read_simplices(reader *r, qmat_usd_prim *prim) {
+  uint32_t *edges = NULL, *triangles = NULL;
+  size_t edge_count = 0, triangle_count = 0;
+  qmat_status status = read_ids(r, prim, "cones", "primvars:qmat:sphere", 2, &edges, &edge_count);
+  if (status == QMAT_OK) status = read_ids(r, prim, "slabs", "faceVertexIndices", 3, &triangles, &triangle_count);
+  if (status == QMAT_OK) {
+    status = qmat_medial_set_simplices(r->context, r->medial, edges, edge_count, triangles, triangle_count);
+  }
+  qmat_free(edges);
+  qmat_free(triangles);
+  return status;
+}
+
+static qmat_status read_facts(reader *r, const qmat_usd_value *data) {
+  for (size_t i = 0; i < data->count && r->facts; i++) {
+    const qmat_usd_value *value = data->entries[i].value;
+    const char *text = qmat_usd_text(value);
+    const double number = qmat_usd_number(value, 0);
+    json_t *json = text && qmat_is_utf8(text)                             ? json_string(text)
+                   : value->type == QMAT_USD_BOOL && !value->is_array     ? json_boolean(number != 0)
+                   : qmat_usd_is_integer(value->type) && !value->is_array ? json_integer((json_int_t)number)
+                   : qmat_usd_is_number(value->type) && !value->is_array  ? json_real(number)
+                                                                          : NULL;
+    if (json && json_object_set_new(r->facts, data->entries[i].name, json) != 0) {
+      return qmat_fail_memory(r->context, "what a medial mesh says of itself");
+    }
+  }
+  return QMAT_OK;
+}
+
+static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_value *data) {
+  qmat_usd_prim spheres = {0};
+  bool found;
+  qmat_status status = find_child(r, prim, "spheres", &spheres, &found);
+  if (status == QMAT_OK && !found) {
+    status =
+        qmat_usd_prim_fail(r->context, r->stage, prim, "it says that it carries a medial mesh, but has no spheres");
+  }
+  if (status == QMAT_OK) {
+    r->medial = qmat_medial_new();
+    status = r->medial ? read_spheres(r, &spheres) : qmat_fail_memory(r->context, "a medial mesh");
+  }
+  qmat_usd_prim_uninit(&spheres);
+  if (status == QMAT_OK) status = read_simplices(r, prim);
+  if (status == QMAT_OK) status = qmat_value_seal(r->context, &r->medial->base);
+  return status == QMAT_OK ? read_facts(r, data) : status;
+}
+
+static qmat_status search(reader *r, qmat_usd_prim *prim) {
+  const qmat_usd_value *data = prim->parent ? qmat_usd_prim_field(prim, "customData") : NULL;
+  if (qmat_usd_text(qmat_usd_entry(data, "qmat_version"))) {
+    r->carriers++;
+    if (r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
+    return read_carrier(r, prim, data);
+  }
+  const char *const *names;
+  size_t count;
+  qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    qmat_usd_prim child;
+    status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], &child);
+    if (status == QMAT_OK) status = search(r, &child);
+    qmat_usd_prim_uninit(&child);
+  }
+  return status;
+}
+
+qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
+                                 qmat_medial **medial, json_t *facts) {
+  reader r = {.context = context, .facts = facts, .name = name};
+  qmat_usd_prim root = {0};
+  *medial = NULL;
+  qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
+  if (status != QMAT_OK) return status;
+  status = qmat_usd_stage_root(context, r.stage, &root);
+  if (status == QMAT_OK) status = search(&r, &root);
+  qmat_usd_prim_uninit(&root);
+  qmat_usd_stage_close(r.stage);
+  if (status == QMAT_OK && !r.medial) {
+    qmat_fail(context, status = QMAT_ERROR_GEOMETRY,
+              r.carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
+  } else if (status == QMAT_OK && !name && r.carriers > 1) {
+    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: one has to be named", r.carriers);
+  }
+  if (status == QMAT_OK) {
+    *medial = r.medial;
+    return QMAT_OK;
+  }
+  if (r.medial) qmat_value_release(&r.medial->base);
+  return qmat_fail_at(context, context->error.file[0] ? context->error.file : path, context->error.line,
+                      context->error.column);
+}

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_USD_USDZ_H
+#define QMAT_IO_USD_USDZ_H
+
+#include "io/bytes.h"
+
+/* USDZ packages: zip archives whose members are stored as they are, each beginning at a multiple of 64 bytes, the first
+ * one being the layer to open. Source: the USDZ file format specification, version 1.3. */
+
+typedef struct qmat_usdz_member {
+  char *name; /* with folders; owned */
+  const uint8_t *bytes;
+  size_t size;
+} qmat_usdz_member;
+
+/* A zeroed package is empty and valid. */
+typedef struct qmat_usdz {
+  size_t member_count;
+  qmat_usdz_member *members; /* in the archive's order */
+} qmat_usdz;
+
+/* Finds the members of the archive in `bytes`, which must outlive the package. Compressed and encrypted members are
+ * refused by name, and so is one whose checksum differs. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY; free with
+ * qmat_usdz_uninit also after a failure. Alignment is not asked for. */
+qmat_status qmat_usdz_open(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_usdz *package);
+
+void qmat_usdz_uninit(qmat_usdz *package);
+
+/* The member of that name, or NULL. */
+const qmat_usdz_member *qmat_usdz_find(const qmat_usdz *package, const char *name);
+
+/* Appends an archive of one member to an empty writer. */
+void qmat_usdz_put(qmat_writer *writer, const char *name, const void *bytes, size_t size);
+
+#endif

@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/initial/edge_halving.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/medial_build.h"
+
+#define NONE UINT32_MAX
+
+/* Each round halves an edge once; edges this many times halved are as short as they need to be. */
+enum { MOST_ROUNDS = 8 };
+
+/* The middle of an edge as an inscribed sphere, when the interpolated one leaves the solid by more than the tolerance.
+ * Both ends inscribed, the middle can leave it by at most (length^2 - change^2) / (2 length): short edges need no look. */
+static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance,
+                        double middle[4]) {
+  double square = 0;
+  for (int k = 0; k < 4; k++) middle[k] = 0.5 * (a[k] + b[k]);
+  for (int k = 0; k < 3; k++) square += (a[k] - b[k]) * (a[k] - b[k]);
+  const double change = a[3] - b[3];
+  if (!(square - change * change > 2 * tolerance * sqrt(square))) return false;
+  const double depth = -qmat_surface_signed_distance(surface, middle);
+  if (!(middle[3] - depth > tolerance) || depth <= 0) return false;
+  middle[3] = depth;
+  return true;
+}
+
+/* The new vertex in the middle of an edge, or NONE; the edges are sorted rows. */
+static uint32_t middle_of(const qmat_medial *medial, const size_t *row_starts, const uint32_t *middles, uint32_t a,
+                          uint32_t b) {
+  const uint32_t low = a < b ? a : b, high = a < b ? b : a;
+  size_t first = row_starts[low], last = row_starts[low + 1];
+  while (first < last) {
+    const size_t half = first + (last - first) / 2;
+    if (medial->edges[2 * half + 1] < high)
+      first = half + 1;
+    else
+      last = half;
+  }
+  return middles[first];
+}
+
+/* The two to four parts of a slab with some sides halved. */
+static size_t divide(const uint32_t *corners, const uint32_t *middles, uint32_t *parts) {
+  int halved = 0;
+  for (int k = 0; k < 3; k++) halved += middles[k] != NONE;
+  /* Start at a corner so that the halved sides come first; middles[k] is between corners k and k + 1. */
+  size_t s = 0;
+  if (halved == 1)
+    while (middles[s] == NONE) s++;
+  if (halved == 2)
+    while (middles[(s + 2) % 3] != NONE) s++;
+  const uint32_t a = corners[s], b = corners[(s + 1) % 3], c = corners[(s + 2) % 3];
+  const uint32_t ab = middles[s], bc = middles[(s + 1) % 3], ca = middles[(s + 2) % 3];
+  const uint32_t by_count[4][12] = {
+      {a, b, c}, {a, ab, c, ab, b, c}, {ab, b, bc, a, ab, bc, a, bc, c}, {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca}};
+  memcpy(parts, by_count[halved], sizeof by_count[halved]);
+  return (size_t)halved + 1;
+}
+
+/* One round; `*added` grows by the edges halved. */
+static qmat_status halve_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
+                               double tolerance, size_t *added) {
+  qmat_arena *arena = &context->arena;
+  const size_t spheres = medial->sphere_count, edges = medial->edge_count, triangles = medial->triangle_count;
+  double *middle_spheres = qmat_arena_alloc(arena, edges, 4 * sizeof *middle_spheres);
+  uint32_t *middles = qmat_arena_alloc(arena, edges, sizeof *middles);
+  size_t *row_starts = qmat_arena_calloc(arena, spheres + 1, sizeof *row_starts);
+  if (!middle_spheres || !middles || !row_starts) return qmat_fail_memory(context, "medial edges");
+  const int threads = qmat_threads(context);
+  const size_t slice = 1 << 12;
+  for (size_t first = 0; first < edges; first += slice) {
+    const qmat_status status = qmat_progress(context, first, edges, "refinement");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < edges ? first + slice : edges;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 512)
+    for (size_t e = first; e < last; e++)
+      middles[e] =
+          find_middle(surface, &medial->spheres[4 * (size_t)medial->edges[2 * e]],
+                      &medial->spheres[4 * (size_t)medial->edges[2 * e + 1]], tolerance, &middle_spheres[4 * e])
+              ? 0
+              : NONE;
+  }
+  size_t count = 0;
+  for (size_t e = 0; e < edges; e++) {
+    row_starts[medial->edges[2 * e] + 1]++;
+    if (middles[e] != NONE) middles[e] = (uint32_t)(spheres + count++);
+  }
+  *added += count;
+  if (count == 0) return QMAT_OK;
+  for (size_t v = 0; v < spheres; v++) row_starts[v + 1] += row_starts[v];
+  double *all = qmat_alloc(spheres + count, 4 * sizeof *all);
+  uint32_t *new_edges = qmat_arena_alloc(arena, edges + count, 2 * sizeof *new_edges);
+  uint32_t *new_triangles = qmat_arena_alloc(arena, 4 * triangles, 3 * sizeof *new_triangles);
+  if (!all || !new_edges || !new_triangles) {
+    qmat_free(all);
+    return qmat_fail_memory(context, "medial spheres");
+  }
+  memcpy(all, medial->spheres, 4 * spheres * sizeof *all);
+  size_t edge_count = 0, triangle_count = 0;
+  for (size_t e = 0; e < edges; e++) {
+    const uint32_t a = medial->edges[2 * e], b = medial->edges[2 * e + 1];
+    const uint32_t halves[2][2] = {{a, middles[e] == NONE ? b : middles[e]}, {b, middles[e]}};
+    const size_t parts = middles[e] == NONE ? 1 : 2;
+    memcpy(&new_edges[2 * edge_count], halves, parts * sizeof halves[0]);
+    edge_count += parts;
+    if (parts == 2) memcpy(&all[4 * (size_t)middles[e]], &middle_spheres[4 * e], 4 * sizeof *all);
+  }
+  for (size_t t = 0; t < triangles; t++) {
+    const uint32_t *corners = &medial->triangles[3 * t];
+    uint32_t sides[3], parts[12];
+    for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, row_starts, middles, corners[k], corners[(k + 1) % 3]);
+    const size_t made = divide(corners, sides, parts);
+    memcpy(&new_triangles[3 * triangle_count], parts, 3 * made * sizeof *parts);
+    triangle_count += made;
+  }
+  qmat_free(medial->spheres);
+  medial->spheres = all;
+  medial->sphere_count = spheres + count;
+  return qmat_medial_set_simplices(context, medial, new_edges, edge_count, new_triangles, triangle_count);
+}
+
+qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
+                               double tolerance, size_t *added) {
+  *added = 0;
+  for (int round = 0; round < MOST_ROUNDS; round++) {
+    const size_t before = *added;
+    qmat_status status = halve_edges(context, surface, medial, tolerance, added);
+    if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "refinement");
+    if (status != QMAT_OK || *added == before) return status;
+  }
+  return QMAT_OK;
+}

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/initial/sample_spacing.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/hash.h"
+
+/* Rows of an even triangular pattern are this far apart, in spacings. */
+static const double row_height = 0.86602540378443864676;
+/* The displacement of a point, in steps of its row and in rows. */
+static const double displacement = 0.2;
+
+static double length_between(const double *a, const double *b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return sqrt(x * x + y * y + z * z);
+}
+
+typedef struct side {
+  uint32_t low, high;
+  size_t corner; /* 3 * facet + k */
+} side;
+
+static int compare_sides(const void *left, const void *right) {
+  const side *a = left, *b = right;
+  if (a->low != b->low) return a->low < b->low ? -1 : 1;
+  if (a->high != b->high) return a->high < b->high ? -1 : 1;
+  return a->corner < b->corner ? -1 : a->corner > b->corner;
+}
+
+qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh, const double *positions,
+                                   double spacing, uint32_t *counts) {
+  size_t long_sides = 0;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    const size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    const double length = length_between(&positions[3 * (size_t)mesh->triangles[i]],
+                                         &positions[3 * (size_t)mesh->triangles[next]]);
+    counts[i] = (uint32_t)fmax(ceil(length / spacing) - 1, 0);
+    long_sides += counts[i] > 0;
+  }
+  side *sides = qmat_arena_alloc(&context->arena, long_sides, sizeof *sides);
+  if (!sides) return qmat_fail_memory(context, "the long sides of facets");
+  long_sides = 0;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    if (counts[i] == 0) continue;
+    const uint32_t a = mesh->triangles[i], b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
+    sides[long_sides++] = (side){a < b ? a : b, a < b ? b : a, i};
+  }
+  qsort(sides, long_sides, sizeof *sides, compare_sides);
+  for (size_t i = 1; i < long_sides; i++)
+    if (sides[i].low == sides[i - 1].low && sides[i].high == sides[i - 1].high) counts[sides[i].corner] = 0;
+  return QMAT_OK;
+}
+
+void qmat_side_points_fill(int side, uint32_t count, double *barycentrics) {
+  for (uint32_t i = 0; i < count; i++) {
+    const double t = (i + 1.0) / (count + 1.0);
+    barycentrics[3 * i + (uint32_t)side] = 1 - t;
+    barycentrics[3 * i + (uint32_t)(side + 1) % 3] = t;
+    barycentrics[3 * i + (uint32_t)(side + 2) % 3] = 0;
+  }
+}
+
+/* The rows of a triangle: along its longest side, which starts at corner `base`. */
+typedef struct rows {
+  int base;
+  double length;
+  uint64_t count; /* of rows, without the longest side and the corner across */
+} rows;
+
+static rows find_rows(const double *a, const double *b, const double *c, double spacing) {
+  const double *corners[3] = {a, b, c};
+  rows r = {0, 0, 0};
+  for (int k = 0; k < 3; k++) {
+    const double length = length_between(corners[k], corners[(k + 1) % 3]);
+    if (length > r.length) r = (rows){k, length, 0};
+  }
+  if (!(r.length > spacing)) return r;
+  const double *p = corners[r.base], *q = corners[(r.base + 1) % 3], *top = corners[(r.base + 2) % 3];
+  double along = 0, square = 0;
+  for (int k = 0; k < 3; k++) {
+    along += (q[k] - p[k]) * (top[k] - p[k]) / r.length;
+    square += (top[k] - p[k]) * (top[k] - p[k]);
+  }
+  const double height = sqrt(fmax(square - along * along, 0));
+  r.count = (uint64_t)fmax(ceil(height / (row_height * spacing)) - 1, 0);
+  return r;
+}
+
+/* The share of the height at which a row lies, and how many points it has. */
+static double row_place(const rows *r, uint64_t row) {
+  return (double)(row + 1) / (double)(r->count + 1);
+}
+
+static uint64_t row_points(const rows *r, uint64_t row, double spacing) {
+  return (uint64_t)fmax(floor(r->length * (1 - row_place(r, row)) / spacing + 0.5), 1);
+}
+
+uint64_t qmat_row_points_count(const double *a, const double *b, const double *c, double spacing) {
+  const rows r = find_rows(a, b, c, spacing);
+  uint64_t count = 0;
+  for (uint64_t row = 0; row < r.count; row++) count += row_points(&r, row, spacing);
+  return count;
+}
+
+void qmat_row_points_fill(const double *a, const double *b, const double *c, double spacing, uint64_t key,
+                          uint64_t wanted, double *barycentrics) {
+  const rows r = find_rows(a, b, c, spacing);
+  const uint64_t all = qmat_row_points_count(a, b, c, spacing);
+  uint64_t index = 0, picked = 0;
+  for (uint64_t row = 0; row < r.count; row++) {
+    const uint64_t points = row_points(&r, row, spacing);
+    for (uint64_t i = 0; i < points; i++, index++) {
+      /* Point `index` is taken when the running share of the wanted ones passes a whole number. */
+      if (picked >= wanted || (double)(index + 1) * (double)wanted < (double)(picked + 1) * (double)all) continue;
+      const double x = displacement * (qmat_hash_unit(qmat_hash3(key, index, 0)) - 0.5);
+      const double y = displacement * (qmat_hash_unit(qmat_hash3(key, index, 1)) - 0.5);
+      const double up = row_place(&r, row) + y / (double)(r.count + 1);
+      const double t = ((double)i + 0.5 + x) / (double)points;
+      double *weights = &barycentrics[3 * picked++];
+      weights[r.base] = (1 - up) * (1 - t);
+      weights[(r.base + 1) % 3] = (1 - up) * t;
+      weights[(r.base + 2) % 3] = 1 - weights[r.base] - weights[(r.base + 1) % 3];
+    }
+  }
+}

@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/initial/sample_thinning.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/hash.h"
+#include "core/geometry/triangle.h"
+
+/* Each level's cells are half as wide as those of the one before; smaller radii search the finest level. */
+enum { LEVELS = 8, REPORT_EVERY = 65536 };
+/* Normals look the same way when the cosine between them is at least this. */
+static const double same_way = 0.7;
+/* Cells are no narrower than this (unit frame), so that they can be numbered however small the radii are. */
+static const double narrowest = 1e-9;
+
+#define NONE UINT32_MAX
+
+/* Kept samples by place: on every level each is in the list of its cell's bucket. */
+typedef struct sample_grid {
+  double widths[LEVELS];
+  size_t bucket_mask; /* buckets: a power of two, less one */
+  uint32_t *heads;    /* per bucket: its newest entry, or NONE */
+  uint32_t *next;     /* per entry, LEVELS * sample + level */
+} sample_grid;
+
+static double dot(const double *a, const double *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static size_t bucket_of(const sample_grid *grid, int level, const int64_t cell[3]) {
+  uint64_t h = (uint64_t)cell[0] * UINT64_C(0x9e3779b97f4a7c15) + (uint64_t)level;
+  h = (h ^ (uint64_t)cell[1]) * UINT64_C(0xbf58476d1ce4e5b9);
+  return (size_t)qmat_hash_mix(h ^ (h >> 31) ^ (uint64_t)cell[2]) & grid->bucket_mask;
+}
+
+static qmat_status grid_init(qmat_context *context, sample_grid *grid, size_t count, double largest) {
+  size_t buckets = 1024;
+  while (buckets < 2 * count) buckets *= 2;
+  for (int level = 0; level < LEVELS; level++) grid->widths[level] = fmax(ldexp(2 * largest, -level), narrowest);
+  grid->bucket_mask = buckets - 1;
+  grid->heads = qmat_arena_alloc(&context->arena, buckets, sizeof *grid->heads);
+  grid->next = qmat_arena_alloc(&context->arena, count, LEVELS * sizeof *grid->next);
+  if (grid->heads == NULL || grid->next == NULL) return qmat_fail_memory(context, "the samples");
+  for (size_t i = 0; i < buckets; i++) grid->heads[i] = NONE;
+  return QMAT_OK;
+}
+
+static void grid_add(sample_grid *grid, const double *point, uint32_t sample) {
+  for (int level = 0; level < LEVELS; level++) {
+    int64_t cell[3];
+    for (int k = 0; k < 3; k++) cell[k] = (int64_t)floor(point[k] / grid->widths[level]);
+    uint32_t *head = &grid->heads[bucket_of(grid, level, cell)];
+    grid->next[LEVELS * (size_t)sample + (size_t)level] = *head;
+    *head = LEVELS * sample + (uint32_t)level;
+  }
+}
+
+typedef struct thinning {
+  const double *points, *normals, *radii;
+  double detail;
+  sample_grid grid;
+} thinning;
+
+static bool stands_for(const thinning *t, uint32_t kept, uint32_t sample) {
+  double offset[3];
+  for (size_t k = 0; k < 3; k++) offset[k] = t->points[3 * (size_t)sample + k] - t->points[3 * (size_t)kept + k];
+  const double *mine = &t->normals[3 * (size_t)sample], *theirs = &t->normals[3 * (size_t)kept];
+  return dot(offset, offset) < t->radii[sample] * t->radii[sample] && dot(mine, theirs) >= same_way &&
+         fabs(dot(offset, mine)) <= t->detail && fabs(dot(offset, theirs)) <= t->detail;
+}
+
+/* The kept sample that stands for this one, or the sample itself. The cells of its level are at least twice its radius
+ * wide, so that two by two by two of them hold all that is near. */
+static uint32_t find_stand_in(const thinning *t, uint32_t sample) {
+  const sample_grid *grid = &t->grid;
+  const double radius = t->radii[sample], *point = &t->points[3 * (size_t)sample];
+  int level = 0;
+  while (level + 1 < LEVELS && grid->widths[level + 1] >= 2 * radius) level++;
+  int64_t low[3], high[3], cell[3];
+  for (int k = 0; k < 3; k++) {
+    low[k] = (int64_t)floor((point[k] - radius) / grid->widths[level]);
+    high[k] = (int64_t)floor((point[k] + radius) / grid->widths[level]);
+  }
+  for (cell[0] = low[0]; cell[0] <= high[0]; cell[0]++)
+    for (cell[1] = low[1]; cell[1] <= high[1]; cell[1]++)
+      for (cell[2] = low[2]; cell[2] <= high[2]; cell[2]++)
+        for (uint32_t entry = grid->heads[bucket_of(grid, level, cell)]; entry != NONE; entry = grid->next[entry])
+          if (stands_for(t, entry / LEVELS, sample)) return entry / LEVELS;
+  return sample;
+}
+
+qmat_status qmat_samples_thin(qmat_context *context, const double *points, const double *normals, const double *radii,
+                              size_t count, double largest, double detail, uint32_t *stand_ins) {
+  thinning t = {.points = points, .normals = normals, .radii = radii, .detail = detail};
+  if (count >= NONE / LEVELS)
+    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are more than can be thinned out", count);
+  qmat_status status = grid_init(context, &t.grid, count, largest);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    if (i % REPORT_EVERY == 0) status = qmat_progress(context, i, count, "samples");
+    stand_ins[i] = find_stand_in(&t, (uint32_t)i);
+    if (stand_ins[i] == i) grid_add(&t.grid, &points[3 * i], (uint32_t)i);
+  }
+  return status;
+}
+
+/* The unit normals of samples: 3 doubles each, zero where there is none. */
+static void find_normals(const qmat_surface *surface, const qmat_samples *samples, double *normals) {
+  const double *positions = qmat_surface_positions(surface);
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  memset(normals, 0, 3 * samples->count * sizeof *normals);
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const uint32_t *ids = &mesh->triangles[3 * t];
+    double normal[3];
+    const double area = qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                                           &positions[3 * (size_t)ids[2]], normal);
+    for (size_t corner = 0; corner < 3; corner++)
+      for (size_t k = 0; k < 3; k++) normals[3 * (size_t)ids[corner] + k] += area * normal[k];
+  }
+  for (size_t i = 0; i < samples->vertex_count; i++) {
+    double *normal = &normals[3 * i];
+    const double length = sqrt(dot(normal, normal));
+    for (size_t k = 0; k < 3; k++) normal[k] = length > 0 ? normal[k] / length : 0;
+  }
+  for (size_t i = samples->vertex_count; i < samples->count; i++) {
+    const uint32_t *ids = &mesh->triangles[3 * (size_t)samples->facets[i]];
+    (void)qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
+                             &positions[3 * (size_t)ids[2]], &normals[3 * i]);
+  }
+}
+
+/* How far a sample may be from what stands for it: this share of the thickness, and of the diagonal at most. */
+static const double thickness_share = 0.25, longest_reach = 0.01;
+
+qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                const double *points, const double *thickness, double detail, const double *reaches,
+                                uint32_t *stand_ins) {
+  const size_t count = samples->count;
+  if (detail == 0) {
+    for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+    return QMAT_OK;
+  }
+  double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
+  double *radii = qmat_arena_alloc(&context->arena, count, sizeof *radii);
+  if (!normals || !radii) return qmat_fail_memory(context, "samples");
+  find_normals(surface, samples, normals);
+  const double diagonal = qmat_surface_frame(surface)->diagonal;
+  for (size_t i = 0; i < count; i++) {
+    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), detail), longest_reach);
+    if (reaches) radii[i] = fmin(radii[i], reaches[i]);
+  }
+  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, detail, stand_ins);
+}

@@ -1,0 +1,611 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/control_points.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_distance.h"
+#include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
+#include "nodes/measure/inner_points.h"
+#include "nodes/measure/point_grid.h"
+
+enum { FINEST_GRID = 256 };
+
+/* The grid's spacing as a share of epsilon. What happens between is bounded afterwards (nodes/measure/medial_errors.h). */
+static const double spacing_share = 0.4;
+
+/* Into how many parts a length is divided. */
+static uint32_t parts_of(double length, double spacing) {
+  const double parts = ceil(length / spacing);
+  return parts < 1 ? 1 : parts > FINEST_GRID ? FINEST_GRID : (uint32_t)parts;
+}
+
+/* A facet's grid: points on those of its sides that run from a smaller to a larger vertex, so that the facet across has
+ * the others, and inside on rows along the longest side. */
+typedef struct {
+  const double *corners[3]; /* the longest side first, from corner 0 to corner 1 */
+  double longest;
+  bool own[3];       /* whether side k, from corner k on, is this facet's to divide */
+  uint32_t parts[3]; /* of the sides */
+  uint32_t rows;
+} grid;
+
+static grid grid_of(const double *positions, const uint32_t *corners, double spacing) {
+  double lengths[3];
+  size_t first = 0;
+  for (size_t k = 0; k < 3; k++) {
+    lengths[k] = qmat_point_distance(&positions[3 * (size_t)corners[k]], &positions[3 * (size_t)corners[(k + 1) % 3]]);
+    if (lengths[k] > lengths[first]) first = k;
+  }
+  grid g = {.longest = lengths[first]};
+  for (size_t k = 0; k < 3; k++) {
+    const size_t side = (first + k) % 3;
+    g.corners[k] = &positions[3 * (size_t)corners[side]];
+    g.own[k] = corners[side] < corners[(side + 1) % 3];
+    g.parts[k] = parts_of(lengths[side], spacing);
+  }
+  double along = 0, square = 0;
+  for (int k = 0; k < 3; k++) {
+    const double side = g.corners[1][k] - g.corners[0][k], across = g.corners[2][k] - g.corners[0][k];
+    along += side * across;
+    square += across * across;
+  }
+  const double foot = g.longest > 0 ? along / g.longest : 0;
+  g.rows = parts_of(sqrt(fmax(square - foot * foot, 0)), spacing);
+  return g;
+}
+
+static uint32_t parts_of_row(const grid *g, uint32_t row, double spacing) {
+  return parts_of(g->longest * (1 - (double)row / g->rows), spacing);
+}
+
+static size_t grid_points(const grid *g, double spacing) {
+  size_t count = 0;
+  for (int k = 0; k < 3; k++) count += g->own[k] ? g->parts[k] - 1 : 0;
+  for (uint32_t row = 1; row < g->rows; row++) count += parts_of_row(g, row, spacing) - 1;
+  return count;
+}
+
+static double *put_point(const double *const corners[3], double a, double b, double c, double *points) {
+  for (int k = 0; k < 3; k++) points[k] = a * corners[0][k] + b * corners[1][k] + c * corners[2][k];
+  return points + 3;
+}
+
+static void fill_grid(const grid *g, double spacing, double *points) {
+  for (int k = 0; k < 3; k++)
+    for (uint32_t i = 1; g->own[k] && i < g->parts[k]; i++) {
+      double weights[3] = {0, 0, 0};
+      weights[(k + 1) % 3] = (double)i / g->parts[k];
+      weights[k] = 1 - weights[(k + 1) % 3];
+      points = put_point(g->corners, weights[0], weights[1], weights[2], points);
+    }
+  for (uint32_t row = 1; row < g->rows; row++) {
+    const double height = (double)row / g->rows;
+    const uint32_t parts = parts_of_row(g, row, spacing);
+    for (uint32_t i = 1; i < parts; i++) {
+      const double along = (1 - height) * i / parts;
+      points = put_point(g->corners, 1 - height - along, along, height, points);
+    }
+  }
+}
+
+/* Which spheres answer for each sample, and where the samples are. */
+typedef struct {
+  const qmat_mesh *mesh;
+  const qmat_complex *complex;
+  size_t *sphere_starts; /* per sample, + 1 */
+  uint32_t *spheres;
+  const double *reaches; /* per sphere, of find_reaches */
+  qmat_point_grid samples;
+} answering;
+
+/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it.
+ */
+static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
+  double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
+  for (size_t e = 0; e < complex->edge_count && reaches; e++) {
+    const uint32_t *ends = &complex->edges[2 * e];
+    const double *a = &complex->spheres[4 * (size_t)ends[0]], *b = &complex->spheres[4 * (size_t)ends[1]];
+    const double reach = qmat_point_distance(a, b) + fabs(a[3] - b[3]);
+    for (int k = 0; k < 2; k++) reaches[ends[k]] = qmat_larger(reaches[ends[k]], reach);
+  }
+  return reaches;
+}
+
+static qmat_status find_answering(qmat_context *context, const qmat_samples *samples, const qmat_medial *medial,
+                                  answering *a) {
+  a->sphere_starts = qmat_arena_calloc(&context->arena, samples->count + 2, sizeof *a->sphere_starts);
+  a->spheres = qmat_arena_alloc(&context->arena, medial->region_sample_count, sizeof *a->spheres);
+  if (!a->sphere_starts || !a->spheres) return qmat_fail_memory(context, "responsible regions");
+  for (size_t i = 0; i < medial->region_sample_count; i++) {
+    if (medial->region_samples[i] >= samples->count) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh answers for sample %u of %zu: it belongs to others",
+                medial->region_samples[i], samples->count);
+      return qmat_fail_field(context, "medial");
+    }
+    a->sphere_starts[medial->region_samples[i] + 2]++;
+  }
+  for (size_t i = 0; i < samples->count; i++) a->sphere_starts[i + 2] += a->sphere_starts[i + 1];
+  if (medial->region_offset_count)
+    for (size_t v = 0; v < medial->sphere_count; v++)
+      for (uint32_t i = medial->region_offsets[v]; i < medial->region_offsets[v + 1]; i++)
+        a->spheres[a->sphere_starts[medial->region_samples[i] + 1]++] = (uint32_t)v;
+  a->reaches = find_reaches(context, a->complex);
+  return a->reaches ? QMAT_OK : qmat_fail_memory(context, "responsible regions");
+}
+
+typedef struct {
+  double distance;
+  uint32_t vertices[3];
+  double weights[3];
+} witness;
+
+static void take_sphere(const answering *a, const double *point, uint32_t sample, witness *best) {
+  for (size_t i = a->sphere_starts[sample]; i < a->sphere_starts[sample + 1]; i++) {
+    const uint32_t v = a->spheres[i];
+    const double f = qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point);
+    if (f < best->distance) *best = (witness){f, {v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+  }
+}
+
+/* The primitives at a sphere. */
+static void take_star(const qmat_complex *complex, const double *point, uint32_t vertex, witness *best) {
+  size_t count;
+  const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
+    qmat_slab slab;
+    witness w = {.vertices = {t[0], t[1], t[2]}};
+    qmat_slab_prepare(&slab, &complex->spheres[4 * (size_t)t[0]], &complex->spheres[4 * (size_t)t[1]],
+                      &complex->spheres[4 * (size_t)t[2]]);
+    w.distance = qmat_slab_foot(&slab, point, w.weights);
+    if (w.distance < best->distance) *best = w;
+  }
+  at = qmat_complex_edges_at(complex, vertex, &count);
+  for (size_t i = 0; i < count; i++) {
+    if (complex->edge_triangles[at[i]]) continue;
+    const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
+    qmat_cone cone;
+    witness w = {.vertices = {ends[0], ends[1], QMAT_NONE}};
+    qmat_cone_prepare(&cone, &complex->spheres[4 * (size_t)ends[0]], &complex->spheres[4 * (size_t)ends[1]]);
+    w.distance = qmat_cone_foot(&cone, point, w.weights);
+    if (w.distance < best->distance) *best = w;
+  }
+}
+
+/* A point is content with a sphere that comes this close, as a part of epsilon; else it looks at the primitives around,
+ * and when those are farther than the second part it asks the whole medial mesh. */
+static const double content_with_sphere = 0.5, content_with_star = 0.9;
+
+/* About a tenth of a second of looks at single spheres: more far points than that are worth a search structure. */
+static const size_t most_sphere_looks = 100000000;
+
+static void store(qmat_control_points *control, size_t i, const witness *w) {
+  memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
+  memcpy(&control->weights[3 * i], w->weights, sizeof w->weights);
+  control->distances[i] = w->distance;
+}
+
+/* The best witness among what answers for `count` samples; the primitives around are only looked at where no sphere
+ * comes as close as is `content`. */
+static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double content,
+                        witness *best) {
+  *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
+  for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
+  if (!(best->distance > content)) return;
+  for (size_t k = 0; k < count; k++)
+    for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
+      const uint32_t v = a->spheres[i];
+      if (qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point) - a->reaches[v] < best->distance)
+        take_star(a->complex, point, v, best);
+    }
+}
+
+/* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where
+ * they leave the point farther than `enough` the sample nearest to it is asked. */
+static void look_around_in_facet(const answering *a, const double *point, size_t facet, double content, double enough,
+                                 witness *best) {
+  look_around(a, point, &a->mesh->triangles[3 * facet], 3, content, best);
+  if (best->distance <= enough) return;
+  const uint32_t nearest = qmat_point_grid_nearest(&a->samples, point);
+  witness other;
+  look_around(a, point, &nearest, 1, content, &other);
+  if (other.distance < best->distance) *best = other;
+}
+
+/* Also without a bound every point needs some witness. */
+static bool is_far(const qmat_control_points *control, size_t i, double enough) {
+  return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= enough);
+}
+
+/* So many points or facets are done between two calls of the progress function. */
+enum { SLICE = 1 << 11 };
+
+/* The end of the slice that starts at `first`, of `count`; QMAT_CANCELLED. */
+static qmat_status next_slice(qmat_context *context, size_t first, size_t count, size_t *last) {
+  *last = count - first < SLICE ? count : first + SLICE;
+  return qmat_progress(context, first, count, "control points");
+}
+
+static size_t count_far(const qmat_control_points *control, double enough) {
+  size_t far = 0;
+  for (size_t i = 0; i < control->count; i++) far += is_far(control, i, enough);
+  return far;
+}
+
+/* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
+ * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
+static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double enough,
+                                   qmat_control_points *control) {
+  const qmat_complex *complex = a->complex;
+  const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < control->count; first = last) {
+    const qmat_status status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t i = first; i < last; i++) {
+      if (!is_far(control, i, enough)) continue;
+      const double *p = &control->points[3 * i];
+      witness best = {.distance = control->distances[i]};
+      memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
+      memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
+      for (size_t v = 0; v < complex->vertex_count; v++) {
+        const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
+        if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+      }
+      for (size_t v = 0; v < complex->vertex_count; v++)
+        if (qmat_sphere_distance(&complex->spheres[4 * v], p) - a->reaches[v] < best.distance)
+          take_star(complex, p, (uint32_t)v, &best);
+      store(control, i, &best);
+    }
+  }
+  return QMAT_OK;
+}
+
+static witness nearest_primitive(const qmat_envelope *envelope, const qmat_complex *complex, const double *p) {
+  size_t primitive;
+  witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
+  qmat_envelope_distance(envelope, p, &primitive);
+  const int count = qmat_envelope_primitive(envelope, primitive, w.vertices);
+  const double *s[3] = {NULL, NULL, NULL};
+  for (int k = 0; k < count; k++) s[k] = &complex->spheres[4 * (size_t)w.vertices[k]];
+  qmat_slab slab;
+  qmat_cone cone;
+  if (count == 3) {
+    qmat_slab_prepare(&slab, s[0], s[1], s[2]);
+    w.distance = qmat_slab_foot(&slab, p, w.weights);
+  } else if (count == 2) {
+    qmat_cone_prepare(&cone, s[0], s[1]);
+    w.distance = qmat_cone_foot(&cone, p, w.weights);
+  } else {
+    w.weights[0] = 1;
+    w.distance = qmat_sphere_distance(s[0], p);
+  }
+  for (int k = count; k < 3; k++) w.vertices[k] = QMAT_NONE;
+  return w;
+}
+
+static qmat_status envelope_of(qmat_context *context, const qmat_complex *complex, qmat_envelope **envelope) {
+  return qmat_envelope_new(context, complex->spheres, complex->vertex_count, complex->edges, complex->edge_count,
+                           complex->triangles, complex->triangle_count, envelope);
+}
+
+/* The same for many points: the nearest primitive of all. */
+static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double enough,
+                                qmat_control_points *control) {
+  qmat_envelope *envelope;
+  qmat_status status = envelope_of(context, complex, &envelope);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < control->count; first = last) {
+    status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) break;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+    for (size_t i = first; i < last; i++) {
+      if (!is_far(control, i, enough)) continue;
+      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
+      store(control, i, &w);
+    }
+  }
+  qmat_envelope_free(envelope);
+  return status;
+}
+
+static qmat_status allocate(qmat_context *context, qmat_control_points *control) {
+  qmat_arena *arena = &context->arena;
+  control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
+  control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
+  control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
+  control->inner_limits =
+      qmat_arena_calloc(arena, control->count - control->surface_count, sizeof *control->inner_limits);
+  if (!control->points || !control->witnesses || !control->weights || !control->distances || !control->inner_limits)
+    return qmat_fail_memory(context, "control points");
+  return QMAT_OK;
+}
+
+/* A place below the surface as deep as the wanted error, and the cube of a lattice that it lies in. */
+typedef struct {
+  uint64_t cube;
+  uint32_t facet;
+  double point[3];
+  witness witness;
+} shell_place;
+
+typedef struct {
+  size_t count;
+  shell_place *places;
+} shell_points;
+
+/* Of each cube with this share of epsilon for a side one place is taken. */
+static const double shell_share = 0.6;
+
+/* The shell's depth as a share of epsilon: the rest is for the envelope between its places. */
+static const double shell_depth = 0.98;
+
+static int by_cube_and_facet(const void *left, const void *right) {
+  const shell_place *a = left, *b = right;
+  if (a->cube != b->cube) return a->cube < b->cube ? -1 : 1;
+  return a->facet < b->facet ? -1 : a->facet > b->facet;
+}
+
+static shell_place shell_place_below(const double *corners, const double *normal, uint32_t facet, double depth,
+                                     double side) {
+  shell_place place = {.facet = facet};
+  for (int k = 0; k < 3; k++) {
+    place.point[k] = corners[k] - depth * normal[k];
+    place.cube = place.cube << 21 | ((uint64_t)(int64_t)floor(place.point[k] / side + (1 << 20)) & 0x1fffff);
+  }
+  return place;
+}
+
+/* Places nearly epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than
+ * epsilon. Only where the solid is so thick and the initial medial mesh holds them. */
+static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const answering *a, double epsilon,
+                              shell_points *shell) {
+  qmat_arena *arena = &context->arena;
+  const qmat_mesh *mesh = a->mesh;
+  const double *positions = qmat_surface_positions(surface);
+  const double spacing = epsilon, depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
+  size_t capacity = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    capacity += grid_points(&g, spacing) + 1;
+  }
+  shell->places = qmat_arena_alloc(arena, capacity, sizeof *shell->places);
+  double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
+  if (!shell->places || !points) return qmat_fail_memory(context, "control points");
+  size_t count = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    if (t % SLICE == 0) {
+      const qmat_status status = qmat_progress(context, t, mesh->triangle_count, "control points");
+      if (status != QMAT_OK) return status;
+    }
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    double normal[3];
+    if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
+    const size_t on_grid = grid_points(&g, spacing);
+    fill_grid(&g, spacing, points);
+    for (int k = 0; k < 3; k++)
+      points[3 * on_grid + (size_t)k] = (g.corners[0][k] + g.corners[1][k] + g.corners[2][k]) / 3;
+    for (size_t i = 0; i <= on_grid; i++)
+      shell->places[count++] = shell_place_below(&points[3 * i], normal, (uint32_t)t, depth, side);
+  }
+  if (count) qsort(shell->places, count, sizeof *shell->places, by_cube_and_facet);
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (i == 0 || shell->places[i].cube != shell->places[i - 1].cube) shell->places[kept++] = shell->places[i];
+  const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < kept; first = last) {
+    const qmat_status status = next_slice(context, first, kept, &last);
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t i = first; i < last; i++) {
+      shell_place *place = &shell->places[i];
+      place->witness.distance = INFINITY;
+      if (!qmat_surface_inside(surface, place->point) ||
+          qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
+        continue;
+      look_around_in_facet(a, place->point, place->facet, 0, 0, &place->witness);
+    }
+  }
+  for (size_t i = 0; i < kept; i++)
+    if (shell->places[i].witness.distance <= 0) shell->places[shell->count++] = shell->places[i];
+  return QMAT_OK;
+}
+
+/* The samples and what answers for them; `unit_samples` are in the unit frame. */
+static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
+                                  const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
+                                  answering *a) {
+  *a = (answering){.mesh = mesh, .complex = complex};
+  const qmat_status status = find_answering(context, samples, medial, a);
+  return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
+}
+
+/* Where each facet's grid starts behind the samples. The spacing grows until no more than `most` points are added. */
+static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
+                               size_t *starts, qmat_control_points *control) {
+  for (;; control->spacing *= 1.25) {
+    const qmat_status status = qmat_progress(context, 0, 0, "control points");
+    if (status != QMAT_OK) return status;
+    size_t added = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
+      starts[t] = control->sample_count + added;
+      added += grid_points(&g, control->spacing);
+    }
+    control->surface_count = control->sample_count + added;
+    if (added <= most) return QMAT_OK;
+  }
+}
+
+/* The places on the surface, with witnesses of what answers around them. */
+static qmat_status look_on_surface(qmat_context *context, const answering *a, const double *positions,
+                                   const double *unit_samples, const size_t *starts, double content, double enough,
+                                   qmat_control_points *control) {
+  const qmat_mesh *mesh = a->mesh;
+  const size_t samples = control->sample_count;
+  memcpy(control->points, unit_samples, 3 * samples * sizeof *unit_samples);
+  const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < samples; first = last) {
+    const qmat_status status = next_slice(context, first, samples, &last);
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t i = first; i < last; i++) {
+      const uint32_t sample = (uint32_t)i;
+      witness best;
+      look_around(a, &control->points[3 * i], &sample, 1, content, &best);
+      store(control, i, &best);
+    }
+  }
+  for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
+    const qmat_status status = next_slice(context, first, mesh->triangle_count, &last);
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+    for (size_t t = first; t < last; t++) {
+      const uint32_t *corners = &mesh->triangles[3 * t];
+      const grid g = grid_of(positions, corners, control->spacing);
+      const size_t count = grid_points(&g, control->spacing);
+      if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
+      for (size_t i = starts[t]; i < starts[t] + count; i++) {
+        witness best;
+        look_around_in_facet(a, &control->points[3 * i], t, content, enough, &best);
+        store(control, i, &best);
+      }
+    }
+  }
+  return QMAT_OK;
+}
+
+static qmat_status ask_for_far_points(qmat_context *context, const answering *a, double enough,
+                                      qmat_control_points *control) {
+  const size_t far = count_far(control, enough);
+  if (far == 0) return QMAT_OK;
+  if (far * a->complex->vertex_count > most_sphere_looks) return ask_envelope(context, a->complex, enough, control);
+  return ask_all_spheres(context, a, enough, control);
+}
+
+qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
+                                     const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
+                                     const qmat_complex *complex, double spacing, size_t most, double enough,
+                                     qmat_control_points *control) {
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing};
+  size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
+  if (!starts) return qmat_fail_memory(context, "control points");
+  answering a;
+  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
+  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, control);
+  control->count = control->surface_count;
+  if (status == QMAT_OK) status = allocate(context, control);
+  if (status == QMAT_OK)
+    status = look_on_surface(context, &a, positions, unit_samples, starts, enough, enough, control);
+  return status == QMAT_OK ? ask_for_far_points(context, &a, enough, control) : status;
+}
+
+qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
+                                     size_t most, bool inside, qmat_control_points *control) {
+  qmat_arena *arena = &context->arena;
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
+  size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
+  answering a;
+  qmat_inner_points inner = {.count = 0};
+  double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
+  if (!starts || !unit_samples) return qmat_fail_memory(context, "control points");
+  qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
+  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
+  if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
+  shell_points shell = {.count = 0};
+  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
+  if (status != QMAT_OK) return status;
+  if ((status = place_grids(context, mesh, positions, most, starts, control)) != QMAT_OK) return status;
+  control->count = control->surface_count + inner.count + shell.count;
+  if ((status = allocate(context, control)) != QMAT_OK) return status;
+  const double enough = content_with_star * epsilon;
+  status =
+      look_on_surface(context, &a, positions, unit_samples, starts, content_with_sphere * epsilon, enough, control);
+  if (status != QMAT_OK) return status;
+  size_t next = control->surface_count;
+  for (size_t i = 0; i < inner.count; i++, next++) {
+    const witness own = {inner.distances[i], {inner.spheres[i], QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+    memcpy(&control->points[3 * next], &inner.points[3 * i], 3 * sizeof(double));
+    control->inner_limits[i] = inner.limits[i];
+    store(control, next, &own);
+  }
+  for (size_t i = 0; i < shell.count; i++, next++) {
+    memcpy(&control->points[3 * next], shell.places[i].point, 3 * sizeof(double));
+    store(control, next, &shell.places[i].witness);
+  }
+  return ask_for_far_points(context, &a, enough, control);
+}
+
+qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
+                                   qmat_control_points *control) {
+  *control =
+      (qmat_control_points){.count = extra->surface_count + extra->inner_count, .surface_count = extra->surface_count};
+  qmat_status status = allocate(context, control);
+  qmat_envelope *envelope;
+  if (status == QMAT_OK) status = envelope_of(context, complex, &envelope);
+  if (status != QMAT_OK) return status;
+  if (extra->surface_count) memcpy(control->points, extra->surface, 3 * extra->surface_count * sizeof *control->points);
+  if (extra->inner_count)
+    memcpy(&control->points[3 * extra->surface_count], extra->inner, 3 * extra->inner_count * sizeof *control->points);
+  const int threads = qmat_threads(context);
+  for (size_t first = 0, last; first < control->count; first = last) {
+    status = next_slice(context, first, control->count, &last);
+    if (status != QMAT_OK) break;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+    for (size_t i = first; i < last; i++) {
+      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
+      store(control, i, &w);
+    }
+  }
+  qmat_envelope_free(envelope);
+  if (status != QMAT_OK) return status;
+  size_t kept = extra->surface_count;
+  for (size_t i = kept; i < control->count; i++) {
+    if (!(control->distances[i] < 0)) continue;
+    memmove(&control->points[3 * kept], &control->points[3 * i], 3 * sizeof *control->points);
+    memmove(&control->witnesses[3 * kept], &control->witnesses[3 * i], 3 * sizeof *control->witnesses);
+    memmove(&control->weights[3 * kept], &control->weights[3 * i], 3 * sizeof *control->weights);
+    control->distances[kept] = control->distances[i];
+    control->inner_limits[kept - extra->surface_count] = fmax(0.5 * control->distances[i], -extra->held_depth);
+    kept++;
+  }
+  control->count = kept;
+  return QMAT_OK;
+}
+
+qmat_status qmat_control_points_join(qmat_context *context, const qmat_control_points *base, const uint32_t *witnesses,
+                                     const double *weights, const uint32_t *ids, const qmat_control_points *extra,
+                                     qmat_control_points *joined) {
+  *joined = (qmat_control_points){.count = base->count + extra->count,
+                                  .sample_count = base->sample_count,
+                                  .surface_count = base->surface_count + extra->surface_count,
+                                  .spacing = base->spacing};
+  const qmat_status status = allocate(context, joined);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < joined->count; i++) {
+    const bool inside = i >= joined->surface_count;
+    const size_t place = inside ? i - joined->surface_count : i;
+    const size_t own = inside ? base->count - base->surface_count : base->surface_count;
+    const bool is_base = place < own;
+    const qmat_control_points *source = is_base ? base : extra;
+    const size_t j = (inside ? source->surface_count : 0) + (is_base ? place : place - own);
+    memcpy(&joined->points[3 * i], &source->points[3 * j], 3 * sizeof *joined->points);
+    memcpy(&joined->weights[3 * i], &(is_base ? weights : extra->weights)[3 * j], 3 * sizeof *joined->weights);
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t vertex = (is_base ? witnesses : extra->witnesses)[3 * j + k];
+      joined->witnesses[3 * i + k] = is_base && ids && vertex != QMAT_NONE ? ids[vertex] : vertex;
+    }
+    joined->distances[i] = source->distances[j];
+    if (inside) joined->inner_limits[place] = source->inner_limits[j - source->surface_count];
+  }
+  return QMAT_OK;
+}

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/cover.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/medial_distance.h"
+
+/* Pieces are not split beyond what rounding leaves of F. */
+static const double least_tolerance = 1e-6;
+
+typedef struct facet_search {
+  const qmat_envelope *envelope;
+  const double *spheres;
+  double tolerance;
+  double found, bound; /* the largest F found, and the largest bound of a finished piece */
+  double worst, worst_point[3]; /* the largest F found on this facet */
+} facet_search;
+
+static double distance(const double *a, const double *b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return sqrt(x * x + y * y + z * z);
+}
+
+/* The signed distance to one primitive at the farthest of three corners: an upper bound of F over their triangle. */
+static double convex_bound(const facet_search *search, size_t primitive, double corners[3][3]) {
+  uint32_t ids[3];
+  const int count = qmat_envelope_primitive(search->envelope, primitive, ids);
+  const double *s[3] = {NULL, NULL, NULL};
+  for (int k = 0; k < count; k++) s[k] = &search->spheres[4 * (size_t)ids[k]];
+  double bound = -INFINITY;
+  qmat_slab slab;
+  qmat_cone cone;
+  if (count == 3) qmat_slab_prepare(&slab, s[0], s[1], s[2]);
+  if (count == 2) qmat_cone_prepare(&cone, s[0], s[1]);
+  for (int i = 0; i < 3; i++)
+    bound = fmax(bound, count == 3   ? qmat_slab_prepared_distance(&slab, corners[i])
+                        : count == 2 ? qmat_cone_prepared_distance(&cone, corners[i])
+                                     : qmat_sphere_distance(s[0], corners[i]));
+  return bound;
+}
+
+static void search_piece(facet_search *search, double corners[3][3]) {
+  double centre[3], reach = 0;
+  for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
+  for (int i = 0; i < 3; i++) reach = fmax(reach, distance(corners[i], centre));
+  size_t primitive;
+  const double f = qmat_envelope_distance(search->envelope, centre, &primitive);
+  if (f > search->worst) {
+    search->worst = f;
+    memcpy(search->worst_point, centre, sizeof centre);
+  }
+  search->found = fmax(search->found, f);
+  double bound = f + reach;
+  if (bound > search->found + search->tolerance) bound = fmin(bound, convex_bound(search, primitive, corners));
+  if (bound <= search->found + search->tolerance || reach <= 0.5 * search->tolerance) {
+    search->bound = fmax(search->bound, bound);
+    return;
+  }
+  int a = 0, b = 1;
+  double longest = -1;
+  for (int i = 0; i < 3; i++) {
+    const double length = distance(corners[i], corners[(i + 1) % 3]);
+    if (length > longest) {
+      longest = length;
+      a = i;
+      b = (i + 1) % 3;
+    }
+  }
+  double low[3][3], high[3][3];
+  memcpy(low, corners, sizeof low);
+  memcpy(high, corners, sizeof high);
+  for (int k = 0; k < 3; k++) low[b][k] = high[a][k] = 0.5 * (corners[a][k] + corners[b][k]);
+  search_piece(search, low);
+  search_piece(search, high);
+}
+
+qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_envelope *envelope,
+                               const double *spheres, double known, double tolerance, double threshold,
+                               qmat_cover *cover) {
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface);
+  const size_t count = mesh->triangle_count, slice = 1 << 12;
+  *cover = (qmat_cover){.found = known, .bound = known};
+  cover->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *cover->points);
+  cover->facets = qmat_arena_alloc(&context->arena, count, sizeof *cover->facets);
+  double *worst = qmat_arena_alloc(&context->arena, count, sizeof *worst);
+  if (!cover->points || !cover->facets || !worst) return qmat_fail_memory(context, "the cover");
+  const int threads = qmat_threads(context);
+  double bound = known;
+  for (size_t first = 0; first < count; first += slice) {
+    const qmat_status status = qmat_progress(context, first, count, "facets measured");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < count ? first + slice : count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : bound)
+    for (size_t t = first; t < last; t++) {
+      facet_search search = {.envelope = envelope,
+                             .spheres = spheres,
+                             .tolerance = fmax(tolerance, least_tolerance),
+                             .found = known,
+                             .bound = -INFINITY,
+                             .worst = -INFINITY};
+      double corners[3][3];
+      for (int i = 0; i < 3; i++)
+        memcpy(corners[i], &positions[3 * (size_t)mesh->triangles[3 * t + (size_t)i]], sizeof corners[i]);
+      search_piece(&search, corners);
+      bound = fmax(bound, search.bound);
+      worst[t] = search.worst;
+      memcpy(&cover->points[3 * t], search.worst_point, sizeof search.worst_point);
+    }
+  }
+  for (size_t t = 0; t < count; t++) {
+    cover->found = fmax(cover->found, worst[t]);
+    if (!(worst[t] > threshold)) continue;
+    memmove(&cover->points[3 * cover->count], &cover->points[3 * t], 3 * sizeof *cover->points);
+    cover->facets[cover->count++] = (uint32_t)t;
+  }
+  cover->bound = bound;
+  return QMAT_OK;
+}

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/medial_errors.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "nodes/measure/boundary_distance.h"
+#include "nodes/measure/protrusion.h"
+
+/* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
+ * one look. */
+static double least_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+                               int threads) {
+  const size_t primitives = qmat_envelope_primitive_count(envelope);
+  double least = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
+  for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
+    double middle[4] = {0, 0, 0, 0};
+    uint32_t ids[3] = {(uint32_t)i};
+    const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
+    for (int c = 0; c < count; c++)
+      for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
+    least = fmax(least, qmat_protrusion_of_sphere(surface, middle));
+  }
+  return least;
+}
+
+static double largest_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+                                 double tolerance, double enough, int threads) {
+  enough = fmax(enough, least_protrusion(surface, unit, envelope, threads) + tolerance);
+  const size_t primitives = qmat_envelope_primitive_count(envelope);
+  double largest = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
+  for (size_t i = 0; i < primitives; i++) {
+    uint32_t ids[3];
+    const int count = qmat_envelope_primitive(envelope, i, ids);
+    const double *spheres[3];
+    for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
+    largest = fmax(largest, qmat_protrusion_bound(surface, spheres, count, enough, tolerance));
+  }
+  return largest;
+}
+
+qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                      const double *points, size_t point_count, double tolerance, double enough,
+                                      double threshold, qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(context);
+  double farthest = enough;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
+  for (size_t i = 0; i < point_count; i++)
+    farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
+  status =
+      qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
+  errors->surface_to_envelope = errors->cover.bound;
+  qmat_envelope_free(envelope);
+  return status;
+}
+
+qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                           double tolerance, double enough, qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, qmat_threads(context));
+  qmat_envelope_free(envelope);
+  return qmat_progress(context, 0, 0, "primitives measured");
+}
+
+/* Leaves the points that lie in the solid; how many they are. */
+static size_t keep_inside(const qmat_surface *surface, double *points, size_t count) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (qmat_surface_inside(surface, &points[3 * i])) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
+  return kept;
+}
+
+/* How closely the boundary is looked at, as a share of epsilon. */
+static const double boundary_tolerance = 0.15;
+
+qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                         double epsilon, qmat_medial_errors *errors) {
+  qmat_envelope *envelope;
+  qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
+  if (status != QMAT_OK) return status;
+  qmat_boundary_distance boundary;
+  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false, 0,
+                                          &boundary);
+  qmat_envelope_free(envelope);
+  errors->boundary_to_surface = boundary.either_side.hi;
+  errors->hollows = boundary.far_points;
+  errors->hollow_count = keep_inside(surface, errors->hollows, boundary.far_count);
+  errors->doubts = boundary.doubts;
+  errors->doubt_count = keep_inside(surface, errors->doubts, boundary.doubt_count);
+  return status;
+}
+
+void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
+  qmat_free(errors->hollows);
+  qmat_free(errors->doubts);
+  errors->hollows = errors->doubts = NULL;
+  errors->hollow_count = errors->doubt_count = 0;
+}

@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/point_grid.h"
+
+#include <math.h>
+
+enum { MOST_ALONG = 128 };
+/* Points spread evenly over a cube's six sides come about so many to a cell that has any. */
+static const double points_to_a_cell = 2;
+
+static size_t cell_along(const qmat_point_grid *grid, size_t axis, double x) {
+  const double cell = floor((x - grid->low[axis]) / grid->width);
+  return cell > 0 ? (size_t)fmin(cell, (double)grid->along[axis] - 1) : 0;
+}
+
+static size_t cell_index(const qmat_point_grid *grid, const size_t cell[3]) {
+  return (cell[0] * grid->along[1] + cell[1]) * grid->along[2] + cell[2];
+}
+
+static size_t cell_of(const qmat_point_grid *grid, const double *point) {
+  size_t cell[3];
+  for (size_t k = 0; k < 3; k++) cell[k] = cell_along(grid, k, point[k]);
+  return cell_index(grid, cell);
+}
+
+qmat_status qmat_point_grid_init(qmat_context *context, const double *points, size_t count, qmat_point_grid *grid) {
+  double high[3], extent = 0;
+  *grid = (qmat_point_grid){.points = points};
+  for (size_t k = 0; k < 3; k++) grid->low[k] = high[k] = points[k];
+  for (size_t i = 0; i < 3 * count; i++) {
+    grid->low[i % 3] = fmin(grid->low[i % 3], points[i]);
+    high[i % 3] = fmax(high[i % 3], points[i]);
+  }
+  for (size_t k = 0; k < 3; k++) extent = fmax(extent, high[k] - grid->low[k]);
+  const double most = fmin(fmax(ceil(sqrt((double)count / (6 * points_to_a_cell))), 1), MOST_ALONG);
+  grid->width = extent > 0 ? extent / most : 1;
+  size_t cells = 1;
+  for (size_t k = 0; k < 3; k++) {
+    grid->along[k] = (size_t)fmin(floor((high[k] - grid->low[k]) / grid->width) + 1, most);
+    cells *= grid->along[k];
+  }
+  grid->starts = qmat_arena_calloc(&context->arena, cells + 2, sizeof *grid->starts);
+  grid->items = qmat_arena_alloc(&context->arena, count, sizeof *grid->items);
+  if (!grid->starts || !grid->items) return qmat_fail_memory(context, "a grid of points");
+  for (size_t i = 0; i < count; i++) grid->starts[cell_of(grid, &points[3 * i]) + 2]++;
+  for (size_t i = 0; i < cells; i++) grid->starts[i + 2] += grid->starts[i + 1];
+  for (size_t i = 0; i < count; i++) grid->items[grid->starts[cell_of(grid, &points[3 * i]) + 1]++] = (uint32_t)i;
+  return QMAT_OK;
+}
+
+/* The nearest point so far, and the square of its distance. */
+typedef struct {
+  double square;
+  uint32_t point;
+} nearest_point;
+
+static void look_into(const qmat_point_grid *grid, size_t cell, const double *place, nearest_point *best) {
+  for (uint32_t i = grid->starts[cell]; i < grid->starts[cell + 1]; i++) {
+    const uint32_t point = grid->items[i];
+    double square = 0;
+    for (size_t k = 0; k < 3; k++) {
+      const double d = grid->points[3 * (size_t)point + k] - place[k];
+      square += d * d;
+    }
+    if (square < best->square || (square == best->square && point < best->point))
+      *best = (nearest_point){square, point};
+  }
+}
+
+/* Looks into the cells that are `ring` cells away from `middle` along the axis along which they are farthest. */
+static void look_around(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
+                        nearest_point *best) {
+  size_t first[3], last[3], cell[3];
+  for (size_t k = 0; k < 3; k++) {
+    first[k] = middle[k] > ring ? middle[k] - ring : 0;
+    last[k] = middle[k] + ring < grid->along[k] ? middle[k] + ring : grid->along[k] - 1;
+  }
+  for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++)
+    for (cell[1] = first[1]; cell[1] <= last[1]; cell[1]++) {
+      const bool on_side = cell[0] + ring == middle[0] || cell[0] == middle[0] + ring || cell[1] + ring == middle[1] ||
+                           cell[1] == middle[1] + ring;
+      for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++)
+        if (on_side || cell[2] + ring == middle[2] || cell[2] == middle[2] + ring)
+          look_into(grid, cell_index(grid, cell), place, best);
+    }
+}
+
+uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place[3]) {
+  size_t middle[3], rings = 1;
+  for (size_t k = 0; k < 3; k++) {
+    middle[k] = cell_along(grid, k, place[k]);
+    if (grid->along[k] > rings) rings = grid->along[k];
+  }
+  nearest_point best = {INFINITY, UINT32_MAX};
+  for (size_t ring = 0; ring < rings; ring++) {
+    look_around(grid, middle, ring, place, &best);
+    /* All that was not looked at is beyond so many whole cells. */
+    const double beyond = (double)ring * grid->width;
+    if (best.square < beyond * beyond) break;
+  }
+  return best.point;
+}
+
+bool qmat_point_grid_has_within(const qmat_point_grid *grid, const double place[3], double reach) {
+  size_t first[3], last[3], cell[3];
+  for (size_t k = 0; k < 3; k++) {
+    first[k] = cell_along(grid, k, place[k] - reach);
+    last[k] = cell_along(grid, k, place[k] + reach);
+  }
+  nearest_point best = {INFINITY, UINT32_MAX};
+  for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++)
+    for (cell[1] = first[1]; cell[1] <= last[1]; cell[1]++)
+      for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++) {
+        look_into(grid, cell_index(grid, cell), place, &best);
+        if (best.square <= reach * reach) return true;
+      }
+  return false;
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_MEASURE_POINT_GRID_H
+#define QMAT_NODES_MEASURE_POINT_GRID_H
+
+#include "core/context.h"
+
+/* Points by the cells of a grid, for questions about the nearest of them. Made for points that are spread over a
+ * surface; after qmat_point_grid_init it is only read, by any number of threads. */
+typedef struct qmat_point_grid {
+  const double *points;
+  double low[3], width; /* where the grid starts, and a cell's side */
+  size_t along[3];      /* cells */
+  uint32_t *starts;     /* per cell, + 1: its first point in `items` */
+  uint32_t *items;      /* per point, in rising order within a cell */
+} qmat_point_grid;
+
+/* Sorts `count` (at least 1, below 2^32 - 1) finite points, 3 doubles each, which stay the caller's. What it needs
+ * lives in the context's arena: 4 bytes a point and up to 10 MB. QMAT_ERROR_MEMORY. Cost: linear. */
+qmat_status qmat_point_grid_init(qmat_context *context, const double *points, size_t count, qmat_point_grid *grid);
+
+/* The point nearest to `place` (3 doubles), of equally near ones the first. Quick where that is few cells away. */
+uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place[3]);
+
+/* Whether any point is no farther than `reach` from `place` (3 doubles). Quick where that is few cells. */
+bool qmat_point_grid_has_within(const qmat_point_grid *grid, const double place[3], double reach);
+
+#endif

@@ -1,0 +1,356 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/protrusion.h"
+
+#include <math.h>
+#include <string.h>
+
+static double distance(const double *a, const double *b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return sqrt(x * x + y * y + z * z);
+}
+
+static double maximum(double a, double b) {
+  return a > b ? a : b;
+}
+
+static double minimum(double a, double b) {
+  return a < b ? a : b;
+}
+
+/* One piece of a primitive: its corners, each with a lower bound of its depth. */
+typedef struct piece {
+  double spheres[3][4], depths[3];
+  int count;
+} piece;
+
+/* The least bound of h over a piece by the Lipschitz constant from a corner, where its depth is known: convex, so
+ * largest at a corner. For an edge the crossing of the bounds from both ends is tighter. */
+static double bound_from_corners(const piece *p) {
+  if (p->count == 2) {
+    const double length = distance(p->spheres[0], p->spheres[1]), change = p->spheres[1][3] - p->spheres[0][3];
+    const double a = p->spheres[0][3] - p->depths[0], b = p->spheres[1][3] - p->depths[1];
+    /* a + t (length + change) and b + (1 - t) (length - change): the largest of their minimum is at an end or where
+     * they meet. */
+    const double ends = maximum(minimum(a, b + length - change), minimum(b, a + length + change));
+    const double t = length > 0 ? (b - a + length - change) / (2 * length) : 0;
+    return t > 0 && t < 1 ? maximum(ends, a + t * (length + change)) : ends;
+  }
+  double sides[3], bound = INFINITY; /* each opposite a corner */
+  for (int k = 0; k < 3; k++) sides[k] = distance(p->spheres[(k + 1) % 3], p->spheres[(k + 2) % 3]);
+  for (int i = 0; i < 3; i++) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const double own = p->spheres[i][3] - p->depths[i];
+    const double one = p->spheres[j][3] - p->depths[i] + sides[k];
+    const double other = p->spheres[k][3] - p->depths[i] + sides[j];
+    bound = minimum(bound, maximum(own, maximum(one, other)));
+  }
+  return bound;
+}
+
+/* Halves a piece across its longest side. What is known of the depth at its corners is not carried on: the centres of
+ * the halves say more. */
+static void split(const piece *p, piece *low, piece *high) {
+  int a = 0, b = 1;
+  if (p->count == 3) {
+    double longest = -1;
+    for (int i = 0; i < 3; i++) {
+      double square = 0;
+      for (int k = 0; k < 3; k++) {
+        const double d = p->spheres[i][k] - p->spheres[(i + 1) % 3][k];
+        square += d * d;
+      }
+      if (square > longest) {
+        longest = square;
+        a = i;
+        b = (i + 1) % 3;
+      }
+    }
+  }
+  double middle[4];
+  for (int k = 0; k < 4; k++) middle[k] = 0.5 * (p->spheres[a][k] + p->spheres[b][k]);
+  *low = *high = *p;
+  memcpy(low->spheres[b], middle, sizeof middle);
+  memcpy(high->spheres[a], middle, sizeof middle);
+}
+
+/* Branch and bound over one primitive: depth first, at most this deep. */
+enum { DEEPEST = 40 };
+
+typedef struct search {
+  const qmat_surface *surface;
+  qmat_depth_lattice *lattice; /* NULL: every depth is asked of the surface */
+  double content;              /* a piece with a bound up to this is done */
+  double limit;                /* an h above this ends the search */
+  double smallest;             /* pieces no larger than this are not split for a better bound; larger ones are not worth
+                                  a question to the surface where there is a lattice */
+  double found;                /* the largest h found */
+  double bound;                /* the largest bound of a finished piece */
+  double place[4];             /* the centre of the piece that was looked at last */
+  double tolerance;            /* a piece whose bound is this close above `found` is done too */
+} search;
+
+static bool is_done(search *s, double bound, double size, bool last) {
+  if (!(bound <= s->content || bound <= s->found + s->tolerance ||
+        (bound <= s->limit && (last || size <= s->smallest))))
+    return false;
+  s->bound = maximum(s->bound, bound);
+  return true;
+}
+
+static bool search_piece(search *s, const piece *p, int level) {
+  double centre[4] = {0, 0, 0, 0}, size = 0, farthest = -INFINITY;
+  const double share = 1.0 / p->count;
+  for (int i = 0; i < p->count; i++)
+    for (int k = 0; k < 4; k++) centre[k] += share * p->spheres[i][k];
+  for (int i = 0; i < p->count; i++) {
+    const double d = distance(p->spheres[i], centre);
+    size = maximum(size, d);
+    farthest = maximum(farthest, p->spheres[i][3] + d);
+  }
+  /* h over the piece is at most `farthest` less the depth at the centre: convex, so largest at a corner. */
+  const bool last = p->count == 1 || level == DEEPEST;
+  bool ask = true;
+  double near = 0, gap = 0;
+  if (s->lattice) {
+    near = qmat_depth_lattice_near(s->lattice, centre, &gap);
+    if (centre[3] - near - gap > s->limit) {
+      s->found = centre[3] - near - gap;
+      memcpy(s->place, centre, sizeof centre);
+      return false;
+    }
+    if (is_done(s, farthest - near + gap, size, last)) return true;
+    ask = size <= s->smallest || last;
+    if (ask && is_done(s, farthest - qmat_depth_lattice_least(s->lattice, centre), size, last)) return true;
+  }
+  if (ask) {
+    const double depth = s->lattice
+                             ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
+                             : -qmat_surface_signed_distance(s->surface, centre);
+    if (depth == INFINITY) { /* deeper than that */
+      s->bound = maximum(s->bound, s->content);
+      return true;
+    }
+    const double h = centre[3] - depth;
+    s->found = maximum(s->found, h);
+    memcpy(s->place, centre, sizeof centre);
+    if (h > s->limit) return false;
+    if (is_done(s, farthest - depth, size, last)) return true;
+    if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
+      s->bound = maximum(s->bound, farthest - depth);
+      return farthest - depth <= s->limit;
+    }
+  }
+  piece low, high;
+  split(p, &low, &high);
+  return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
+}
+
+double qmat_protrusion_of_sphere(const qmat_surface *surface, const double sphere[4]) {
+  return sphere[3] + qmat_surface_signed_distance(surface, sphere);
+}
+
+double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,
+                             double tolerance) {
+  piece p = {.count = count};
+  search s = {.surface = surface,
+              .content = enough,
+              .limit = INFINITY,
+              .smallest = 0.01 * tolerance,
+              .found = -INFINITY,
+              .bound = enough,
+              .tolerance = tolerance};
+  for (int i = 0; i < count; i++) {
+    memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
+    p.depths[i] = -qmat_surface_signed_distance(surface, spheres[i]);
+    s.found = maximum(s.found, spheres[i][3] - p.depths[i]);
+  }
+  if (count > 1) search_piece(&s, &p, 0);
+  return maximum(s.bound, s.found);
+}
+
+/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away.
+ */
+static const double lattice_share = 0.5, widest_spacing = 0.005;
+
+qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
+                                 const qmat_complex *complex, const double *depths, double limit) {
+  *protrusion = (qmat_protrusion){.limit = limit};
+  const double spacing = limit < INFINITY ? lattice_share * limit : widest_spacing;
+  const qmat_status status = qmat_depth_lattice_init(context, &protrusion->lattice, surface,
+                                                     spacing < widest_spacing ? spacing : widest_spacing);
+  if (status != QMAT_OK) return status;
+  protrusion->depths = qmat_alloc(complex->vertex_count, sizeof(double));
+  protrusion->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
+  protrusion->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
+  if (!protrusion->depths || !protrusion->edge_bounds || !protrusion->triangle_bounds)
+    return qmat_fail_memory(context, "protrusion bounds");
+  memcpy(protrusion->depths, depths, complex->vertex_count * sizeof *depths);
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads)
+  for (size_t i = 0; i < complex->edge_count + complex->triangle_count; i++) {
+    const bool is_edge = i < complex->edge_count;
+    const size_t id = is_edge ? i : i - complex->edge_count;
+    piece p = {.count = is_edge ? 2 : 3};
+    for (int k = 0; k < p.count; k++) {
+      const size_t v = is_edge ? complex->edges[2 * id + (size_t)k] : complex->triangles[3 * id + (size_t)k];
+      memcpy(p.spheres[k], &complex->spheres[4 * v], sizeof p.spheres[k]);
+      p.depths[k] = depths[v];
+    }
+    *(is_edge ? &protrusion->edge_bounds[id] : &protrusion->triangle_bounds[id]) = bound_from_corners(&p);
+  }
+  return QMAT_OK;
+}
+
+void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
+  qmat_depth_lattice_uninit(&protrusion->lattice);
+  qmat_free(protrusion->depths);
+  qmat_free(protrusion->edge_bounds);
+  qmat_free(protrusion->triangle_bounds);
+  qmat_free(protrusion->new_edge_bounds);
+  qmat_free(protrusion->new_triangle_bounds);
+  *protrusion = (qmat_protrusion){0};
+}
+
+/* Asks for what the tests of a star read, all at once. */
+static void fetch_bounds(const qmat_protrusion *protrusion, const qmat_complex *complex, const qmat_collapse *c) {
+  for (size_t t = 0; t < c->triangle_count; t++) {
+    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->kept_triangles[t]]);
+    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->removed_triangles[t]]);
+  }
+  for (size_t n = 0; n < c->neighbour_count; n++) {
+    __builtin_prefetch(&protrusion->depths[c->neighbours[n]]);
+    __builtin_prefetch(&complex->spheres[4 * (size_t)c->neighbours[n]]);
+    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->kept_edges[n]]);
+    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->removed_edges[n]]);
+  }
+}
+
+bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
+                                 const qmat_collapse *collapse, const double sphere[4]) {
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  double depth = -INFINITY, gap;
+  fetch_bounds(protrusion, complex, collapse);
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    depth = maximum(depth, protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
+  if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
+    const double near = qmat_depth_lattice_near(&protrusion->lattice, sphere, &gap);
+    depth = maximum(depth, near - gap);
+    if (!(depth > 0 && sphere[3] - depth <= protrusion->limit))
+      depth = qmat_depth_lattice_exact_near(&protrusion->lattice, sphere, near, gap);
+  }
+  protrusion->sphere_depth = depth;
+  return depth > 0 && sphere[3] - depth <= protrusion->limit;
+}
+
+bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_complex *complex,
+                                    const qmat_collapse *collapse, const double sphere[4]) {
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
+    if (sphere[3] == 0 && other[3] == 0) continue; /* a crease, which lies on the surface */
+    const double half = 0.5 * distance(sphere, other);
+    if (half < protrusion->sphere_depth || half < protrusion->depths[collapse->neighbours[n]]) continue;
+    double middle[3], gap;
+    for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
+    const double near = qmat_depth_lattice_near(&protrusion->lattice, middle, &gap);
+    if (near > gap) continue;
+    if (near < -gap || !qmat_surface_inside(protrusion->lattice.surface, middle)) return false;
+  }
+  return true;
+}
+
+/* By how much h grows at most over a primitive of which a corner moves to another sphere. */
+static double growth(const double *from, const double *to) {
+  return maximum(0, distance(from, to) + to[3] - from[3]);
+}
+
+/* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
+static const double content_share = 0.8, smallest_share = 0.15;
+
+qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrusion, const qmat_complex *complex,
+                                 const qmat_collapse *collapse, const double sphere[4], bool *kept) {
+  if (qmat_grow((void **)&protrusion->new_edge_bounds, &protrusion->new_edge_capacity, collapse->neighbour_count,
+                sizeof(double)) ||
+      qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity, collapse->triangle_count,
+                sizeof(double)))
+    return qmat_fail_memory(context, "protrusion bounds");
+  const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
+  const double removed_growth =
+      collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
+  search s = {.lattice = &protrusion->lattice,
+              .content = content_share * protrusion->limit,
+              .limit = protrusion->limit,
+              .smallest = smallest_share * protrusion->limit,
+              .tolerance = 0};
+  piece p;
+  memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
+  p.depths[0] = protrusion->sphere_depth;
+  *kept = true;
+  for (size_t t = 0; t < collapse->triangle_count + collapse->neighbour_count && *kept; t++) {
+    const bool is_edge = t >= collapse->triangle_count;
+    const size_t id = is_edge ? t - collapse->triangle_count : t;
+    const uint32_t mine = is_edge ? collapse->kept_edges[id] : collapse->kept_triangles[id];
+    const uint32_t theirs = is_edge ? collapse->removed_edges[id] : collapse->removed_triangles[id];
+    const double *bounds = is_edge ? protrusion->edge_bounds : protrusion->triangle_bounds;
+    double *result = is_edge ? &protrusion->new_edge_bounds[id] : &protrusion->new_triangle_bounds[id];
+    double bound = INFINITY;
+    if (mine != QMAT_NONE) bound = bounds[mine] + kept_growth;
+    if (theirs != QMAT_NONE) bound = minimum(bound, bounds[theirs] + removed_growth);
+    p.count = is_edge ? 2 : 3;
+    for (int k = 1; k < p.count; k++) {
+      const uint32_t v = is_edge ? collapse->neighbours[id] : collapse->triangle_pairs[2 * id + (size_t)k - 1];
+      memcpy(p.spheres[k], &complex->spheres[4 * (size_t)v], sizeof p.spheres[k]);
+      p.depths[k] = protrusion->depths[v];
+    }
+    bound = minimum(bound, bound_from_corners(&p));
+    if (is_edge) /* an edge of a triangle is as good as the triangle */
+      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > protrusion->limit; i++)
+        if (collapse->triangle_pairs[i] == collapse->neighbours[id])
+          bound = minimum(bound, protrusion->new_triangle_bounds[i / 2]);
+    if (bound > protrusion->limit) {
+      s.found = s.bound = -INFINITY;
+      memcpy(s.place, sphere, sizeof s.place);
+      *kept = search_piece(&s, &p, 0);
+      bound = s.bound;
+      protrusion->failed = maximum(s.found, protrusion->limit);
+      memcpy(protrusion->failed_place, s.place, sizeof s.place);
+    }
+    *result = bound;
+  }
+  return QMAT_OK;
+}
+
+void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse) {
+  protrusion->depths[collapse->kept] = protrusion->sphere_depth;
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const uint32_t edge = collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
+    protrusion->edge_bounds[edge] = protrusion->new_edge_bounds[n];
+  }
+  for (size_t t = 0; t < collapse->triangle_count; t++) {
+    const uint32_t triangle =
+        collapse->kept_triangles[t] != QMAT_NONE ? collapse->kept_triangles[t] : collapse->removed_triangles[t];
+    protrusion->triangle_bounds[triangle] = protrusion->new_triangle_bounds[t];
+  }
+}
+
+void qmat_protrusion_bound_edge(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                double bound) {
+  double *known = &protrusion->edge_bounds[qmat_complex_find_edge(complex, a, b)];
+  *known = minimum(*known, bound);
+}
+
+void qmat_protrusion_bound_triangle(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
+                                    uint32_t c, double bound) {
+  double *known = &protrusion->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
+  *known = minimum(*known, bound);
+}
+
+double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex) {
+  double largest = 0;
+  for (size_t v = 0; v < complex->vertex_count; v++)
+    if (complex->vertex_alive[v]) largest = maximum(largest, complex->spheres[4 * v + 3] - protrusion->depths[v]);
+  for (size_t e = 0; e < complex->edge_count; e++)
+    if (complex->edge_alive[e]) largest = maximum(largest, protrusion->edge_bounds[e]);
+  for (size_t t = 0; t < complex->triangle_count; t++)
+    if (complex->triangle_alive[t]) largest = maximum(largest, protrusion->triangle_bounds[t]);
+  return largest;
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_COLLAPSE_CANDIDATES_H
+#define QMAT_NODES_SIMPLIFY_COLLAPSE_CANDIDATES_H
+
+#include "core/geometry/medial_complex.h"
+#include "core/geometry/quadric.h"
+
+enum { QMAT_MOST_CANDIDATES = 4 };
+
+/* Spheres that an edge may collapse to, least slab quadratic error first. */
+typedef struct qmat_candidates {
+  double spheres[QMAT_MOST_CANDIDATES][4], errors[QMAT_MOST_CANDIDATES];
+  int count;
+} qmat_candidates;
+
+/* The sum of the quadrics (one per vertex) of the ends of an edge. */
+qmat_quadric qmat_merged_quadric(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge);
+
+/* Puts a sphere in its place by its error; equals keep their order. There are at most QMAT_MOST_CANDIDATES. */
+void qmat_candidates_insert(qmat_candidates *candidates, const double sphere[4], double error);
+/* The same with its slab quadratic error. */
+void qmat_candidates_add(qmat_candidates *candidates, const qmat_quadric *quadric, const double sphere[4]);
+
+/* The candidates of an edge: the sphere of least error where there is one with a radius > 0 that does not run away
+ * along a nearly flat direction, both ends, and the middle (section 3.1.2). */
+void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                          qmat_candidates *candidates);
+
+/* The one that the public Q-MAT code takes: the sphere of least error, inside the model or not, or the middle where its
+ * radius is negative or where it is more than a diagonal away. Where there is no sphere of least error, the best of
+ * both ends and the middle, or the middle alone for an edge without slabs. */
+void qmat_candidates_find_published(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                                    qmat_candidates *candidates);
+
+/* The larger end alone (Faraj et al. 2013); the first of equals. */
+void qmat_candidates_find_larger(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                                 qmat_candidates *candidates);
+
+#endif

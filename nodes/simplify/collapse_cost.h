@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_COLLAPSE_COST_H
+#define QMAT_NODES_SIMPLIFY_COLLAPSE_COST_H
+
+#include "nodes/simplify/collapse_candidates.h"
+#include "nodes/measure/coverage.h"
+
+/* What the order of collapses goes by. */
+typedef enum qmat_cost_kind {
+  QMAT_COST_SLAB,      /* Q-MAT: slab quadratic error and stability ratio (eq. 6) */
+  QMAT_COST_HAUSDORFF, /* HEM (Sun et al. 2016): the distance from the surface to the envelope */
+  QMAT_COST_PMAT       /* PMAT (Faraj et al. 2013): length of the edge against the difference of radii */
+} qmat_cost_kind;
+
+/* Eq. 6: `error` is the slab quadratic error of the merged sphere, the edge that between spheres `a` and `b` (4 doubles
+ * each). 0 for a pure spike, whatever the error is. */
+double qmat_slab_cost(double error, double k, const double a[4], const double b[4]);
+
+/* The distance of the centres over the difference of the radii: below 1 where one sphere holds the other, INFINITY for
+ * equal radii, 0 for equal centres. */
+double qmat_pmat_cost(const double a[4], const double b[4]);
+
+/* The end of the edge of the newest preview to which a collapse leaves the least F at the points that both ends answer
+ * for, of the first `point_count` control points, with that F: the largest. -INFINITY where there are none; of equals
+ * the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
+qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
+                                      const qmat_collapse *collapse, size_t point_count, qmat_candidates *candidates);
+
+#endif

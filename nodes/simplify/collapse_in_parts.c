@@ -1,0 +1,475 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/collapse_in_parts.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include "core/geometry/medial_build.h"
+
+/* A part has no more vertices than this where they do not all lie in one place. */
+enum { MOST_IN_A_PART = 1 << 14 };
+
+/* Of the vertices of a part this share is left. */
+static const double left_share = 0.25;
+
+static bool has_features(const qmat_simplification_rules *rules, const qmat_complex *complex) {
+  for (size_t v = 0; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
+    if (complex->spheres[4 * v + 3] == 0) return true;
+  return false;
+}
+
+bool qmat_can_collapse_in_parts(const qmat_simplification_rules *rules, const qmat_complex *complex) {
+  return complex->vertex_count > MOST_IN_A_PART && rules->on_exceed == QMAT_EXCEED_SKIP &&
+         rules->cost == QMAT_COST_SLAB && !rules->published && rules->protect == QMAT_PROTECT_OFF &&
+         (double)rules->vertices <= left_share * (double)complex->vertex_count && !has_features(rules, complex);
+}
+
+/* Rows by the part that they belong to: those of part p are items[starts[p]] to items[starts[p + 1]]. Behind the last
+ * part come those between parts. */
+typedef struct part_rows {
+  size_t *starts;
+  uint32_t *items;
+} part_rows;
+
+/* What is left of a part: its edges and triangles by the numbers of the whole, and their bounds. */
+typedef struct part_rest {
+  size_t edge_count, triangle_count;
+  uint32_t *edges, *triangles;
+  double *edge_bounds, *triangle_bounds;
+  qmat_collapse_counts counts;
+  size_t questions;
+} part_rest;
+
+typedef struct divided {
+  qmat_context *context;
+  qmat_simplification *whole;
+  qmat_control_points *control;
+  double *depths; /* per vertex, and so on */
+  size_t part_count;
+  uint32_t *parts;        /* per vertex */
+  uint32_t *numbers;      /* per vertex: its number within its part */
+  uint8_t *locked, *gone; /* per vertex: whether it has an edge to another part, and whether it is no more */
+  part_rows vertices, edges, triangles, points;
+  part_rest *rests;
+  _Atomic size_t done; /* vertices of parts that are done */
+  _Atomic bool ended;  /* the run was cancelled, or a part has failed */
+} divided;
+
+/* ---- the parts ---- */
+
+enum { BINS = 1024 };
+
+/* Moves those of `vertices` that lie in the lower half of the box, by their number, before the others; how many they
+ * are. 0: all lie in one place. */
+static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uint32_t *upper) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < count; i++)
+    for (int k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], spheres[4 * (size_t)vertices[i] + (size_t)k]);
+      high[k] = fmax(high[k], spheres[4 * (size_t)vertices[i] + (size_t)k]);
+    }
+  size_t axis = 0;
+  for (size_t k = 1; k < 3; k++)
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  const double scale = BINS / (high[axis] - low[axis]);
+  if (!(high[axis] > low[axis]) || !(scale < INFINITY)) return 0;
+  size_t counts[BINS + 1] = {0}, below = 0;
+  for (size_t i = 0; i < count; i++) counts[(size_t)(scale * (spheres[4 * (size_t)vertices[i] + axis] - low[axis]))]++;
+  size_t bins = 0;
+  while (bins < BINS && (bins == 0 || 2 * (below + counts[bins]) <= count)) below += counts[bins++];
+  size_t kept = 0, moved = 0;
+  for (size_t i = 0; i < count; i++) {
+    if ((size_t)(scale * (spheres[4 * (size_t)vertices[i] + axis] - low[axis])) < bins)
+      vertices[kept++] = vertices[i];
+    else
+      upper[moved++] = vertices[i];
+  }
+  memcpy(&vertices[kept], upper, moved * sizeof *upper);
+  return kept;
+}
+
+/* Numbers the parts of `count` vertices. */
+static void divide_vertices(divided *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
+  const size_t lower = count > MOST_IN_A_PART ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
+  if (lower > 0 && lower < count) {
+    divide_vertices(d, vertices, lower, scratch);
+    divide_vertices(d, &vertices[lower], count - lower, scratch);
+    return;
+  }
+  for (size_t i = 0; i < count; i++) d->parts[vertices[i]] = (uint32_t)d->part_count;
+  d->part_count++;
+}
+
+/* The part of all of a row's vertices, or the number of parts. */
+static size_t part_of(const divided *d, const uint32_t *row, size_t size) {
+  const uint32_t part = d->parts[row[0]];
+  for (size_t k = 1; k < size && row[k] != QMAT_NONE; k++)
+    if (d->parts[row[k]] != part) return d->part_count;
+  return part;
+}
+
+/* Sorts rows of `size` vertices each by their parts; NULL: each vertex is a row. */
+static qmat_status sort_rows(divided *d, const uint32_t *rows, size_t count, size_t size, part_rows *sorted) {
+  qmat_arena *arena = &d->context->arena;
+  sorted->starts = qmat_arena_calloc(arena, d->part_count + 3, sizeof *sorted->starts);
+  sorted->items = qmat_arena_alloc(arena, count, sizeof *sorted->items);
+  if (!sorted->starts || !sorted->items) return qmat_fail_memory(d->context, "parts of the medial mesh");
+  for (size_t i = 0; i < count; i++) sorted->starts[(rows ? part_of(d, &rows[size * i], size) : d->parts[i]) + 2]++;
+  for (size_t p = 0; p <= d->part_count; p++) sorted->starts[p + 2] += sorted->starts[p + 1];
+  for (size_t i = 0; i < count; i++)
+    sorted->items[sorted->starts[(rows ? part_of(d, &rows[size * i], size) : d->parts[i]) + 1]++] = (uint32_t)i;
+  return QMAT_OK;
+}
+
+static qmat_status divide(divided *d) {
+  const qmat_complex *c = &d->whole->complex;
+  qmat_arena *arena = &d->context->arena;
+  const size_t vertices = c->vertex_count;
+  d->parts = qmat_arena_alloc(arena, vertices, sizeof *d->parts);
+  d->numbers = qmat_arena_alloc(arena, vertices, sizeof *d->numbers);
+  d->locked = qmat_arena_calloc(arena, vertices, 1);
+  d->gone = qmat_arena_calloc(arena, vertices, 1);
+  uint32_t *order = qmat_arena_alloc(arena, vertices, sizeof *order);
+  uint32_t *scratch = qmat_arena_alloc(arena, vertices, sizeof *scratch);
+  if (!d->parts || !d->numbers || !d->locked || !d->gone || !order || !scratch)
+    return qmat_fail_memory(d->context, "parts of the medial mesh");
+  for (size_t v = 0; v < vertices; v++) order[v] = (uint32_t)v;
+  divide_vertices(d, order, vertices, scratch);
+  qmat_status status = sort_rows(d, NULL, vertices, 1, &d->vertices);
+  if (status == QMAT_OK) status = sort_rows(d, c->edges, c->edge_count, 2, &d->edges);
+  if (status == QMAT_OK) status = sort_rows(d, c->triangles, c->triangle_count, 3, &d->triangles);
+  if (status == QMAT_OK) status = sort_rows(d, d->control->witnesses, d->control->count, 3, &d->points);
+  d->rests = qmat_arena_calloc(arena, d->part_count, sizeof *d->rests);
+  if (status == QMAT_OK && !d->rests) status = qmat_fail_memory(d->context, "parts of the medial mesh");
+  if (status != QMAT_OK) return status;
+  for (size_t p = 0; p < d->part_count; p++)
+    for (size_t i = d->vertices.starts[p]; i < d->vertices.starts[p + 1]; i++)
+      d->numbers[d->vertices.items[i]] = (uint32_t)(i - d->vertices.starts[p]);
+  for (size_t i = d->edges.starts[d->part_count]; i < d->edges.starts[d->part_count + 1]; i++)
+    for (size_t k = 0; k < 2; k++) d->locked[c->edges[2 * (size_t)d->edges.items[i] + k]] = 1;
+  return QMAT_OK;
+}
+
+/* ---- the collapses of one part ---- */
+
+/* Rows of a part by the part's own numbers. NULL when memory is short. */
+static uint32_t *renumber(qmat_arena *arena, const divided *d, const part_rows *sorted, size_t part,
+                          const uint32_t *rows, size_t size) {
+  const size_t first = sorted->starts[part], count = sorted->starts[part + 1] - first;
+  uint32_t *own = qmat_arena_alloc(arena, count, size * sizeof *own);
+  for (size_t i = 0; own && i < count; i++)
+    for (size_t k = 0; k < size; k++) {
+      const uint32_t vertex = rows[size * sorted->items[first + i] + k];
+      own[size * i + k] = vertex == QMAT_NONE ? QMAT_NONE : d->numbers[vertex];
+    }
+  return own;
+}
+
+/* The control points that hang on the part alone. */
+static qmat_status take_points(qmat_context *context, const divided *d, size_t part, qmat_control_points *own) {
+  const qmat_control_points *all = d->control;
+  const size_t first = d->points.starts[part];
+  qmat_arena *arena = &context->arena;
+  *own = (qmat_control_points){.count = d->points.starts[part + 1] - first, .spacing = all->spacing};
+  const uint32_t *items = &d->points.items[first];
+  own->points = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
+  own->weights = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
+  own->distances = qmat_arena_alloc(arena, own->count, sizeof(double));
+  own->inner_limits = qmat_arena_alloc(arena, own->count, sizeof(double));
+  own->witnesses = renumber(arena, d, &d->points, part, all->witnesses, 3);
+  if (!own->points || !own->weights || !own->distances || !own->inner_limits || !own->witnesses)
+    return qmat_fail_memory(context, "control points");
+  for (size_t i = 0; i < own->count; i++) {
+    const size_t j = items[i];
+    memcpy(&own->points[3 * i], &all->points[3 * j], 3 * sizeof(double));
+    memcpy(&own->weights[3 * i], &all->weights[3 * j], 3 * sizeof(double));
+    own->distances[i] = all->distances[j];
+    own->sample_count += j < all->sample_count;
+    own->surface_count += j < all->surface_count;
+    if (j >= all->surface_count) own->inner_limits[i - own->surface_count] = all->inner_limits[j - all->surface_count];
+  }
+  return QMAT_OK;
+}
+
+/* What of a whole number falls to a part by its share of the vertices; all parts together get all of it. */
+static int64_t share_of(const divided *d, size_t part, int64_t number) {
+  const double all = (double)d->whole->complex.vertex_count;
+  const double before = (double)d->vertices.starts[part] / all, after = (double)d->vertices.starts[part + 1] / all;
+  return (int64_t)floor((double)number * after) - (int64_t)floor((double)number * before);
+}
+
+/* Sets the part up as a medial mesh of its own. */
+static qmat_status start_part(qmat_context *context, const divided *d, size_t part, qmat_control_points *control,
+                              qmat_simplification *own) {
+  const qmat_simplification *whole = d->whole;
+  const qmat_complex *c = &whole->complex;
+  qmat_arena *arena = &context->arena;
+  const size_t first = d->vertices.starts[part], count = d->vertices.starts[part + 1] - first;
+  const uint32_t *vertices = &d->vertices.items[first];
+  *own = (qmat_simplification){.context = context, .surface = whole->surface, .rules = whole->rules};
+  double *spheres = qmat_arena_alloc(arena, count, 4 * sizeof *spheres);
+  double *depths = qmat_arena_alloc(arena, count, sizeof *depths);
+  uint8_t *locked = qmat_arena_alloc(arena, count, 1);
+  own->quadrics = qmat_arena_alloc(arena, count, sizeof *own->quadrics);
+  qmat_medial medial = {.sphere_count = count,
+                        .edge_count = d->edges.starts[part + 1] - d->edges.starts[part],
+                        .triangle_count = d->triangles.starts[part + 1] - d->triangles.starts[part],
+                        .edges = renumber(arena, d, &d->edges, part, c->edges, 2),
+                        .triangles = renumber(arena, d, &d->triangles, part, c->triangles, 3)};
+  if (!spheres || !depths || !locked || !own->quadrics || !medial.edges || !medial.triangles)
+    return qmat_fail_memory(context, "a part of the medial mesh");
+  for (size_t i = 0; i < count; i++) {
+    memcpy(&spheres[4 * i], &c->spheres[4 * (size_t)vertices[i]], 4 * sizeof *spheres);
+    depths[i] = d->depths[vertices[i]];
+    locked[i] = d->locked[vertices[i]];
+    own->quadrics[i] = whole->quadrics[vertices[i]];
+  }
+  own->locked = locked;
+  own->rules.refits = 0;
+  own->rules.vertices = (size_t)ceil(left_share * (double)count);
+  qmat_status status = qmat_complex_init(context, &own->complex, &medial, spheres);
+  if (status == QMAT_OK) status = take_points(context, d, part, control);
+  if (status == QMAT_OK) status = qmat_simplification_init(own, control, depths);
+  own->rules.target_euler = own->euler + share_of(d, part, whole->rules.target_euler - whole->euler);
+  return status;
+}
+
+/* The live rows of a part by the numbers of the whole, and their bounds. Both are to be freed. */
+static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint32_t *rows, const double *bounds,
+                     size_t count, size_t size, size_t *left, uint32_t **rows_left, double **bounds_left) {
+  *left = 0;
+  for (size_t i = 0; i < count; i++) *left += alive[i];
+  *rows_left = qmat_alloc(*left, size * sizeof **rows_left);
+  *bounds_left = qmat_alloc(*left, sizeof **bounds_left);
+  if (!*rows_left || !*bounds_left) return -1;
+  size_t next = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (!alive[i]) continue;
+    for (size_t k = 0; k < size; k++) (*rows_left)[size * next + k] = vertices[rows[size * i + k]];
+    (*bounds_left)[next++] = bounds[i];
+  }
+  return 0;
+}
+
+/* Gives back to the whole what is left of a part: what belongs to one part is written by it alone. */
+static qmat_status end_part(divided *d, size_t part, const qmat_simplification *own) {
+  qmat_complex *all = &d->whole->complex;
+  const qmat_complex *c = &own->complex;
+  const uint32_t *vertices = &d->vertices.items[d->vertices.starts[part]];
+  const uint32_t *points = &d->points.items[d->points.starts[part]];
+  part_rest *rest = &d->rests[part];
+  for (size_t i = 0; i < c->vertex_count; i++) {
+    const uint32_t v = vertices[i];
+    d->gone[v] = !c->vertex_alive[i];
+    memcpy(&all->spheres[4 * (size_t)v], &c->spheres[4 * i], 4 * sizeof(double));
+    d->depths[v] = own->protrusion.depths[i];
+    d->whole->quadrics[v] = own->quadrics[i];
+  }
+  for (size_t i = 0; i < own->control->count; i++)
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t vertex = own->coverage.witnesses[3 * i + k];
+      d->control->witnesses[3 * (size_t)points[i] + k] = vertex == QMAT_NONE ? QMAT_NONE : vertices[vertex];
+      d->control->weights[3 * (size_t)points[i] + k] = own->coverage.weights[3 * i + k];
+    }
+  rest->counts = own->counts;
+  rest->questions = own->protrusion.lattice.questions;
+  if (take_rows(vertices, c->edge_alive, c->edges, own->protrusion.edge_bounds, c->edge_count, 2, &rest->edge_count,
+                &rest->edges, &rest->edge_bounds) ||
+      take_rows(vertices, c->triangle_alive, c->triangles, own->protrusion.triangle_bounds, c->triangle_count, 3,
+                &rest->triangle_count, &rest->triangles, &rest->triangle_bounds))
+    return qmat_fail_memory(own->context, "a part of the medial mesh");
+  atomic_fetch_add(&d->done, c->vertex_count);
+  return QMAT_OK;
+}
+
+static qmat_status collapse_part(qmat_context *context, divided *d, size_t part) {
+  qmat_simplification own;
+  qmat_control_points control;
+  qmat_status status = start_part(context, d, part, &control, &own);
+  if (status == QMAT_OK) status = qmat_simplification_run(&own);
+  if (status == QMAT_OK) status = end_part(d, part, &own);
+  qmat_simplification_uninit(&own);
+  qmat_arena_uninit(&context->arena);
+  return status;
+}
+
+/* Who asks: only the thread that runs the node may call the progress function of the run. */
+typedef struct asker {
+  divided *divided;
+  bool is_outside;
+} asker;
+
+static bool may_go_on(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                      const char *unit) {
+  (void)node_id;
+  (void)node_type;
+  (void)total;
+  const asker *here = user;
+  divided *d = here->divided;
+  if (here->is_outside &&
+      qmat_progress(d->context, atomic_load(&d->done) + done, d->whole->complex.vertex_count, unit) != QMAT_OK)
+    atomic_store(&d->ended, true);
+  return !atomic_load(&d->ended);
+}
+
+static qmat_status collapse_parts(divided *d) {
+  qmat_context *context = d->context;
+  const int threads = qmat_threads(context);
+  qmat_status status = qmat_progress(context, 0, 0, "collapses");
+  if (status != QMAT_OK) return status;
+  size_t failed = SIZE_MAX;
+  qmat_error error = {.status = QMAT_OK};
+#pragma omp parallel num_threads(threads)
+  {
+    asker here = {.divided = d, .is_outside = false};
+    qmat_context own = {.progress = may_go_on,
+                        .progress_user = &here,
+                        .threads = 1,
+                        .node_id = context->node_id,
+                        .node_type = context->node_type};
+#pragma omp master
+    here.is_outside = true;
+#pragma omp for schedule(dynamic, 1)
+    for (size_t part = 0; part < d->part_count; part++) {
+      if (atomic_load(&d->ended)) continue;
+      const qmat_status result = collapse_part(&own, d, part);
+      if (result == QMAT_OK || result == QMAT_CANCELLED) continue;
+      atomic_store(&d->ended, true);
+#pragma omp critical(qmat_collapse_in_parts)
+      if (part < failed) {
+        failed = part;
+        error = own.error;
+      }
+    }
+    qmat_context_uninit(&own);
+  }
+  if (failed < SIZE_MAX) {
+    context->error = error;
+    return error.status;
+  }
+  return atomic_load(&d->ended) ? QMAT_CANCELLED : QMAT_OK;
+}
+
+/* ---- what is left of all ---- */
+
+static size_t put_rows(const uint32_t *rows, size_t count, size_t size, const uint32_t *ids, uint32_t *out) {
+  for (size_t i = 0; i < size * count; i++) out[i] = ids[rows[i]];
+  return count;
+}
+
+static size_t put_rows_between(const divided *d, const part_rows *sorted, const uint32_t *rows, size_t size,
+                               const uint32_t *ids, uint32_t *out) {
+  const size_t first = sorted->starts[d->part_count], count = sorted->starts[d->part_count + 1] - first;
+  for (size_t i = 0; i < count; i++) put_rows(&rows[size * sorted->items[first + i]], 1, size, ids, &out[size * i]);
+  return count;
+}
+
+/* The medial mesh of all parts, with the numbers that `ids` gives to the vertices. */
+static qmat_status join(const divided *d, const uint32_t *ids, qmat_medial *medial) {
+  const qmat_complex *c = &d->whole->complex;
+  uint32_t *edges = qmat_arena_alloc(&d->context->arena, c->edge_count, 2 * sizeof *edges);
+  uint32_t *triangles = qmat_arena_alloc(&d->context->arena, c->triangle_count, 3 * sizeof *triangles);
+  if (!edges || !triangles) return qmat_fail_memory(d->context, "the medial mesh");
+  size_t edge_count = put_rows_between(d, &d->edges, c->edges, 2, ids, edges);
+  size_t triangle_count = put_rows_between(d, &d->triangles, c->triangles, 3, ids, triangles);
+  for (size_t p = 0; p < d->part_count; p++) {
+    const part_rest *rest = &d->rests[p];
+    edge_count += put_rows(rest->edges, rest->edge_count, 2, ids, &edges[2 * edge_count]);
+    triangle_count += put_rows(rest->triangles, rest->triangle_count, 3, ids, &triangles[3 * triangle_count]);
+  }
+  return qmat_medial_set_simplices(d->context, medial, edges, edge_count, triangles, triangle_count);
+}
+
+/* What the parts know of the protrusion of their edges and triangles, where it is more than their corners say. */
+static void carry_bounds(const divided *d, const uint32_t *ids) {
+  qmat_simplification *whole = d->whole;
+  for (size_t p = 0; p < d->part_count; p++) {
+    const part_rest *rest = &d->rests[p];
+    for (size_t i = 0; i < rest->edge_count; i++) {
+      const uint32_t *ends = &rest->edges[2 * i];
+      qmat_protrusion_bound_edge(&whole->protrusion, &whole->complex, ids[ends[0]], ids[ends[1]], rest->edge_bounds[i]);
+    }
+    for (size_t i = 0; i < rest->triangle_count; i++) {
+      const uint32_t *t = &rest->triangles[3 * i];
+      qmat_protrusion_bound_triangle(&whole->protrusion, &whole->complex, ids[t[0]], ids[t[1]], ids[t[2]],
+                                     rest->triangle_bounds[i]);
+    }
+  }
+}
+
+static void add_counts(const divided *d) {
+  qmat_simplification *whole = d->whole;
+  for (size_t p = 0; p < d->part_count; p++) {
+    const part_rest *rest = &d->rests[p];
+    whole->counts.collapses += rest->counts.collapses;
+    whole->counts.refused_by_surface += rest->counts.refused_by_surface;
+    whole->counts.refused_by_coverage += rest->counts.refused_by_coverage;
+    whole->counts.refused_by_protrusion += rest->counts.refused_by_protrusion;
+    whole->counts.refused_by_topology += rest->counts.refused_by_topology;
+    whole->protrusion.lattice.questions += rest->questions;
+  }
+}
+
+/* Puts what is left together in place of the whole. */
+static qmat_status put_together(divided *d) {
+  qmat_simplification *whole = d->whole;
+  qmat_arena *arena = &d->context->arena;
+  const size_t before = whole->complex.vertex_count;
+  uint32_t *ids = qmat_arena_alloc(arena, before, sizeof *ids);
+  qmat_medial *medial = qmat_medial_new();
+  if (!ids || !medial) {
+    qmat_value_release(medial ? &medial->base : NULL);
+    return qmat_fail_memory(d->context, "the medial mesh");
+  }
+  double *spheres = whole->complex.spheres;
+  size_t count = 0;
+  for (size_t v = 0; v < before; v++) {
+    ids[v] = d->gone[v] ? QMAT_NONE : (uint32_t)count;
+    if (d->gone[v]) continue;
+    memmove(&spheres[4 * count], &spheres[4 * v], 4 * sizeof *spheres);
+    d->depths[count] = d->depths[v];
+    whole->quadrics[count++] = whole->quadrics[v];
+  }
+  medial->sphere_count = count;
+  for (size_t i = 0; i < 3 * d->control->count; i++)
+    if (d->control->witnesses[i] != QMAT_NONE) d->control->witnesses[i] = ids[d->control->witnesses[i]];
+  qmat_status status = join(d, ids, medial);
+  qmat_complex left = {.vertex_count = 0};
+  if (status == QMAT_OK) status = qmat_complex_init(d->context, &left, medial, spheres);
+  qmat_complex_uninit(&whole->complex);
+  whole->complex = left;
+  qmat_value_release(&medial->base);
+  if (status == QMAT_OK) status = qmat_simplification_init(whole, d->control, d->depths);
+  if (status != QMAT_OK) return status;
+  carry_bounds(d, ids);
+  add_counts(d);
+  return QMAT_OK;
+}
+
+static void free_rests(const divided *d) {
+  for (size_t p = 0; d->rests && p < d->part_count; p++) {
+    qmat_free(d->rests[p].edges);
+    qmat_free(d->rests[p].triangles);
+    qmat_free(d->rests[p].edge_bounds);
+    qmat_free(d->rests[p].triangle_bounds);
+  }
+}
+
+qmat_status qmat_collapse_in_parts(qmat_simplification *simplification, qmat_control_points *control,
+                                   const double *depths) {
+  qmat_context *context = simplification->context;
+  const qmat_complex *c = &simplification->complex;
+  divided d = {.context = context, .whole = simplification, .control = control};
+  d.depths = qmat_arena_alloc(&context->arena, c->vertex_count, sizeof *d.depths);
+  simplification->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *simplification->quadrics);
+  if (!d.depths || !simplification->quadrics) return qmat_fail_memory(context, "parts of the medial mesh");
+  memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
+  qmat_medial_quadrics_add(c, simplification->quadrics);
+  simplification->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
+  qmat_status status = divide(&d);
+  if (status == QMAT_OK) status = collapse_parts(&d);
+  if (status == QMAT_OK) status = put_together(&d);
+  free_rests(&d);
+  return status;
+}

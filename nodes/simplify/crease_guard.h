@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_CREASE_GUARD_H
+#define QMAT_NODES_SIMPLIFY_CREASE_GUARD_H
+
+#include "core/geometry/medial_complex.h"
+#include "nodes/simplify/collapse_candidates.h"
+#include "nodes/initial/creases.h"
+
+/* Keeps the sharp features of a medial mesh while it is simplified: its spheres of radius zero, as medial.features
+ * makes them. They stay where they are, and so does the cone between two that follow each other on a crease. An inner
+ * sphere may go into a feature, but for the last of all, never the other way; of a crease only points between its
+ * corners may go, into one of the two next to them, and only where all points of the initial crease stay close to the
+ * cones that are left.
+ *
+ * The arrays live in the context's arena. Zeroed, it guards nothing. */
+typedef struct qmat_crease_guard {
+  size_t feature_count, left;   /* at first, and now */
+  uint32_t *features;           /* per vertex of the complex: its feature, or QMAT_NONE; NULL: there is none */
+  uint32_t *vertices;           /* per feature: the vertex whose sphere it is, or QMAT_NONE when it is gone */
+  const double *points;         /* 3 per feature */
+  const uint32_t *places;       /* per feature: its place along the creases, or QMAT_NONE for a corner */
+  qmat_creases creases;         /* their points are features; each stands at a place */
+  const uint32_t *initial_next; /* per place: the one that follows on its crease, QMAT_NONE beyond a corner */
+  uint32_t *next, *previous;    /* per place: that of the next feature which is left, QMAT_NONE beyond a corner */
+} qmat_crease_guard;
+
+/* Guards the spheres of radius zero of a complex that is not yet changed, and the edges between two of them.
+ * QMAT_ERROR_MEMORY. Cost: linear. */
+qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, qmat_crease_guard *guard);
+
+/* The same features in another complex: `ids` gives new numbers, of `vertex_count`, to the live vertices. `from` stays
+ * as it is and has to live as long. QMAT_ERROR_MEMORY. */
+qmat_status qmat_crease_guard_renumber(qmat_context *context, const qmat_crease_guard *from, const uint32_t *ids,
+                                       size_t vertex_count, qmat_crease_guard *guard);
+
+static inline bool qmat_crease_guard_is_feature(const qmat_crease_guard *guard, uint32_t vertex) {
+  return guard->features && vertex != QMAT_NONE && guard->features[vertex] != QMAT_NONE;
+}
+
+/* Leaves of the candidates of an edge what keeps features, with their slab quadratic errors: none or some of its ends.
+ * False, and nothing changed, where neither end is a feature. `held` is how far points of a crease may be from it;
+ * `*asked` gets the least for which there would be a candidate more (INFINITY: none). Safe from any thread. */
+bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_complex *complex,
+                                const qmat_quadric *quadrics, uint32_t edge, double held, qmat_candidates *candidates,
+                                double *asked);
+
+/* Follows a collapse to `sphere`, one of those that were left: call it before the complex changes. */
+void qmat_crease_guard_commit(qmat_crease_guard *guard, const qmat_complex *complex, const qmat_collapse *collapse,
+                              const double sphere[4]);
+
+/* The largest distance of a point of the initial creases to the cones that are left of its crease, in the complex's
+ * frame; 0 without creases. Cost: linear in the initial creases. */
+double qmat_crease_guard_error(const qmat_crease_guard *guard);
+
+#endif

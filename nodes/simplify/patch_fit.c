@@ -1,0 +1,274 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/patch_fit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+
+enum { MOST_PLACES = 512, VARIABLES = 4 * QMAT_PATCH_SPHERES };
+
+/* A slab or loose cone of the patch, prepared with the spheres of the newest step, and the ball that holds it. */
+typedef struct qmat_patch_part {
+  uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
+  int moving[3];        /* which sphere of the fit each corner is, or -1 */
+  qmat_primitive primitive;
+  qmat_primitive_ball ball;
+} patch_part;
+
+typedef struct qmat_patch_place {
+  double point[3];
+  double slack; /* how much more than `held` F may be; of a border, how much less it may be below 0 */
+  qmat_place_kind kind;
+  uint32_t part; /* the nearest one, of the newest step */
+} patch_place;
+
+void qmat_patch_fit_uninit(qmat_patch_fit *fit) {
+  qmat_free(fit->parts);
+  qmat_free(fit->places);
+  *fit = (qmat_patch_fit){.count = 0};
+}
+
+static int moving_index(const qmat_patch_fit *fit, uint32_t vertex) {
+  for (int i = 0; i < fit->count; i++)
+    if (fit->vertices[i] == vertex) return i;
+  return -1;
+}
+
+static bool has_corner(const patch_part *part, uint32_t vertex) {
+  return part->vertices[0] == vertex || part->vertices[1] == vertex || part->vertices[2] == vertex;
+}
+
+/* Adds a simplex of the complex as the collapse leaves it, unless it vanishes or is there already. */
+static qmat_status add_part(qmat_context *context, qmat_patch_fit *fit, const qmat_collapse *collapse,
+                            const uint32_t *vertices, int count) {
+  uint32_t corners[3] = {QMAT_NONE, QMAT_NONE, QMAT_NONE};
+  for (int k = 0; k < count; k++) {
+    corners[k] = vertices[k] == collapse->removed ? collapse->kept : vertices[k];
+    for (int j = 0; j < k; j++)
+      if (corners[j] == corners[k]) return QMAT_OK;
+  }
+  for (size_t i = 0; i < fit->part_count; i++) {
+    int shared = 0;
+    for (int k = 0; k < count; k++) shared += has_corner(&fit->parts[i], corners[k]);
+    if (shared == count) return QMAT_OK; /* the same, or an edge of a slab */
+  }
+  if (qmat_grow((void **)&fit->parts, &fit->part_capacity, fit->part_count + 1, sizeof *fit->parts))
+    return qmat_fail_memory(context, "the fit of a patch");
+  patch_part *part = &fit->parts[fit->part_count++];
+  for (int k = 0; k < 3; k++) {
+    part->vertices[k] = corners[k];
+    part->moving[k] = corners[k] == QMAT_NONE ? -1 : moving_index(fit, corners[k]);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status add_star(qmat_context *context, qmat_patch_fit *fit, const qmat_complex *complex,
+                            const qmat_collapse *collapse, uint32_t vertex, int corners) {
+  size_t count;
+  const uint32_t *at = corners == 3 ? qmat_complex_triangles_at(complex, vertex, &count)
+                                    : qmat_complex_edges_at(complex, vertex, &count);
+  const uint32_t *rows = corners == 3 ? complex->triangles : complex->edges;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = add_part(context, fit, collapse, &rows[(size_t)corners * at[i]], corners);
+  return status;
+}
+
+qmat_status qmat_patch_fit_add(qmat_context *context, qmat_patch_fit *fit, const double *point, qmat_place_kind kind,
+                               double limit) {
+  if (qmat_grow((void **)&fit->places, &fit->place_capacity, fit->place_count + 1, sizeof *fit->places))
+    return qmat_fail_memory(context, "the fit of a patch");
+  patch_place *place = &fit->places[fit->place_count++];
+  *place = (patch_place){.kind = kind, .slack = kind == QMAT_PLACE_BORDER ? fit->held - limit : limit - fit->held};
+  memcpy(place->point, point, sizeof place->point);
+  return QMAT_OK;
+}
+
+/* Whether this slot is the first by which its point hangs on the patch. */
+static bool is_first_slot(const qmat_patch_fit *fit, const qmat_coverage *coverage, uint32_t removed, uint32_t slot) {
+  for (uint32_t s = slot - slot % 3; s < slot; s++)
+    if (coverage->witnesses[s] == removed || moving_index(fit, coverage->witnesses[s]) >= 0) return false;
+  return true;
+}
+
+qmat_status qmat_patch_fit_start(qmat_context *context, qmat_patch_fit *fit, const qmat_coverage *coverage,
+                                 const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
+                                 const uint32_t *vertices, size_t count, size_t surface_count, double held) {
+  fit->held = held;
+  fit->part_count = fit->place_count = 0;
+  fit->worst = 0;
+  fit->count = 1;
+  fit->vertices[0] = collapse->kept;
+  memcpy(fit->spheres[0], sphere, sizeof fit->spheres[0]);
+  for (size_t i = 0; i < count && fit->count < QMAT_PATCH_SPHERES; i++) {
+    fit->vertices[fit->count] = vertices[i];
+    memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)vertices[i]], 4 * sizeof(double));
+  }
+  qmat_status status = QMAT_OK;
+  for (int corners = 3; corners >= 2; corners--)
+    for (int i = -1; i < fit->count && status == QMAT_OK; i++)
+      status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
+  size_t slots = coverage->slot_counts[collapse->removed], at = 0;
+  for (int i = 0; i < fit->count; i++) slots += coverage->slot_counts[fit->vertices[i]];
+  const size_t stride = (slots + MOST_PLACES - 1) / MOST_PLACES;
+  for (int i = -1; i < fit->count && status == QMAT_OK; i++)
+    for (uint32_t slot = qmat_coverage_first(coverage, i < 0 ? collapse->removed : fit->vertices[i]);
+         slot != QMAT_NONE && status == QMAT_OK; slot = coverage->next[slot], at++) {
+      const size_t point = slot / 3;
+      if (at % stride == 0 && point < surface_count && is_first_slot(fit, coverage, collapse->removed, slot))
+        status =
+            qmat_patch_fit_add(context, fit, &coverage->points[3 * point], QMAT_PLACE_SURFACE, coverage->limits[point]);
+    }
+  return status;
+}
+
+static void prepare(qmat_patch_fit *fit, const qmat_complex *complex, double spheres[][4]) {
+  for (size_t i = 0; i < fit->part_count; i++) {
+    patch_part *part = &fit->parts[i];
+    const int corners = part->vertices[2] == QMAT_NONE ? 2 : 3;
+    const double *at[3];
+    for (int k = 0; k < corners; k++)
+      at[k] = part->moving[k] >= 0 ? spheres[part->moving[k]] : &complex->spheres[4 * (size_t)part->vertices[k]];
+    qmat_primitive_prepare(at, corners, &part->primitive, &part->ball);
+  }
+}
+
+/* F at a place, and the weights of the corners of its nearest part, which is looked for from the last one on. */
+static double find_foot(const qmat_patch_fit *fit, patch_place *place, double weights[3]) {
+  uint32_t nearest = place->part;
+  double best = qmat_primitive_foot(&fit->parts[nearest].primitive, place->point, weights);
+  for (uint32_t i = 0; i < fit->part_count; i++) {
+    if (i == place->part) continue;
+    const patch_part *part = &fit->parts[i];
+    double w[3];
+    if (qmat_primitive_is_farther(&part->ball, place->point, best)) continue;
+    const double f = qmat_primitive_foot(&part->primitive, place->point, w);
+    if (!(f < best)) continue;
+    best = f;
+    nearest = i;
+    memcpy(weights, w, sizeof w);
+  }
+  place->part = nearest;
+  return best;
+}
+
+/* By how much F is wrong; above `held` in size where it is not what is asked. */
+static double error_at(const patch_place *place, double f) {
+  switch (place->kind) {
+    case QMAT_PLACE_INSIDE:
+      return qmat_larger(0, f - place->slack);
+    case QMAT_PLACE_BORDER:
+      return qmat_smaller(0, f - place->slack);
+    default:
+      return f > 0 ? qmat_larger(0, f - place->slack) : f;
+  }
+}
+
+/* The normal equations of a step: symmetric, the lower triangle. */
+typedef struct {
+  double a[VARIABLES][VARIABLES], b[VARIABLES];
+  int count;
+} equations;
+
+/* Adds weight times the square of the linearised error of a place. */
+static void add_place(const qmat_patch_fit *fit, const qmat_complex *complex, double spheres[][4],
+                      const patch_place *place, const double weights[3], double error, double weight, equations *e) {
+  const patch_part *part = &fit->parts[place->part];
+  double foot[3] = {0, 0, 0}, row[12];
+  int columns[12], count = 0;
+  for (int k = 0; k < 3 && part->vertices[k] != QMAT_NONE; k++) {
+    const double *at =
+        part->moving[k] >= 0 ? spheres[part->moving[k]] : &complex->spheres[4 * (size_t)part->vertices[k]];
+    for (int i = 0; i < 3; i++) foot[i] += weights[k] * at[i];
+  }
+  const double length = qmat_point_distance(place->point, foot);
+  if (!(length > 0)) return;
+  for (int k = 0; k < 3; k++) {
+    if (part->moving[k] < 0 || !(weights[k] > 0)) continue;
+    for (int i = 0; i < 4; i++) {
+      columns[count] = 4 * part->moving[k] + i;
+      row[count++] = i < 3 ? -weights[k] * (place->point[i] - foot[i]) / length : -weights[k];
+    }
+  }
+  for (int i = 0; i < count; i++) {
+    e->b[columns[i]] -= weight * error * row[i];
+    for (int j = 0; j < count; j++)
+      if (columns[j] <= columns[i]) e->a[columns[i]][columns[j]] += weight * row[i] * row[j];
+  }
+}
+
+/* Keeps the spheres near where they are, with this share of the places' weight. */
+static const double damping = 1e-3;
+
+/* Solves by LDL'; b becomes the solution. */
+static bool solve(equations *e) {
+  const int n = e->count;
+  double trace = 0;
+  for (int i = 0; i < n; i++) trace += e->a[i][i];
+  if (!(trace > 0)) return false;
+  for (int i = 0; i < n; i++) e->a[i][i] += damping * trace / n;
+  for (int j = 0; j < n; j++) {
+    double scaled[VARIABLES];
+    for (int k = 0; k < j; k++) scaled[k] = e->a[j][k] * e->a[k][k];
+    for (int i = j; i < n; i++) {
+      double sum = e->a[i][j];
+      for (int k = 0; k < j; k++) sum -= e->a[i][k] * scaled[k];
+      e->a[i][j] = i == j ? sum : sum / e->a[j][j];
+    }
+    if (!(e->a[j][j] > 0)) return false;
+  }
+  for (int i = 0; i < n; i++)
+    for (int k = 0; k < i; k++) e->b[i] -= e->a[i][k] * e->b[k];
+  for (int i = 0; i < n; i++) e->b[i] /= e->a[i][i];
+  for (int i = n - 1; i >= 0; i--)
+    for (int k = i + 1; k < n; k++) e->b[i] -= e->a[k][i] * e->b[k];
+  return true;
+}
+
+/* The order of the norm in each step: the weight of a square is the error to this power. A full step to the least of
+ * the weighted squares would go too far, as the weights fall on the way; half of the power is taken off. */
+static const int powers[] = {0, 2, 2, 4, 4, 6, 6, 6};
+enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
+
+/* A fit whose error is still this many times what is held after this many steps is left. */
+enum { STEPS_OF_HOPE = 3 };
+static const double hope = 2;
+
+void qmat_patch_fit_run(qmat_patch_fit *fit, const qmat_complex *complex, bool again, double *error) {
+  double current[QMAT_PATCH_SPHERES][4];
+  equations e;
+  const size_t bytes = (size_t)fit->count * sizeof *current;
+  memcpy(current, fit->spheres, bytes);
+  *error = INFINITY;
+  for (int step = again ? FIRST_STEP_AGAIN : 0; fit->part_count > 0; step++) {
+    prepare(fit, complex, current);
+    e.count = 4 * fit->count;
+    for (int i = 0; i < e.count; i++) {
+      memset(e.a[i], 0, (size_t)e.count * sizeof e.a[i][0]);
+      e.b[i] = 0;
+    }
+    const double last_worst = fit->worst;
+    double worst = 0;
+    for (size_t i = 0; i < fit->place_count; i++) {
+      patch_place *place = &fit->places[i];
+      double weights[3], weight = 1;
+      const double wrong = error_at(place, find_foot(fit, place, weights));
+      worst = qmat_larger(worst, fabs(wrong));
+      if (step == STEPS || wrong == 0) continue;
+      const double relative = last_worst > 0 ? wrong / last_worst : 1;
+      for (int p = 0; p < powers[step]; p += 2) weight *= relative * relative;
+      add_place(fit, complex, current, place, weights, wrong, weight, &e);
+    }
+    fit->worst = worst;
+    if (worst < *error) {
+      *error = worst;
+      memcpy(fit->spheres, current, bytes);
+    }
+    if (step == STEPS || (step >= STEPS_OF_HOPE && *error > hope * fit->held) || !solve(&e)) return;
+    for (int i = 0; i < fit->count; i++) {
+      for (int k = 0; k < 4; k++) current[i][k] += e.b[4 * i + k] / (1 + 0.5 * powers[step]);
+      if (!(current[i][3] > 0)) return;
+    }
+  }
+}

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/simplifier.h"
+
+#include <math.h>
+
+#include "core/geometry/surface.h"
+#include "core/geometry/thickness.h"
+
+const char *const qmat_error_choices[] = {"two_sided", "one_sided", NULL};
+const char *const qmat_cost_choices[] = {"slab", "hausdorff", "pmat", NULL};
+const char *const qmat_compat_choices[] = {"off", "qmat", NULL};
+const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
+const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
+const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
+
+/* The control points of collapses in order, which are there for any epsilon, are those of so many times the finest. */
+static const double control_error = 2;
+
+enum { MOST_CONTROL_POINTS = 600000 };
+
+/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
+ * digits. */
+static const double farthest_sphere = 1e6;
+
+/* The exact depth at the centre of a medial sphere. Most are inscribed: a look no farther than their radius finds it.
+ */
+static double depth_of(const qmat_surface *surface, const double *sphere) {
+  double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
+  if (!(depth < INFINITY)) depth = qmat_surface_distance(surface, sphere, INFINITY, NULL, NULL);
+  return qmat_surface_inside(surface, sphere) ? depth : -depth;
+}
+
+static qmat_status measure_depths(qmat_context *context, const qmat_surface *surface, const double *spheres,
+                                  size_t count, double *depths) {
+  const size_t slice = 1 << 11;
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < count; first += slice) {
+    const qmat_status status = qmat_progress(context, 0, 0, "depths");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < count ? first + slice : count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t v = first; v < last; v++) depths[v] = depth_of(surface, &spheres[4 * v]);
+  }
+  return QMAT_OK;
+}
+
+/* The constants and rules of the public Q-MAT code. */
+static void apply_compatibility(qmat_simplify_params *p) {
+  if (p->compat != QMAT_COMPAT_QMAT) return;
+  p->cost = QMAT_COST_SLAB;
+  p->k = 1e-5;
+  p->epsilon = 0;
+  p->on_exceed = QMAT_EXCEED_STOP;
+  p->topology = QMAT_TOPOLOGY_FREE;
+  p->protect = QMAT_PROTECT_OFF;
+  p->features = QMAT_FEATURES_NONE;
+}
+
+qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
+                                          double *deviation) {
+  *deviation = 0;
+  if (mesh->deviation == 0) return QMAT_OK;
+  qmat_frame frame;
+  const qmat_status status = qmat_frame_of_mesh(context, mesh, &frame);
+  if (status != QMAT_OK) return status;
+  *deviation = mesh->deviation / frame.diagonal;
+  if (params->epsilon == 0 || params->compat == QMAT_COMPAT_QMAT) return QMAT_OK;
+  params->epsilon -= *deviation;
+  if (params->epsilon > 0) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "the mesh may be %.2g of the diagonal from the surface that it stands for",
+            *deviation);
+  qmat_fail_field(context, "epsilon");
+  return qmat_fail_hint(context, "a higher level of mesh.subdivide, or a larger epsilon");
+}
+
+qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,
+                                  const qmat_value *const inputs[], qmat_surface **surface,
+                                  qmat_initial_medial *initial) {
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  const qmat_field *thickness = (const qmat_field *)inputs[1];
+  const qmat_samples *samples = (const qmat_samples *)inputs[2];
+  const qmat_medial *medial = (const qmat_medial *)inputs[3];
+  qmat_status status = qmat_thickness_check(context, mesh, thickness, samples);
+  if (status == QMAT_OK && medial->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
+    status = qmat_fail_field(context, "medial");
+  }
+  if (status == QMAT_OK) status = qmat_surface_new(context, mesh, surface);
+  if (status != QMAT_OK) return status;
+  double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
+  double *spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof *spheres);
+  double *depths = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *depths);
+  uint8_t *thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *thin);
+  if (!spheres || !depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
+  qmat_thickness_of_samples(mesh, thickness, samples, values);
+  const double theta = qmat_thickness_threshold(thickness, params->theta);
+  for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
+  qmat_frame_spheres_to_unit(qmat_surface_frame(*surface), medial->spheres, medial->sphere_count, spheres);
+  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
+    if (fabs(spheres[i]) <= farthest_sphere) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
+    qmat_fail_field(context, "medial");
+    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
+  }
+  *initial = (qmat_initial_medial){spheres, depths, thin};
+  return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
+}
+
+/* The Euler characteristic of the solid within a closed surface: half that of the surface. */
+static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mesh, int64_t *euler) {
+  uint8_t *used = qmat_arena_calloc(&context->arena, mesh->vertex_count, sizeof *used);
+  if (!used) return qmat_fail_memory(context, "the surface's vertices");
+  int64_t vertices = 0;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    vertices += !used[mesh->triangles[i]];
+    used[mesh->triangles[i]] = 1;
+  }
+  /* Every triangle has three sides, every side two triangles. */
+  *euler = (vertices - (int64_t)mesh->triangle_count / 2) / 2;
+  return QMAT_OK;
+}
+
+qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *p, const qmat_mesh *mesh,
+                                const qmat_initial_medial *initial, qmat_simplification_rules *rules) {
+  *rules = (qmat_simplification_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
+                                       .share = 1,
+                                       .finest = p->finest,
+                                       .vertices = (size_t)p->vertices,
+                                       .most_cost = p->most_cost,
+                                       .k = p->k,
+                                       .cost = (qmat_cost_kind)p->cost,
+                                       .published = p->compat == QMAT_COMPAT_QMAT,
+                                       .error = (qmat_error_kind)p->error,
+                                       .on_exceed = (qmat_exceed_rule)p->on_exceed,
+                                       .topology = (qmat_topology_policy)p->topology,
+                                       .protect = (qmat_protection)p->protect,
+                                       .features = (qmat_feature_rule)p->features,
+                                       .crease_share = p->crease,
+                                       .refits = (int)p->refits,
+                                       .thin = initial->thin,
+                                       .has_target = mesh->closed && mesh->oriented};
+  return rules->has_target ? find_target_euler(context, mesh, &rules->target_euler) : QMAT_OK;
+}
+
+bool qmat_simplify_in_order(const qmat_simplify_params *params) {
+  return params->on_exceed != QMAT_EXCEED_SKIP || params->compat != QMAT_COMPAT_OFF;
+}
+
+qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplify_params *params,
+                                       const qmat_value *const inputs[], qmat_ordered_collapses *o) {
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  const qmat_samples *samples = (const qmat_samples *)inputs[2];
+  const qmat_medial *medial = (const qmat_medial *)inputs[3];
+  *o = (qmat_ordered_collapses){.params = *params};
+  apply_compatibility(&o->params);
+  qmat_simplification *run = &o->simplification;
+  qmat_status status = qmat_simplify_prepare(context, &o->params, inputs, &o->surface, &o->initial);
+  if (status != QMAT_OK) return status;
+  run->context = context;
+  run->surface = o->surface;
+  status = qmat_simplify_rules(context, &o->params, mesh, &o->initial, &run->rules);
+  if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
+  if (status == QMAT_OK)
+    status =
+        qmat_control_points_make(context, o->surface, samples, medial, &run->complex, control_error * o->params.finest,
+                                 MOST_CONTROL_POINTS, run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
+  if (status == QMAT_OK) status = qmat_simplification_init(run, &o->control, o->initial.depths);
+  return status == QMAT_OK ? qmat_simplification_run(run) : status;
+}
+
+void qmat_ordered_collapses_uninit(qmat_ordered_collapses *o) {
+  qmat_simplification_uninit(&o->simplification);
+  qmat_surface_free(o->surface);
+}

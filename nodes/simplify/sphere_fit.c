@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/sphere_fit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/quadric.h"
+#include "core/geometry/vector.h"
+
+void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
+  qmat_free(fit->points);
+  *fit = (qmat_sphere_fit){0};
+}
+
+/* Whether this slot is the first by which its point hangs on the collapse. */
+static bool is_first_slot(const qmat_coverage *coverage, const qmat_collapse *collapse, uint32_t slot) {
+  for (uint32_t s = slot - slot % 3; s < slot; s++)
+    if (coverage->witnesses[s] == collapse->kept || coverage->witnesses[s] == collapse->removed) return false;
+  return true;
+}
+
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_coverage *coverage,
+                                   const qmat_collapse *collapse, size_t surface_count, size_t most) {
+  if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points))
+    return qmat_fail_memory(context, "the fit of a sphere");
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  size_t slots = 0, skip = 0;
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += coverage->slot_counts[ends[e]];
+  const size_t stride = (slots + most - 1) / most;
+  fit->count = 0;
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot]) {
+      if (skip > 0) {
+        skip--;
+        continue;
+      }
+      skip = stride - 1;
+      if (slot / 3 < surface_count && is_first_slot(coverage, collapse, slot)) fit->points[fit->count++] = slot / 3;
+    }
+  return QMAT_OK;
+}
+
+qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_coverage *coverage,
+                                  const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
+                                  double *error) {
+  *error = 0;
+  const qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, sphere);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < fit->count; i++) {
+    double foot[4], share;
+    const double f = qmat_coverage_star_foot(coverage, complex, collapse, sphere,
+                                             &coverage->points[3 * (size_t)fit->points[i]], foot, &share);
+    *error = qmat_larger(*error, fabs(f));
+  }
+  return QMAT_OK;
+}
+
+/* The order of the norm in each step: the weight of a square is |F| to this power. */
+static const int powers[] = {0, 0, 2, 2, 4, 4, 6, 6};
+enum { STEPS = sizeof powers / sizeof *powers };
+
+/* A fit whose error is still this many times hopeless after this many steps is left. */
+enum { STEPS_OF_HOPE = 3 };
+static const double hope = 3;
+
+/* Adds weight times the square of the linearised F of a point whose foot moves with `share` of the sphere: a tangent
+ * plane in the coordinates of the sphere. */
+static void add_residual(qmat_quadric *sum, const double *point, const double *foot, double share, double f,
+                         const double *sphere, double weight) {
+  const double length = qmat_point_distance(point, foot);
+  if (!(length > 0)) return;
+  double n[3], tangent[4];
+  /* F(x) ~ f - share (n . (x - sphere) + x.r - sphere.r) = -share times the signed distance to a plane at f / share. */
+  for (int k = 0; k < 3; k++) n[k] = (point[k] - foot[k]) / length;
+  memcpy(tangent, sphere, sizeof tangent);
+  tangent[3] += f / share;
+  qmat_quadric_add_plane(sum, n, tangent, weight * share * share);
+}
+
+/* Keeps the sphere near where it is, with this share of the points' weight. */
+static const double damping = 1e-3;
+
+static void add_damping(qmat_quadric *sum, const double *sphere) {
+  const double weight = damping * (sum->a[0] + sum->a[4] + sum->a[7]) / 3;
+  static const int diagonal[4] = {0, 4, 7, 9};
+  for (int k = 0; k < 4; k++) {
+    sum->a[diagonal[k]] += weight;
+    sum->b[k] -= 2 * weight * sphere[k];
+    sum->c += weight * sphere[k] * sphere[k];
+  }
+}
+
+qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_coverage *coverage,
+                                const qmat_complex *complex, const qmat_collapse *collapse, double hopeless,
+                                double sphere[4], double *error) {
+  double current[4], worst = 0, last_worst = INFINITY;
+  memcpy(current, sphere, sizeof current);
+  *error = INFINITY;
+  for (int step = 0;; step++) {
+    const qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, current);
+    if (status != QMAT_OK) return status;
+    qmat_quadric sum = {.c = 0};
+    last_worst = worst;
+    worst = 0;
+    for (size_t i = 0; i < fit->count; i++) {
+      const double *point = &coverage->points[3 * (size_t)fit->points[i]];
+      double foot[4], share;
+      const double f = qmat_coverage_star_foot(coverage, complex, collapse, current, point, foot, &share);
+      worst = qmat_larger(worst, fabs(f));
+      if (step == STEPS || !(share > 1e-3)) continue;
+      double weight = 1;
+      const double relative = last_worst > 0 ? fabs(f) / last_worst : 1;
+      for (int p = 0; p < powers[step]; p += 2) weight *= relative * relative;
+      add_residual(&sum, point, foot, share, f, current, weight);
+    }
+    if (worst < *error) {
+      *error = worst;
+      memcpy(sphere, current, sizeof current);
+    }
+    if (step == STEPS || (step >= STEPS_OF_HOPE && *error > hope * hopeless)) return QMAT_OK;
+    add_damping(&sum, current);
+    double next[4];
+    if (!qmat_quadric_minimise(&sum, next) || !(next[3] > 0)) return QMAT_OK;
+    memcpy(current, next, sizeof current);
+  }
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SKIN_ENVELOPE_CELLS_H
+#define QMAT_NODES_SKIN_ENVELOPE_CELLS_H
+
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_distance.h"
+
+/* The cells of an octree that the surface of an envelope passes through, and only those. A cell is halved until it is
+ * no larger than the base size, and further where the medial radii near it are small, down to the finest size. */
+
+#define QMAT_NO_ID UINT32_MAX
+
+/* The primitives of an envelope, with radii raised to a floor so that none slips between the corners of the finest
+ * cells. Numbered slabs, cones, spheres; a sphere of radius 0 that belongs to nothing is left out. */
+typedef struct qmat_cell_primitives {
+  size_t slab_count, cone_count, sphere_count;
+  qmat_slab *slabs;
+  qmat_cone *cones;
+  double *spheres;      /* 4 per sphere */
+  double *slab_radii;   /* 3 per slab: of its corners */
+  double *cone_radii;   /* 2 per cone */
+  double *slab_centres; /* 9 per slab */
+  double *cone_centres; /* 6 per cone */
+} qmat_cell_primitives;
+
+typedef struct qmat_cell {
+  uint32_t at[3];      /* its lowest corner, in finest cells */
+  uint32_t size;       /* in finest cells: a power of two */
+  size_t list;         /* its primitives: lists[list .. list + list_count) */
+  uint32_t list_count; /* they hold the minimum of F wherever it is 0 or less in the cell */
+} qmat_cell;
+
+typedef struct qmat_cells {
+  qmat_cell_primitives primitives;
+  double origin[3], finest; /* the corner (0, 0, 0), and the size of the finest cells */
+  uint32_t base;            /* the size of the largest cells, in finest cells */
+  size_t count;
+  qmat_cell *cells;
+  uint32_t *lists;
+  size_t list_count;
+  size_t refined_count; /* cells smaller than the base size */
+} qmat_cells;
+
+/* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of; `base` is the largest
+ * size of a cell, halved up to `detail` times where radii are small; `floor` is the least radius. Freed with
+ * qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED, or QMAT_ERROR_GEOMETRY when the cells
+ * are too many to hold. The same cells in the same order for any number of threads. Cost: linear in the cells, times
+ * the primitives that meet in one. */
+qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
+                            int detail, double floor, qmat_cells *cells);
+void qmat_cells_uninit(qmat_cells *cells);
+
+/* F with the floor on the radii, at a point of the cell; where F is positive, a positive number that is at least F. */
+double qmat_cell_distance(const qmat_cells *cells, const qmat_cell *cell, const double point[3]);
+/* The same, and its gradient: a unit vector (3 doubles). */
+double qmat_cell_gradient(const qmat_cells *cells, const qmat_cell *cell, const double point[3], double gradient[3]);
+
+#endif

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SKIN_RISING_ALLOCATOR_H
+#define QMAT_NODES_SKIN_RISING_ALLOCATOR_H
+
+#include <sys/mman.h>
+
+#include <atomic>
+#include <cstddef>
+#include <limits>
+#include <new>
+
+namespace qmat {
+
+/* Thrown into what allocates after it was asked to stop. */
+struct Stopped {};
+
+/* Memory whose addresses only rise, so that the order of objects by address is the order in which they were made.
+ * CGAL's mixed complex sorts simplices by the addresses of their vertices and cells: with any other memory the last
+ * digits of its points depend on what the process did before. While an object of this class lives, the thread's
+ * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc, and Stopped once
+ * `stop` is set: CGAL asks nobody whether to go on, but it allocates all the time. */
+class RisingMemory {
+ public:
+  explicit RisingMemory(const std::atomic<bool> &stop) : stop_(stop), outer_(current()) {
+    /* Address space only: pages come when they are touched. */
+    for (size_ = kLargest; base_ == nullptr; size_ /= 2) {
+      if (size_ < kSmallest) throw std::bad_alloc();
+      void *memory = mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+      if (memory == MAP_FAILED) continue;
+      base_ = static_cast<char *>(memory);
+      break;
+    }
+    current() = this;
+  }
+  ~RisingMemory() {
+    current() = outer_;
+    munmap(base_, size_);
+  }
+  RisingMemory(const RisingMemory &) = delete;
+  RisingMemory &operator=(const RisingMemory &) = delete;
+
+  void *take(std::size_t bytes) {
+    constexpr std::size_t alignment = 64;
+    if (stop_) throw Stopped();
+    if (bytes > size_ - used_) throw std::bad_alloc();
+    void *memory = base_ + used_;
+    used_ += (bytes + alignment - 1) / alignment * alignment;
+    if (used_ > size_) used_ = size_;
+    return memory;
+  }
+  bool holds(const void *memory) const {
+    const char *at = static_cast<const char *>(memory);
+    return at >= base_ && at < base_ + size_;
+  }
+
+  static RisingMemory *&current() {
+    static thread_local RisingMemory *memory = nullptr;
+    return memory;
+  }
+
+ private:
+  static constexpr std::size_t kLargest = std::size_t{1} << 36, kSmallest = std::size_t{1} << 26;
+  const std::atomic<bool> &stop_;
+  RisingMemory *outer_;
+  char *base_ = nullptr;
+  std::size_t size_ = 0, used_ = 0;
+};
+
+/* Takes from the thread's RisingMemory and gives nothing back; without one, the ordinary heap. */
+template <class T>
+class RisingAllocator {
+ public:
+  using value_type = T;
+  RisingAllocator() = default;
+  template <class U>
+  RisingAllocator(const RisingAllocator<U> &) {}
+
+  T *allocate(std::size_t count) {
+    if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_alloc();
+    RisingMemory *memory = RisingMemory::current();
+    if (memory == nullptr) return static_cast<T *>(::operator new(count * sizeof(T)));
+    return static_cast<T *>(memory->take(count * sizeof(T)));
+  }
+  void deallocate(T *place, std::size_t) {
+    const RisingMemory *memory = RisingMemory::current();
+    if (memory != nullptr && memory->holds(place)) return;
+    ::operator delete(place);
+  }
+  template <class U>
+  bool operator==(const RisingAllocator<U> &) const {
+    return true;
+  }
+  template <class U>
+  bool operator!=(const RisingAllocator<U> &) const {
+    return false;
+  }
+};
+
+}  // namespace qmat
+
+#endif

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SKIN_SKIN_TRIANGLES_H
+#define QMAT_NODES_SKIN_SKIN_TRIANGLES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* A triangle surface as plain arrays (qmat_alloc): corner k of triangle t is triangles[3 * t + k], counter-clockwise
+ * as seen from outside. */
+typedef struct qmat_skin_triangles {
+  size_t vertex_count, triangle_count;
+  double *positions; /* 3 * vertex_count */
+  uint32_t *triangles;
+} qmat_skin_triangles;
+
+#endif

@@ -1,0 +1,31 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Prints a SHA-256 of every file that `qmat mat` writes, in every format. A change that must not alter a result prints
+# the same lines before and after it.
+#   digests.sh [--epsilon E] [MODEL...]      default: the generated models and ../shared/data/surfaces at 2 %
+# QMAT_BUILD is the build folder, by default build/release.
+set -eu
+. "$(dirname "$0")/functions.sh"
+epsilon=2%
+if [ "${1:-}" = --epsilon ]; then
+  epsilon=$2
+  shift 2
+fi
+if [ $# -eq 0 ]; then
+  "$build/qmat_models" all "$work" >"$work/models.log"
+  for model in "$work"/*.off "$top"/../shared/data/surfaces/*; do
+    if [ -e "$model" ]; then set -- "$@" "$model"; fi
+  done
+fi
+QMAT_CACHE=off # what another build made must not stand for this one's
+export QMAT_CACHE
+for model in "$@"; do
+  mkdir "$work/written"
+  "$build/qmat" mat "$model" --epsilon "$epsilon" --quiet --progress off -o "$work/written/mat.ma" \
+    -o "$work/written/mat.ply" -o "$work/written/mat.glb" -o "$work/written/mat.gltf" -o "$work/written/mat.usda" \
+    -o "$work/written/mat.usdz"
+  for file in "$work"/written/*; do
+    printf '%s  %s %s\n' "$(sha256sum <"$file" | cut -d ' ' -f 1)" "$(basename "$model")" "$(basename "$file")"
+  done
+  rm -r "$work/written"
+done

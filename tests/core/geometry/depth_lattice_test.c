@@ -1,0 +1,203 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/geometry/depth_lattice.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "tests/random.h"
+#include "tests/shapes.h"
+
+/* A torus, which has an inside, an outside and a hole. */
+typedef struct {
+  qmat_mesh *mesh;
+  qmat_surface *surface;
+} solid;
+
+static int set_up(void **state) {
+  static solid s;
+  qmat_context context = {0};
+  s.mesh = shape_seal(shape_torus(2, 0.7, 40, 20));
+  assert_int_equal(qmat_surface_new(&context, s.mesh, &s.surface), QMAT_OK);
+  qmat_context_uninit(&context);
+  *state = &s;
+  return 0;
+}
+
+static int tear_down(void **state) {
+  solid *s = *state;
+  qmat_surface_free(s->surface);
+  qmat_value_release(&s->mesh->base);
+  return 0;
+}
+
+static void make_lattice(qmat_depth_lattice *lattice, void **state, double spacing) {
+  qmat_context context = {0};
+  const solid *s = *state;
+  assert_int_equal(qmat_depth_lattice_init(&context, lattice, s->surface, spacing), QMAT_OK);
+  qmat_context_uninit(&context);
+}
+
+static void random_point(random_numbers *random, double half, double point[3]) {
+  for (int k = 0; k < 3; k++) point[k] = random_between(random, -half, half);
+}
+
+static void test_exact_depth_is_positive_inside(void **state) {
+  const solid *s = *state;
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, 0.01);
+  const double middle = 2 / qmat_surface_frame(s->surface)->diagonal;
+  const double inside[3] = {middle, 0, 0}, hole[3] = {0, 0, 0}, outside[3] = {0.9, 0.9, 0.9};
+  /* Facets of a torus of 40 by 20 sink 2 % in. */
+  assert_near(qmat_depth_lattice_exact(&lattice, inside), 0.35 * middle, 0.02 * middle);
+  assert_near(qmat_depth_lattice_exact(&lattice, hole), -0.65 * middle, 0.02 * middle);
+  assert_true(qmat_depth_lattice_exact(&lattice, outside) < -0.8);
+  assert_true(lattice.questions == 3);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
+static void test_near_depth_differs_by_no_more_than_the_way_to_the_node(void **state) {
+  static const double spacings[] = {0.1, 0.02, 0.003};
+  random_numbers random = {.seed = 1};
+  for (size_t i = 0; i < 3; i++) {
+    qmat_depth_lattice lattice;
+    make_lattice(&lattice, state, spacings[i]);
+    for (int round = 0; round < 3000; round++) {
+      double point[3], distance = -1;
+      random_point(&random, round % 10 ? 0.6 : 1.9, point);
+      const double near = qmat_depth_lattice_near(&lattice, point, &distance);
+      assert_true(distance >= 0 && distance <= sqrt(3) / 2 * spacings[i] * (1 + 1e-9));
+      assert_near(near, qmat_depth_lattice_exact(&lattice, point), distance + 1e-12);
+    }
+    qmat_depth_lattice_uninit(&lattice);
+  }
+}
+
+static void test_nodes_are_exact(void **state) {
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, 0.125);
+  for (int i = -4; i <= 4; i++)
+    for (int j = -4; j <= 4; j++) {
+      const double point[3] = {0.125 * i, 0.125 * j, 0};
+      double distance;
+      const double near = qmat_depth_lattice_near(&lattice, point, &distance);
+      assert_near(distance, 0, 0);
+      assert_near(near, qmat_depth_lattice_exact(&lattice, point), 0);
+    }
+  assert_int_equal(lattice.count, 81);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
+static void test_answers_do_not_depend_on_what_was_asked_before(void **state) {
+  enum { POINTS = 20000 };
+  double(*points)[3] = calloc(POINTS, sizeof *points), *answers = calloc(POINTS, sizeof *answers);
+  double *ways = calloc(POINTS, sizeof *ways);
+  assert_true(points && answers && ways);
+  random_numbers random = {.seed = 2};
+  for (size_t i = 0; i < POINTS; i++) random_point(&random, 0.6, points[i]);
+  qmat_depth_lattice forward, backward;
+  make_lattice(&forward, state, 0.004);
+  make_lattice(&backward, state, 0.004);
+  const size_t before = forward.capacity;
+  for (size_t i = 0; i < POINTS; i++) answers[i] = qmat_depth_lattice_near(&forward, points[i], &ways[i]);
+  for (size_t i = POINTS; i-- > 0;) {
+    double distance;
+    const double near = qmat_depth_lattice_near(&backward, points[i], &distance);
+    assert_memory_equal(&near, &answers[i], sizeof near);
+    assert_memory_equal(&distance, &ways[i], sizeof distance);
+  }
+  /* The table has grown meanwhile, and still holds every node once. */
+  assert_true(forward.capacity > before && 2 * forward.count <= forward.capacity);
+  assert_int_equal(forward.count, backward.count);
+  assert_int_equal(forward.questions, forward.count);
+  for (size_t i = 0; i < POINTS; i++) {
+    double distance;
+    const double near = qmat_depth_lattice_near(&forward, points[i], &distance);
+    assert_memory_equal(&near, &answers[i], sizeof near);
+  }
+  assert_int_equal(forward.questions, forward.count); /* remembered: nothing was asked again */
+  qmat_depth_lattice_uninit(&forward);
+  qmat_depth_lattice_uninit(&backward);
+  free(points);
+  free(answers);
+  free(ways);
+}
+
+static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, 0.01);
+  static const double points[][3] = {{2.5, 0, 0}, {0, -100, 0}, {0, 0, 1e9}, {2.0000001, 2, 2}};
+  for (size_t i = 0; i < 4; i++) {
+    double distance = -1;
+    const double near = qmat_depth_lattice_near(&lattice, points[i], &distance);
+    assert_near(distance, 0, 0);
+    assert_near(near, qmat_depth_lattice_exact(&lattice, points[i]), 0);
+  }
+  assert_int_equal(lattice.count, 0);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
+static void test_places_that_were_asked_bound_depths_around_them(void **state) {
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, 0.02);
+  random_numbers random = {.seed = 3};
+  size_t known = 0, inside = 0;
+  for (int round = 0; round < 6000; round++) {
+    double point[3], beside[3], gap;
+    random_point(&random, 0.3, point);
+    for (int k = 0; k < 3; k++) beside[k] = point[k] + random_between(&random, -0.002, 0.002);
+    const double near = qmat_depth_lattice_near(&lattice, point, &gap), most = random_between(&random, 0, 0.1);
+    const double asked = qmat_depth_lattice_exact_up_to(&lattice, point, near, gap, most);
+    const double depth = qmat_depth_lattice_exact(&lattice, point);
+    if (asked < INFINITY)
+      assert_near(asked, depth, 1e-12);
+    else
+      assert_true(depth > most);
+    assert_near(qmat_depth_lattice_least(&lattice, point), asked < INFINITY ? depth : most, 1e-12);
+    const double least = qmat_depth_lattice_least(&lattice, beside);
+    const double truth = qmat_depth_lattice_exact(&lattice, beside);
+    assert_true(least <= truth + 1e-12);
+    known += least > -INFINITY;
+    inside += least > 0;
+  }
+  assert_true(known > 3000 && inside > 100);
+  static const double elsewhere[3] = {0.9, 0.9, 0.9};
+  assert_true(qmat_depth_lattice_least(&lattice, elsewhere) == -INFINITY);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
+static void test_corners_of_the_lattice_have_keys_of_their_own(void **state) {
+  /* The finest spacing that the keys can number, and the farthest nodes. */
+  static const double spacings[] = {0, 1e-6, 0.01};
+  for (size_t i = 0; i < 3; i++) {
+    qmat_depth_lattice lattice;
+    make_lattice(&lattice, state, spacings[i]);
+    assert_true(lattice.spacing >= 1e-6);
+    for (int corner = 0; corner < 27; corner++) {
+      const double point[3] = {2 * (corner % 3 - 1), 2 * (corner / 3 % 3 - 1), 2 * (corner / 9 - 1)};
+      double distance;
+      const double near = qmat_depth_lattice_near(&lattice, point, &distance);
+      assert_near(near, qmat_depth_lattice_exact(&lattice, point), distance + 1e-12);
+    }
+    assert_int_equal(lattice.count, 27);
+    qmat_depth_lattice_uninit(&lattice);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_exact_depth_is_positive_inside),
+      cmocka_unit_test(test_near_depth_differs_by_no_more_than_the_way_to_the_node),
+      cmocka_unit_test(test_nodes_are_exact),
+      cmocka_unit_test(test_answers_do_not_depend_on_what_was_asked_before),
+      cmocka_unit_test(test_points_beyond_the_lattice_are_asked_exactly),
+      cmocka_unit_test(test_places_that_were_asked_bound_depths_around_them),
+      cmocka_unit_test(test_corners_of_the_lattice_have_keys_of_their_own),
+  };
+  return cmocka_run_group_tests(tests, set_up, tear_down);
+}

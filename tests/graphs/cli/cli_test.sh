@@ -1,0 +1,209 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The command line as a user meets it: cli_test.sh PROGRAM SOURCE_FOLDER
+qmat=$1
+source=$2
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+# Results of earlier builds must not stand for those of this one; tests/graphs/cache/cache_test.sh tests the cache.
+QMAT_CACHE=off
+export QMAT_CACHE
+failures=0
+
+# expect CODE TEXT COMMAND...: the exit code, and a text on either output ("" for any).
+expect() {
+  code=$1
+  text=$2
+  shift 2
+  "$@" >out.txt 2>err.txt
+  got=$?
+  if [ "$got" -ne "$code" ]; then
+    echo "FAILED (exit $got, not $code): $*"
+    cat out.txt err.txt
+    failures=$((failures + 1))
+  elif [ -n "$text" ] && ! cat out.txt err.txt | grep -qF -e "$text"; then
+    echo "FAILED (no '$text'): $*"
+    cat out.txt err.txt
+    failures=$((failures + 1))
+  fi
+}
+
+# holds WHAT COMMAND...: the command must succeed.
+holds() {
+  what=$1
+  shift
+  if ! "$@"; then
+    echo "FAILED: $what"
+    failures=$((failures + 1))
+  fi
+}
+
+# A box of quads.
+cat >box.off <<'END'
+OFF
+8 6 0
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+0 0 1
+2 0 1
+2 1 1
+0 1 1
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+END
+# So few samples, and spheres, that a run takes no second, with sanitizers neither.
+coarse="--set samples.spacing=10%"
+
+# Commands and options.
+expect 2 "no command is given" "$qmat"
+expect 0 "qmat COMMAND" "$qmat" help
+expect 0 "qmat COMMAND" "$qmat" --help
+expect 2 "did you mean 'run'?" "$qmat" rnu
+expect 2 "did you mean 'check'?" "$qmat" help chekc
+for command in mat run batch watch why cache check info extract dot nodes node version help; do
+  expect 0 "Options:" "$qmat" help $command
+  expect 0 "qmat $command" "$qmat" $command --help
+done
+expect 0 "--epsilon" "$qmat" help mat
+expect 0 "0.01" "$qmat" mat --help
+expect 0 "default none" "$qmat" mat --help # the graph's, not that of medial.features
+expect 2 "did you mean '--threads'?" "$qmat" run g.yaml --thread 2
+expect 2 "did you mean '--epsilon'?" "$qmat" mat box.off -o x.glb --epsilom 1%
+expect 2 "needs a value" "$qmat" run g.yaml --set
+expect 2 "takes no value" "$qmat" nodes --json=yes
+expect 2 "one argument too many" "$qmat" check a b
+expect 2 "needs more arguments" "$qmat" run
+expect 2 "no option '-x'" "$qmat" run -x
+expect 2 "0 to 1024" "$qmat" mat box.off -o x.glb --threads many
+expect 2 "did you mean 'json'?" "$qmat" mat box.off -o x.glb --progress jsn
+expect 0 "qmat " "$qmat" version
+expect 0 "libyaml" "$qmat" version -v
+expect 0 "medial.simplify" "$qmat" nodes
+expect 0 '"name": "medial.simplify"' "$qmat" nodes --json
+expect 0 "epsilon" "$qmat" node medial.simplify
+expect 0 '"epsilon"' "$qmat" node medial.simplify --json
+expect 2 "did you mean 'medial.simplify'?" "$qmat" node medial.simplfy
+
+# Graph files.
+expect 0 "no mistakes" "$qmat" check "$source/graphs/qmat_plus.yaml"
+expect 0 "digraph" "$qmat" dot "$source/graphs/qmat_plus.yaml"
+expect 0 "no mistakes" "$qmat" check "$source/graphs/lod.yaml"
+expect 2 "cannot be opened" "$qmat" check missing.yaml
+printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' >bad.yaml
+expect 2 "bad.yaml:3:14: there is no node type 'mesh.sfd' (did you mean 'mesh.sdf'?)" "$qmat" check bad.yaml
+expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report failed.json
+holds "a report of the failure" grep -q '"line": 3' failed.json
+expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report bad.yaml
+holds "the graph file is never overwritten" grep -q 'mesh.sfd' bad.yaml
+expect 2 "did you mean '--set'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --sat model=box.off
+expect 2 "did you mean 'epsilon'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --set simple.epsilom=1
+expect 2 "path must be given" "$qmat" run "$source/graphs/qmat_plus.yaml" -o a.glb
+
+# Runs.
+expect 2 "-o PATH" "$qmat" mat box.off
+expect 2 "known endings" "$qmat" mat box.off -o box.xyz
+expect 2 "between 0 and 1" "$qmat" mat box.off -o box.glb --epsilon 200%
+expect 2 "two outputs" "$qmat" mat box.off -o box.glb -o ./box.glb
+expect 2 "did you mean 'asset'?" "$qmat" mat box.off -o aset=box.glb
+expect 1 "folder of the output" "$qmat" mat box.off -o missing/box.glb
+expect 1 "nothere.off" "$qmat" mat nothere.off -o box.glb --report failed.json
+holds "the failure in the report" grep -q '"node": "model"' failed.json
+holds "no file after a failure" test ! -e box.glb
+cp box.off box.ma
+expect 2 "would overwrite" "$qmat" mat box.ma -o box.ma
+expect 2 "would overwrite" "$qmat" mat box.off -o box.glb --report box.off
+holds "the model is untouched" cmp -s box.off box.ma
+rm box.ma
+
+expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.gltf -o box.ma --epsilon 5% $coarse --report report.json \
+  --threads 1
+holds "all files" test -s box.glb -a -s box.gltf -a -s box.ma
+expect 0 "a medial mesh of" "$qmat" info box.glb
+expect 0 "triangles: 12" "$qmat" info box.off
+expect 0 "not refuted" "$qmat" info box.glb --against box.off
+sed 's/^{$/{"images": [{"uri": "\\u001b[2J.png"}],/' box.gltf >odd.gltf
+expect 0 'the file "?[2J.png" cannot be read' "$qmat" info odd.gltf
+expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
+expect 0 "spheres" "$qmat" extract box.glb -o back.ma
+holds "as many spheres as before" test "$(head -n 1 back.ma)" = "$(head -n 1 box.ma)"
+expect 2 "-o PATH" "$qmat" extract box.glb
+expect 2 "known endings" "$qmat" extract box.glb -o back.off
+expect 2 "would overwrite" "$qmat" extract box.ma -o ./box.ma
+expect 1 "OFF does not carry" "$qmat" extract box.off -o back.ma
+expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
+expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5% $coarse
+expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
+holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
+holds "the report names all" test "$(grep -c '"sha256"' report.json)" -eq 3
+holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
+expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
+  --set epsilon=5% $coarse -o again.glb --threads 2
+expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --set epsilon=0.05 $coarse \
+  -o asset=again.ma
+holds "the same bytes from mat and run" cmp box.glb again.glb
+holds "the same bytes from mat and run, .ma" cmp box.ma again.ma
+expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 5% $coarse
+holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
+expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 5% $coarse
+holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 12
+cat >cage.usda <<'END'
+#usda 1.0
+def Mesh "cage" {
+  point3f[] points = [(-1, -1, -1), (1, -1, -1), (-1, 1, -1), (1, 1, -1), (-1, -1, 1), (1, -1, 1), (-1, 1, 1), (1, 1, 1)]
+  int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]
+  int[] faceVertexIndices = [0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5]
+}
+END
+expect 0 "(certified)" "$qmat" mat cage.usda -o cage.ma --epsilon 4% --report cage.json
+holds "the cage is taken to its limit" grep -q '"deviation": 0.00' cage.json
+expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
+holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
+# A number of spheres alone means no bound on the distance.
+expect 0 "" "$qmat" mat box.off -o few.ma --vertices 5 --report few.json
+holds "--vertices sets epsilon to 0" grep -q '"epsilon": 0.0' few.json
+
+# Cancelled by a signal while a node runs: exit code 3 and no file. A wavy torus is enough work to be interrupted.
+awk 'BEGIN {
+  n = 240; m = 120; pi = 3.14159265358979
+  printf "OFF\n%d %d 0\n", n * m, n * m
+  for (i = 0; i < n; i++) for (j = 0; j < m; j++) {
+    a = 2 * pi * i / n; b = 2 * pi * j / m; r = 1 + 0.2 * cos(5 * a) * cos(3 * b)
+    printf "%.9f %.9f %.9f\n", (3 + r * cos(b)) * cos(a), (3 + r * cos(b)) * sin(a), r * sin(b)
+  }
+  for (i = 0; i < n; i++) for (j = 0; j < m; j++) {
+    k = (i + 1) % n; l = (j + 1) % m
+    printf "4 %d %d %d %d\n", i * m + j, k * m + j, k * m + l, i * m + l
+  }
+}' >torus.off
+"$qmat" mat torus.off -o torus.glb --epsilon 0.1% --progress json >out.txt 2>err.txt &
+running=$!
+tries=0
+while ! grep -q '"event":"start"' err.txt && [ $tries -lt 600 ]; do
+  sleep 0.1
+  tries=$((tries + 1))
+done
+kill -TERM $running
+wait $running
+code=$?
+holds "exit code 3 after a signal, not $code" test $code -eq 3
+holds "the cancelled node is named" grep -q 'cancelled' err.txt
+holds "no file after a signal" test ! -e torus.glb
+
+# A locale with a decimal comma changes nothing.
+if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; then
+  expect 0 "" env LOCPATH="$work/locale" LC_ALL=de_DE.UTF-8 "$qmat" mat box.off -o comma.glb --epsilon 0.05 $coarse \
+    --report comma.json
+  holds "the same bytes under de_DE" cmp box.glb comma.glb
+fi
+
+if [ $failures -ne 0 ]; then
+  echo "$failures failed"
+  exit 1
+fi

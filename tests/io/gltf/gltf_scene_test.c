@@ -1,0 +1,393 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* glTF scenes on their way through: what is read of them, and that what comes out only has more in it. */
+#include <sys/stat.h>
+
+#include "tests/io/files.h"
+
+#include "core/json_text.h"
+#include "io/extract.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_write.h"
+#include "io/model.h"
+#include "tests/io/gltf/gltf_assets.h"
+#include "tests/io/medial_examples.h"
+
+/* Two boxes: `near` is on two nodes, of which the second has extras that are a text; `far` is on one, below a camera's
+ * parent. A third mesh has points only, a fourth is on no node. */
+static const char scene_text[] =
+    "{'asset':{'version':'2.0','copyright':'nobody','extras':{'x':1.0}},'scene':0,"
+    "'scenes':[{'name':'all','nodes':[0,1,2,5]}],"
+    "'extensionsUsed':['ACME_glow','KHR_lights_punctual'],"
+    "'extensions':{'ACME_glow':{'much':1e-7,'deep':[{'a':null},true]},'KHR_lights_punctual':{'lights':[{'type':'point'}"
+    "]}},"
+    "'nodes':[{'mesh':0,'name':'A','translation':[5,0,0.1],'extras':{'keep':[1,2.5,null]}},"
+    "{'mesh':0,'name':'B','scale':[1,2,3],'extras':'a text'},{'mesh':1,'children':[3,4]},{'camera':0},"
+    "{'extensions':{'KHR_lights_punctual':{'light':0}}},{'mesh':2}],"
+    "'cameras':[{'type':'perspective','perspective':{'yfov':0.7,'znear':0.01}}],"
+    "'materials':[{'name':'red','pbrMetallicRoughness':{'baseColorFactor':[1,0,0,1]}}],"
+    "'images':[{'uri':'tex/a%20b.png'},{'uri':'tex/gone.png'}],"
+    "'animations':[{'channels':[],'samplers':[]}],"
+    "'meshes':[{'name':'near','primitives':[{'attributes':{'POSITION':0},'indices':1,'material':0}],'extras':7},"
+    "{'name':'far','primitives':[{'attributes':{'POSITION':2},'indices':1}]},"
+    "{'name':'dust','primitives':[{'attributes':{'POSITION':0},'mode':0}]},"
+    "{'name':'unused','primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+    "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]},"
+    "{'bufferView':1,'componentType':5123,'count':36,'type':'SCALAR'},"
+    "{'bufferView':2,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[4,1,1]}],"
+    "'bufferViews':[{'buffer':0,'byteOffset':0,'byteLength':96},{'buffer':0,'byteOffset':96,'byteLength':72},"
+    "{'buffer':0,'byteOffset':168,'byteLength':96}],"
+    "'buffers':[{'byteLength':264BUFFER}]}";
+
+/* 264 bytes: the corners of a box of side 1, its triangles, and the corners of a box of 4 by 1 by 1. */
+static qmat_writer box_data(void) {
+  qmat_writer data = {0};
+  put_box_corners(&data, 1);
+  put_box_triangles(&data);
+  put_box_corners(&data, 4);
+  assert_int_equal(data.size, 264);
+  return data;
+}
+
+typedef struct fixture {
+  char folder[64], path[96];
+  qmat_scene *scene;
+  qmat_value *mesh;
+  qmat_report *report;
+  qmat_context context;
+} fixture;
+
+/* Writes the scene, as a .glb or as a .gltf with files beside it, and reads it. */
+static qmat_status read_scene(fixture *f, bool binary, const char *choice) {
+  qmat_writer data = box_data();
+  *f = (fixture){0};
+  make_folder(f->folder);
+  char path[96];
+  snprintf(path, sizeof path, "%s/tex", f->folder);
+  assert_int_equal(mkdir(path, 0777), 0);
+  snprintf(path, sizeof path, "%s/tex/a b.png", f->folder);
+  write_file(path, "a picture", 9);
+  snprintf(f->path, sizeof f->path, "%s/scene.%s", f->folder, binary ? "glb" : "gltf");
+  char *text = asset_replace(scene_text, "BUFFER", binary ? "" : ",'uri':'./the%20data.bin'");
+  if (binary) {
+    qmat_writer glb = asset_glb(text, data.bytes, data.size);
+    write_file(f->path, glb.bytes, glb.size);
+    qmat_writer_uninit(&glb);
+  } else {
+    char *json = asset_json(text);
+    write_file(f->path, json, strlen(json));
+    free(json);
+    snprintf(path, sizeof path, "%s/the data.bin", f->folder);
+    write_file(path, data.bytes, data.size);
+  }
+  free(text);
+  qmat_writer_uninit(&data);
+  const qmat_read_options options = {0};
+  return qmat_model_read_meshes(&f->context, f->path, &options, choice, &f->scene, &f->mesh, &f->report);
+}
+
+static void release(fixture *f) {
+  static const char *const names[] = {"tex/a b.png", "the data.bin"};
+  for (size_t i = 0; i < 2; i++) {
+    char path[96];
+    snprintf(path, sizeof path, "%s/%s", f->folder, names[i]);
+    unlink(path);
+  }
+  unlink(f->path);
+  char path[96];
+  snprintf(path, sizeof path, "%s/tex", f->folder);
+  rmdir(path);
+  assert_int_equal(rmdir(f->folder), 0);
+  if (f->scene) qmat_value_release(&f->scene->base);
+  qmat_value_release(f->mesh);
+  if (f->report) qmat_value_release(&f->report->base);
+  qmat_context_uninit(&f->context);
+}
+
+/* Fails where `after` lacks or changes anything of `before`: objects may have more keys, arrays more members. The
+ * length of the GLB's buffer may grow. */
+static void assert_only_more(const json_t *before, const json_t *after, const char *where) {
+  const char *key;
+  json_t *value;
+  char path[512];
+  if (json_is_object(before)) {
+    assert_true(json_is_object(after));
+    json_object_foreach((json_t *)(uintptr_t)before, key, value) {
+      snprintf(path, sizeof path, "%s/%s", where, key);
+      const json_t *other = json_object_get(after, key);
+      if (!other) fail_msg("%s is gone", path);
+      if (strcmp(path, "/buffers/0/byteLength") == 0) {
+        assert_true(json_integer_value(other) >= json_integer_value(value));
+      } else {
+        assert_only_more(value, other, path);
+      }
+    }
+  } else if (json_is_array(before)) {
+    assert_true(json_array_size(after) >= json_array_size(before));
+    for (size_t i = 0; i < json_array_size(before); i++) {
+      snprintf(path, sizeof path, "%s/%zu", where, i);
+      assert_only_more(json_array_get(before, i), json_array_get(after, i), path);
+    }
+  } else if (!json_equal((json_t *)(uintptr_t)before, (json_t *)(uintptr_t)after)) {
+    fail_msg("%s is another", where);
+  }
+}
+
+static qmat_gltf_asset open_part(const qmat_file_part *part) {
+  qmat_context context = {0};
+  qmat_gltf_asset asset;
+  assert_int_equal(qmat_gltf_asset_init(&context, part->bytes, part->size, "a file", &asset), QMAT_OK);
+  return asset;
+}
+
+static const json_t *node_of(const qmat_gltf_asset *asset, size_t i) {
+  return json_array_get(json_object_get(asset->root, "nodes"), i);
+}
+
+static const char *data_of(const json_t *node) {
+  return json_string_value(json_object_get(json_object_get(node, "extras"), "qmat_data"));
+}
+
+/* The scene with a medial mesh of 3 spheres for the first mesh and of 5 for the second. */
+static qmat_file *enrich(fixture *f, size_t count, bool binary, const qmat_mesh *skin, bool compress) {
+  qmat_medial *medials[] = {example_medial(3), example_medial(5)};
+  qmat_gltf_addition additions[2];
+  for (size_t i = 0; i < 2; i++) {
+    additions[i] = (qmat_gltf_addition){.medial = medials[i],
+                                        .skin = skin,
+                                        .options = {.binary = binary,
+                                                    .compress_skin = compress,
+                                                    .quantisation = 1e-3,
+                                                    .epsilon = (double)NAN,
+                                                    .error_out = (double)NAN,
+                                                    .error_in = (double)NAN,
+                                                    .name = "scene"}};
+  }
+  qmat_file *file;
+  if (qmat_gltf_enrich(&f->context, f->scene, additions, count, false, NULL, &file) != QMAT_OK)
+    fail_msg("%s", f->context.error.message);
+  for (size_t i = 0; i < 2; i++) qmat_value_release(&medials[i]->base);
+  return file;
+}
+
+static void test_meshes_are_read_once_each_in_their_own_space(void **state) {
+  (void)state;
+  for (int binary = 0; binary < 2; binary++) {
+    fixture f;
+    assert_int_equal(read_scene(&f, binary == 1, "all"), QMAT_OK);
+    assert_int_equal(f.mesh->type, QMAT_LIST);
+    const qmat_list *list = (const qmat_list *)f.mesh;
+    assert_int_equal(list->count, 2); /* not the points, not the one on no node */
+    assert_string_equal(list->names[0], "near");
+    assert_string_equal(list->names[1], "far");
+    assert_int_equal(f.scene->mesh_count, 2);
+    assert_int_equal(f.scene->meshes[0], 0);
+    assert_int_equal(f.scene->meshes[1], 1);
+    const double lengths[] = {1, 4};
+    for (size_t i = 0; i < 2; i++) {
+      const qmat_mesh *mesh = (const qmat_mesh *)list->items[i];
+      assert_int_equal(mesh->vertex_count, 8);
+      assert_true(mesh->closed && mesh->oriented);
+      double low = INFINITY, high = -INFINITY;
+      for (size_t v = 0; v < 8; v++) {
+        low = fmin(low, mesh->positions[3 * v]);
+        high = fmax(high, mesh->positions[3 * v]);
+      }
+      assert_true(low == 0 && high == lengths[i]); /* the node's translation is not in it */
+    }
+    const json_t *meshes = json_object_get(f.report->root, "meshes");
+    assert_int_equal(json_integer_value(json_object_get(json_array_get(meshes, 0), "nodes")), 2);
+    const json_t *warnings = json_object_get(f.report->root, "warnings");
+    assert_int_equal(json_array_size(warnings), 2);
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "node 1 "));
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 1)), "tex/gone.png"));
+    assert_int_equal(f.scene->part_count, binary ? 2 : 3);
+    assert_string_equal(f.scene->parts[1].name, "tex/a b.png");
+    if (!binary) assert_string_equal(f.scene->parts[2].name, "the data.bin");
+    release(&f);
+  }
+}
+
+static void test_a_mesh_is_chosen_by_name_or_number(void **state) {
+  (void)state;
+  static const char *const choices[] = {"far", "1"};
+  fixture f;
+  for (size_t i = 0; i < 2; i++) {
+    assert_int_equal(read_scene(&f, true, choices[i]), QMAT_OK);
+    assert_int_equal(f.mesh->type, QMAT_MESH);
+    assert_int_equal(f.scene->mesh_count, 1);
+    assert_int_equal(f.scene->meshes[0], 1);
+    release(&f);
+  }
+  static const char *const wrong[] = {"unused", "3", "4", "-1", "nothing", ""};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    assert_int_equal(read_scene(&f, true, wrong[i]), QMAT_ERROR_USAGE);
+    assert_string_equal(f.context.error.field, "mesh");
+    assert_true(!f.scene && !f.mesh && !f.report);
+    release(&f);
+  }
+  assert_int_equal(read_scene(&f, true, "merged"), QMAT_OK);
+  assert_int_equal(f.mesh->type, QMAT_MESH);
+  assert_int_equal(((const qmat_mesh *)f.mesh)->triangle_count, 36); /* three boxes are placed */
+  assert_int_equal(f.scene->mesh_count, 0);
+  release(&f);
+}
+
+static void test_what_comes_out_only_has_more_in_it(void **state) {
+  (void)state;
+  for (int way = 0; way < 12; way++) {
+    const bool from_binary = way & 1, to_binary = way >> 1 & 1, has_skin = way >= 4, compress = way >= 8;
+    fixture f;
+    assert_int_equal(read_scene(&f, from_binary, "all"), QMAT_OK);
+    const qmat_mesh *skin = has_skin ? (const qmat_mesh *)((const qmat_list *)f.mesh)->items[1] : NULL;
+    qmat_file *file = enrich(&f, 2, to_binary, skin, compress);
+    qmat_gltf_asset before = open_part(&f.scene->parts[0]), after = open_part(&file->parts[0]);
+    assert_only_more(before.root, after.root, "");
+    assert_int_equal(after.binary, to_binary);
+    assert_int_equal(file->part_count, f.scene->part_count);
+    for (size_t i = 1; i < file->part_count; i++) {
+      assert_string_equal(file->parts[i].name, f.scene->parts[i].name);
+      assert_int_equal(file->parts[i].size, f.scene->parts[i].size);
+      assert_memory_equal(file->parts[i].bytes, f.scene->parts[i].bytes, file->parts[i].size);
+    }
+    if (from_binary && to_binary) {
+      assert_true(after.chunk_size >= before.chunk_size);
+      assert_memory_equal(after.chunk, before.chunk, before.chunk_size);
+      if (!has_skin) assert_int_equal(after.chunk_size, before.chunk_size);
+    }
+    /* Node 0 has extras, node 1 a text instead, node 2 none: all carry one, nodes of one mesh the same. */
+    const json_t *child = node_of(&after, has_skin ? 7 : 6);
+    assert_non_null(data_of(node_of(&after, 0)));
+    assert_null(data_of(node_of(&after, 1)));
+    assert_string_equal(data_of(child), data_of(node_of(&after, 0)));
+    assert_string_equal(json_string_value(json_object_get(child, "name")), "B medial mesh");
+    assert_non_null(data_of(node_of(&after, 2)));
+    assert_string_not_equal(data_of(child), data_of(node_of(&after, 2)));
+    assert_int_equal(json_array_size(json_object_get(after.root, "nodes")), has_skin ? 10 : 7);
+    release(&f);
+    qmat_gltf_asset_uninit(&before);
+    qmat_gltf_asset_uninit(&after);
+    qmat_value_release(&file->base);
+  }
+}
+
+/* Saves the file and its parts in a folder of its own, and reads all of it again. */
+static void test_what_comes_out_is_read_again_with_the_same_meshes(void **state) {
+  (void)state;
+  for (int way = 0; way < 8; way++) {
+    const bool binary = way & 1, has_skin = way >= 4, compress = way >= 6, to_binary = way >> 1 & 1;
+    fixture f;
+    assert_int_equal(read_scene(&f, binary, "all"), QMAT_OK);
+    const qmat_mesh *skin = has_skin ? (const qmat_mesh *)((const qmat_list *)f.mesh)->items[1] : NULL;
+    qmat_file *file = enrich(&f, 2, to_binary, skin, compress);
+    char folder[64], path[96], side[160];
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/out.%s", folder, to_binary ? "glb" : "gltf");
+    assert_int_equal(qmat_file_save(&f.context, file, path), QMAT_OK);
+    qmat_scene *scene;
+    qmat_value *mesh;
+    qmat_report *report;
+    const qmat_read_options options = {0};
+    if (qmat_model_read_meshes(&f.context, path, &options, "all", &scene, &mesh, &report) != QMAT_OK)
+      fail_msg("%s", f.context.error.message);
+    assert_memory_equal(&mesh->digest, &f.mesh->digest, sizeof mesh->digest); /* the skins are not taken for models */
+    qmat_medial *medial;
+    assert_int_equal(qmat_medial_extract(&f.context, path, "A", &medial, NULL), QMAT_OK);
+    assert_int_equal(medial->sphere_count, 3);
+    qmat_value_release(&medial->base);
+    assert_int_equal(qmat_medial_extract(&f.context, path, "2", &medial, NULL), QMAT_OK);
+    assert_int_equal(medial->sphere_count, 5);
+    qmat_value_release(&medial->base);
+    for (size_t i = 1; i < file->part_count; i++) {
+      snprintf(side, sizeof side, "%s/%s", folder, file->parts[i].name);
+      assert_int_equal(unlink(side), 0);
+    }
+    snprintf(side, sizeof side, "%s/tex", folder);
+    assert_int_equal(rmdir(side), 0);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(rmdir(folder), 0);
+    qmat_value_release(&scene->base);
+    qmat_value_release(mesh);
+    qmat_value_release(&report->base);
+    qmat_value_release(&file->base);
+    release(&f);
+  }
+}
+
+static void test_a_second_time_replaces_what_the_first_left(void **state) {
+  (void)state;
+  fixture f, again = {0};
+  assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
+  qmat_file *first = enrich(&f, 1, true, NULL, false);
+  again.scene = qmat_scene_new();
+  again.scene->name = qmat_strdup("again");
+  again.scene->format = qmat_strdup("glb");
+  again.scene->parts = qmat_calloc(1, sizeof *again.scene->parts);
+  again.scene->part_count = 1;
+  again.scene->parts[0].name = qmat_strdup("");
+  again.scene->parts[0].bytes = qmat_alloc(first->parts[0].size, 1);
+  again.scene->parts[0].size = first->parts[0].size;
+  memcpy(again.scene->parts[0].bytes, first->parts[0].bytes, first->parts[0].size);
+  again.scene->mesh_count = 1;
+  again.scene->meshes = qmat_calloc(1, sizeof *again.scene->meshes);
+  again.scene->meshes[0] = 1;
+  assert_int_equal(qmat_value_seal(&again.context, &again.scene->base), QMAT_OK);
+  qmat_file *second = enrich(&again, 1, true, NULL, false);
+  assert_int_equal(second->parts[0].size, first->parts[0].size);
+  assert_memory_equal(second->parts[0].bytes, first->parts[0].bytes, first->parts[0].size);
+  qmat_value_release(&again.scene->base);
+  qmat_value_release(&first->base);
+  qmat_value_release(&second->base);
+  release(&f);
+}
+
+static void test_one_of_all_meshes_gets_a_node_of_the_scene(void **state) {
+  (void)state;
+  fixture f;
+  assert_int_equal(read_scene(&f, true, "merged"), QMAT_OK);
+  qmat_file *file = enrich(&f, 1, true, NULL, false);
+  qmat_gltf_asset before = open_part(&f.scene->parts[0]), after = open_part(&file->parts[0]);
+  assert_only_more(before.root, after.root, "");
+  assert_non_null(data_of(node_of(&after, 6)));
+  const json_t *roots = json_object_get(json_array_get(json_object_get(after.root, "scenes"), 0), "nodes");
+  assert_int_equal(json_array_size(roots), 5);
+  assert_int_equal(json_integer_value(json_array_get(roots, 4)), 6);
+  qmat_gltf_asset_uninit(&before);
+  qmat_gltf_asset_uninit(&after);
+  qmat_value_release(&file->base);
+  release(&f);
+}
+
+static void test_a_long_name_of_a_missing_file_is_told_in_whole_characters(void **state) {
+  (void)state;
+  char name[256];
+  memset(name, 'a', 199);
+  snprintf(name + 199, sizeof name - 199, "\xC3\xA9.png"); /* the 200th byte is the first of two */
+  json_t *root = json_pack("{s:[{s:s}]}", "images", "uri", name), *warnings = json_array();
+  assert_true(root && warnings);
+  qmat_context context = {0};
+  qmat_scene *scene = qmat_scene_new();
+  const uint8_t bytes[] = {'{', '}'};
+  assert_int_equal(qmat_gltf_keep(&context, root, bytes, sizeof bytes, "/nowhere/at/all.gltf", scene, warnings),
+                   QMAT_OK);
+  assert_int_equal(scene->part_count, 1);
+  assert_int_equal(json_array_size(warnings), 1);
+  memcpy(name + 199, "\" cannot be read", 17);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), name));
+  qmat_value_release(&scene->base);
+  json_decref(root);
+  json_decref(warnings);
+  qmat_context_uninit(&context);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_meshes_are_read_once_each_in_their_own_space),
+      cmocka_unit_test(test_a_mesh_is_chosen_by_name_or_number),
+      cmocka_unit_test(test_what_comes_out_only_has_more_in_it),
+      cmocka_unit_test(test_what_comes_out_is_read_again_with_the_same_meshes),
+      cmocka_unit_test(test_a_second_time_replaces_what_the_first_left),
+      cmocka_unit_test(test_one_of_all_meshes_gets_a_node_of_the_scene),
+      cmocka_unit_test(test_a_long_name_of_a_missing_file_is_told_in_whole_characters),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

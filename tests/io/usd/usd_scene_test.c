@@ -1,0 +1,559 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_scene.h"
+
+#include <sys/stat.h>
+
+#include "io/usd/usdz.h"
+#include "tests/io/files.h"
+
+#define DATA "../shared/data/usd/"
+
+/* A right triangle in the plane z = 0, and what is needed around it. */
+#define TRIANGLE                                                                         \
+  "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\nint[] faceVertexCounts = [3]\n" \
+  "int[] faceVertexIndices = [0, 1, 2]\nuniform token subdivisionScheme = \"none\"\n"
+#define MESH(name, more) "def Mesh \"" name "\" {\n" TRIANGLE more "}\n"
+
+static char folder[64];
+
+static int set_up(void **state) {
+  (void)state;
+  make_folder(folder);
+  return 0;
+}
+
+static int tear_down(void **state) {
+  (void)state;
+  return rmdir(folder);
+}
+
+static const char *in_folder(const char *name) {
+  static char path[256];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  return path;
+}
+
+static qmat_status read_text(qmat_context *context, const char *text, qmat_soup *soup, json_t *report) {
+  qmat_bytes bytes = memory_file(text, strlen(text));
+  *soup = (qmat_soup){0};
+  qmat_status status = qmat_usd_read(context, &bytes, in_folder("main.usda"), soup, report);
+  free(bytes.data);
+  return status;
+}
+
+/* Reads a scene that must be good. The report is the caller's. */
+static qmat_soup good_scene(const char *text, json_t **report) {
+  qmat_context context = {0};
+  qmat_soup soup;
+  *report = json_object();
+  if (read_text(&context, text, &soup, *report) != QMAT_OK) {
+    char line[1024];
+    qmat_error_format(&context.error, line, sizeof line);
+    fail_msg("%s", line);
+  }
+  qmat_context_uninit(&context);
+  return soup;
+}
+
+static void assert_points(const char *text, const double *expected, size_t count) {
+  json_t *report;
+  qmat_soup soup = good_scene(text, &report);
+  assert_int_equal(soup.vertex_count, count);
+  for (size_t i = 0; i < 3 * count; i++) {
+    if (fabs(soup.positions[i] - expected[i]) > 1e-12) {
+      fail_msg("coordinate %zu is %.17g, not %.17g", i, soup.positions[i], expected[i]);
+    }
+  }
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static json_int_t count_of(const json_t *report, const char *key) {
+  return json_integer_value(json_object_get(report, key));
+}
+
+static const char *warning_of(const json_t *report, size_t i) {
+  const char *text = json_string_value(json_array_get(json_object_get(report, "warnings"), i));
+  return text ? text : "";
+}
+
+/* The error of a scene that must be refused, without the path of its file. */
+static void assert_scene_refused(const char *text, qmat_status expected_status, const char *expected) {
+  qmat_context context = {0};
+  qmat_soup soup;
+  assert_int_equal(read_text(&context, text, &soup, NULL), expected_status);
+  assert_string_equal(context.error.message, expected);
+  assert_string_equal(context.error.file, in_folder("main.usda"));
+  qmat_soup_uninit(&soup);
+  qmat_context_uninit(&context);
+}
+
+/* What becomes of the point (1, 2, 3) under operations at one prim. */
+static void assert_moves(const char *operations, const char *order, double x, double y, double z) {
+  char text[2048];
+  snprintf(
+      text, sizeof text,
+      "#usda 1.0\ndef Xform \"w\" { double3 xformOp:translate = (100, 0, 0)\n uniform token[] xformOpOrder = "
+      "[\"xformOp:translate\"]\ndef Mesh \"m\" {\n point3f[] points = [(1, 2, 3), (0, 0, 0), (0, 1, 0)]\n"
+      "int[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n%s\nuniform token[] xformOpOrder = [%s]\n"
+      "uniform token subdivisionScheme = \"none\" } }",
+      operations, order);
+  json_t *report;
+  qmat_soup soup = good_scene(text, &report);
+  const double expected[3] = {x, y, z};
+  for (int k = 0; k < 3; k++) {
+    if (fabs(soup.positions[k] - expected[k]) > 1e-12) {
+      fail_msg("%s: coordinate %d is %.17g, not %.17g", order, k, soup.positions[k], expected[k]);
+    }
+  }
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_every_operation_moves_a_point_as_by_hand(void **state) {
+  (void)state;
+  assert_moves("", "", 101, 2, 3);
+  assert_moves("double3 xformOp:translate = (10, 20, 30)", "\"xformOp:translate\"", 111, 22, 33);
+  assert_moves("float3 xformOp:scale = (2, 3, -1)", "\"xformOp:scale\"", 102, 6, -3);
+  assert_moves("float xformOp:rotateX = 90", "\"xformOp:rotateX\"", 101, -3, 2);
+  assert_moves("float xformOp:rotateY = 90", "\"xformOp:rotateY\"", 103, 2, -1);
+  assert_moves("double xformOp:rotateZ:tilt = -90", "\"xformOp:rotateZ:tilt\"", 102, -1, 3);
+  /* First about x: (1, -3, 2); then about y: (2, -3, -1). */
+  assert_moves("float3 xformOp:rotateXYZ = (90, 90, 0)", "\"xformOp:rotateXYZ\"", 102, -3, -1);
+  /* First about y: (3, 2, -1); then about x: (3, 1, 2). */
+  assert_moves("half3 xformOp:rotateYXZ = (90, 90, 0)", "\"xformOp:rotateYXZ\"", 103, 1, 2);
+  assert_moves("float3 xformOp:rotateZYX = (90, 90, 0)", "\"xformOp:rotateZYX\"", 103, 1, 2);
+  assert_moves("float3 xformOp:rotateZXY = (90, 90, 0)", "\"xformOp:rotateZXY\"", 102, -3, -1);
+  assert_moves("float3 xformOp:rotateXZY = (90, 90, 0)", "\"xformOp:rotateXZY\"", 102, -3, -1);
+  assert_moves("float3 xformOp:rotateYZX = (90, 90, 0)", "\"xformOp:rotateYZX\"", 103, 1, 2);
+  /* Twice the unit: a quaternion is a direction only. 90 degrees about z. */
+  assert_moves("quatf xformOp:orient = (2, 0, 0, 2)", "\"xformOp:orient\"", 98, 1, 3);
+  assert_moves("matrix4d xformOp:transform = ((0, 1, 0, 0), (1, 0, 0, 0), (0, 0, 2, 0), (5, 6, 7, 1))",
+               "\"xformOp:transform\"", 107, 7, 13);
+  /* The last one is the first that the point meets. */
+  assert_moves("double3 xformOp:translate = (10, 0, 0)\nfloat3 xformOp:scale = (2, 2, 2)",
+               "\"xformOp:translate\", \"xformOp:scale\"", 112, 4, 6);
+  assert_moves("double3 xformOp:translate = (10, 0, 0)\nfloat3 xformOp:scale = (2, 2, 2)",
+               "\"xformOp:scale\", \"xformOp:translate\"", 122, 4, 6);
+  /* About a pivot. */
+  assert_moves("float3 xformOp:translate:pivot = (1, 1, 0)\nfloat xformOp:rotateZ = 180",
+               "\"xformOp:translate:pivot\", \"xformOp:rotateZ\", \"!invert!xformOp:translate:pivot\"", 101, 0, 3);
+  assert_moves("float3 xformOp:translate = (1, 1, 1)", "\"!resetXformStack!\", \"xformOp:translate\"", 2, 3, 4);
+  assert_moves("float3 xformOp:translate", "\"xformOp:translate\"", 101, 2, 3);
+}
+
+static void test_operations_that_are_none_are_errors_that_name_the_prim(void **state) {
+  (void)state;
+#define WITH(text) "#usda 1.0\n" MESH("m", text)
+  assert_scene_refused(WITH("uniform token[] xformOpOrder = [\"xformOp:twist\"]"), QMAT_ERROR_FORMAT,
+                       "/m: 'xformOp:twist' is no transform operation");
+  assert_scene_refused(WITH("float xformOp:scale = 1\nuniform token[] xformOpOrder = [\"xformOp:scale\"]"),
+                       QMAT_ERROR_FORMAT, "/m: xformOp:scale is of another type than it has to be");
+  assert_scene_refused(
+      WITH("float3 xformOp:scale = (1, 0, 1)\nuniform token[] xformOpOrder = [\"!invert!xformOp:scale\"]"),
+      QMAT_ERROR_FORMAT, "/m: xformOp:scale has no inverse");
+#undef WITH
+}
+
+static void test_mirrors_and_left_hands_turn_faces_and_cancel_out(void **state) {
+  (void)state;
+  static const char left[] = "uniform token orientation = \"leftHanded\"\n",
+                    mirror[] =
+                        "float3 xformOp:scale = (1, 1, -1)\nuniform token[] xformOpOrder = "
+                        "[\"xformOp:scale\"]\n";
+  for (size_t i = 0; i < 4; i++) {
+    char text[2048];
+    snprintf(text, sizeof text, "#usda 1.0\ndef Mesh \"m\" {\n%s%s%s}", TRIANGLE, i & 1 ? left : "",
+             i & 2 ? mirror : "");
+    json_t *report;
+    qmat_soup soup = good_scene(text, &report);
+    static const uint32_t kept[] = {0, 1, 2}, turned[] = {2, 1, 0};
+    assert_memory_equal(soup.corners, i == 1 || i == 2 ? turned : kept, sizeof kept);
+    qmat_soup_uninit(&soup);
+    json_decref(report);
+  }
+}
+
+static void test_holes_are_left_out_and_cages_are_reported(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n(metersPerUnit = 0.5 upAxis = \"Z\")\ndef Mesh \"m\" {\npoint3f[] points = [(0, 0, 0), (1, 0, 0), "
+      "(1, "
+      "1, 0), (0, 1, 0), (2, 0, 0)]\nint[] faceVertexCounts = [4, 3]\nint[] faceVertexIndices = [0, 1, 2, 3, 1, 4, 2]\n"
+      "int[] holeIndices = [0]\n}",
+      &report);
+  assert_int_equal(soup.facet_count, 1);
+  static const uint32_t corners[] = {1, 4, 2};
+  assert_memory_equal(soup.corners, corners, sizeof corners);
+  assert_int_equal(count_of(report, "holes"), 1);
+  assert_int_equal(count_of(report, "cages"), 1);
+  assert_int_equal(json_array_size(json_object_get(report, "warnings")), 0);
+  assert_true(json_real_value(json_object_get(report, "meters_per_unit")) == 0.5);
+  assert_string_equal(json_string_value(json_object_get(report, "up_axis")), "Z");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_cages_keep_schemes_creases_corners_and_holes_in_world_space(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n" MESH("first", "") "def Mesh \"m\" {\npoint3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]\n"
+      "int[] faceVertexCounts = [4, 3]\nint[] faceVertexIndices = [0, 1, 2, 3, 0, 1, 2]\nint[] holeIndices = [1]\n"
+      "int[] creaseLengths = [3, 2]\nint[] creaseIndices = [0, 1, 2, 2, 3]\nfloat[] creaseSharpnesses = [2, 10]\n"
+      "int[] cornerIndices = [3]\nfloat[] cornerSharpnesses = [5]\ntoken interpolateBoundary = \"edgeOnly\"\n"
+      "uniform token orientation = \"leftHanded\"\nuniform token subdivisionScheme = \"loop\"\n"
+      "double3 xformOp:translate = (0, 0, 4)\nuniform token[] xformOpOrder = [\"xformOp:translate\"] }",
+      &report);
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  qmat_context context = {0};
+  qmat_mesh *mesh;
+  assert_int_equal(qmat_soup_to_mesh(&context, &soup, "file", &options, &mesh, NULL), QMAT_OK);
+  const qmat_cage *cage = &mesh->cage;
+  static const uint32_t surface_faces[] = {1, 2}, schemes[] = {QMAT_SCHEME_NONE, QMAT_SCHEME_LOOP},
+                        boundaries[] = {QMAT_BOUNDARY_EDGE_AND_CORNER, QMAT_BOUNDARY_EDGE}, sizes[] = {3, 4, 3},
+                        corners[] = {0, 1, 2, 6, 5, 4, 3, 5, 4, 3}, creases[] = {3, 4, 4, 5, 5, 6};
+  static const double crease_sharpness[] = {2, 2, 10};
+  assert_int_equal(cage->surface_count, 2);
+  assert_memory_equal(cage->surface_faces, surface_faces, sizeof surface_faces);
+  assert_memory_equal(cage->schemes, schemes, sizeof schemes);
+  assert_memory_equal(cage->boundaries, boundaries, sizeof boundaries);
+  assert_int_equal(cage->vertex_count, 7);
+  assert_true(cage->positions[3 * 3 + 2] == 4);
+  assert_int_equal(cage->face_count, 3);
+  assert_memory_equal(cage->face_sizes, sizes, sizeof sizes);
+  assert_int_equal(cage->corner_count, 10);
+  assert_memory_equal(cage->corners, corners, sizeof corners);
+  assert_int_equal(cage->hole_count, 1);
+  assert_int_equal(cage->holes[0], 2);
+  assert_int_equal(cage->crease_count, 3);
+  assert_memory_equal(cage->creases, creases, sizeof creases);
+  assert_memory_equal(cage->crease_sharpness, crease_sharpness, sizeof crease_sharpness);
+  assert_int_equal(cage->sharp_count, 1);
+  assert_int_equal(cage->sharp_vertices[0], 6);
+  assert_true(cage->vertex_sharpness[0] == 5);
+  qmat_value_release(&mesh->base);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  soup = good_scene("#usda 1.0\n" MESH("first", ""), &report);
+  assert_int_equal(soup.cage.surface_count, 0);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  qmat_context_uninit(&context);
+}
+
+static void test_what_is_hidden_inactive_or_for_other_purposes_is_skipped(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n" MESH("seen", "") "def \"off\" ( active = false ) {\n" MESH("a", "") "}\n"
+      "def Xform \"hidden\" { token visibility = \"invisible\"\n" MESH("b", "") "}\n"
+      "def Xform \"guides\" { uniform token purpose = \"guide\"\n" MESH("c", "")
+      MESH("d", "uniform token purpose = \"render\"\n") "}\n"
+      MESH("e", "uniform token purpose = \"proxy\"\n") "class \"k\" {\n" MESH("f", "") "}\n"
+      "over \"o\" {\n" MESH("g", "") "}\n def Sphere \"s\" {}\ndef PointInstancer \"p\" {\n" MESH("h", "") "}\n"
+      "def Camera \"eye\" {}\n",
+      &report);
+  assert_int_equal(count_of(report, "meshes_placed"), 2);
+  assert_int_equal(soup.facet_count, 2);
+  assert_int_equal(count_of(report, "prims_skipped"), 4);
+  assert_int_equal(count_of(report, "shapes_skipped"), 2);
+  assert_string_equal(warning_of(report, 0), "/o: left out with all below it: only an 'over', defined nowhere");
+  assert_string_equal(warning_of(report, 1), "/s: left out: a Sphere is no mesh");
+  assert_string_equal(warning_of(report, 2), "/p: left out with all below it: a PointInstancer is not expanded");
+  assert_string_equal(warning_of(report, 3), "");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_what_nothing_defines_is_read_where_there_is_nothing_else(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene("#usda 1.0\nover \"o\" {\n" MESH("g", "") "}\n", &report);
+  assert_int_equal(soup.facet_count, 1);
+  assert_string_equal(warning_of(report, 0), "/o: taken for defined: the scene has only an 'over' of it");
+  assert_string_equal(warning_of(report, 1), "");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_strength_of_arcs_is_local_inherit_variant_reference_payload_specialize(void **state) {
+  (void)state;
+  /* Every arc moves the mesh to another x; fewer and fewer of them have a say. */
+  static const char *const arcs[] = {"inherits = </i>", "variants = { string v = \"on\" }\nprepend variantSets = \"v\"",
+                                     "prepend references = </r>", "payload = </p>", "specializes = </s>"};
+  static const char before[] =
+      "#usda 1.0\n"
+      "class \"i\" { double3 xformOp:translate = (2, 0, 0) }\nclass \"r\" { double3 xformOp:translate = (4, 0, 0) }\n"
+      "class \"p\" { double3 xformOp:translate = (5, 0, 0) }\nclass \"s\" { double3 xformOp:translate = (6, 0, 0) }\n";
+  for (int first = -1; first < 5; first++) {
+    char text[4096];
+    int used = snprintf(text, sizeof text, "%sdef Mesh \"m\" (\n", before);
+    for (int k = first < 0 ? 0 : first; k < 5; k++) {
+      used += snprintf(text + used, sizeof text - (size_t)used, "%s\n", arcs[k]);
+    }
+    snprintf(text + used, sizeof text - (size_t)used,
+             ") {\n" TRIANGLE
+             "%s\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n"
+             "variantSet \"v\" = { \"on\" { double3 xformOp:translate = (3, 0, 0) } \"off\" {} }\n}",
+             first < 0 ? "double3 xformOp:translate = (1, 0, 0)" : "");
+    const double x = first + 2;
+    const double expected[] = {x, 0, 0, x + 1, 0, 0, x, 1, 0};
+    assert_points(text, expected, 3);
+  }
+}
+
+static void test_children_come_through_variants_nested_variants_and_references(void **state) {
+  (void)state;
+  /* Weaker opinions have their children first. */
+  static const double expected[] = {7, 0, 0, 8, 0, 0, 7, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+  assert_points(
+      "#usda 1.0\n"
+      "def Xform \"w\" ( variants = { string lod = \"high\" } prepend variantSets = \"lod\" ) {\n"
+      "  variantSet \"lod\" = {\n    \"low\" { }\n"
+      "    \"high\" ( variants = { string place = \"here\" } prepend variantSets = \"place\" ) {\n" MESH("a", "")
+      "      variantSet \"place\" = { \"here\" { def Xform \"t\" ( references = </asset> ) {\n"
+      "        double3 xformOp:translate = (7, 0, 0)\n uniform token[] xformOpOrder = [\"xformOp:translate\"] } } }\n"
+      "    }\n  }\n}\nclass Xform \"asset\" {\n" MESH("b", "") "}\n",
+      expected, 6);
+}
+
+static void test_a_variant_that_is_not_selected_is_left_out_aloud(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene("#usda 1.0\n" MESH("m", "") "def \"w\" ( prepend variantSets = \"v\" ) {\n variantSet \"v\" "
+                              "= { \"x\" {\n" MESH("n", "") "} } }",
+                              &report);
+  assert_int_equal(soup.facet_count, 1);
+  assert_string_equal(warning_of(report, 0), "/w: no variant of 'v' is selected: all are left out");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_files_are_found_beside_the_layer_that_names_them(void **state) {
+  (void)state;
+  char sub[256], asset[256], sublayer[256];
+  snprintf(sub, sizeof sub, "%s", in_folder("sub"));
+  assert_int_equal(mkdir(sub, 0777), 0);
+  snprintf(asset, sizeof asset, "%s", in_folder("sub/asset.usda"));
+  snprintf(sublayer, sizeof sublayer, "%s", in_folder("below.usda"));
+  static const char asset_text[] =
+      "#usda 1.0\n( defaultPrim = \"A\" )\ndef Xform \"A\" ( references = @../below.usda@</B> ) {}";
+  static const char below_text[] = "#usda 1.0\ndef Xform \"B\" {\n" MESH(
+      "b", "") "}\ndef Xform \"w\" { def \"gone\" (active = true) {\n" MESH("c", "") "} }";
+  write_file(asset, asset_text, strlen(asset_text));
+  write_file(sublayer, below_text, strlen(below_text));
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n( subLayers = [@./below.usda@] )\nover \"w\" { over \"gone\" (active = false) {} }\n"
+      "def \"x\" ( references = @sub\\asset.usda@ ) {}\ndef \"y\" ( payload = [@sub/asset.usda@</A>, @no.usda@] ) {}\n"
+      "def \"z\" ( references = [@http://a/b.usd@, @sub/asset.usda@</none>, </z>] ) {}",
+      &report);
+  assert_int_equal(count_of(report, "meshes_placed"), 3);
+  assert_int_equal(count_of(report, "layers_read"), 3);
+  assert_string_equal(warning_of(report, 0),
+                      "/y: the payload @no.usda@ is left out: cannot open the file: No such file or directory");
+  assert_string_equal(warning_of(report, 1),
+                      "/z: the reference @http://a/b.usd@ is left out: only files beside the layer are looked for");
+  assert_string_equal(warning_of(report, 2), "/z: the reference of </none> is left out: there is no such prim");
+  assert_string_equal(warning_of(report, 3), "/z: the reference of </z> is left out: it leads back to itself");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+
+  /* A file that is there and broken is an error in that file. */
+  write_file(asset, "#usda 1.0\n?", 11);
+  qmat_context context = {0};
+  assert_int_equal(read_text(&context, "#usda 1.0\ndef \"x\" ( references = @sub/asset.usda@ ) {}", &soup, NULL),
+                   QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.file, asset);
+  assert_int_equal(context.error.line, 2);
+  qmat_soup_uninit(&soup);
+  qmat_context_uninit(&context);
+  unlink(asset);
+  unlink(sublayer);
+  rmdir(sub);
+}
+
+static void test_samples_over_time_give_the_first_with_a_warning(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup =
+      good_scene("#usda 1.0\n" MESH("m",
+                                    "double3 xformOp:translate.timeSamples = { 5: (9, 0, 0), 1: (4, 0, 0) }\n"
+                                    "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"),
+                 &report);
+  assert_true(soup.positions[0] == 4);
+  assert_string_equal(warning_of(report, 0), "/m: xformOp:translate changes over time: its first sample is taken");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_broken_meshes_are_errors_that_name_the_prim(void **state) {
+  (void)state;
+#define BROKEN(points, counts, indices, more)                                                   \
+  "#usda 1.0\ndef Mesh \"m\" { point3f[] points = " points "\nint[] faceVertexCounts = " counts \
+  "\nint[] faceVertexIndices = " indices "\n" more "}"
+#define POINTS "[(0, 0, 0), (1, 0, 0), (0, 1, 0)]"
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1]", ""), QMAT_ERROR_FORMAT,
+                       "/m: face 0 has more corners than there are faceVertexIndices");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2, 0]", ""), QMAT_ERROR_FORMAT,
+                       "/m: its faces have 3 corners, but there are 4 indices");
+  assert_scene_refused(BROKEN(POINTS, "[-3]", "[0, 1, 2]", ""), QMAT_ERROR_FORMAT,
+                       "/m: face 0 has a negative number of corners");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 3]", ""), QMAT_ERROR_FORMAT,
+                       "/m: corner 2 names vertex 3, but there are 3 points");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] holeIndices = [1]"), QMAT_ERROR_FORMAT,
+                       "/m: hole 0 names face 1, but there are 1 faces");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "uniform token subdivisionScheme = \"doo\""),
+                       QMAT_ERROR_FORMAT, "/m: subdivisionScheme is 'doo', which is unknown");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [3]\nint[] creaseIndices = [0, 1]"),
+                       QMAT_ERROR_FORMAT, "/m: crease 0 has 3 vertices");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [2]\nint[] creaseIndices = [0, 1]"),
+                       QMAT_ERROR_FORMAT, "/m: 1 creases of 2 vertices do not go with 2 indices and 0 sharpnesses");
+  assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [7]\nfloat[] cornerSharpnesses = [1]"),
+                       QMAT_ERROR_FORMAT, "/m: a corner names vertex 7, but there are 3 points");
+  assert_scene_refused(
+      BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [0]\nfloat[] cornerSharpnesses = [-1]"),
+      QMAT_ERROR_FORMAT, "/m: the sharpness of corner 0 is negative or not finite");
+  assert_scene_refused("#usda 1.0\ndef Mesh \"m\" { float[] points = [1] }", QMAT_ERROR_FORMAT,
+                       "/m: points is of another type than it has to be");
+  assert_scene_refused("#usda 1.0\ndef Mesh \"m\" {}", QMAT_ERROR_GEOMETRY,
+                       "no mesh of the scene is left; /m: the mesh has no points");
+  assert_scene_refused("#usda 1.0\ndef \"m\" ( references = @x.usd@ ) {}", QMAT_ERROR_GEOMETRY,
+                       "no mesh of the scene is left; /m: the reference @x.usd@ is left out: cannot open the file: No "
+                       "such file or directory");
+#undef BROKEN
+#undef POINTS
+}
+
+static void test_references_that_multiply_are_stopped(void **state) {
+  (void)state;
+  /* Forty levels of two references each would make 2^40 meshes. */
+  char *text = malloc(65536);
+  assert_non_null(text);
+  int used = snprintf(text, 65536, "#usda 1.0\n" MESH("l0", ""));
+  for (int level = 1; level <= 40; level++) {
+    used += snprintf(text + used, 65536 - (size_t)used,
+                     "def \"l%d\" { def \"a\" ( references = </l%d> ) {} def \"b\" ( references = </l%d> ) {} }\n",
+                     level, level - 1, level - 1);
+  }
+  qmat_context context = {0};
+  qmat_soup soup;
+  assert_int_equal(read_text(&context, text, &soup, NULL), QMAT_ERROR_FORMAT);
+  assert_non_null(strstr(context.error.message, "the scene has become larger than its files justify"));
+  qmat_soup_uninit(&soup);
+  qmat_context_uninit(&context);
+  free(text);
+}
+
+static void test_a_package_is_read_and_its_members_refer_to_each_other(void **state) {
+  (void)state;
+  static const char text[] = "#usda 1.0\n" MESH("m", "");
+  qmat_writer writer = {0};
+  qmat_usdz_put(&writer, "a.usda", text, strlen(text));
+  assert_false(writer.failed);
+  qmat_context context = {0};
+  qmat_soup soup = {0};
+  qmat_bytes bytes = memory_file(writer.bytes, writer.size);
+  assert_int_equal(qmat_usd_read(&context, &bytes, in_folder("a.usdz"), &soup, NULL), QMAT_OK);
+  assert_int_equal(soup.facet_count, 1);
+  qmat_soup_uninit(&soup);
+  qmat_usdz package;
+  assert_int_equal(qmat_usdz_open(&context, &bytes, "a.usdz", &package), QMAT_OK);
+  assert_int_equal(package.member_count, 1);
+  assert_int_equal((package.members[0].bytes - bytes.data) % 64, 0);
+  assert_string_equal(package.members[0].name, "a.usda");
+  qmat_usdz_uninit(&package);
+  /* A byte of the content that is not what its checksum says. */
+  bytes.data[bytes.size / 2] ^= 1;
+  assert_int_equal(qmat_usd_read(&context, &bytes, "a.usdz", &soup, NULL), QMAT_ERROR_FORMAT);
+  for (size_t cut = 4; cut < bytes.size; cut++) {
+    qmat_bytes part = memory_file(writer.bytes, cut);
+    soup = (qmat_soup){0};
+    assert_int_equal(qmat_usd_read(&context, &part, "a.usdz", &soup, NULL), QMAT_ERROR_FORMAT);
+    free(part.data);
+  }
+  free(bytes.data);
+  qmat_writer_uninit(&writer);
+  qmat_context_uninit(&context);
+}
+
+static void test_real_assets_are_read_whole_or_refused_by_name(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    json_int_t meshes, cages;
+    size_t facets;
+  } assets[] = {
+      {"cube.usdz", 1, 0, 6},
+      {"hair.usda", 1, 0, 1},
+      {"hair.usdc", 1, 0, 1},
+      {"texturedcube.usda", 1, 0, 6},
+      {"texturedcube.usdc", 1, 0, 6},
+      {"translated-cube.usda", 1, 0, 6},
+      {"translated-cube.usdc", 1, 0, 6},
+      {"skintest.usda", 1, 0, 100},
+      {"shader_ball_subdiv.usda", 1, 1, 5838},
+      {"primvar_interpolation.usda", 7, 7, 14},
+      {"pyramid_creases.usda", 1, 1, 12},
+  };
+  if (access(DATA "hair.usda", R_OK) != 0) {
+    print_message("skipped: %s is not there\n", DATA);
+    skip();
+  }
+  for (size_t i = 0; i < sizeof assets / sizeof assets[0]; i++) {
+    char path[256];
+    snprintf(path, sizeof path, "%s%s", DATA, assets[i].name);
+    qmat_context context = {0};
+    qmat_bytes bytes = {0};
+    qmat_soup soup = {0};
+    json_t *report = json_object();
+    qmat_status status = qmat_bytes_read_file(&context, path, &bytes);
+    if (status == QMAT_OK) status = qmat_usd_read(&context, &bytes, path, &soup, report);
+    if (status != QMAT_OK) fail_msg("%s: %s", path, context.error.message);
+    for (size_t k = 0; k < json_array_size(json_object_get(report, "warnings")); k++) {
+      print_message("%s: %s\n", assets[i].name, warning_of(report, k));
+    }
+    assert_int_equal(count_of(report, "meshes_placed"), assets[i].meshes);
+    assert_int_equal(count_of(report, "cages"), assets[i].cages);
+    assert_int_equal(soup.facet_count, assets[i].facets);
+    qmat_soup_uninit(&soup);
+    qmat_bytes_uninit(&bytes);
+    json_decref(report);
+    qmat_context_uninit(&context);
+  }
+  qmat_context context = {0};
+  qmat_bytes bytes = {0};
+  qmat_soup soup = {0};
+  assert_int_equal(qmat_bytes_read_file(&context, DATA "reference.usda", &bytes), QMAT_OK);
+  assert_int_equal(qmat_usd_read(&context, &bytes, DATA "reference.usda", &soup, NULL), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(
+      context.error.message,
+      "no mesh of the scene is left; /bora: the reference @./suzanne.usdc@ is left out: cannot open the "
+      "file: No such file or directory");
+  qmat_bytes_uninit(&bytes);
+  qmat_context_uninit(&context);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_every_operation_moves_a_point_as_by_hand),
+      cmocka_unit_test(test_operations_that_are_none_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_mirrors_and_left_hands_turn_faces_and_cancel_out),
+      cmocka_unit_test(test_holes_are_left_out_and_cages_are_reported),
+      cmocka_unit_test(test_cages_keep_schemes_creases_corners_and_holes_in_world_space),
+      cmocka_unit_test(test_what_is_hidden_inactive_or_for_other_purposes_is_skipped),
+      cmocka_unit_test(test_what_nothing_defines_is_read_where_there_is_nothing_else),
+      cmocka_unit_test(test_strength_of_arcs_is_local_inherit_variant_reference_payload_specialize),
+      cmocka_unit_test(test_children_come_through_variants_nested_variants_and_references),
+      cmocka_unit_test(test_a_variant_that_is_not_selected_is_left_out_aloud),
+      cmocka_unit_test(test_files_are_found_beside_the_layer_that_names_them),
+      cmocka_unit_test(test_samples_over_time_give_the_first_with_a_warning),
+      cmocka_unit_test(test_broken_meshes_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_references_that_multiply_are_stopped),
+      cmocka_unit_test(test_a_package_is_read_and_its_members_refer_to_each_other),
+      cmocka_unit_test(test_real_assets_are_read_whole_or_refused_by_name),
+  };
+  return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "tests/io/usd/crate_writer.h"
+#include "tests/io/usd/usd_examples.h"
+#include "tests/io/usd/usd_layers.h"
+
+#define DATA "../shared/data/usd/"
+
+static bool is_there(const char *path) {
+  return access(path, R_OK) == 0;
+}
+
+static qmat_usd_layer read_layer_file(const char *path) {
+  qmat_context context = {0};
+  qmat_usd_layer layer = {0};
+  qmat_bytes bytes = {0};
+  if (qmat_bytes_read_file(&context, path, &bytes) != QMAT_OK ||
+      qmat_usd_layer_read(&context, &bytes, path, &layer) != QMAT_OK) {
+    char line[1024];
+    qmat_error_format(&context.error, line, sizeof line);
+    fail_msg("%s", line);
+  }
+  qmat_bytes_uninit(&bytes);
+  qmat_context_uninit(&context);
+  return layer;
+}
+
+/* What differs is known to differ: the files were exported at different times, so that an object had moved, and an
+ * image had another name. */
+static void test_crates_of_real_assets_say_what_their_texts_say(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *crate, *differences;
+    size_t least; /* values to be compared */
+  } twins[] = {
+      {DATA "hair.usda", DATA "hair.usdc", "", 80},
+      {DATA "texturedcube.usda", DATA "texturedcube.usdc", "xformOp:transform.default inputs:file.default ", 120},
+      {DATA "translated-cube.usda", DATA "translated-cube.usdc", "", 64}};
+  if (!is_there(twins[0].text)) {
+    print_message("skipped: %s is not there\n", DATA);
+    skip();
+  }
+  for (size_t i = 0; i < sizeof twins / sizeof twins[0]; i++) {
+    qmat_usd_layer text = read_layer_file(twins[i].text), crate = read_layer_file(twins[i].crate);
+    char differences[1024] = "";
+    size_t compared = compare_specs(&text, text.root, &crate, crate.root, differences);
+    print_message("%s: %zu values\n", twins[i].crate, compared);
+    assert_string_equal(differences, twins[i].differences);
+    assert_true(compared >= twins[i].least);
+    assert_int_equal(text.spec_count, crate.spec_count);
+    qmat_usd_layer_uninit(&text);
+    qmat_usd_layer_uninit(&crate);
+  }
+}
+
+static void read_crate(const qmat_writer *crate, qmat_usd_layer *layer) {
+  qmat_context context = {0};
+  qmat_bytes bytes = memory_file(crate->bytes, crate->size);
+  if (qmat_usdc_read(&context, &bytes, "file", layer) != QMAT_OK) fail_msg("%s", context.error.message);
+  free(bytes.data);
+  qmat_context_uninit(&context);
+}
+
+static void test_every_kind_of_value_comes_through_a_crate_of_every_version(void **state) {
+  (void)state;
+  qmat_usd_layer text = good_layer(usd_example);
+  for (int version = 6; version <= 10; version++) {
+    qmat_usd_layer crate = {0};
+    qmat_writer writer = write_crate(&text, version);
+    read_crate(&writer, &crate);
+    char differences[1024] = "";
+    assert_true(compare_specs(&text, text.root, &crate, crate.root, differences) > 80);
+    assert_string_equal(differences, "");
+    assert_int_equal(text.spec_count, crate.spec_count);
+    const qmat_usd_spec *a = text.root->first_child, *b = crate.root->first_child;
+    for (; a; a = a->next, b = b->next) assert_string_equal(a->name, b->name);
+    assert_null(b);
+    qmat_usd_layer_uninit(&crate);
+    qmat_writer_uninit(&writer);
+  }
+  qmat_usd_layer_uninit(&text);
+}
+
+static void assert_crate_refused(const qmat_writer *crate, size_t size, const char *expected) {
+  qmat_context context = {0};
+  qmat_usd_layer layer = {0};
+  qmat_bytes bytes = memory_file(crate->bytes, size);
+  assert_int_equal(qmat_usdc_read(&context, &bytes, "file", &layer), QMAT_ERROR_FORMAT);
+  if (expected) assert_string_equal(context.error.message, expected);
+  assert_string_equal(context.error.file, "file");
+  qmat_usd_layer_uninit(&layer);
+  free(bytes.data);
+  qmat_context_uninit(&context);
+}
+
+static void test_versions_that_are_not_read_are_refused_by_number(void **state) {
+  (void)state;
+  qmat_usd_layer text = good_layer(usd_example);
+  qmat_writer writer = write_crate(&text, 8);
+  writer.bytes[9] = 5;
+  assert_crate_refused(&writer, writer.size, "the crate is of version 0.5; 0.6 to 0.10 are read");
+  writer.bytes[9] = 11;
+  assert_crate_refused(&writer, writer.size, "the crate is of version 0.11; 0.6 to 0.10 are read");
+  writer.bytes[8] = 1;
+  assert_crate_refused(&writer, writer.size, "the crate is of version 1.11; 0.6 to 0.10 are read");
+  qmat_writer_uninit(&writer);
+  qmat_usd_layer_uninit(&text);
+}
+
+static void test_every_beginning_of_a_crate_is_refused(void **state) {
+  (void)state;
+  qmat_usd_layer text = good_layer(usd_example);
+  qmat_writer writer = write_crate(&text, 8);
+  for (size_t size = 1; size < writer.size; size++) assert_crate_refused(&writer, size, NULL);
+  qmat_writer_uninit(&writer);
+  qmat_usd_layer_uninit(&text);
+}
+
+/* A count in the first table, raised: refused before anything of that size is asked for. */
+static void test_counts_beyond_the_file_are_refused(void **state) {
+  (void)state;
+  qmat_usd_layer text = good_layer(usd_example);
+  qmat_writer writer = write_crate(&text, 8);
+  qmat_byte_reader toc = {.bytes = writer.bytes, .size = writer.size, .at = 16};
+  toc.at = (size_t)qmat_take_u64(&toc) + 8;
+  for (int table = 0; table < 6; table++) {
+    toc.at += 16;
+    const size_t at = (size_t)qmat_take_u64(&toc);
+    qmat_take_u64(&toc);
+    for (int byte = 3; byte < 8; byte++) {
+      writer.bytes[at + (size_t)byte] ^= 0x7F;
+      assert_crate_refused(&writer, writer.size, NULL);
+      writer.bytes[at + (size_t)byte] ^= 0x7F;
+    }
+  }
+  qmat_writer_uninit(&writer);
+  qmat_usd_layer_uninit(&text);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_every_kind_of_value_comes_through_a_crate_of_every_version),
+      cmocka_unit_test(test_versions_that_are_not_read_are_refused_by_number),
+      cmocka_unit_test(test_every_beginning_of_a_crate_is_refused),
+      cmocka_unit_test(test_counts_beyond_the_file_are_refused),
+      cmocka_unit_test(test_crates_of_real_assets_say_what_their_texts_say),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

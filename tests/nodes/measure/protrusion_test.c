@@ -1,0 +1,321 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/protrusion.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/geometry/medial_build.h"
+#include "tests/nodes/pipeline.h"
+#include "tests/random.h"
+
+#define ROUNDING 1e-9
+
+static double distance(const double *a, const double *b) {
+  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* The largest h = r - depth over a dense grid of a primitive, and how far its points are from each other at most. */
+static double sampled(const qmat_surface *surface, const double *const spheres[], int count, int steps, double *gap) {
+  double most = -INFINITY, longest = 0;
+  for (int i = 0; i < count; i++)
+    for (int j = 0; j < i; j++) longest = fmax(longest, distance(spheres[i], spheres[j]));
+  *gap = longest / steps;
+  for (int i = 0; i <= (count > 1 ? steps : 0); i++)
+    for (int j = 0; j <= (count > 2 ? steps - i : 0); j++) {
+      double sphere[4];
+      const double w[3] = {1 - (double)(i + j) / steps, (double)i / steps, (double)j / steps};
+      for (int k = 0; k < 4; k++) {
+        sphere[k] = 0;
+        for (int c = 0; c < count; c++) sphere[k] += w[c] * spheres[c][k];
+      }
+      most = fmax(most, sphere[3] + qmat_surface_signed_distance(surface, sphere));
+    }
+  return most;
+}
+
+/* --- one primitive ------------------------------------------------------------------------------------------------ */
+
+typedef struct {
+  qmat_context context;
+  qmat_mesh *mesh;
+  qmat_surface *surface;
+} solid;
+
+static void make_solid(solid *s, qmat_mesh *mesh) {
+  *s = (solid){.mesh = mesh->base.sealed ? mesh : shape_seal(mesh)};
+  assert_int_equal(qmat_surface_new(&s->context, s->mesh, &s->surface), QMAT_OK);
+}
+
+static void free_solid(solid *s) {
+  qmat_surface_free(s->surface);
+  qmat_value_release(&s->mesh->base);
+  qmat_context_uninit(&s->context);
+}
+
+static void test_spheres_in_a_cube_by_hand(void **state) {
+  (void)state;
+  solid s;
+  make_solid(&s, shape_box(1, 1, 1));
+  /* In the unit frame the cube's half side is 1 / sqrt(12). */
+  const double half = 1 / sqrt(12.0);
+  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0, 0, 0, half}), 0, 1e-12);
+  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0, 0, 0, half + 0.1}), 0.1, 1e-12);
+  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0.1, 0, 0, half}), 0.1, 1e-12);
+  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){half + 0.2, 0, 0, 0.1}), 0.3, 1e-12);
+  const double sphere[4] = {0, 0.05, 0, half}, *const one[1] = {sphere};
+  assert_near(qmat_protrusion_bound(s.surface, one, 1, -INFINITY, 1e-6), 0.05, 1e-12);
+  free_solid(&s);
+}
+
+static void test_bound_between_the_corners_of_an_l_by_hand(void **state) {
+  (void)state;
+  /* From one arm of the L straight to the other: the middle of the way is outside, by 1 / sqrt(2) of the inner corner
+   * at its farthest. */
+  solid s;
+  make_solid(&s, shape_l());
+  const double scale = 1 / qmat_surface_frame(s.surface)->diagonal;
+  double a[4] = {1.5, 0.5, 0.5, 0}, b[4] = {0.5, 1.5, 0.5, 0};
+  double touching[4] = {1, 1, 0.5, 0.25};
+  qmat_frame_spheres_to_unit(qmat_surface_frame(s.surface), a, 1, a);
+  qmat_frame_spheres_to_unit(qmat_surface_frame(s.surface), b, 1, b);
+  qmat_frame_spheres_to_unit(qmat_surface_frame(s.surface), touching, 1, touching);
+  const double *const cone[2] = {a, b};
+  /* The way runs through the inner corner itself: h is 0 there, negative elsewhere. */
+  assert_near(qmat_protrusion_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0, 1e-6);
+  assert_near(qmat_protrusion_of_sphere(s.surface, touching), 0.25 * scale, 1e-12);
+  for (int k = 0; k < 2; k++) a[k] += 0.25 * scale, b[k] += 0.25 * scale; /* half way out: through (1.25, 1.25) */
+  assert_near(qmat_protrusion_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0.25 * scale, 1e-6);
+  free_solid(&s);
+}
+
+static void random_sphere(random_numbers *random, double sphere[4]) {
+  for (int k = 0; k < 3; k++) sphere[k] = random_between(random, -0.5, 0.5);
+  sphere[3] = random_between(random, 0, 0.3);
+}
+
+static void check_random_primitives(qmat_mesh *mesh, uint64_t seed) {
+  solid s;
+  make_solid(&s, mesh);
+  random_numbers random = {.seed = seed};
+  for (int round = 0; round < 90; round++) {
+    double spheres[3][4], gap;
+    const double *const corners[3] = {spheres[0], spheres[1], spheres[2]};
+    const int count = 1 + round % 3;
+    for (int i = 0; i < count; i++) random_sphere(&random, spheres[i]);
+    if (round % 7 == 0) memcpy(spheres[count - 1], spheres[0], sizeof spheres[0]); /* degenerate */
+    const double most = sampled(s.surface, corners, count, 40, &gap);
+    const double tolerance = round % 2 ? 1e-3 : 1e-2;
+    const double bound = qmat_protrusion_bound(s.surface, corners, count, -INFINITY, tolerance);
+    assert_true(bound >= most - ROUNDING);
+    /* Between the samples h may be larger by the slopes of both terms. */
+    double slope = 1;
+    for (int i = 0; i < count; i++)
+      for (int j = 0; j < i; j++) {
+        const double apart = distance(spheres[i], spheres[j]);
+        if (apart > 0) slope = fmax(slope, 1 + fabs(spheres[i][3] - spheres[j][3]) / apart);
+      }
+    assert_true(bound <= most + tolerance + 2 * slope * gap + ROUNDING);
+    /* Where more than that is not of interest, what is asked for comes back. */
+    assert_near(qmat_protrusion_bound(s.surface, corners, count, bound + 0.1, tolerance), bound + 0.1, ROUNDING);
+    const double half = most - 0.05;
+    const double again = qmat_protrusion_bound(s.surface, corners, count, half, tolerance);
+    assert_true(again >= most - ROUNDING && again <= most + tolerance + 2 * slope * gap + ROUNDING);
+  }
+  free_solid(&s);
+}
+
+static void test_bound_against_dense_samples_in_a_torus(void **state) {
+  (void)state;
+  check_random_primitives(shape_torus(2, 0.7, 30, 15), 1);
+}
+
+static void test_bound_against_dense_samples_in_an_l(void **state) {
+  (void)state;
+  check_random_primitives(shape_l(), 2);
+}
+
+/* --- while a medial mesh collapses -------------------------------------------------------------------------------- */
+
+typedef struct {
+  pipeline p;
+  qmat_context context;
+  qmat_surface *surface;
+  qmat_complex complex;
+  qmat_protrusion protrusion;
+  qmat_collapse collapse;
+} model;
+
+static void make_model(model *m, qmat_mesh *mesh, double limit) {
+  *m = (model){.surface = NULL};
+  pipeline_make(&m->p, mesh, "spacing=8% n_f=0", "");
+  const qmat_medial *medial = m->p.medial;
+  assert_int_equal(qmat_surface_new(&m->context, m->p.mesh, &m->surface), QMAT_OK);
+  double *spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *spheres);
+  double *depths = qmat_alloc(medial->sphere_count, sizeof *depths);
+  qmat_frame_spheres_to_unit(qmat_surface_frame(m->surface), medial->spheres, medial->sphere_count, spheres);
+  assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
+  for (size_t v = 0; v < medial->sphere_count; v++)
+    depths[v] = -qmat_surface_signed_distance(m->surface, &spheres[4 * v]);
+  assert_int_equal(qmat_protrusion_init(&m->context, &m->protrusion, m->surface, &m->complex, depths, limit), QMAT_OK);
+  qmat_free(spheres);
+  qmat_free(depths);
+}
+
+static void free_model(model *m) {
+  qmat_collapse_uninit(&m->collapse);
+  qmat_protrusion_uninit(&m->protrusion);
+  qmat_complex_uninit(&m->complex);
+  qmat_surface_free(m->surface);
+  qmat_context_uninit(&m->context);
+  pipeline_free(&m->p);
+}
+
+/* What is known of a vertex, an edge or a triangle holds on a dense grid of it. */
+static void check_vertex(const model *m, uint32_t v) {
+  const double depth = -qmat_surface_signed_distance(m->surface, &m->complex.spheres[4 * (size_t)v]);
+  assert_true(m->protrusion.depths[v] <= depth + ROUNDING);
+}
+
+static void check_edge(const model *m, uint32_t e, int steps) {
+  const double *spheres[2];
+  double gap;
+  for (size_t k = 0; k < 2; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.edges[2 * (size_t)e + k]];
+  assert_true(m->protrusion.edge_bounds[e] >= sampled(m->surface, spheres, 2, steps, &gap) - ROUNDING);
+}
+
+static void check_triangle(const model *m, uint32_t t, int steps) {
+  const double *spheres[3];
+  double gap;
+  for (size_t k = 0; k < 3; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.triangles[3 * (size_t)t + k]];
+  assert_true(m->protrusion.triangle_bounds[t] >= sampled(m->surface, spheres, 3, steps, &gap) - ROUNDING);
+}
+
+static void check_all(const model *m, int steps) {
+  for (uint32_t v = 0; v < m->complex.vertex_count; v++)
+    if (m->complex.vertex_alive[v]) check_vertex(m, v);
+  for (uint32_t e = 0; e < m->complex.edge_count; e++)
+    if (m->complex.edge_alive[e]) check_edge(m, e, steps);
+  for (uint32_t t = 0; t < m->complex.triangle_count; t++)
+    if (m->complex.triangle_alive[t]) check_triangle(m, t, steps);
+}
+
+/* The star of the merged vertex: its bounds hold, and keep the limit. */
+static void check_star(const model *m, uint32_t v, int steps) {
+  size_t count;
+  check_vertex(m, v);
+  const uint32_t *at = qmat_complex_edges_at(&m->complex, v, &count);
+  for (size_t i = 0; i < count; i++) {
+    assert_true(m->protrusion.edge_bounds[at[i]] <= m->protrusion.limit);
+    check_edge(m, at[i], steps);
+  }
+  at = qmat_complex_triangles_at(&m->complex, v, &count);
+  for (size_t i = 0; i < count; i++) {
+    assert_true(m->protrusion.triangle_bounds[at[i]] <= m->protrusion.limit);
+    check_triangle(m, at[i], steps);
+  }
+}
+
+static void check_midpoints(const model *m, const double sphere[4], bool inside) {
+  bool all = true, close = false;
+  for (size_t n = 0; n < m->collapse.neighbour_count; n++) {
+    const double *other = &m->complex.spheres[4 * (size_t)m->collapse.neighbours[n]];
+    const double middle[3] = {0.5 * (sphere[0] + other[0]), 0.5 * (sphere[1] + other[1]), 0.5 * (sphere[2] + other[2])};
+    const double depth = -qmat_surface_signed_distance(m->surface, middle);
+    all = all && depth > 0;
+    close |= fabs(depth) < 1e-7;
+  }
+  if (!close) assert_int_equal(inside, all);
+}
+
+static uint32_t random_live_edge(random_numbers *random, const qmat_complex *complex) {
+  for (;;) {
+    const size_t e = random_index(random, complex->edge_count);
+    if (complex->edge_alive[e]) return (uint32_t)e;
+  }
+}
+
+/* Random collapses, each accepted one checked around the merged vertex, and all of them at the end. */
+static void collapse_at_random(model *m, uint64_t seed, size_t least) {
+  random_numbers random = {.seed = seed};
+  size_t collapses = 0, by_sphere = 0, by_midpoints = 0, by_limit = 0, idle = 0;
+  check_all(m, 3);
+  while (m->complex.live_edges > 0 && idle < 1000) {
+    const uint32_t edge = random_live_edge(&random, &m->complex);
+    const uint32_t *ends = &m->complex.edges[2 * (size_t)edge];
+    const double *a = &m->complex.spheres[4 * (size_t)ends[0]], *b = &m->complex.spheres[4 * (size_t)ends[1]];
+    double sphere[4];
+    const double t = random_index(&random, 3) == 0 ? random_between(&random, 0, 1) : (double)random_index(&random, 2);
+    for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * a[k] + t * b[k];
+    if (random_index(&random, 4) == 0) sphere[random_index(&random, 4)] += random_between(&random, -0.02, 0.02);
+    sphere[3] = fmax(sphere[3], 0);
+    bool kept = true;
+    assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
+    const bool good = qmat_protrusion_test_sphere(&m->protrusion, &m->complex, &m->collapse, sphere);
+    const double depth = -qmat_surface_signed_distance(m->surface, sphere);
+    assert_true(m->protrusion.sphere_depth <= depth + ROUNDING);
+    if (fabs(depth) > 1e-7 && fabs(sphere[3] - depth - m->protrusion.limit) > 1e-7)
+      assert_int_equal(good, depth > 0 && sphere[3] - depth <= m->protrusion.limit);
+    idle++;
+    by_sphere += !good;
+    if (!good) continue;
+    const bool inside = qmat_protrusion_test_midpoints(&m->protrusion, &m->complex, &m->collapse, sphere);
+    check_midpoints(m, sphere, inside);
+    by_midpoints += !inside;
+    if (!inside) continue;
+    assert_int_equal(qmat_protrusion_test(&m->context, &m->protrusion, &m->complex, &m->collapse, sphere, &kept),
+                     QMAT_OK);
+    by_limit += !kept;
+    if (!kept) continue;
+    qmat_protrusion_commit(&m->protrusion, &m->collapse);
+    assert_int_equal(qmat_complex_collapse(&m->context, &m->complex, &m->collapse, sphere), QMAT_OK);
+    if (collapses++ % 8 == 0) check_star(m, m->collapse.kept, 6);
+    idle = 0;
+  }
+  check_all(m, 24);
+  assert_true(collapses >= least && by_sphere > 0 && by_midpoints > 0 && by_limit > 10);
+}
+
+static void test_bounds_hold_after_random_collapses_of_a_torus(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, pipeline_model("torus", 8), 0.02);
+  collapse_at_random(&m, 1, 500);
+  free_model(&m);
+}
+
+static void test_bounds_hold_after_random_collapses_of_an_l(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_l(), 0.05);
+  collapse_at_random(&m, 2, 300);
+  free_model(&m);
+}
+
+static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_box(1, 1, 1), INFINITY);
+  assert_int_equal(qmat_complex_preview(&m.context, &m.complex, 0, &m.collapse), QMAT_OK);
+  assert_true(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){0, 0, 0, 9}));
+  assert_false(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){0.3, 0, 0, 0}));
+  assert_false(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){5, 0, 0, 9}));
+  free_model(&m);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_spheres_in_a_cube_by_hand),
+      cmocka_unit_test(test_bound_between_the_corners_of_an_l_by_hand),
+      cmocka_unit_test(test_bound_against_dense_samples_in_a_torus),
+      cmocka_unit_test(test_bound_against_dense_samples_in_an_l),
+      cmocka_unit_test(test_bounds_hold_after_random_collapses_of_a_torus),
+      cmocka_unit_test(test_bounds_hold_after_random_collapses_of_an_l),
+      cmocka_unit_test(test_spheres_out_of_the_solid_are_refused_without_a_limit_too),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,294 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/topology.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/geometry/medial_build.h"
+#include "tests/nodes/pipeline.h"
+#include "tests/random.h"
+
+/* ---- medial meshes ---- */
+
+/* A sealed medial mesh of `count` points anywhere; the sides of triangles are added. */
+static qmat_medial *complex_of(size_t count, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
+                               size_t triangle_count) {
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  medial->sphere_count = count;
+  medial->spheres = qmat_calloc(4 * count, sizeof *medial->spheres);
+  for (size_t i = 0; i < count; i++) medial->spheres[4 * i] = (double)i;
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return medial;
+}
+
+static qmat_topology topology_of(const qmat_medial *medial) {
+  qmat_context context = {0};
+  qmat_topology t;
+  assert_int_equal(qmat_topology_of_medial(&context, medial, &t), QMAT_OK);
+  qmat_context_uninit(&context);
+  return t;
+}
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static void check_complex(size_t count, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
+                          size_t triangle_count, size_t components, size_t loops, size_t voids) {
+  qmat_medial *medial = complex_of(count, edges, edge_count, triangles, triangle_count);
+  const qmat_topology t = topology_of(medial);
+  assert_true(t.known);
+  assert_int_equal(t.components, components);
+  assert_int_equal(t.loops, loops);
+  assert_int_equal(t.voids, voids);
+  assert_int_equal(t.euler, pipeline_euler(medial));
+  qmat_value_release(&medial->base);
+}
+
+static void test_small_complexes_by_hand(void **state) {
+  (void)state;
+  check_complex(1, NULL, 0, NULL, 0, 1, 0, 0);
+  static const uint32_t ring[] = {0, 1, 1, 2, 0, 2};
+  check_complex(5, ring, 3, NULL, 0, 3, 1, 0);
+  static const uint32_t slab[] = {0, 1, 2};
+  check_complex(3, ring, 3, slab, 1, 1, 0, 0);
+  static const uint32_t hollow[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
+  check_complex(4, NULL, 0, hollow, 4, 1, 0, 1);
+  check_complex(4, NULL, 0, hollow, 3, 1, 0, 0); /* one side open */
+  static const uint32_t fan[] = {0, 1, 2, 0, 1, 3, 0, 1, 4};
+  check_complex(5, NULL, 0, fan, 3, 1, 0, 0);
+}
+
+/* A hollow tetrahedron with a strip of two slabs at one of its sides: the strip is none of its walls. */
+static void test_walls_of_a_void_by_hand(void **state) {
+  (void)state;
+  static const uint32_t triangles[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 2, 3, 4, 3, 4, 5};
+  qmat_medial *medial = complex_of(6, NULL, 0, triangles, 6);
+  qmat_context context = {0};
+  uint32_t *walls;
+  size_t count;
+  assert_int_equal(qmat_topology_find_walls(&context, medial, &walls, &count), QMAT_OK);
+  assert_int_equal(count, 4);
+  for (size_t i = 0; i < 4; i++) assert_true(medial->triangles[3 * walls[i] + 2] <= 3);
+  qmat_value_release(&medial->base);
+  medial = complex_of(4, NULL, 0, triangles, 3); /* open: nothing is left */
+  assert_int_equal(qmat_topology_find_walls(&context, medial, &walls, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_empty_triangles_by_hand(void **state) {
+  (void)state;
+  /* Of a tetrahedron's four triangles two are there, the third sphere has a loop of its own, and a square has none. */
+  static const uint32_t edges[] = {2, 3, 3, 4, 2, 4, 4, 5, 5, 6, 6, 7, 4, 7, 0, 3};
+  static const uint32_t triangles[] = {0, 1, 2, 1, 2, 3};
+  qmat_medial *medial = complex_of(8, edges, COUNT(edges) / 2, triangles, 2);
+  qmat_context context = {0};
+  uint32_t *corners;
+  size_t count;
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 3);
+  static const uint32_t expected[] = {0, 1, 3, 0, 2, 3, 2, 3, 4};
+  assert_memory_equal(corners, expected, sizeof expected);
+  qmat_value_release(&medial->base);
+  static const uint32_t ring[] = {0, 1, 1, 2, 2, 3, 0, 3};
+  medial = complex_of(4, ring, 4, NULL, 0);
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  medial = complex_of(1, NULL, 0, NULL, 0);
+  assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
+  assert_int_equal(count, 0);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_hollows_that_share_a_side_are_two(void **state) {
+  (void)state;
+  /* Tetrahedra over and under the triangle 0 1 2: their edges in common lie on three triangles. */
+  static const uint32_t two[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 0, 1, 4, 0, 2, 4, 1, 2, 4};
+  check_complex(5, NULL, 0, two, 7, 1, 0, 2);
+  check_complex(5, NULL, 0, two + 3, 6, 1, 0, 1); /* without the wall between them */
+  /* With a flap on the edge from top to bottom, which closes a ring around the edge of the wall. */
+  static const uint32_t flag[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 0, 1, 4, 0, 2, 4, 1, 2, 4, 3, 4, 5};
+  check_complex(6, NULL, 0, flag, 8, 1, 1, 2);
+}
+
+static void test_surfaces_without_a_side_are_told_over_z2(void **state) {
+  (void)state;
+  /* Moebius' torus of seven vertices, and the projective plane of six. */
+  uint32_t torus[42];
+  for (uint32_t i = 0; i < 7; i++) {
+    const uint32_t rows[6] = {i, (i + 1) % 7, (i + 3) % 7, i, (i + 2) % 7, (i + 3) % 7};
+    memcpy(torus + 6 * i, rows, sizeof rows);
+  }
+  check_complex(7, NULL, 0, torus, 14, 1, 2, 1);
+  static const uint32_t plane[] = {0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 5, 0, 1, 5,
+                                   1, 2, 4, 2, 4, 5, 2, 3, 5, 1, 3, 5, 1, 3, 4};
+  check_complex(6, NULL, 0, plane, 10, 1, 1, 1);
+  static const uint32_t strip[] = {0, 1, 2, 1, 2, 3, 2, 3, 4, 0, 3, 4, 0, 1, 4};
+  check_complex(5, NULL, 0, strip, 5, 1, 1, 0);
+}
+
+/* The rank over Z/2 of the edges' rows over the triangles, by elimination in full. */
+static size_t rank_in_full(const qmat_medial *m) {
+  enum { MOST = 64 };
+  uint64_t rows[1024];
+  size_t rank = 0;
+  assert_true(m->triangle_count <= MOST && m->edge_count <= COUNT(rows));
+  for (size_t e = 0; e < m->edge_count; e++) {
+    rows[e] = 0;
+    for (size_t t = 0; t < m->triangle_count; t++) {
+      int ends = 0;
+      for (size_t k = 0; k < 3; k++)
+        ends += m->triangles[3 * t + k] == m->edges[2 * e] || m->triangles[3 * t + k] == m->edges[2 * e + 1];
+      if (ends == 2) rows[e] |= UINT64_C(1) << t;
+    }
+  }
+  for (size_t bit = 0; bit < m->triangle_count; bit++) {
+    size_t pivot = rank;
+    while (pivot < m->edge_count && !(rows[pivot] >> bit & 1)) pivot++;
+    if (pivot == m->edge_count) continue;
+    const uint64_t swap = rows[pivot];
+    rows[pivot] = rows[rank];
+    rows[rank] = swap;
+    for (size_t e = 0; e < m->edge_count; e++)
+      if (e != rank && (rows[e] >> bit & 1)) rows[e] ^= rows[rank];
+    rank++;
+  }
+  return rank;
+}
+
+static void test_random_complexes_have_the_rank_of_full_elimination(void **state) {
+  (void)state;
+  random_numbers random = {.seed = 1};
+  size_t with_voids = 0;
+  for (int round = 0; round < 300; round++) {
+    const size_t points = 4 + random_index(&random, 6), rows = 1 + random_index(&random, 60);
+    uint32_t triangles[180], edges[8];
+    for (size_t i = 0; i < 3 * rows; i++) triangles[i] = (uint32_t)random_index(&random, points);
+    for (size_t i = 0; i < COUNT(edges); i++) edges[i] = (uint32_t)random_index(&random, points);
+    qmat_medial *medial = complex_of(points, edges, COUNT(edges) / 2, triangles, rows);
+    const qmat_topology t = topology_of(medial);
+    assert_true(t.known);
+    assert_int_equal(t.voids, medial->triangle_count - rank_in_full(medial));
+    assert_int_equal(t.components, pipeline_components(medial));
+    assert_int_equal((long)t.components - (long)t.loops + (long)t.voids, pipeline_euler(medial));
+    with_voids += t.voids > 1;
+    qmat_value_release(&medial->base);
+  }
+  assert_true(with_voids > 50);
+}
+
+static void test_a_large_sheet_with_flaps_is_done_at_once(void **state) {
+  (void)state;
+  /* A torus of n x n squares, each edge of one direction with a flap: every such edge lies on three triangles. */
+  enum { N = 150 };
+  uint32_t *triangles = malloc(3 * 3 * N * N * sizeof *triangles);
+  assert_non_null(triangles);
+  size_t count = 0;
+  for (uint32_t i = 0; i < N; i++)
+    for (uint32_t j = 0; j < N; j++) {
+      const uint32_t a = i * N + j, b = (i + 1) % N * N + j, c = (i + 1) % N * N + (j + 1) % N, d = i * N + (j + 1) % N;
+      const uint32_t rows[9] = {a, b, c, a, c, d, a, b, N * N + a};
+      memcpy(triangles + 3 * count, rows, sizeof rows);
+      count += 3;
+    }
+  check_complex(2 * N * N, NULL, 0, triangles, count, 1, 2, 1);
+  free(triangles);
+}
+
+/* ---- solids ---- */
+
+/* Takes the mesh over. */
+static qmat_topology solid_of(qmat_mesh *mesh) {
+  qmat_context context = {0};
+  qmat_surface *surface;
+  qmat_topology t;
+  shape_seal(mesh);
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  assert_int_equal(qmat_topology_of_solid(&context, surface, &t), QMAT_OK);
+  qmat_surface_free(surface);
+  qmat_value_release(&mesh->base);
+  qmat_context_uninit(&context);
+  return t;
+}
+
+static void check_solid(qmat_mesh *mesh, size_t components, size_t loops, size_t voids) {
+  const qmat_topology t = solid_of(mesh);
+  assert_true(t.known);
+  assert_int_equal(t.components, components);
+  assert_int_equal(t.loops, loops);
+  assert_int_equal(t.voids, voids);
+  assert_int_equal(t.euler, (int64_t)components - (int64_t)loops + (int64_t)voids);
+}
+
+static void test_solids_by_hand(void **state) {
+  (void)state;
+  check_solid(shape_box(1, 2, 3), 1, 0, 0);
+  check_solid(shape_l(), 1, 0, 0);
+  check_solid(shape_torus(3, 1, 12, 8), 1, 1, 0);
+  qmat_mesh *mesh = shape_box(4, 4, 4);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, true);
+  shape_add_box(mesh, 9, 9, 9, 10, 10, 10, false);
+  check_solid(mesh, 2, 0, 1);
+  mesh = shape_torus(3, 1, 12, 8); /* a box in the hole, and one within the tube */
+  shape_add_box(mesh, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, false);
+  shape_add_box(mesh, 2.8, -0.1, -0.1, 3.2, 0.1, 0.1, false);
+  check_solid(mesh, 2, 1, 0);
+}
+
+static void test_an_island_in_a_void_is_a_component(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(4, 4, 4);
+  shape_add_box(mesh, 1, 1, 1, 3, 3, 3, true);
+  shape_add_box(mesh, 1.5, 1.5, 1.5, 2.5, 2.5, 2.5, false);
+  check_solid(mesh, 2, 0, 1);
+}
+
+static void test_boxes_that_meet_in_a_corner_are_apart(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
+    if (mesh->triangles[i] == 8) mesh->triangles[i] = 7; /* both are (1, 1, 1) */
+  check_solid(mesh, 2, 0, 0);
+}
+
+static void test_nothing_is_said_of_open_and_branching_surfaces(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  mesh->triangle_count--;
+  assert_false(solid_of(mesh).known);
+  mesh = shape_box(1, 1, 1); /* two boxes with an edge in common: four triangles at it */
+  shape_add_box(mesh, 1, 1, 0, 2, 2, 1, false);
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    if (mesh->triangles[i] == 8) mesh->triangles[i] = 3;
+    if (mesh->triangles[i] == 12) mesh->triangles[i] = 7;
+  }
+  assert_false(solid_of(mesh).known);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_small_complexes_by_hand),
+      cmocka_unit_test(test_walls_of_a_void_by_hand),
+      cmocka_unit_test(test_empty_triangles_by_hand),
+      cmocka_unit_test(test_hollows_that_share_a_side_are_two),
+      cmocka_unit_test(test_surfaces_without_a_side_are_told_over_z2),
+      cmocka_unit_test(test_random_complexes_have_the_rank_of_full_elimination),
+      cmocka_unit_test(test_a_large_sheet_with_flaps_is_done_at_once),
+      cmocka_unit_test(test_solids_by_hand),
+      cmocka_unit_test(test_an_island_in_a_void_is_a_component),
+      cmocka_unit_test(test_boxes_that_meet_in_a_corner_are_apart),
+      cmocka_unit_test(test_nothing_is_said_of_open_and_branching_surfaces),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
