@@ -47,16 +47,16 @@ void *qmat_arena_alloc(qmat_arena *arena, size_t count, size_t size) {
   if (bytes == 0) return NULL;
 
   qmat_arena_block *block = arena->newest;
-  if (block == NULL || block->capacity - block->used < bytes) {
+  if (!block || block->capacity - block->used < bytes) {
     size_t capacity = block == NULL ? FIRST_BLOCK : block->capacity;
-    if (block != NULL && capacity < LARGEST_SHARED_BLOCK) capacity *= 2;
+    if (block && capacity < LARGEST_SHARED_BLOCK) capacity *= 2;
     if (capacity > LARGEST_SHARED_BLOCK) capacity = LARGEST_SHARED_BLOCK;
     if (capacity < bytes) capacity = bytes;
     qmat_arena_block *fresh = aligned_alloc(ALIGNMENT, ALIGNMENT + capacity);
-    if (fresh == NULL) return NULL;
+    if (!fresh) return NULL;
     *fresh = (qmat_arena_block){.older = block, .capacity = capacity};
     ASAN_POISON_MEMORY_REGION(block_memory(fresh), capacity);
-    if (block != NULL && block->capacity - block->used > capacity - bytes) {
+    if (block && block->capacity - block->used > capacity - bytes) {
       /* A large array took a block of its own: what is left of the current one stays in use. */
       fresh->older = block->older;
       block->older = fresh;
@@ -74,14 +74,14 @@ void *qmat_arena_alloc(qmat_arena *arena, size_t count, size_t size) {
 
 void *qmat_arena_calloc(qmat_arena *arena, size_t count, size_t size) {
   void *memory = qmat_arena_alloc(arena, count, size);
-  if (memory != NULL) memset(memory, 0, count * size);
+  if (memory) memset(memory, 0, count * size);
   return memory;
 }
 
 void qmat_arena_uninit(qmat_arena *arena) {
-  if (arena == NULL) return;
+  if (!arena) return;
   qmat_arena_block *block = arena->newest;
-  while (block != NULL) {
+  while (block) {
     qmat_arena_block *older = block->older;
     ASAN_UNPOISON_MEMORY_REGION(block_memory(block), block->capacity);
     free(block);
@@ -94,13 +94,13 @@ void *qmat_alloc(size_t count, size_t size) {
   const size_t bytes = padded_bytes(count, size);
   if (bytes == 0) return NULL;
   uint8_t *memory = aligned_alloc(ALIGNMENT, bytes);
-  if (memory != NULL) memset(memory + count * size, 0, PADDING);
+  if (memory) memset(memory + count * size, 0, PADDING);
   return memory;
 }
 
 void *qmat_calloc(size_t count, size_t size) {
   void *memory = qmat_alloc(count, size);
-  if (memory != NULL) memset(memory, 0, count * size);
+  if (memory) memset(memory, 0, count * size);
   return memory;
 }
 
@@ -109,13 +109,13 @@ void qmat_free(void *memory) {
 }
 
 int qmat_grow(void **array, size_t *capacity, size_t needed, size_t size) {
-  if (needed <= *capacity && *array != NULL) return 0;
+  if (needed <= *capacity && *array) return 0;
   size_t wanted = *capacity > SIZE_MAX / 2 ? SIZE_MAX : *capacity * 2;
   if (wanted < needed) wanted = needed;
   if (wanted < 16) wanted = 16;
   void *grown = qmat_alloc(wanted, size);
-  if (grown == NULL) return -1;
-  if (*array != NULL) memcpy(grown, *array, *capacity * size);
+  if (!grown) return -1;
+  if (*array) memcpy(grown, *array, *capacity * size);
   qmat_free(*array);
   *array = grown;
   *capacity = wanted;

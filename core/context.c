@@ -10,7 +10,7 @@
 static const int64_t PROGRESS_INTERVAL = 50000000; /* nanoseconds */
 
 void qmat_context_uninit(qmat_context *context) {
-  if (context != NULL) qmat_arena_uninit(&context->arena);
+  if (context) qmat_arena_uninit(&context->arena);
 }
 
 int qmat_threads(const qmat_context *context) {
@@ -20,12 +20,12 @@ int qmat_threads(const qmat_context *context) {
 }
 
 void qmat_note_file_read(const qmat_context *context, const char *path, const uint8_t *bytes, size_t size) {
-  if (context->file_read != NULL) context->file_read(context->file_read_user, path, bytes, size);
+  if (context->file_read) context->file_read(context->file_read_user, path, bytes, size);
 }
 
 /* Copies what fits, without cutting a UTF-8 sequence; NULL becomes "". */
 static void copy_text(char *to, size_t size, const char *from) {
-  if (from == NULL) from = "";
+  if (!from) from = "";
   size_t length = strnlen(from, size);
   if (length >= size) {
     length = size - 1;
@@ -98,7 +98,7 @@ qmat_status qmat_fail_memory(qmat_context *context, const char *what) {
 }
 
 qmat_status qmat_progress(qmat_context *context, uint64_t done, uint64_t total, const char *unit) {
-  if (context->progress == NULL) return QMAT_OK;
+  if (!context->progress) return QMAT_OK;
   struct timespec time = {0};
   clock_gettime(CLOCK_MONOTONIC, &time);
   const int64_t now = (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
@@ -144,7 +144,7 @@ void qmat_error_format(const qmat_error *error, char *text, size_t size) {
   if (error->hint[0] != '\0') APPEND(" (%s)", error->hint);
 #undef APPEND
   /* Names and library texts may hold line ends and terminal controls. */
-  for (size_t i = 0; i < used; ++i) {
+  for (size_t i = 0; i < used; i++) {
     if ((unsigned char)line[i] < 0x20 || line[i] == 0x7F) line[i] = ' ';
   }
   copy_text(text, size, line);

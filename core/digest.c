@@ -11,7 +11,7 @@
 qmat_status qmat_hasher_init(qmat_hasher *hasher) {
   EVP_MD_CTX *state = EVP_MD_CTX_new();
   hasher->state = NULL;
-  if (state == NULL) return QMAT_ERROR_MEMORY;
+  if (!state) return QMAT_ERROR_MEMORY;
   if (EVP_DigestInit_ex(state, EVP_sha256(), NULL) != 1) {
     EVP_MD_CTX_free(state);
     return QMAT_ERROR_DEPENDENCY;
@@ -21,13 +21,13 @@ qmat_status qmat_hasher_init(qmat_hasher *hasher) {
 }
 
 void qmat_hasher_add(qmat_hasher *hasher, const void *bytes, size_t size) {
-  if (hasher->state == NULL || size == 0) return;
+  if (!hasher->state || size == 0) return;
   if (EVP_DigestUpdate(hasher->state, bytes, size) != 1) qmat_hasher_finish(hasher, NULL);
 }
 
 qmat_status qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest) {
   bool done = hasher->state != NULL;
-  if (digest != NULL) {
+  if (digest) {
     memset(digest, 0, sizeof *digest);
     done = done && EVP_DigestFinal_ex(hasher->state, digest->bytes, NULL) == 1;
   }
@@ -37,7 +37,7 @@ qmat_status qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest) {
 }
 
 void qmat_digest_hex(const qmat_digest *digest, char text[65]) {
-  for (size_t i = 0; i < sizeof digest->bytes; ++i) {
+  for (size_t i = 0; i < sizeof digest->bytes; i++) {
     text[2 * i] = "0123456789abcdef"[digest->bytes[i] >> 4];
     text[2 * i + 1] = "0123456789abcdef"[digest->bytes[i] & 15];
   }
@@ -86,7 +86,7 @@ static int hex_digit(char c) {
 bool qmat_digest_parse(const char *text, qmat_digest *digest) {
   qmat_digest parsed;
   if (strnlen(text, 65) != 64) return false;
-  for (size_t i = 0; i < sizeof parsed.bytes; ++i) {
+  for (size_t i = 0; i < sizeof parsed.bytes; i++) {
     const int high = hex_digit(text[2 * i]), low = hex_digit(text[2 * i + 1]);
     if (high < 0 || low < 0) return false;
     parsed.bytes[i] = (uint8_t)(16 * high + low);

@@ -29,7 +29,7 @@ char *qmat_json_text(const json_t *json, size_t flags, size_t *size) {
     qmat_free(text.bytes);
     return NULL;
   }
-  if (size != NULL) *size = text.size;
+  if (size) *size = text.size;
   return text.bytes;
 }
 

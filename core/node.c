@@ -11,13 +11,13 @@
 
 size_t qmat_param_count(const qmat_node *node) {
   size_t count = 0;
-  while (node->params != NULL && node->params[count].name != NULL) ++count;
+  while (node->params && node->params[count].name) count++;
   return count;
 }
 
 static size_t port_count(const qmat_port *ports) {
   size_t count = 0;
-  while (ports != NULL && ports[count].name != NULL) ++count;
+  while (ports && ports[count].name) count++;
   return count;
 }
 
@@ -30,14 +30,14 @@ size_t qmat_output_count(const qmat_node *node) {
 }
 
 const qmat_param *qmat_param_find(const qmat_node *node, const char *name) {
-  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+  for (size_t i = 0; i < qmat_param_count(node); i++) {
     if (strcmp(node->params[i].name, name) == 0) return &node->params[i];
   }
   return NULL;
 }
 
 static size_t port_find(const qmat_port *ports, const char *name) {
-  for (size_t i = 0; i < port_count(ports); ++i) {
+  for (size_t i = 0; i < port_count(ports); i++) {
     if (strcmp(ports[i].name, name) == 0) return i;
   }
   return SIZE_MAX;
@@ -62,7 +62,7 @@ static const void *const_slot(const qmat_param *param, const void *params) {
 
 void qmat_params_default(const qmat_node *node, void *params) {
   if (node->params_size > 0) memset(params, 0, node->params_size);
-  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+  for (size_t i = 0; i < qmat_param_count(node); i++) {
     const qmat_param *param = &node->params[i];
     void *place = slot(param, params);
     switch (param->type) {
@@ -92,7 +92,7 @@ static bool is_digit(char c) {
 
 /* Skips a run of digits. */
 static const char *skip_digits(const char *text) {
-  while (is_digit(*text)) ++text;
+  while (is_digit(*text)) text++;
   return text;
 }
 
@@ -148,7 +148,7 @@ void qmat_format_number(double number, char *text, size_t size) {
   char shortest[40];
   /* "%.15g" drops trailing zeros and so is the shortest where 15 digits do, but for numbers of reduced precision. */
   const int first = number != 0 && fabs(number) < DBL_MIN ? 1 : 15;
-  for (int precision = first; precision <= 17; ++precision) {
+  for (int precision = first; precision <= 17; precision++) {
     snprintf(shortest, sizeof shortest, "%.*g", precision, number);
     if (strtod(shortest, NULL) == number) break;
   }
@@ -167,10 +167,10 @@ enum { LONGEST_NAME = 63 };
 static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length) {
   size_t rows[3][LONGEST_NAME + 1];
   size_t *before = rows[0], *last = rows[1], *row = rows[2];
-  for (size_t j = 0; j <= b_length; ++j) last[j] = j;
-  for (size_t i = 1; i <= a_length; ++i) {
+  for (size_t j = 0; j <= b_length; j++) last[j] = j;
+  for (size_t i = 1; i <= a_length; i++) {
     row[0] = i;
-    for (size_t j = 1; j <= b_length; ++j) {
+    for (size_t j = 1; j <= b_length; j++) {
       row[j] = smaller(smaller(last[j], row[j - 1]) + 1, last[j - 1] + (a[i - 1] != b[j - 1]));
       if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = smaller(row[j], before[j - 2] + 1);
     }
@@ -187,7 +187,7 @@ const char *qmat_nearest_name(const char *text, const char *const *names, size_t
   if (length > LONGEST_NAME) return NULL;
   const char *nearest = NULL;
   size_t nearest_distance = smaller(1 + length / 3 + 1, length); /* a wholly different letter is not near */
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     const size_t name_length = strnlen(names[i], LONGEST_NAME + 1);
     if (name_length > LONGEST_NAME) continue;
     const size_t distance = edit_distance(text, length, names[i], name_length);
@@ -202,7 +202,7 @@ const char *qmat_nearest_name(const char *text, const char *const *names, size_t
 /* The unit in parentheses after a range, or nothing for plain numbers. */
 static void format_unit(const qmat_param *param, char *text, size_t size) {
   text[0] = '\0';
-  if (param->unit != NULL && param->unit[0] != '\0' && strcmp(param->unit, "1") != 0) {
+  if (param->unit && param->unit[0] != '\0' && strcmp(param->unit, "1") != 0) {
     snprintf(text, size, " (%s)", param->unit);
   }
 }
@@ -238,7 +238,7 @@ static bool float_in_range(const qmat_param *param, double value) {
 
 static qmat_status parse_bool(qmat_context *context, const qmat_param *param, const char *text, bool *value) {
   static const char *const words[] = {"false", "true", "no", "yes", "off", "on"};
-  for (size_t i = 0; i < sizeof words / sizeof *words; ++i) {
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
     if (strcmp(text, words[i]) == 0) {
       *value = i % 2 == 1;
       return QMAT_OK;
@@ -279,7 +279,7 @@ static qmat_status parse_float(qmat_context *context, const qmat_param *param, c
 
 static size_t choice_count(const qmat_param *param) {
   size_t count = 0;
-  while (param->choices != NULL && param->choices[count] != NULL) ++count;
+  while (param->choices && param->choices[count]) count++;
   return count;
 }
 
@@ -288,7 +288,7 @@ static qmat_status parse_enum(qmat_context *context, const qmat_param *param, co
   char list[400];
   size_t used = 0;
   list[0] = '\0';
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     if (strcmp(text, param->choices[i]) == 0) {
       *value = (int)i;
       return QMAT_OK;
@@ -300,7 +300,7 @@ static qmat_status parse_enum(qmat_context *context, const qmat_param *param, co
   }
   qmat_fail(context, QMAT_ERROR_USAGE, "%s must be %s, not '%s'", param->name, list, text);
   const char *nearest = qmat_nearest_name(text, param->choices, count);
-  if (nearest != NULL) qmat_fail_hint(context, "did you mean '%s'?", nearest);
+  if (nearest) qmat_fail_hint(context, "did you mean '%s'?", nearest);
   return qmat_fail_field(context, param->name);
 }
 
@@ -334,7 +334,7 @@ qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const
 }
 
 qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, const void *params) {
-  for (size_t i = 0; i < qmat_param_count(node); ++i) {
+  for (size_t i = 0; i < qmat_param_count(node); i++) {
     const qmat_param *param = &node->params[i];
     const void *place = const_slot(param, params);
     char text[40];
@@ -366,12 +366,12 @@ static bool fits(const qmat_port *port, const qmat_value *value) {
 }
 
 static qmat_status check_inputs(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[]) {
-  for (size_t i = 0; i < qmat_input_count(node); ++i) {
+  for (size_t i = 0; i < qmat_input_count(node); i++) {
     const qmat_port *port = &node->inputs[i];
     const qmat_value *value = inputs[i];
-    if (value == NULL && port->optional) continue;
-    if (value != NULL && value->sealed && fits(port, value)) continue;
-    if (value == NULL) {
+    if (!value && port->optional) continue;
+    if (value && value->sealed && fits(port, value)) continue;
+    if (!value) {
       qmat_fail(context, QMAT_ERROR_USAGE, "a %s must be given", qmat_value_type_name(port->type));
     } else if (value->sealed && !fits(port, value)) {
       qmat_fail(context, QMAT_ERROR_USAGE, "a %s is given, not a %s", qmat_value_type_name(value->type),
@@ -386,18 +386,18 @@ static qmat_status check_inputs(qmat_context *context, const qmat_node *node, co
 
 static qmat_status check_counts(qmat_context *context, const qmat_node *node, const void *params,
                                 const qmat_value *const inputs[]) {
-  if (node->check_counts == NULL) return QMAT_OK;
+  if (!node->check_counts) return QMAT_OK;
   size_t *counts = qmat_alloc(qmat_input_count(node), sizeof *counts);
-  if (counts == NULL) return qmat_fail_memory(context, "the counts of values");
-  for (size_t i = 0; i < qmat_input_count(node); ++i) counts[i] = qmat_value_count(inputs[i]);
+  if (!counts) return qmat_fail_memory(context, "the counts of values");
+  for (size_t i = 0; i < qmat_input_count(node); i++) counts[i] = qmat_value_count(inputs[i]);
   const qmat_status status = node->check_counts(context, params, counts);
   qmat_free(counts);
   return status;
 }
 
 static qmat_status check_outputs(qmat_context *context, const qmat_node *node, qmat_value *const outputs[]) {
-  for (size_t i = 0; i < qmat_output_count(node); ++i) {
-    if (outputs[i] != NULL && outputs[i]->sealed && fits(&node->outputs[i], outputs[i])) continue;
+  for (size_t i = 0; i < qmat_output_count(node); i++) {
+    if (outputs[i] && outputs[i]->sealed && fits(&node->outputs[i], outputs[i])) continue;
     qmat_fail(context, QMAT_ERROR_INTERNAL, "the node did not make its output '%s'", node->outputs[i].name);
     return qmat_fail_field(context, node->outputs[i].name);
   }
@@ -408,7 +408,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
                           const qmat_value *const inputs[], qmat_value *outputs[]) {
   const char *outer = context->node_type;
   context->node_type = node->name;
-  for (size_t i = 0; i < qmat_output_count(node); ++i) outputs[i] = NULL;
+  for (size_t i = 0; i < qmat_output_count(node); i++) outputs[i] = NULL;
   qmat_status status = check_inputs(context, node, inputs);
   if (status == QMAT_OK) status = check_counts(context, node, params, inputs);
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "");
@@ -421,7 +421,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
       qmat_fail(context, status, "the node failed and did not say why");
     }
   }
-  for (size_t i = 0; status != QMAT_OK && i < qmat_output_count(node); ++i) {
+  for (size_t i = 0; status != QMAT_OK && i < qmat_output_count(node); i++) {
     qmat_value_release(outputs[i]);
     outputs[i] = NULL;
   }

@@ -181,7 +181,7 @@ static bool has_pointer(const row *r) {
 
 static void *value_new(qmat_value_type type) {
   qmat_value *value = qmat_calloc(1, value_types[type].size);
-  if (value == NULL) return NULL;
+  if (!value) return NULL;
   value->type = type;
   atomic_init(&value->references, 1);
   return value;
@@ -213,9 +213,9 @@ qmat_chain *qmat_chain_new(void) {
 
 qmat_report *qmat_report_new(void) {
   qmat_report *report = value_new(QMAT_REPORT);
-  if (report == NULL) return NULL;
+  if (!report) return NULL;
   report->root = json_object();
-  if (report->root == NULL) {
+  if (!report->root) {
     qmat_value_release(&report->base);
     return NULL;
   }
@@ -232,10 +232,10 @@ qmat_failure *qmat_failure_new(void) {
 
 qmat_list *qmat_list_new(size_t count) {
   qmat_list *list = value_new(QMAT_LIST);
-  if (list == NULL) return NULL;
+  if (!list) return NULL;
   list->items = qmat_calloc(count, sizeof *list->items);
   list->names = qmat_calloc(count, sizeof *list->names);
-  if (list->items != NULL && list->names != NULL) {
+  if (list->items && list->names) {
     list->count = count;
     return list;
   }
@@ -244,7 +244,7 @@ qmat_list *qmat_list_new(size_t count) {
 }
 
 size_t qmat_value_count(const qmat_value *value) {
-  if (value == NULL) return 0;
+  if (!value) return 0;
   return value->type == QMAT_LIST ? ((const qmat_list *)value)->count : 1;
 }
 
@@ -254,7 +254,7 @@ const qmat_value *qmat_value_at(const qmat_value *value, size_t index) {
 
 qmat_value_type qmat_value_item_type(const qmat_value *value) {
   size_t index = 0;
-  while (index + 1 < qmat_value_count(value) && qmat_value_at(value, index)->type == QMAT_FAILURE) ++index;
+  while (index + 1 < qmat_value_count(value) && qmat_value_at(value, index)->type == QMAT_FAILURE) index++;
   return qmat_value_at(value, index)->type;
 }
 
@@ -267,52 +267,52 @@ qmat_value *qmat_failure_of_error(qmat_context *context) {
   char reason[2048];
   error.node_id[0] = error.file[0] = '\0';
   qmat_error_format(&error, reason, sizeof reason);
-  for (char *c = reason; !qmat_is_utf8(reason) && *c != '\0'; ++c) {
+  for (char *c = reason; !qmat_is_utf8(reason) && *c != '\0'; c++) {
     if ((unsigned char)*c >= 0x80) *c = '?';
   }
   qmat_failure *failure = qmat_failure_new();
-  if (failure != NULL) failure->reason = qmat_strdup(reason);
-  if (failure == NULL || failure->reason == NULL) {
+  if (failure) failure->reason = qmat_strdup(reason);
+  if (!failure || !failure->reason) {
     qmat_fail_memory(context, "the reason of a failure");
   } else if (qmat_value_seal(context, &failure->base) == QMAT_OK) {
     return &failure->base;
   }
-  if (failure != NULL) qmat_value_release(&failure->base);
+  if (failure) qmat_value_release(&failure->base);
   return NULL;
 }
 
 char *qmat_strdup(const char *text) {
   const size_t size = strlen(text) + 1;
   char *copy = qmat_alloc(size, 1);
-  if (copy != NULL) memcpy(copy, text, size);
+  if (copy) memcpy(copy, text, size);
   return copy;
 }
 
 qmat_value *qmat_value_retain(const qmat_value *value) {
   qmat_value *shared = (qmat_value *)value; /* the count of readers is the one part of a sealed value that changes */
-  if (shared != NULL) atomic_fetch_add_explicit(&shared->references, 1, memory_order_relaxed);
+  if (shared) atomic_fetch_add_explicit(&shared->references, 1, memory_order_relaxed);
   return shared;
 }
 
 void qmat_value_release(qmat_value *value) {
-  if (value == NULL || atomic_fetch_sub_explicit(&value->references, 1, memory_order_acq_rel) != 1) return;
-  for (const row *r = rows_of(value); r->name != NULL; ++r) {
+  if (!value || atomic_fetch_sub_explicit(&value->references, 1, memory_order_acq_rel) != 1) return;
+  for (const row *r = rows_of(value); r->name != NULL; r++) {
     if (!has_pointer(r)) continue;
     void *pointer = pointer_of(value, r);
     if (r->element == ELEMENT_JSON) {
       json_decref(pointer);
       continue;
     }
-    if (r->element == ELEMENT_PARTS && pointer != NULL) {
+    if (r->element == ELEMENT_PARTS && pointer) {
       const qmat_file_part *parts = pointer;
-      for (size_t i = 0; i < count_of(value, r); ++i) {
+      for (size_t i = 0; i < count_of(value, r); i++) {
         qmat_free(parts[i].name);
         qmat_free(parts[i].bytes);
       }
     }
-    for (size_t i = 0; r->element == ELEMENT_ITEMS && pointer != NULL && i < count_of(value, r); ++i)
+    for (size_t i = 0; r->element == ELEMENT_ITEMS && pointer && i < count_of(value, r); i++)
       qmat_value_release(((qmat_value **)pointer)[i]);
-    for (size_t i = 0; r->element == ELEMENT_NAMES && pointer != NULL && i < count_of(value, r); ++i)
+    for (size_t i = 0; r->element == ELEMENT_NAMES && pointer && i < count_of(value, r); i++)
       qmat_free(((char **)pointer)[i]);
     qmat_free(pointer);
   }
@@ -333,28 +333,28 @@ typedef struct sink {
 
 static void put(sink *to, const void *bytes, size_t size) {
   if (size == 0) return;
-  if (to->hasher != NULL) qmat_hasher_add(to->hasher, bytes, size);
-  if (to->bytes != NULL) memcpy(to->bytes + to->used, bytes, size);
+  if (to->hasher) qmat_hasher_add(to->hasher, bytes, size);
+  if (to->bytes) memcpy(to->bytes + to->used, bytes, size);
   to->used += size;
 }
 
 static void encode_u32(uint8_t *to, uint32_t number) {
-  for (int i = 0; i < 4; ++i) to[i] = (uint8_t)(number >> (8 * i));
+  for (int i = 0; i < 4; i++) to[i] = (uint8_t)(number >> (8 * i));
 }
 
 static void encode_u64(uint8_t *to, uint64_t number) {
-  for (int i = 0; i < 8; ++i) to[i] = (uint8_t)(number >> (8 * i));
+  for (int i = 0; i < 8; i++) to[i] = (uint8_t)(number >> (8 * i));
 }
 
 static uint32_t decode_u32(const uint8_t *from) {
   uint32_t number = 0;
-  for (int i = 0; i < 4; ++i) number |= (uint32_t)from[i] << (8 * i);
+  for (int i = 0; i < 4; i++) number |= (uint32_t)from[i] << (8 * i);
   return number;
 }
 
 static uint64_t decode_u64(const uint8_t *from) {
   uint64_t number = 0;
-  for (int i = 0; i < 8; ++i) number |= (uint64_t)from[i] << (8 * i);
+  for (int i = 0; i < 8; i++) number |= (uint64_t)from[i] << (8 * i);
   return number;
 }
 
@@ -379,7 +379,7 @@ static void put_text(sink *to, const char *text) {
 static void put_array(sink *to, element kind, const void *array, size_t length) {
   enum { CHUNK = 512 };
   const size_t size = element_size(kind);
-  if (to->hasher == NULL && to->bytes == NULL) {
+  if (!to->hasher && !to->bytes) {
     to->used += length * size;
     return;
   }
@@ -388,10 +388,10 @@ static void put_array(sink *to, element kind, const void *array, size_t length) 
     const size_t count = length - start < CHUNK ? length - start : CHUNK;
     if (kind == ELEMENT_U32) {
       const uint32_t *numbers = (const uint32_t *)array + start;
-      for (size_t i = 0; i < count; ++i) encode_u32(bytes + 4 * i, numbers[i]);
+      for (size_t i = 0; i < count; i++) encode_u32(bytes + 4 * i, numbers[i]);
     } else {
       const double *numbers = (const double *)array + start;
-      for (size_t i = 0; i < count; ++i) {
+      for (size_t i = 0; i < count; i++) {
         uint64_t bits;
         memcpy(&bits, &numbers[i], sizeof bits);
         encode_u64(bytes + 8 * i, bits);
@@ -439,7 +439,7 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
       const qmat_file_part *parts = pointer_of(value, r);
       const size_t count = count_of(value, r);
       put_u64(to, count);
-      for (size_t i = 0; i < count; ++i) {
+      for (size_t i = 0; i < count; i++) {
         put_text(to, parts[i].name);
         put_u64(to, parts[i].size);
         put(to, parts[i].bytes, parts[i].size);
@@ -448,7 +448,7 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
     }
     case ELEMENT_ITEMS: {
       qmat_value *const *items = pointer_of(value, r);
-      for (size_t i = 0; i < count_of(value, r); ++i) {
+      for (size_t i = 0; i < count_of(value, r); i++) {
         sink size = {0};
         if (!write_rows(&size, items[i])) return false;
         put_u64(to, size.used);
@@ -458,7 +458,7 @@ static bool write_content(sink *to, const qmat_value *value, const row *r) {
     }
     case ELEMENT_NAMES: {
       char *const *names = pointer_of(value, r);
-      for (size_t i = 0; i < count_of(value, r); ++i) put_text(to, names[i]);
+      for (size_t i = 0; i < count_of(value, r); i++) put_text(to, names[i]);
       return true;
     }
   }
@@ -469,7 +469,7 @@ static bool write_rows(sink *to, const qmat_value *value) {
   put(to, MAGIC, sizeof MAGIC);
   put_u32(to, FORM_VERSION);
   put_text(to, value_types[value->type].name);
-  for (const row *r = rows_of(value); r->name != NULL; ++r) {
+  for (const row *r = rows_of(value); r->name != NULL; r++) {
     sink size = {0};
     if (!write_content(&size, value, r)) return false;
     put_text(to, r->name);
@@ -483,15 +483,15 @@ static bool write_rows(sink *to, const qmat_value *value) {
 
 size_t qmat_value_bytes(const qmat_value *value) {
   size_t bytes = 0;
-  for (const row *r = rows_of(value); r->name != NULL; ++r) {
+  for (const row *r = rows_of(value); r->name != NULL; r++) {
     if (!has_pointer(r) || pointer_of(value, r) == NULL) continue;
     if (r->element == ELEMENT_PARTS) {
       const qmat_file_part *parts = pointer_of(value, r);
-      for (size_t i = 0; i < count_of(value, r); ++i) bytes += parts[i].size;
+      for (size_t i = 0; i < count_of(value, r); i++) bytes += parts[i].size;
     } else if (r->element == ELEMENT_ITEMS || r->element == ELEMENT_NAMES) {
-      for (size_t i = 0; r->element == ELEMENT_ITEMS && i < count_of(value, r); ++i) {
+      for (size_t i = 0; r->element == ELEMENT_ITEMS && i < count_of(value, r); i++) {
         const qmat_value *item = ((qmat_value *const *)pointer_of(value, r))[i];
-        if (item != NULL) bytes += qmat_value_bytes(item);
+        if (item) bytes += qmat_value_bytes(item);
       }
     } else {
       sink size = {0};
@@ -512,7 +512,7 @@ qmat_status qmat_value_serialize(qmat_context *context, const qmat_value *value,
   sink to = {0};
   if (!write_rows(&to, value)) return qmat_fail_memory(context, "the text of a report");
   to.bytes = qmat_alloc(to.used, 1);
-  if (to.bytes == NULL) return qmat_fail_memory(context, "the binary form of a value");
+  if (!to.bytes) return qmat_fail_memory(context, "the binary form of a value");
   to.used = 0;
   if (!write_rows(&to, value)) {
     qmat_free(to.bytes);
@@ -528,28 +528,28 @@ qmat_status qmat_value_serialize(qmat_context *context, const qmat_value *value,
 /* What must hold before the content can be walked at all; only a mistake in a node can break it. */
 static qmat_status check_rows(qmat_context *context, const qmat_value *value) {
   const char *type = qmat_value_type_name(value->type);
-  for (const row *r = rows_of(value); r->name != NULL; ++r) {
+  for (const row *r = rows_of(value); r->name != NULL; r++) {
     if (!has_pointer(r)) continue;
     const void *pointer = pointer_of(value, r);
     if (!is_array(r)) {
-      if (pointer != NULL) continue;
+      if (pointer) continue;
       qmat_fail(context, QMAT_ERROR_INTERNAL, "the %s of a %s is not set", r->name, type);
       return qmat_fail_field(context, r->name);
     }
     const size_t count = count_of(value, r);
-    if (count > SIZE_MAX / (8 * r->components * element_size(r->element)) || (count > 0 && pointer == NULL)) {
+    if (count > SIZE_MAX / (8 * r->components * element_size(r->element)) || (count > 0 && !pointer)) {
       qmat_fail(context, QMAT_ERROR_INTERNAL, "a %s counts %zu %s but holds none", type, count, r->name);
       return qmat_fail_field(context, r->name);
     }
-    for (size_t i = 0; (r->element == ELEMENT_ITEMS || r->element == ELEMENT_NAMES) && i < count; ++i) {
+    for (size_t i = 0; (r->element == ELEMENT_ITEMS || r->element == ELEMENT_NAMES) && i < count; i++) {
       if (((void *const *)pointer)[i] != NULL) continue;
       qmat_fail(context, QMAT_ERROR_INTERNAL, "an item of a list is missing or has no name");
       return qmat_fail_element(context, "item", (int64_t)i);
     }
     if (r->element != ELEMENT_PARTS) continue;
     const qmat_file_part *parts = pointer;
-    for (size_t i = 0; i < count; ++i) {
-      if (parts[i].name == NULL || (parts[i].size > 0 && parts[i].bytes == NULL)) {
+    for (size_t i = 0; i < count; i++) {
+      if (!parts[i].name || (parts[i].size > 0 && !parts[i].bytes)) {
         qmat_fail(context, QMAT_ERROR_INTERNAL, "a part of a %s has no name or no bytes", type);
         return qmat_fail_element(context, "part", (int64_t)i);
       }
@@ -585,7 +585,7 @@ static qmat_status fail_element(qmat_context *context, const char *kind, size_t 
 /* Every number of an array is finite; names the first group of `components` that is not. */
 static qmat_status check_finite(qmat_context *context, const double *numbers, size_t count, size_t components,
                                 const char *kind, const char *what) {
-  for (size_t i = 0; i < count * components; ++i) {
+  for (size_t i = 0; i < count * components; i++) {
     if (isfinite(numbers[i])) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the %s is not finite", what);
     return fail_element(context, kind, i / components);
@@ -605,7 +605,7 @@ size_t qmat_utf8_length(const char *text) {
                         : first >= 0xE0 && first < 0xF0 ? 3
                         : first >= 0xF0 && first < 0xF5 ? 4
                                                         : 0;
-  for (size_t i = 1; i < length; ++i) {
+  for (size_t i = 1; i < length; i++) {
     if ((bytes[i] & 0xC0) != 0x80) return 0;
   }
   /* Longer than need be, surrogates, beyond U+10FFFF. */
@@ -633,7 +633,7 @@ static qmat_status check_utf8(qmat_context *context, const char *text, const cha
 
 bool qmat_is_part_name(const char *name) {
   if (strchr(name, '\\') != NULL || strlen(name) > 255) return false;
-  for (const char *step = name;; ++step) {
+  for (const char *step = name;; step++) {
     const size_t length = strcspn(step, "/");
     if (length == 0 || (length == 1 && step[0] == '.') || (length == 2 && step[0] == '.' && step[1] == '.'))
       return false;
@@ -650,7 +650,7 @@ static int compare_part_names(const void *a, const void *b) {
 
 /* The main part has no name, the others have different ones. */
 static qmat_status check_parts(qmat_context *context, const qmat_file_part *parts, size_t part_count) {
-  for (size_t i = 0; i < part_count; ++i) {
+  for (size_t i = 0; i < part_count; i++) {
     const char *name = parts[i].name;
     const qmat_status status = check_utf8(context, name, "name");
     if (status != QMAT_OK) return fail_element(context, "part", i);
@@ -664,11 +664,11 @@ static qmat_status check_parts(qmat_context *context, const qmat_file_part *part
     }
   }
   const qmat_file_part **sorted = qmat_alloc(part_count, sizeof *sorted);
-  if (sorted == NULL) return qmat_fail_memory(context, "the names of a file's parts");
-  for (size_t i = 0; i < part_count; ++i) sorted[i] = &parts[i];
+  if (!sorted) return qmat_fail_memory(context, "the names of a file's parts");
+  for (size_t i = 0; i < part_count; i++) sorted[i] = &parts[i];
   qsort(sorted, part_count, sizeof *sorted, compare_part_names);
   size_t repeated = SIZE_MAX;
-  for (size_t i = 1; i < part_count; ++i) {
+  for (size_t i = 1; i < part_count; i++) {
     const size_t part = (size_t)(sorted[i] - parts);
     if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && part < repeated) repeated = part;
   }
@@ -692,7 +692,7 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
 /* Every id of an array is below `count`; names the first group of `components` that is not. */
 static qmat_status check_ids(qmat_context *context, const uint32_t *ids, size_t length, size_t count, const char *kind,
                              size_t components, const char *of) {
-  for (size_t i = 0; i < length; ++i) {
+  for (size_t i = 0; i < length; i++) {
     if (ids[i] < count) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it names %s %u of %zu", of, ids[i], count);
     return fail_element(context, kind, i / components);
@@ -701,7 +701,7 @@ static qmat_status check_ids(qmat_context *context, const uint32_t *ids, size_t 
 }
 
 static qmat_status check_sharpness(qmat_context *context, const double *sharpness, size_t count, const char *kind) {
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     if (sharpness[i] >= 0 && isfinite(sharpness[i])) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "its sharpness is negative or not finite");
     return fail_element(context, kind, i);
@@ -739,8 +739,8 @@ static qmat_status check_cage(qmat_context *context, const qmat_cage *cage) {
   if (status == QMAT_OK) status = check_sharpness(context, cage->crease_sharpness, cage->crease_count, "crease");
   if (status == QMAT_OK) status = check_sharpness(context, cage->vertex_sharpness, cage->sharp_count, "sharp vertex");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < cage->surface_count; ++i) faces += cage->surface_faces[i];
-  for (size_t i = 0; i < cage->face_count; ++i) corners += cage->face_sizes[i];
+  for (size_t i = 0; i < cage->surface_count; i++) faces += cage->surface_faces[i];
+  for (size_t i = 0; i < cage->face_count; i++) corners += cage->face_sizes[i];
   if (faces == cage->face_count && corners == cage->corner_count) return QMAT_OK;
   return qmat_fail(context, QMAT_ERROR_GEOMETRY,
                    "a cage has %zu faces and %zu corners, but its parts add up to %zu and "
@@ -758,7 +758,7 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is no length");
     return qmat_fail_field(context, "deviation");
   }
-  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     if (mesh->triangles[i] < mesh->vertex_count) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "corner %zu names vertex %u of %zu", i % 3, mesh->triangles[i],
               mesh->vertex_count);
@@ -792,7 +792,7 @@ static qmat_status check_samples(qmat_context *context, const qmat_value *value)
     status = check_finite(context, samples->barycentrics, samples->count, 3, "sample", "barycentric coordinate");
   }
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < samples->count; ++i) {
+  for (size_t i = 0; i < samples->count; i++) {
     const double *weights = samples->barycentrics + 3 * i;
     const double sum = weights[0] + weights[1] + weights[2];
     if (fabs(sum - 1) <= 1e-9) continue;
@@ -806,7 +806,7 @@ static qmat_status check_samples(qmat_context *context, const qmat_value *value)
 
 /* The order of two rows of `width` indices, as of words in a dictionary. */
 static int compare_indices(const uint32_t *a, const uint32_t *b, size_t width) {
-  for (size_t i = 0; i < width; ++i) {
+  for (size_t i = 0; i < width; i++) {
     if (a[i] != b[i]) return a[i] < b[i] ? -1 : 1;
   }
   return 0;
@@ -815,9 +815,9 @@ static int compare_indices(const uint32_t *a, const uint32_t *b, size_t width) {
 /* Edges or triangles: every id names a sphere, ids rise within a row, and rows rise strictly. */
 static qmat_status check_simplices(qmat_context *context, const uint32_t *rows, size_t count, size_t width,
                                    size_t sphere_count, const char *kind) {
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     const uint32_t *ids = rows + width * i;
-    for (size_t k = 0; k < width; ++k) {
+    for (size_t k = 0; k < width; k++) {
       if (ids[k] >= sphere_count) {
         qmat_fail(context, QMAT_ERROR_GEOMETRY, "it names sphere %u of %zu", ids[k], sphere_count);
         return fail_element(context, kind, i);
@@ -854,7 +854,7 @@ static bool has_edge(const qmat_medial *medial, uint32_t low, uint32_t high) {
 
 static qmat_status check_regions(qmat_context *context, const qmat_medial *medial) {
   if (medial->region_offset_count == 0) {
-    if (medial->region_offsets == NULL && medial->region_sample_count == 0) return QMAT_OK;
+    if (!medial->region_offsets && medial->region_sample_count == 0) return QMAT_OK;
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "a medial mesh without region rows holds region data");
   }
   if (medial->region_offset_count != medial->sphere_count + 1) {
@@ -869,7 +869,7 @@ static qmat_status check_regions(qmat_context *context, const qmat_medial *media
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the first region starts at %u, not 0", offsets[0]);
     return fail_element(context, "region", 0);
   }
-  for (size_t i = 0; i < medial->sphere_count; ++i) {
+  for (size_t i = 0; i < medial->sphere_count; i++) {
     if (offsets[i] <= offsets[i + 1]) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it ends at %u, before its start at %u", offsets[i + 1], offsets[i]);
     return fail_element(context, "region", i);
@@ -886,7 +886,7 @@ static qmat_status check_regions(qmat_context *context, const qmat_medial *media
 static qmat_status check_spheres(qmat_context *context, const double *spheres, size_t count, const char *kind) {
   const qmat_status status = check_finite(context, spheres, count, 4, kind, "centre or radius");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     if (spheres[4 * i + 3] >= 0) continue;
     char number[32];
     qmat_format_number(spheres[4 * i + 3], number, sizeof number);
@@ -907,10 +907,10 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
   if (status != QMAT_OK) return status;
   status = check_simplices(context, medial->triangles, medial->triangle_count, 3, medial->sphere_count, "triangle");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < medial->triangle_count; ++i) {
+  for (size_t i = 0; i < medial->triangle_count; i++) {
     const uint32_t *ids = medial->triangles + 3 * i;
     static const int sides[3][2] = {{0, 1}, {0, 2}, {1, 2}};
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3; k++) {
       const uint32_t low = ids[sides[k][0]], high = ids[sides[k][1]];
       if (has_edge(medial, low, high)) continue;
       qmat_fail(context, QMAT_ERROR_GEOMETRY, "its side (%u, %u) is not among the edges", low, high);
@@ -923,10 +923,10 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
 /* Every collapse joins two spheres that are still there. */
 static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
   uint8_t *gone = qmat_calloc(chain->sphere_count, 1);
-  if (gone == NULL) return qmat_fail_memory(context, "the spheres of a chain");
+  if (!gone) return qmat_fail_memory(context, "the spheres of a chain");
   size_t i = 0;
   const char *fault = NULL;
-  for (; i < chain->collapse_count; ++i) {
+  for (; i < chain->collapse_count; i++) {
     const uint32_t stays = chain->ends[2 * i], goes = chain->ends[2 * i + 1];
     if (stays >= chain->sphere_count || goes >= chain->sphere_count)
       fault = "it names a sphere that is not there";
@@ -934,11 +934,11 @@ static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
       fault = "it joins a sphere with itself";
     else if (gone[stays] || gone[goes])
       fault = "it names a sphere that went before";
-    if (fault != NULL) break;
+    if (fault) break;
     gone[goes] = 1;
   }
   qmat_free(gone);
-  if (fault == NULL) return QMAT_OK;
+  if (!fault) return QMAT_OK;
   qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s", fault);
   return fail_element(context, "collapse", i);
 }
@@ -955,7 +955,7 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
   qmat_status status = check_medial(context, &initial.base);
   if (status == QMAT_OK) status = check_u32_count(context, chain->sample_count, "samples");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < chain->sample_count; ++i) {
+  for (size_t i = 0; i < chain->sample_count; i++) {
     if (chain->owners[i] < chain->sphere_count || chain->owners[i] == UINT32_MAX) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "its owner is sphere %u of %zu", chain->owners[i], chain->sphere_count);
     return fail_element(context, "sample", i);
@@ -964,7 +964,7 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
   if (status == QMAT_OK) status = check_spheres(context, chain->merged, chain->collapse_count, "collapse");
   if (status == QMAT_OK) status = check_finite(context, chain->errors, chain->collapse_count, 1, "collapse", "error");
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < chain->collapse_count; ++i) {
+  for (size_t i = 0; i < chain->collapse_count; i++) {
     if (chain->errors[i] >= (i == 0 ? 0 : chain->errors[i - 1])) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error falls");
     return fail_element(context, "collapse", i);
@@ -994,7 +994,7 @@ static qmat_status check_list(qmat_context *context, const qmat_value *value) {
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "a list has %zu items, not two or more", list->count);
   const qmat_value_type type = qmat_value_item_type(value);
   if (type == QMAT_FAILURE) return qmat_fail(context, QMAT_ERROR_INTERNAL, "a list has nothing but failures");
-  for (size_t i = 0; i < list->count; ++i) {
+  for (size_t i = 0; i < list->count; i++) {
     const qmat_value *item = list->items[i];
     if (!item->sealed || item->type == QMAT_LIST || (item->type != type && item->type != QMAT_FAILURE)) {
       qmat_fail(context, QMAT_ERROR_INTERNAL, "it is a list, not sealed, or not of the type of the others");
@@ -1028,13 +1028,13 @@ static const uint8_t *take(reader *from, uint64_t size) {
 
 static bool take_u32(reader *from, uint32_t *number) {
   const uint8_t *bytes = take(from, 4);
-  if (bytes != NULL) *number = decode_u32(bytes);
+  if (bytes) *number = decode_u32(bytes);
   return bytes != NULL;
 }
 
 static bool take_u64(reader *from, uint64_t *number) {
   const uint8_t *bytes = take(from, 8);
-  if (bytes != NULL) *number = decode_u64(bytes);
+  if (bytes) *number = decode_u64(bytes);
   return bytes != NULL;
 }
 
@@ -1050,10 +1050,10 @@ static bool take_word(reader *from, const char *wanted) {
 /* The next `size` bytes as a string of one's own. */
 static qmat_status take_string(qmat_context *context, reader *from, uint64_t size, char **text) {
   const uint8_t *bytes = take(from, size);
-  if (bytes == NULL) return fail_form(context, from, "a text is longer than what is left");
+  if (!bytes) return fail_form(context, from, "a text is longer than what is left");
   if (memchr(bytes, '\0', (size_t)size) != NULL) return fail_form(context, from, "a text holds a zero byte");
   char *copy = qmat_alloc((size_t)size + 1, 1);
-  if (copy == NULL) return qmat_fail_memory(context, "a text");
+  if (!copy) return qmat_fail_memory(context, "a text");
   memcpy(copy, bytes, (size_t)size);
   copy[size] = '\0';
   *text = copy;
@@ -1062,7 +1062,7 @@ static qmat_status take_string(qmat_context *context, reader *from, uint64_t siz
 
 /* Whether a row before `r` has set the count that `r` uses. */
 static bool shares_count(const row *rows, const row *r) {
-  for (const row *earlier = rows; earlier < r; ++earlier) {
+  for (const row *earlier = rows; earlier < r; earlier++) {
     if (is_array(earlier) && earlier->count_offset == r->count_offset) return true;
   }
   return false;
@@ -1078,15 +1078,15 @@ static qmat_status read_array(qmat_context *context, reader *from, qmat_value *v
   }
   if (size == 0) return QMAT_OK;
   void *array = qmat_alloc(size / stride, stride);
-  if (array == NULL) return qmat_fail_memory(context, r->name);
+  if (!array) return qmat_fail_memory(context, r->name);
   set_pointer(value, r, array);
   *count = size / stride;
   const uint8_t *bytes = take(from, size);
   const size_t length = *count * r->components;
   if (r->element == ELEMENT_U32) {
-    for (size_t i = 0; i < length; ++i) ((uint32_t *)array)[i] = decode_u32(bytes + 4 * i);
+    for (size_t i = 0; i < length; i++) ((uint32_t *)array)[i] = decode_u32(bytes + 4 * i);
   } else {
-    for (size_t i = 0; i < length; ++i) {
+    for (size_t i = 0; i < length; i++) {
       const uint64_t bits = decode_u64(bytes + 8 * i);
       memcpy((double *)array + i, &bits, sizeof bits);
     }
@@ -1103,19 +1103,19 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   }
   if (count == 0) return QMAT_OK;
   qmat_file_part *parts = qmat_calloc((size_t)count, sizeof *parts);
-  if (parts == NULL) return qmat_fail_memory(context, "the parts of a file");
+  if (!parts) return qmat_fail_memory(context, "the parts of a file");
   set_pointer(value, r, parts);
   *part_count = (size_t)count;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     uint32_t name_size;
     uint64_t size;
     if (!take_u32(from, &name_size)) return fail_form(context, from, "a part's name is missing");
     const qmat_status status = take_string(context, from, name_size, &parts[i].name);
     if (status != QMAT_OK) return status;
     const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
-    if (bytes == NULL) return fail_form(context, from, "a part is longer than what is left");
+    if (!bytes) return fail_form(context, from, "a part is longer than what is left");
     parts[i].bytes = qmat_alloc((size_t)size, 1);
-    if (parts[i].bytes == NULL) return qmat_fail_memory(context, "the bytes of a file");
+    if (!parts[i].bytes) return qmat_fail_memory(context, "the bytes of a file");
     parts[i].size = (size_t)size;
     if (size > 0) memcpy(parts[i].bytes, bytes, (size_t)size);
   }
@@ -1127,15 +1127,15 @@ static qmat_status read_items(qmat_context *context, reader *from, qmat_value *v
   const size_t count = from->size / (8 + sizeof digest.bytes);
   if (from->size % (8 + sizeof digest.bytes) != 0) return fail_form(context, from, "an item is cut short");
   qmat_value **items = qmat_calloc(count, sizeof *items);
-  if (items == NULL) return qmat_fail_memory(context, "the items of a list");
+  if (!items) return qmat_fail_memory(context, "the items of a list");
   set_pointer(value, r, items);
   *(size_t *)mutable_slot(value, r->count_offset) = count;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     uint64_t size = 0;
     take_u64(from, &size);
     memcpy(digest.bytes, take(from, sizeof digest.bytes), sizeof digest.bytes);
     items[i] = from->items != NULL ? from->items->find(from->items->user, &digest, size) : NULL;
-    if (items[i] == NULL) return fail_form(context, from, "an item is not at hand");
+    if (!items[i]) return fail_form(context, from, "an item is not at hand");
   }
   return QMAT_OK;
 }
@@ -1143,9 +1143,9 @@ static qmat_status read_items(qmat_context *context, reader *from, qmat_value *v
 static qmat_status read_names(qmat_context *context, reader *from, qmat_value *value, const row *r) {
   const size_t count = count_of(value, r);
   char **names = qmat_calloc(count, sizeof *names);
-  if (names == NULL) return qmat_fail_memory(context, "the names of a list");
+  if (!names) return qmat_fail_memory(context, "the names of a list");
   set_pointer(value, r, names);
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i++) {
     uint32_t size;
     if (!take_u32(from, &size)) return fail_form(context, from, "there are fewer names than items");
     const qmat_status status = take_string(context, from, size, &names[i]);
@@ -1188,7 +1188,7 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
       return read_names(context, from, value, r);
     case ELEMENT_BOOL:
       byte = take(from, 1);
-      if (byte == NULL || *byte > 1) return fail_form(context, from, "a flag is neither 0 nor 1");
+      if (!byte || *byte > 1) return fail_form(context, from, "a flag is neither 0 nor 1");
       *(bool *)mutable_slot(value, r->offset) = *byte == 1;
       return QMAT_OK;
     case ELEMENT_ENUM:
@@ -1208,13 +1208,13 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
 }
 
 static qmat_status read_rows(qmat_context *context, reader *from, qmat_value *value) {
-  for (const row *r = rows_of(value); r->name != NULL; ++r) {
+  for (const row *r = rows_of(value); r->name != NULL; r++) {
     if (!take_word(from, r->name)) return fail_form(context, from, "a row is missing");
     const uint8_t *kind = take(from, 1);
-    if (kind == NULL || *kind != (uint8_t)r->element) return fail_form(context, from, "a row is of another kind");
+    if (!kind || *kind != (uint8_t)r->element) return fail_form(context, from, "a row is of another kind");
     uint64_t size;
     const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
-    if (bytes == NULL) return fail_form(context, from, "a row is longer than what is left");
+    if (!bytes) return fail_form(context, from, "a row is longer than what is left");
     reader content = {bytes, (size_t)size, 0, from->items};
     const qmat_status status = read_content(context, &content, value, r);
     if (status != QMAT_OK) {
@@ -1233,7 +1233,7 @@ qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, 
   reader from = {bytes, size, 0, items};
   const uint8_t *magic = take(&from, sizeof MAGIC);
   uint32_t version;
-  if (magic == NULL || memcmp(magic, MAGIC, sizeof MAGIC) != 0) {
+  if (!magic || memcmp(magic, MAGIC, sizeof MAGIC) != 0) {
     return fail_form(context, &from, "it does not start with QMAT");
   }
   if (!take_u32(&from, &version)) return fail_form(context, &from, "its version is missing");
@@ -1245,12 +1245,12 @@ qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, 
   int type = 0;
   while (type < QMAT_VALUE_TYPE_COUNT && !take_word(&from, value_types[type].name)) {
     from.used = name_start;
-    ++type;
+    type++;
   }
   if (type == QMAT_VALUE_TYPE_COUNT) return fail_form(context, &from, "its type is unknown");
 
   qmat_value *made = value_new((qmat_value_type)type);
-  if (made == NULL) return qmat_fail_memory(context, "a value");
+  if (!made) return qmat_fail_memory(context, "a value");
   qmat_status status = read_rows(context, &from, made);
   if (status == QMAT_OK) {
     status = qmat_value_seal(context, made);

@@ -23,7 +23,7 @@ static int close_file(FILE *file, const char *path) {
 
 static int write_surface(const qmat_model *model, const char *path) {
   FILE *file = strcmp(path, "-") == 0 ? stdout : fopen(path, "w");
-  if (file == NULL) {
+  if (!file) {
     fprintf(stderr, "qmat_models: %s: %s\n", path, strerror(errno));
     return 1;
   }
@@ -45,7 +45,7 @@ static int write_medial(const qmat_model *model, const char *path) {
     return 1;
   }
   FILE *file = fopen(path, "w");
-  if (file == NULL) {
+  if (!file) {
     fprintf(stderr, "qmat_models: %s: %s\n", path, strerror(errno));
     return 1;
   }
@@ -111,7 +111,7 @@ int main(int argc, char **argv) {
     } else if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) {
       fputs(usage, stdout);
       return 0;
-    } else if (strcmp(word, "--resolution") == 0 && value != NULL) {
+    } else if (strcmp(word, "--resolution") == 0 && value) {
       char *end;
       const long number = strtol(value, &end, 10);
       if (*end != 0 || number < QMAT_MODEL_RESOLUTION_MIN || number > QMAT_MODEL_RESOLUTION_MAX) {
@@ -121,15 +121,15 @@ int main(int argc, char **argv) {
       }
       resolution = (int)number;
       i++;
-    } else if (strcmp(word, "-o") == 0 && value != NULL) {
+    } else if (strcmp(word, "-o") == 0 && value) {
       output = value;
       i++;
-    } else if (strcmp(word, "--medial") == 0 && value != NULL) {
+    } else if (strcmp(word, "--medial") == 0 && value) {
       medial = value;
       i++;
-    } else if (word[0] != '-' && name == NULL) {
+    } else if (word[0] != '-' && !name) {
       name = word;
-    } else if (word[0] != '-' && folder == NULL && strcmp(name, "all") == 0) {
+    } else if (word[0] != '-' && !folder && strcmp(name, "all") == 0) {
       folder = word;
     } else {
       fprintf(stderr, "qmat_models: cannot use '%s' here\n%s", word, usage);
@@ -137,7 +137,7 @@ int main(int argc, char **argv) {
     }
   }
   const bool all = name != NULL && strcmp(name, "all") == 0;
-  if (name == NULL || all != (folder != NULL) || (all && (output != NULL || medial != NULL))) {
+  if (!name || all != (folder != NULL) || (all && (output || medial))) {
     fputs(usage, stderr);
     return 2;
   }
@@ -145,8 +145,8 @@ int main(int argc, char **argv) {
   qmat_model model;
   int failed = make(name, resolution, &model);
   if (failed != 0) return failed;
-  if (output != NULL || medial == NULL) failed = write_surface(&model, output == NULL ? "-" : output);
-  if (failed == 0 && medial != NULL) failed = write_medial(&model, medial);
+  if (output || !medial) failed = write_surface(&model, output == NULL ? "-" : output);
+  if (failed == 0 && medial) failed = write_medial(&model, medial);
   qmat_model_uninit(&model);
   return failed;
 }

@@ -39,7 +39,7 @@ static void *grown(builder *b, void *array, size_t *capacity, size_t needed, siz
   size_t wanted = *capacity < 64 ? 64 : 2 * *capacity;
   if (wanted < needed) wanted = needed;
   void *larger = wanted > SIZE_MAX / size ? NULL : realloc(array, wanted * size);
-  if (larger == NULL) {
+  if (!larger) {
     b->failed = true;
     return array;
   }
@@ -129,7 +129,7 @@ static void lattice_grow(builder *b) {
   b->key_capacity = old_capacity == 0 ? 1024 : 2 * old_capacity;
   b->keys = calloc(b->key_capacity, sizeof *b->keys);
   b->key_vertices = calloc(b->key_capacity, sizeof *b->key_vertices);
-  if (b->keys == NULL || b->key_vertices == NULL) {
+  if (!b->keys || !b->key_vertices) {
     b->failed = true;
   } else {
     for (size_t i = 0; i < old_capacity; i++) {
@@ -672,7 +672,7 @@ static double *tentacle_steps(const tentacle *arm, int corners, size_t *count) {
   const double stretch = 2.2;
   double total = 0;
   double *sums = malloc((FINE + 1) * sizeof *sums);
-  if (sums == NULL) return NULL;
+  if (!sums) return NULL;
   sums[0] = 0;
   for (int i = 0; i < FINE; i++) {
     const double t = (i + 0.5) / FINE;
@@ -682,7 +682,7 @@ static double *tentacle_steps(const tentacle *arm, int corners, size_t *count) {
   }
   *count = (size_t)ceil(total);
   double *steps = malloc((*count + 1) * sizeof *steps);
-  if (steps != NULL) {
+  if (steps) {
     int fine = 0;
     for (size_t k = 0; k <= *count; k++) {
       const double wanted = total * (double)k / (double)*count;
@@ -702,7 +702,7 @@ static void add_tentacle(builder *b, const head *shape, const tentacle *arm) {
   uint32_t *rings = calloc(2 * (size_t)corners, sizeof *rings), *previous = rings;
   uint32_t *grid = calloc((size_t)(size + 1) * (size_t)(size + 1), sizeof *grid);
   vec *border = calloc((size_t)corners, sizeof *border); /* the patch's border in the frame of the root */
-  if (steps == NULL || rings == NULL || grid == NULL || border == NULL) {
+  if (!steps || !rings || !grid || !border) {
     b->failed = true;
   }
   for (int k = 0; k < corners && !b->failed; k++) {
@@ -846,7 +846,7 @@ qmat_status qmat_model_make(const char *name, int resolution, qmat_model *model)
   for (size_t i = 0; i < qmat_model_kind_count; i++) {
     if (strcmp(name, qmat_model_kinds[i].name) == 0) kind = qmat_model_kinds + i;
   }
-  if (kind == NULL) return QMAT_ERROR_USAGE;
+  if (!kind) return QMAT_ERROR_USAGE;
   const int n = resolution == 0 ? kind->default_resolution : resolution;
   const double long_side = 1.6, sheet_side = 1, thickness = 0.01 * 1.8868;
   if (strcmp(name, "box") == 0) return qmat_model_make_box(3, 2, 1, n, model);

@@ -52,7 +52,7 @@ static int mesh_make(mesh *m, long bytes, const char *path) {
   m->vertices = calloc(m->vertex_count + 1, 4 * sizeof *m->vertices);
   m->edges = calloc(m->edge_count + 1, 2 * sizeof *m->edges);
   m->triangles = calloc(m->triangle_count + 1, 3 * sizeof *m->triangles);
-  return m->vertices == NULL || m->edges == NULL || m->triangles == NULL ? complain(path, "out of memory") : 0;
+  return !m->vertices || !m->edges || m->triangles == NULL ? complain(path, "out of memory") : 0;
 }
 
 static int check_indices(const mesh *m, const char *path) {
@@ -66,7 +66,7 @@ static int check_indices(const mesh *m, const char *path) {
 static int read_file(const char *path, bool medial, mesh *m) {
   *m = (mesh){0};
   FILE *file = fopen(path, "r");
-  if (file == NULL) return complain(path, strerror(errno));
+  if (!file) return complain(path, strerror(errno));
   fseek(file, 0, SEEK_END);
   const long bytes = ftell(file);
   rewind(file);
@@ -221,7 +221,7 @@ static void paint(FILE *out, const view *v, const mesh *surface, const mesh *med
 static shape *collect(const view *v, const mesh *surface, const mesh *medial, bool with_spheres, size_t *count) {
   shape *all = calloc(surface->triangle_count + medial->vertex_count + medial->edge_count + medial->triangle_count + 1,
                       sizeof *all);
-  if (all == NULL) return NULL;
+  if (!all) return NULL;
   size_t n = 0;
   for (uint32_t i = 0; i < surface->triangle_count; i++) {
     const uint32_t *t = surface->triangles + 3 * (size_t)i;
@@ -249,10 +249,10 @@ static int write_picture(const char *path, view *v, double width, const mesh *su
   size_t count = 0;
   fit(v, surface, medial, width, &height);
   shape *all = collect(v, surface, medial, with_spheres, &count);
-  if (all == NULL) return complain(path, "out of memory");
+  if (!all) return complain(path, "out of memory");
   FILE *out = fopen(path, "w");
   int failed = 0;
-  if (out == NULL) {
+  if (!out) {
     failed = complain(path, strerror(errno));
   } else {
     fprintf(out,
@@ -307,13 +307,13 @@ int main(int argc, char **argv) {
     }
     i++;
   }
-  if (names[0] == NULL || output == NULL) {
+  if (!names[0] || !output) {
     fputs(usage, stderr);
     return 2;
   }
   mesh surface = {0}, medial = {0};
   int failed = read_file(names[0], false, &surface);
-  if (failed == 0 && names[1] != NULL) failed = read_file(names[1], true, &medial);
+  if (failed == 0 && names[1]) failed = read_file(names[1], true, &medial);
   if (failed == 0) {
     if (!with_surface) surface.triangle_count = 0;
     view v = make_view(turn, tilt);

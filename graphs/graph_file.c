@@ -17,19 +17,19 @@ const qmat_node *qmat_registry_find(const qmat_registry *registry, const char *n
 
 /* ---- names and suggestions ---- */
 
-// Names that a mistaken one is compared with. A zeroed list is empty.
+/* Names that a mistaken one is compared with. A zeroed list is empty. */
 typedef struct name_list {
   const char **names;
   size_t count, capacity;
 } name_list;
 
-// A name that does not fit is left out: it is only a suggestion.
+/* A name that does not fit is left out: it is only a suggestion. */
 static void add_name(name_list *list, const char *name) {
   if (qmat_grow((void **)&list->names, &list->capacity, list->count + 1, sizeof *list->names) == 0)
     list->names[list->count++] = name;
 }
 
-// Adds to the newest error the name that is nearest to `text`, or all names when they are few. Frees the list.
+/* Adds to the newest error the name that is nearest to `text`, or all names when they are few. Frees the list. */
 static qmat_status suggest(qmat_context *context, const char *text, const char *kind, name_list *list) {
   const char *nearest = qmat_nearest_name(text, list->names, list->count);
   if (nearest) {
@@ -87,7 +87,7 @@ qmat_status qmat_graph_find_node(qmat_context *context, const qmat_graph *graph,
   return suggest(context, id, "nodes", &names);
 }
 
-// Splits "node.rest" and finds the node; `kind` is what the rest should be ("port", "parameter").
+/* Splits "node.rest" and finds the node; `kind` is what the rest should be ("port", "parameter"). */
 static qmat_status split_reference(qmat_context *context, const qmat_graph *graph, const char *text, const char *kind,
                                    size_t *node, const char **rest) {
   const char *dot = strchr(text, '.');
@@ -189,7 +189,7 @@ const qmat_param *qmat_output_format_param(const qmat_node *type) {
   return NULL;
 }
 
-// What follows the last point of the file's name; "" when there is none.
+/* What follows the last point of the file's name; "" when there is none. */
 static const char *path_ending(const char *path) {
   const char *name = strrchr(path, '/');
   name = name ? name + 1 : path;
@@ -239,7 +239,7 @@ qmat_status qmat_graph_output_format(qmat_context *context, const qmat_graph *gr
 
 /* ---- parameters ---- */
 
-// A copy of `path`, put into `folder` when it is relative. The caller frees it.
+/* A copy of `path`, put into `folder` when it is relative. The caller frees it. */
 static char *resolve_path(const char *folder, const char *path) {
   if (path[0] == '/' || path[0] == 0) folder = "";
   size_t length = strlen(folder), rest = strlen(path);
@@ -323,14 +323,14 @@ qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const ch
   return qmat_graph_set_named(context, graph, name, equals + 1);
 }
 
-// Moves the newest error to where the file sets the parameter that it names, if it does.
+/* Moves the newest error to where the file sets the parameter that it names, if it does. */
 static qmat_status place_at_param(qmat_context *context, const qmat_graph *graph, const qmat_graph_node *node) {
   const qmat_param *param = qmat_param_find(node->type, context->error.field);
   qmat_mark mark = node->mark;
   if (param) {
     size_t row = (size_t)(param - node->type->params);
     if (node->marks[row].line > 0) mark = node->marks[row];
-    // Set on the command line: no place in the file is at fault.
+    /* Set on the command line: no place in the file is at fault. */
     else if (node->texts[row])
       return context->error.status;
   }
@@ -529,7 +529,7 @@ static qmat_status read_node(graph_reader *reader, const qmat_tree_entry *entry)
   return values ? read_params(reader, index, values) : QMAT_OK;
 }
 
-// Adds "model.mesh is a mesh" for the first output of the graph that has the wanted type.
+/* Adds "model.mesh is a mesh" for the first output of the graph that has the wanted type. */
 static void suggest_type(graph_reader *reader, qmat_value_type wanted, size_t but_not) {
   const qmat_graph *graph = reader->graph;
   for (size_t i = 0; i < graph->node_count; i++) {
@@ -610,7 +610,7 @@ static qmat_status read_nodes(graph_reader *reader) {
     status = read_node(reader, entry);
     if (status != QMAT_OK) return status;
   }
-  // Wiring may name nodes that come later in the file.
+  /* Wiring may name nodes that come later in the file. */
   size_t index = 0;
   for (const qmat_tree_entry *entry = nodes->entries; entry; entry = entry->next, index++) {
     const qmat_tree *wiring = find_key(entry->value, "in");
@@ -719,13 +719,13 @@ static qmat_status read_outputs(graph_reader *reader) {
 
 /* ---- order ---- */
 
-// Names the nodes of a cycle: every node that is not done waits for another one, so walking back must come round.
+/* Names the nodes of a cycle: every node that is not done waits for another one, so walking back must come round. */
 static qmat_status fail_cycle(graph_reader *reader, const bool *done, size_t *visits) {
   const qmat_graph *graph = reader->graph;
   size_t at = 0;
   while (done[at]) at++;
   for (size_t i = 0; i < graph->node_count; i++) visits[i] = 0;
-  // The second time round, every node seen is on the cycle.
+  /* The second time round, every node seen is on the cycle. */
   size_t first = SIZE_MAX;
   while (visits[at] < 2) {
     if (++visits[at] == 2 && at < first) first = at;
@@ -734,7 +734,7 @@ static qmat_status fail_cycle(graph_reader *reader, const bool *done, size_t *vi
     while (node->links[port].node == SIZE_MAX || done[node->links[port].node]) port++;
     at = node->links[port].node;
   }
-  // From the node that comes first in the file backwards, so the text is put together from its end.
+  /* From the node that comes first in the file backwards, so the text is put together from its end. */
   char path[400];
   size_t start = sizeof path - 1;
   path[start] = 0;
@@ -773,7 +773,7 @@ static qmat_status order_nodes(graph_reader *reader) {
     status = qmat_fail_memory(context, "graph");
     goto cleanup;
   }
-  // Always the first node in the file that waits for nothing, so that the order follows from the file alone.
+  /* Always the first node in the file that waits for nothing, so that the order follows from the file alone. */
   for (size_t count = 0; count < graph->node_count; count++) {
     size_t next = SIZE_MAX;
     for (size_t i = 0; i < graph->node_count && next == SIZE_MAX; i++) {
@@ -798,7 +798,7 @@ cleanup:
   return status;
 }
 
-// Every node must lead to an output of the graph or to a node without outputs.
+/* Every node must lead to an output of the graph or to a node without outputs. */
 static qmat_status check_reached(graph_reader *reader) {
   qmat_graph *graph = reader->graph;
   bool *needed = qmat_calloc(graph->node_count, sizeof *needed);
@@ -826,7 +826,7 @@ static qmat_status check_reached(graph_reader *reader) {
 static qmat_status read_graph(graph_reader *reader) {
   static const char *const keys[] = {"qmat", "inputs", "nodes", "outputs"};
   qmat_status status = expect_mapping(reader, reader->root, "graph", "qmat: 1, nodes: ..., outputs: ...");
-  // A file of another version may have other keys: its version is the better message.
+  /* A file of another version may have other keys: its version is the better message. */
   if (status == QMAT_OK && find_key(reader->root, "qmat")) status = read_version(reader);
   if (status == QMAT_OK) status = check_keys(reader, reader->root, "a graph", keys, 4);
   if (status == QMAT_OK) status = read_version(reader);
@@ -863,7 +863,8 @@ qmat_status qmat_graph_read_text(qmat_context *context, const qmat_registry *reg
   return read_text(context, registry, file, "", 0, text, size, graph);
 }
 
-// Reads at most the largest graph file and one byte more. Everything that goes wrong is a bad graph, not a failed run.
+/* Reads at most the largest graph file and one byte more. Everything that goes wrong is a bad graph, not a failed run.
+ */
 static qmat_status read_bytes(qmat_context *context, const char *path, char **text, size_t *size) {
   *text = NULL;
   struct stat info;

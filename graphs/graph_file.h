@@ -92,8 +92,8 @@ void qmat_graph_uninit(qmat_graph *graph);
  * to the working folder. QMAT_ERROR_USAGE leaves the old value. */
 qmat_status qmat_graph_set(qmat_context *context, qmat_graph *graph, size_t node, size_t param, const char *text);
 
-/* Sets every parameter that "node.param" or the name of an input stands for. QMAT_ERROR_USAGE leaves all of them as they
- * were, and suggests the nearest name. */
+/* Sets every parameter that "node.param" or the name of an input stands for. QMAT_ERROR_USAGE leaves all of them as
+ * they were, and suggests the nearest name. */
 qmat_status qmat_graph_set_named(qmat_context *context, qmat_graph *graph, const char *name, const char *text);
 
 /* Sets what "node.param=value" or "input=value" says. */

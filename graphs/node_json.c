@@ -24,7 +24,7 @@ const char *qmat_param_type_name(qmat_param_type type) {
   return "unknown";
 }
 
-// A bound that stands for "none" is left out of listings.
+/* A bound that stands for "none" is left out of listings. */
 static bool is_bound(const qmat_param *param, double number) {
   return fabs(number) < (param->type == QMAT_PARAM_INT ? 0x1p53 : 1e300);
 }
@@ -47,7 +47,7 @@ json_t *qmat_param_json(const qmat_param *param, const void *params) {
       const char *value = *(const char *const *)place;
       if (!value) return json_null();
       json_t *string = json_string(value);
-      // A path need not be UTF-8, but JSON must be.
+      /* A path need not be UTF-8, but JSON must be. */
       return string ? string : json_string("(not UTF-8)");
     }
   }
@@ -127,7 +127,7 @@ json_t *qmat_registry_json(const qmat_registry *registry) {
   return nodes;
 }
 
-// Text that is put together piece by piece; what does not fit is left out.
+/* Text that is put together piece by piece; what does not fit is left out. */
 typedef struct piece_writer {
   char *text;
   size_t size, used;

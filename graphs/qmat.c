@@ -7,8 +7,8 @@
 
 #include "core/json_text.h"
 #include "graphs/built_in.h"
-#include "graphs/run/graph_run.h"
 #include "graphs/node_json.h"
+#include "graphs/run/graph_run.h"
 #include "graphs/run/run_report.h"
 #include "io/soup.h"
 #include "nodes/nodes.h"
@@ -54,7 +54,7 @@ void qmat_text_free(char *text) {
   qmat_free(text);
 }
 
-// Ends a call: keeps the error for qmat_job_error.
+/* Ends a call: keeps the error for qmat_job_error. */
 static qmat_result finish(qmat_job *job, qmat_status status) {
   qmat_result result = (qmat_result)qmat_status_exit_code(status);
   if (result == QMAT_RESULT_OK) return result;
@@ -195,7 +195,7 @@ static qmat_status make_scene(qmat_context *context, const char *name, qmat_scen
   return status;
 }
 
-// Puts a value in place of what the port would make; the job takes the caller's reference.
+/* Puts a value in place of what the port would make; the job takes the caller's reference. */
 static qmat_status give(qmat_job *job, size_t node, size_t port, qmat_value *value) {
   for (size_t i = 0; i < job->given_count; i++)
     if (job->given[i].node == node && job->given[i].port == port) {
@@ -245,7 +245,7 @@ qmat_result qmat_job_want(qmat_job *job, const char *port) {
   return finish(job, status);
 }
 
-// The only output that is a file.
+/* The only output that is a file. */
 static qmat_status only_file(qmat_job *job, size_t *output) {
   size_t count = 0;
   for (size_t i = 0; i < job->graph.output_count; i++) {

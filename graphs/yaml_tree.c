@@ -20,7 +20,7 @@ qmat_shown qmat_show(const char *text) {
     shown.text[length] = c < 0x20 || c == 0x7f ? '?' : (char)c;
   }
   if (text[length]) {
-    // Not in the middle of a UTF-8 character.
+    /* Not in the middle of a UTF-8 character. */
     while (length > 0 && ((unsigned char)text[length] & 0xc0) == 0x80) length--;
     memcpy(shown.text + length, "...", 3);
     length += 3;
@@ -42,7 +42,7 @@ static qmat_status fail_syntax(tree_reader *reader) {
   if (parser->error == YAML_MEMORY_ERROR) return qmat_fail_memory(reader->context, "graph");
   qmat_mark mark = mark_of(parser->problem_mark);
   if (parser->error == YAML_READER_ERROR) {
-    // The reader knows no marks, only how many bytes it has seen.
+    /* The reader knows no marks, only how many bytes it has seen. */
     mark = (qmat_mark){1, 1};
     for (size_t i = 0; i < parser->problem_offset && i < reader->size; i++) {
       mark.column++;
@@ -57,7 +57,7 @@ static qmat_status fail_syntax(tree_reader *reader) {
   return fail_at(reader, mark);
 }
 
-// The next event, which the caller deletes; anchors, aliases, tags and lists stop here.
+/* The next event, which the caller deletes; anchors, aliases, tags and lists stop here. */
 static qmat_status next_event(tree_reader *reader, yaml_event_t *event) {
   if (!yaml_parser_parse(&reader->parser, event)) return fail_syntax(reader);
   const char *refused = NULL;
@@ -146,7 +146,7 @@ static qmat_status read_entries(tree_reader *reader, int depth, qmat_tree *mappi
   }
 }
 
-// Reads the value that starts with `event`, which stays the caller's.
+/* Reads the value that starts with `event`, which stays the caller's. */
 static qmat_status read_value(tree_reader *reader, const yaml_event_t *event, int depth, const qmat_tree **result) {
   qmat_tree *value = qmat_arena_calloc(reader->arena, 1, sizeof *value);
   if (!value) return qmat_fail_memory(reader->context, "graph");

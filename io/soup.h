@@ -40,7 +40,8 @@ qmat_status qmat_soup_reserve(qmat_context *context, qmat_soup *soup, size_t ver
 qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const double *positions, size_t count);
 
 /* Adds a facet of `count` corners. Indices need not be in range: qmat_soup_to_mesh says so with the facet's number.
- * `ordinal` is what the file calls it, from 0; `line` is 0 where the format has none. QMAT_ERROR_MEMORY, QMAT_CANCELLED.
+ * `ordinal` is what the file calls it, from 0; `line` is 0 where the format has none. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED.
  */
 qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const uint32_t *corners, size_t count,
                                 uint32_t ordinal, int line);

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "core/json_text.h"
-#include "nodes/simplify/collapse_chain.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/simplify/simplifier.h"
+#include "nodes/simplify/collapse_chain.h"
+#include "nodes/simplify/simplify_setup.h"
 
 static void *copy_of(const void *array, size_t count, size_t size) {
   void *copy = qmat_alloc(count, size);
@@ -15,7 +15,7 @@ static void *copy_of(const void *array, size_t count, size_t size) {
 
 static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapses *o, double deviation,
                               const qmat_medial *medial, qmat_chain *chain) {
-  const qmat_collapse_log *log = &o->simplification.log;
+  const qmat_collapse_log *log = &o->decimation.log;
   const qmat_frame *frame = qmat_surface_frame(o->surface);
   chain->spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *chain->spheres);
   chain->edges = copy_of(medial->edges, medial->edge_count, 2 * sizeof *chain->edges);

@@ -2,8 +2,8 @@
 /* medial.delaunay: the initial medial mesh from the Delaunay tetrahedra of surface samples (Algorithm 1). */
 #include "core/geometry/thickness.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/initial/medial_dual.h"
 #include "nodes/descriptor/sampled_solid.h"
+#include "nodes/initial/voronoi_dual.h"
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {

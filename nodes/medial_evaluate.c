@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/medial_distance.h"
 #include "core/hash.h"
 #include "core/json_text.h"
-#include "core/geometry/medial_distance.h"
 #include "core/node.h"
 #include "nodes/measure/boundary_distance.h"
-#include "nodes/measure/cover.h"
+#include "nodes/measure/hausdorff_bound.h"
 #include "nodes/measure/topology.h"
 
 typedef struct medial_evaluate_params {
@@ -165,12 +165,12 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
     const double left = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
     const double tolerance = search < CREEPING ? left : left / 16;
-    qmat_cover cover;
-    status =
-        qmat_cover_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance, INFINITY, &cover);
-    e->surface_to_envelope = (qmat_bounds){cover.found, fmax(cover.bound, cover.found)};
-    known = cover.found;
-    if (cover.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
+    qmat_hausdorff_bound bound;
+    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance,
+                                          INFINITY, &bound);
+    e->surface_to_envelope = (qmat_bounds){bound.found, fmax(bound.bound, bound.found)};
+    known = bound.found;
+    if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
   }
   return status;
 }

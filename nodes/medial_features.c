@@ -5,9 +5,9 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
-#include "core/json_text.h"
 #include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
+#include "core/json_text.h"
 #include "nodes/initial/creases.h"
 
 typedef enum { FEATURES_NONE, FEATURES_SHARP } feature_kind;
@@ -28,7 +28,7 @@ typedef struct {
   uint32_t *neighbours;
   double *distances; /* per sphere: along edges from the root, where `reached` says so */
   uint32_t *parents;
-  uint32_t *reached, *settled, *wanted, *linked; /* per sphere: the number of the search that said so */
+  uint32_t *reached, *converged, *wanted, *linked; /* per sphere: the number of the search that said so */
   uint32_t search;
   uint32_t *heap, *places;
   size_t heap_count;
@@ -175,7 +175,7 @@ static qmat_status make_graph(feature_builder *b) {
   g->starts = qmat_arena_calloc(arena, count + 2, sizeof *g->starts);
   g->neighbours = qmat_arena_alloc(arena, m->edge_count, 2 * sizeof *g->neighbours);
   g->distances = qmat_arena_alloc(arena, count, sizeof *g->distances);
-  uint32_t **const rows[] = {&g->parents, &g->reached, &g->settled, &g->wanted, &g->linked, &g->heap, &g->places};
+  uint32_t **const rows[] = {&g->parents, &g->reached, &g->converged, &g->wanted, &g->linked, &g->heap, &g->places};
   bool bad = !spheres || !g->starts || !g->neighbours || !g->distances;
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
     bad |= !(*rows[i] = qmat_arena_calloc(arena, count, sizeof **rows[i]));
@@ -224,14 +224,14 @@ static void find_paths(sheet_graph *g, uint32_t root, size_t missing) {
   put(g, 0, root);
   while (g->heap_count && missing) {
     const uint32_t v = take_nearest(g);
-    g->settled[v] = g->search;
+    g->converged[v] = g->search;
     missing -= g->wanted[v] == g->search;
     for (size_t i = g->starts[v]; i < g->starts[v + 1]; i++) {
       const uint32_t w = g->neighbours[i];
       const double distance =
           g->distances[v] + qmat_point_distance(&g->spheres[4 * (size_t)v], &g->spheres[4 * (size_t)w]);
       const bool is_new = g->reached[w] != g->search;
-      if (g->settled[w] == g->search || !(is_new || distance < g->distances[w])) continue;
+      if (g->converged[w] == g->search || !(is_new || distance < g->distances[w])) continue;
       g->distances[w] = distance;
       g->parents[w] = v;
       g->reached[w] = g->search;
@@ -277,7 +277,7 @@ static qmat_status link_feature(feature_builder *b, uint32_t id, const uint32_t 
   g->linked[root] = g->search;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     const uint32_t next = b->segments[2 * (size_t)following[i] + 1], anchor = b->features[next].anchor;
-    if (g->settled[anchor] != g->search) {
+    if (g->converged[anchor] != g->search) {
       b->gaps++;
       continue;
     }

@@ -88,7 +88,7 @@ const qmat_node qmat_node_medial_lod = {
     .summary = "Takes a medial mesh of any number of spheres or any error out of a chain",
     .doc =
         "The collapses of the chain are done up to the wanted number of spheres, or as long as both errors are "
-        "held to epsilon at the control points, of which 2.5 % are left to the surface between them; with both "
+        "held to epsilon at the constraint points, of which 2.5 % are left to the surface between them; with both "
         "parameters, what comes first. The medial mesh, with its responsible regions, is the one that "
         "medial.simplify makes with the chain's parameters and that bound, to the byte. Epsilon below the "
         "chain's finest gives the initial medial mesh. Takes milliseconds: time grows with the initial medial "

@@ -3,17 +3,17 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
-#include "core/json_text.h"
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/thickness.h"
 #include "core/geometry/vector.h"
-#include "nodes/measure/control_points.h"
+#include "core/hash.h"
+#include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/initial/medial_dual.h"
-#include "nodes/measure/point_grid.h"
-#include "nodes/initial/sample_spacing.h"
 #include "nodes/descriptor/sampled_solid.h"
+#include "nodes/initial/sample_spacing.h"
+#include "nodes/initial/voronoi_dual.h"
+#include "nodes/measure/constraint_points.h"
+#include "nodes/measure/point_grid.h"
 
 typedef struct {
   qmat_dual_params dual;
@@ -76,7 +76,7 @@ static qmat_status find_far_places(const refiner *r, double limit, refinement *f
   if (!points || !spheres) return qmat_fail_memory(context, "the samples");
   qmat_frame_spheres_to_unit(&r->frame, medial->spheres, medial->sphere_count, spheres);
   qmat_complex complex;
-  qmat_control_points places;
+  qmat_constraint_points places;
   qmat_status status = qmat_complex_init(context, &complex, medial, spheres);
   if (status == QMAT_OK)
     status = qmat_surface_places_make(context, r->mesh, r->positions, found->samples, points, medial, &complex,
@@ -282,7 +282,7 @@ static qmat_status refine_in_rounds(const refiner *r, double limit, refinement *
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
     spacing *= 0.5;
     if (status != QMAT_OK) break;
-    if (next->medial == NULL) {
+    if (!next->medial) {
       refinement_uninit(next);
       continue;
     }

@@ -5,33 +5,33 @@
 
 #include "core/json_text.h"
 #include "core/node.h"
-#include "nodes/simplify/collapse_in_parts.h"
-#include "nodes/simplify/hollow_filling.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/measure/envelope_to_surface.h"
 #include "nodes/measure/medial_errors.h"
-#include "nodes/measure/protrusion.h"
-#include "nodes/simplify/simplifier.h"
 #include "nodes/measure/topology.h"
+#include "nodes/simplify/cavity_filling.h"
+#include "nodes/simplify/partitioned_collapse.h"
+#include "nodes/simplify/simplify_setup.h"
 
 typedef qmat_simplify_params medial_simplify_params;
 
-/* Of the wanted error the control points leave the rest to the surface between them. Where that is not enough the run
- * is repeated, at most this often, with control points in the places found. Notches and voids of the envelope are
- * filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
-enum { MOST_ROUNDS = 8, MOST_SQUEEZES = 3, MOST_FILLINGS = 6 };
-enum { MOST_CONTROL_POINTS = 600000 };
+/* Of the wanted error the constraint points leave the rest to the surface between them. Where that is not enough the
+ * run is repeated, at most this often, with constraint points in the places found. Notches and voids of the envelope
+ * are filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
+enum { MOST_ROUNDS = 8, MOST_JOINT_REFITS = 3, MOST_FILLINGS = 6 };
+enum { MOST_CONSTRAINT_POINTS = 600000 };
 
 typedef struct {
   qmat_context *context;
   const medial_simplify_params *params; /* with what the mesh's deviation leaves of epsilon */
   double epsilon, deviation;            /* what is asked for, and the deviation, in diagonals */
   qmat_surface *surface;
-  qmat_control_points control; /* of `dense` */
-  qmat_simplification dense;   /* where each round starts */
-  size_t initial_count;        /* spheres before the first collapse */
+  qmat_constraint_points control; /* of `dense` */
+  qmat_decimation dense;          /* where each round starts */
+  size_t initial_count;           /* spheres before the first collapse */
   /* Of the newest round, and of the one that it went on from. */
-  qmat_control_points round_controls[2];
-  qmat_simplification rounds[2];
+  qmat_constraint_points round_controls[2];
+  qmat_decimation rounds[2];
   int newest;
 } simplifier;
 
@@ -45,45 +45,48 @@ static const double default_epsilon = 0.01;
 static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
-  const qmat_control_points *control = &s->round_controls[s->newest];
-  qmat_status status = qmat_medial_cover_measure(s->context, s->surface, unit, control->points, control->surface_count,
-                                                 tolerance, least_reported * epsilon, epsilon - tolerance, errors);
+  const qmat_constraint_points *control = &s->round_controls[s->newest];
+  qmat_status status =
+      qmat_medial_surface_bound_measure(s->context, s->surface, unit, control->points, control->surface_count,
+                                        tolerance, least_reported * epsilon, epsilon - tolerance, errors);
   if (status != QMAT_OK) return status;
   const bool two_sided = s->params->epsilon > 0 && s->params->error == QMAT_ERROR_TWO_SIDED;
-  const qmat_simplification *round = &s->rounds[s->newest];
-  if (two_sided) errors->envelope_to_surface = qmat_protrusion_largest_bound(&round->protrusion, &round->complex);
+  const qmat_decimation *round = &s->rounds[s->newest];
+  if (two_sided)
+    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->to_surface, &round->complex);
   if (!two_sided || errors->envelope_to_surface > epsilon)
-    status = qmat_medial_protrusion_measure(s->context, s->surface, unit, tolerance, least_reported * epsilon, errors);
+    status =
+        qmat_medial_envelope_bound_measure(s->context, s->surface, unit, tolerance, least_reported * epsilon, errors);
   return status == QMAT_OK && two_sided ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
                                         : status;
 }
 
 /* Fills notches and voids of the envelope; `left` gets what is still found afterwards, `filled` how many spheres that
  * took. */
-static qmat_status fill_hollows(const simplifier *s, const qmat_medial_errors *found, qmat_medial *unit,
-                                qmat_medial_errors *left, size_t *filled) {
+static qmat_status fill_cavities(const simplifier *s, const qmat_medial_errors *found, qmat_medial *unit,
+                                 qmat_medial_errors *left, size_t *filled) {
   const double epsilon = s->params->epsilon;
   qmat_status status = QMAT_OK;
   *left = *found;
   *filled = 0;
-  for (int i = 0; i < MOST_FILLINGS && left->hollow_count > 0 && status == QMAT_OK; i++) {
+  for (int i = 0; i < MOST_FILLINGS && left->cavity_count > 0 && status == QMAT_OK; i++) {
     size_t added;
-    status = qmat_hollows_fill(s->context, s->surface, left->hollows, left->hollow_count, epsilon, unit, &added);
+    status = qmat_cavities_fill(s->context, s->surface, left->cavities, left->cavity_count, epsilon, unit, &added);
     if (status != QMAT_OK || added == 0) break;
     *filled += added;
     left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
-    left->hollows = left->doubts = NULL; /* those of `found` stay its own */
-    left->hollow_count = left->doubt_count = 0;
+    left->cavities = left->doubts = NULL; /* those of `found` stay its own */
+    left->cavity_count = left->doubt_count = 0;
     status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
   return status;
 }
 
-static void swap_lattices(qmat_simplification *a, qmat_simplification *b) {
-  const qmat_depth_lattice lattice = a->protrusion.lattice;
-  a->protrusion.lattice = b->protrusion.lattice;
-  b->protrusion.lattice = lattice;
+static void swap_lattices(qmat_decimation *a, qmat_decimation *b) {
+  const qmat_depth_lattice lattice = a->to_surface.lattice;
+  a->to_surface.lattice = b->to_surface.lattice;
+  b->to_surface.lattice = lattice;
 }
 
 /* Collapses that keep to this share of the error are done once for all rounds, so that places found later are still
@@ -92,22 +95,23 @@ static const double dense_share = 0.9, held_depth_share = 0.05;
 
 static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                                   const qmat_medial *medial, const qmat_extra_points *extra) {
-  qmat_simplification *dense = &s->dense;
-  *dense = (qmat_simplification){.context = s->context, .surface = s->surface};
+  qmat_decimation *dense = &s->dense;
+  *dense = (qmat_decimation){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_complex_init(s->context, &dense->complex, medial, state->spheres);
   if (status == QMAT_OK)
     status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &dense->rules);
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : INFINITY;
   const bool inside = s->params->error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
-    status = qmat_control_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
-                                      MOST_CONTROL_POINTS, inside, &s->control);
+    status = qmat_constraint_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
+                                         MOST_CONSTRAINT_POINTS, inside, &s->control);
   if (extra->surface_count + extra->inner_count > 0) {
-    const qmat_control_points base = s->control;
-    qmat_control_points further;
+    const qmat_constraint_points base = s->control;
+    qmat_constraint_points further;
     if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &dense->complex, extra, &further);
     if (status == QMAT_OK)
-      status = qmat_control_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->control);
+      status =
+          qmat_constraint_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->control);
   }
   dense->rules.share = dense_share;
   dense->rules.refits = 0;
@@ -115,30 +119,31 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   if (status == QMAT_OK)
     status = qmat_can_collapse_in_parts(&dense->rules, &dense->complex)
                  ? qmat_collapse_in_parts(dense, &s->control, state->depths)
-                 : qmat_simplification_init(dense, &s->control, state->depths);
-  return status == QMAT_OK ? qmat_simplification_run(dense) : status;
+                 : qmat_decimation_init(dense, &s->control, state->depths);
+  return status == QMAT_OK ? qmat_decimation_run(dense) : status;
 }
 
 /* Collapses on from where `from` ended, of which `left` is what is left; `patches` and `polish` as in the rules. */
-static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_simplification *from,
-                             const qmat_medial *left, const qmat_extra_points *extra, bool patches, bool polish) {
+static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_decimation *from,
+                             const qmat_medial *left, const qmat_extra_points *extra, bool neighbourhoods,
+                             bool final_refit) {
   s->newest = 1 - s->newest;
-  qmat_simplification *round = &s->rounds[s->newest];
-  qmat_simplification_uninit(round);
-  *round = (qmat_simplification){.context = s->context, .surface = s->surface};
+  qmat_decimation *round = &s->rounds[s->newest];
+  qmat_decimation_uninit(round);
+  *round = (qmat_decimation){.context = s->context, .surface = s->surface};
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
-  round->rules.patches = patches;
-  round->rules.polish = polish;
-  if (status == QMAT_OK) status = qmat_simplification_resume(from, left, extra, &s->round_controls[s->newest], round);
+  round->rules.neighbourhoods = neighbourhoods;
+  round->rules.final_refit = final_refit;
+  if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_controls[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
   swap_lattices(&s->dense, round);
-  status = qmat_simplification_run(round);
+  status = qmat_decimation_run(round);
   swap_lattices(&s->dense, round);
   return status;
 }
 
-static int report_features(const qmat_simplification *run, json_t *root) {
+static int report_features(const qmat_decimation *run, json_t *root) {
   const size_t left = run->creases.left;
   if (left == 0) return 0;
   int bad = qmat_json_set_count(root, "features", left);
@@ -155,16 +160,16 @@ static int report_errors(json_t *root, double epsilon, double deviation, const q
 }
 
 /* What is reported of any run, and of what it has left. */
-static int report_run(json_t *root, const qmat_simplification *run, size_t initial_spheres, const qmat_medial *unit) {
+static int report_run(json_t *root, const qmat_decimation *run, size_t initial_spheres, const qmat_medial *unit) {
   int bad = qmat_json_set_count(root, "initial_spheres", initial_spheres);
   bad |= qmat_json_set_count(root, "spheres", unit->sphere_count);
   bad |= qmat_json_set_count(root, "edges", unit->edge_count);
   bad |= qmat_json_set_count(root, "triangles", unit->triangle_count);
   bad |= qmat_json_set_count(root, "collapses", run->counts.collapses);
-  bad |= qmat_json_set_count(root, "control_points", run->control->count);
+  bad |= qmat_json_set_count(root, "constraint_points", run->control->count);
   bad |= qmat_json_set_count(root, "refused_by_surface", run->counts.refused_by_surface);
-  bad |= qmat_json_set_count(root, "refused_by_coverage", run->counts.refused_by_coverage);
-  bad |= qmat_json_set_count(root, "refused_by_protrusion", run->counts.refused_by_protrusion);
+  bad |= qmat_json_set_count(root, "refused_by_surface_to_envelope", run->counts.refused_by_surface_to_envelope);
+  bad |= qmat_json_set_count(root, "refused_by_envelope_to_surface", run->counts.refused_by_envelope_to_surface);
   bad |= qmat_json_set_count(root, "refused_by_protection", run->counts.refused_by_protection);
   bad |= qmat_json_set_count(root, "refused_by_topology", run->counts.refused_by_topology);
   bad |= report_features(run, root);
@@ -177,13 +182,13 @@ static int report_run(json_t *root, const qmat_simplification *run, size_t initi
 
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
                                int rounds, size_t filled, qmat_report *report) {
-  const qmat_simplification *run = &s->rounds[s->newest];
+  const qmat_decimation *run = &s->rounds[s->newest];
   json_t *root = report->root;
   int bad = report_run(root, run, s->initial_count, unit);
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
   bad |= qmat_json_set_count(root, "filled", filled);
   bad |= qmat_json_set_count(root, "moves", run->moves);
-  bad |= qmat_json_set_count(root, "surface_questions", s->dense.protrusion.lattice.questions);
+  bad |= qmat_json_set_count(root, "surface_questions", s->dense.to_surface.lattice.questions);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
@@ -192,7 +197,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
 static qmat_status append(simplifier *s, const double **points, size_t *count, const double *added,
                           size_t added_count) {
   double *all = qmat_arena_alloc(&s->context->arena, *count + added_count, 3 * sizeof *all);
-  if (!all) return qmat_fail_memory(s->context, "control points");
+  if (!all) return qmat_fail_memory(s->context, "constraint points");
   if (*count) memcpy(all, *points, 3 * *count * sizeof *all);
   if (added_count) memcpy(all + 3 * *count, added, 3 * added_count * sizeof *all);
   *points = all;
@@ -200,7 +205,7 @@ static qmat_status append(simplifier *s, const double **points, size_t *count, c
   return QMAT_OK;
 }
 
-/* Whether the initial medial mesh itself keeps within epsilon at all control points: what it leaves too far away, no
+/* Whether the initial medial mesh itself keeps within epsilon at all constraint points: what it leaves too far away, no
  * round brings closer. */
 static bool starts_within(const simplifier *s, double epsilon) {
   for (size_t i = 0; i < s->control.surface_count; i++)
@@ -210,7 +215,7 @@ static bool starts_within(const simplifier *s, double epsilon) {
 
 /* Whether the dense part keeps to the places of a round as well as is wanted of the result. */
 static bool dense_keeps(const simplifier *s, const qmat_extra_points *extra) {
-  const qmat_control_points *base = &s->control, *all = &s->round_controls[s->newest];
+  const qmat_constraint_points *base = &s->control, *all = &s->round_controls[s->newest];
   for (size_t i = base->surface_count; i < all->surface_count; i++)
     if (!(all->distances[i] <= s->dense.rules.limit)) return false;
   return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
@@ -238,15 +243,15 @@ static bool is_better(const attempt *a, const attempt *best) {
   return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
 }
 
-/* What the newest round has left, with its hollows filled, and what is wrong with it. `found` are the errors before
- * hollows are filled; `a->filled` tells how many spheres filled some before the round. */
+/* What the newest round has left, with its cavities filled, and what is wrong with it. `found` are the errors before
+ * cavities are filled; `a->filled` tells how many spheres filled some before the round. */
 static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_medial_errors *found) {
-  const qmat_simplification *done = &s->rounds[s->newest];
-  qmat_status status = qmat_simplification_extract(done, a->medial);
+  const qmat_decimation *done = &s->rounds[s->newest];
+  qmat_status status = qmat_decimation_extract(done, a->medial);
   if (status == QMAT_OK) status = measure(s, a->medial, found);
   qmat_medial_errors after = *found;
   size_t filled = 0;
-  if (status == QMAT_OK) status = fill_hollows(s, found, a->medial, &after, &filled);
+  if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);
   a->filled += filled;
   if (status == QMAT_OK) status = make_report(s, a->medial, &after, round, a->filled, a->report);
   const double epsilon = s->params->epsilon;
@@ -269,40 +274,40 @@ static qmat_status start_attempt(const simplifier *s, size_t filled, attempt *a,
   return a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
 }
 
-/* A round from where the dense part ended. `found` are the errors before hollows are filled. */
+/* A round from where the dense part ended. `found` are the errors before cavities are filled. */
 static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra,
                                int round, bool is_last, attempt *a, qmat_medial_errors *found) {
   qmat_medial *left = qmat_medial_new();
   qmat_status status = start_attempt(s, 0, a, found);
   if (status == QMAT_OK && !left) status = qmat_fail_memory(s->context, "the medial mesh");
-  if (status == QMAT_OK) status = qmat_simplification_extract(&s->dense, left);
+  if (status == QMAT_OK) status = qmat_decimation_extract(&s->dense, left);
   if (status == QMAT_OK) status = run_round(s, state, &s->dense, left, extra, false, is_last);
   qmat_value_release(left ? &left->base : NULL);
   return status == QMAT_OK ? finish_attempt(s, round, a, found) : status;
 }
 
-/* Places that were found between the control points are held in the next try. */
+/* Places that were found between the constraint points are held in the next try. */
 static qmat_status hold_found(simplifier *s, const qmat_medial_errors *found, qmat_extra_points *extra) {
   qmat_status status = QMAT_OK;
   if (found->surface_to_envelope > s->params->epsilon)
-    status = append(s, &extra->surface, &extra->surface_count, found->cover.points, found->cover.count);
-  if (status == QMAT_OK) status = append(s, &extra->inner, &extra->inner_count, found->hollows, found->hollow_count);
+    status = append(s, &extra->surface, &extra->surface_count, found->bound.points, found->bound.count);
+  if (status == QMAT_OK) status = append(s, &extra->inner, &extra->inner_count, found->cavities, found->cavity_count);
   return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->doubts, found->doubt_count) : status;
 }
 
-/* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where hollows were
+/* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where cavities were
  * filled, of those in `found`, their places are held: what fills them may be a part of what was there before. What
  * does not keep within epsilon is tried again with the places held that were found. The result changes only where that
  * makes it no worse. */
-static qmat_status squeeze(simplifier *s, const qmat_initial_medial *state, int round, const qmat_medial_errors *found,
-                           attempt *best) {
+static qmat_status refit_jointly(simplifier *s, const qmat_initial_medial *state, int round,
+                                 const qmat_medial_errors *found, attempt *best) {
   if (s->params->refits == 0 || best->medial->sphere_count <= (size_t)s->params->vertices) return QMAT_OK;
   qmat_extra_points extra = {.held_depth = held_depth_share * s->params->epsilon};
   const int base = s->newest;
   qmat_status status = QMAT_OK;
-  if (best->filled > 0) status = append(s, &extra.inner, &extra.inner_count, found->hollows, found->hollow_count);
+  if (best->filled > 0) status = append(s, &extra.inner, &extra.inner_count, found->cavities, found->cavity_count);
   bool ended = false;
-  for (int i = 0; i < MOST_SQUEEZES && status == QMAT_OK && !ended; i++) {
+  for (int i = 0; i < MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
     attempt a;
     qmat_medial_errors errors;
     s->newest = base;
@@ -362,7 +367,7 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qma
 /* Opens voids of a result that keeps within epsilon until there is none that the solid has not. A slab less leaves the
  * solid by no more, but the surface may be farther away. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
-  const qmat_simplification_rules *rules = &s->dense.rules;
+  const qmat_decimation_rules *rules = &s->dense.rules;
   if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
   json_t *root = a->report->root;
   for (bool opened = true; opened;) {
@@ -400,7 +405,7 @@ static qmat_status insert_triangle(qmat_context *context, qmat_medial *medial, c
 /* Closes a loop of the medial mesh that the solid has not: fills the first three edges without a slab that are such a
  * loop, where the slab leaves the solid by no more than epsilon. `*closed`: whether there were any; `*protrusion` is
  * then what the slab leaves it by. One that closes no loop would make a void. */
-static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *protrusion) {
+static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *to_surface) {
   const double epsilon = s->params->epsilon;
   uint32_t *triangles;
   size_t count;
@@ -410,8 +415,9 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
     const uint32_t *corners = &triangles[3 * i];
     const double *spheres[3];
     for (size_t k = 0; k < 3; k++) spheres[k] = &unit->spheres[4 * (size_t)corners[k]];
-    *protrusion = qmat_protrusion_bound(s->surface, spheres, 3, least_reported * epsilon, error_tolerance * epsilon);
-    if (*protrusion > epsilon) continue;
+    *to_surface =
+        qmat_envelope_to_surface_bound(s->surface, spheres, 3, least_reported * epsilon, error_tolerance * epsilon);
+    if (*to_surface > epsilon) continue;
     size_t place = 0;
     qmat_topology topology;
     qmat_medial_errors errors = {.surface_to_envelope = 0};
@@ -431,29 +437,29 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
 /* Closes loops of a result that keeps within epsilon while it has more than the solid. A slab more brings the surface
  * no farther away, but may leave the solid. */
 static qmat_status close_loops(simplifier *s, attempt *a) {
-  const qmat_simplification_rules *rules = &s->dense.rules;
+  const qmat_decimation_rules *rules = &s->dense.rules;
   if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
   json_t *root = a->report->root;
   for (;;) {
     qmat_topology topology;
     bool closed;
-    double protrusion;
+    double to_surface;
     qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
     if (status != QMAT_OK || !topology.known || topology.loops == 0 || topology.euler >= rules->target_euler)
       return status;
-    status = close_loop(s, a->medial, topology.loops, &closed, &protrusion);
+    status = close_loop(s, a->medial, topology.loops, &closed, &to_surface);
     if (status != QMAT_OK || !closed) return status;
     const double before = json_real_value(json_object_get(root, "envelope_to_surface"));
     int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
     bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler + 1));
-    bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, protrusion + s->deviation)));
+    bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, to_surface + s->deviation)));
     if (bad) return qmat_fail_memory(s->context, "the report");
   }
 }
 
-/* Rounds of collapses until surface and envelope keep within epsilon of each other between the control points as they
- * do at them: places where the surface is farther from the envelope, or the envelope has a notch or is hollow, join
- * them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
+/* Rounds of collapses until surface and envelope keep within epsilon of each other between the constraint points as
+ * they do at them: places where the surface is farther from the envelope, or the envelope has a notch or is cavity,
+ * join them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
 static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                             const qmat_medial *initial, attempt *best) {
   const double epsilon = s->params->epsilon;
@@ -464,10 +470,10 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     attempt a;
     const bool is_within = epsilon > 0 && starts_within(s, epsilon), is_last = round == MOST_ROUNDS || !is_within;
     status = run_attempt(s, state, &extra, round, is_last, &a, &errors);
-    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.hollow_count == 0);
+    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.cavity_count == 0);
     const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
     if (status == QMAT_OK && is_done && (a.holds || a.filled > 0 || is_within))
-      status = squeeze(s, state, round, &errors, &a);
+      status = refit_jointly(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
       *best = a;
@@ -481,7 +487,7 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     status = append(s, &in_dense.surface, &in_dense.surface_count, extra.surface, extra.surface_count);
     if (status == QMAT_OK) status = append(s, &in_dense.inner, &in_dense.inner_count, extra.inner, extra.inner_count);
     extra = (qmat_extra_points){.held_depth = extra.held_depth};
-    qmat_simplification_uninit(&s->dense);
+    qmat_decimation_uninit(&s->dense);
     if (status == QMAT_OK) status = collapse_dense(s, state, samples, initial, &in_dense);
   }
   return status;
@@ -490,7 +496,7 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
 static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, double epsilon,
                                    double deviation, const qmat_medial *unit, const qmat_medial_errors *errors,
                                    qmat_report *report) {
-  const qmat_simplification *run = &o->simplification;
+  const qmat_decimation *run = &o->decimation;
   json_t *root = report->root;
   int bad = report_run(root, run, run->complex.vertex_count, unit);
   bad |= json_object_set_new(root, "held", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
@@ -506,15 +512,15 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   qmat_report *report = qmat_report_new();
   qmat_status status = medial && report ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, params, inputs, &o);
-  if (status == QMAT_OK) status = qmat_simplification_extract(&o.simplification, medial);
+  if (status == QMAT_OK) status = qmat_decimation_extract(&o.decimation, medial);
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double bound = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
   if (status == QMAT_OK)
-    status = qmat_medial_cover_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
-                                       error_tolerance * bound, least_reported * bound, INFINITY, &errors);
+    status = qmat_medial_surface_bound_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
+                                               error_tolerance * bound, least_reported * bound, INFINITY, &errors);
   if (status == QMAT_OK)
-    status = qmat_medial_protrusion_measure(context, o.surface, medial, error_tolerance * bound, least_reported * bound,
-                                            &errors);
+    status = qmat_medial_envelope_bound_measure(context, o.surface, medial, error_tolerance * bound,
+                                                least_reported * bound, &errors);
   if (status == QMAT_OK)
     status = report_in_order(context, &o, o.params.epsilon > 0 ? epsilon : 0, deviation, medial, &errors, report);
   if (status == QMAT_OK) {
@@ -562,8 +568,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   } else {
     release(&best);
   }
-  for (int i = 0; i < 2; i++) qmat_simplification_uninit(&s.rounds[i]);
-  qmat_simplification_uninit(&s.dense);
+  for (int i = 0; i < 2; i++) qmat_decimation_uninit(&s.rounds[i]);
+  qmat_decimation_uninit(&s.dense);
   qmat_surface_free(s.surface);
   return status;
 }
@@ -626,10 +632,11 @@ const qmat_node qmat_node_medial_simplify = {
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
         "the edge. A collapse is done when its sphere and the midpoints of its edges lie inside the model and both "
-        "errors stay below epsilon: from the surface to the envelope at the samples and a grid of control points, and "
+        "errors stay below epsilon: from the surface to the envelope at the samples and a grid of constraint points, "
+        "and "
         "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
         "deep "
-        "stay inside the envelope, so that it has no hollow. The first collapses of a large medial mesh are done in "
+        "stay inside the envelope, so that it has no cavity. The first collapses of a large medial mesh are done in "
         "parts, "
         "side by side, as long as each has a quarter of its spheres left. Spheres of radius zero are sharp features: "
         "corners stay, "
@@ -650,7 +657,7 @@ const qmat_node qmat_node_medial_simplify = {
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
         "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is held rises "
-        "as soon as the cheapest collapse asks for it, as in the paper. Both have control points of their own, "
+        "as soon as the cheapest collapse asks for it, as in the paper. Both have constraint points of their own, "
         "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
         "leaves the surface around it nearest to the envelope, and that distance for the cost; pmat keeps the "
         "larger end, and the cost is the distance of the centres over the difference of the radii. With compat=qmat "

@@ -7,8 +7,8 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
 #include "core/node.h"
-#include "nodes/skin/envelope_surface.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/skin/envelope_surface.h"
 #include "nodes/skin/skin_surface_cgal.h"
 
 /* What CGAL's skin surface is given at most: it may take 45 seconds for as many. */
@@ -167,9 +167,9 @@ static qmat_status remove_hidden(skin *s, ball_list *list) {
   if (list->count > 4 * MOST_BALLS) return QMAT_OK; /* too many anyhow */
   qmat_envelope *all;
   qmat_status status = qmat_envelope_new(s->context, list->balls, list->count, NULL, 0, NULL, 0, &all);
-  if (status) return status;
+  if (status != QMAT_OK) return status;
   kept = 0;
-  for (size_t i = 0; i < list->count && !status; i++) {
+  for (size_t i = 0; i < list->count && status == QMAT_OK; i++) {
     double *ball = list->balls + 4 * i;
     if (i % 256 == 0) status = qmat_progress(s->context, i, list->count, "balls");
     /* No ball reaches deeper at its centre than itself, unless it lies within that other one. */
@@ -195,8 +195,8 @@ static qmat_status make_skin_surface(skin *s) {
     if (count == 3) fill_slab(&list, ends[0], ends[1], ends[2]);
   }
   if (list.short_of_memory) status = qmat_fail_memory(s->context, "balls");
-  if (!status && !full(&list)) status = remove_hidden(s, &list);
-  if (!status && list.count > MOST_BALLS) {
+  if (status == QMAT_OK && !full(&list)) status = remove_hidden(s, &list);
+  if (status == QMAT_OK && list.count > MOST_BALLS) {
     char spacing[32];
     qmat_format_number(list.spacing, spacing, sizeof spacing);
     qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
@@ -204,8 +204,8 @@ static qmat_status make_skin_surface(skin *s) {
     qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
     status = qmat_fail_field(s->context, "spacing");
   }
-  if (!status) status = qmat_progress(s->context, 0, list.count, "balls");
-  if (!status) {
+  if (status == QMAT_OK) status = qmat_progress(s->context, 0, list.count, "balls");
+  if (status == QMAT_OK) {
     s->ball_count = list.count;
     status = qmat_skin_surface(s->context, list.balls, list.count, s->params->shrink, (int)s->params->subdivisions,
                                &s->surface);
@@ -246,7 +246,7 @@ static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
       centroids = fmax(centroids, fabs(qmat_envelope_distance(s->envelope, centroid, NULL)));
     }
     qmat_status status = qmat_progress(s->context, end, total, "measured points");
-    if (status) return status;
+    if (status != QMAT_OK) return status;
   }
   *at_vertices = vertices;
   *at_centroids = centroids;
@@ -258,8 +258,8 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
   size_t components = 0;
   double at_vertices = 0, at_centroids = 0;
   qmat_status status = count_components(s, &components);
-  if (!status) status = measure(s, &at_vertices, &at_centroids);
-  if (status) return status;
+  if (status == QMAT_OK) status = measure(s, &at_vertices, &at_centroids);
+  if (status != QMAT_OK) return status;
   json_int_t vertices = (json_int_t)surface->vertex_count, triangles = (json_int_t)surface->triangle_count;
   bool envelope = s->params->method == METHOD_ENVELOPE;
   json_t *root = json_pack("{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f}", "method", envelope ? "envelope" : "skin_surface",
@@ -288,19 +288,19 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_report *report = qmat_report_new();
   qmat_status status = mesh && report ? QMAT_OK : qmat_fail_memory(context, "the skin");
-  if (!status) status = find_frame(&s);
-  if (!status) {
+  if (status == QMAT_OK) status = find_frame(&s);
+  if (status == QMAT_OK) {
     status = qmat_envelope_new(context, s.spheres, s.medial->sphere_count, s.medial->edges, s.medial->edge_count,
                                s.medial->triangles, s.medial->triangle_count, &s.envelope);
   }
-  if (!status) {
+  if (status == QMAT_OK) {
     status = params->method == METHOD_ENVELOPE
                  ? qmat_envelope_surface(context, s.envelope, s.spheres, s.medial->sphere_count,
                                          1 / (double)params->resolution, (int)params->detail, &s.surface, &s.grid)
                  : make_skin_surface(&s);
   }
-  if (!status) status = fill_report(&s, report);
-  if (!status) {
+  if (status == QMAT_OK) status = fill_report(&s, report);
+  if (status == QMAT_OK) {
     qmat_frame_to_model(&s.frame, s.surface.positions, s.surface.vertex_count, s.surface.positions);
     mesh->vertex_count = s.surface.vertex_count;
     mesh->triangle_count = s.surface.triangle_count;
@@ -310,11 +310,11 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     s.surface = (qmat_skin_triangles){0};
     status = qmat_value_seal(context, &mesh->base);
   }
-  if (!status) status = qmat_value_seal(context, &report->base);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(s.surface.positions);
   qmat_free(s.surface.triangles);
   qmat_envelope_free(s.envelope);
-  if (status) {
+  if (status != QMAT_OK) {
     if (mesh) qmat_value_release(&mesh->base);
     if (report) qmat_value_release(&report->base);
     return status;

@@ -5,10 +5,10 @@
 #include <string.h>
 
 #include "core/geometry/frame.h"
-#include "core/hash.h"
-#include "core/node.h"
 #include "core/geometry/thickness.h"
 #include "core/geometry/triangle.h"
+#include "core/hash.h"
+#include "core/node.h"
 #include "nodes/initial/sample_spacing.h"
 
 #define MOST_PER_FACET 64
@@ -124,7 +124,7 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
                                  uint64_t *offsets, spaced_points *spaced, sample_counts *counts) {
   double *scratch = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *scratch);
   smallest_areas *at_vertices = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *at_vertices);
-  if (scratch == NULL || at_vertices == NULL) return qmat_fail_memory(context, "the areas around vertices");
+  if (!scratch || !at_vertices) return qmat_fail_memory(context, "the areas around vertices");
   for (size_t i = 0; i < mesh->vertex_count; i++) {
     at_vertices[i] = (smallest_areas){{INFINITY, INFINITY}, {UINT32_MAX, UINT32_MAX}};
   }
@@ -137,9 +137,8 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
   if (params->spacing > 0) {
     spaced->on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *spaced->on_sides);
     spaced->in_rows = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *spaced->in_rows);
-    if (spaced->on_sides == NULL || spaced->in_rows == NULL) return qmat_fail_memory(context, "the samples");
-    const qmat_status status =
-        qmat_side_points_count(context, mesh, unit_positions, params->spacing, spaced->on_sides);
+    if (!spaced->on_sides || !spaced->in_rows) return qmat_fail_memory(context, "the samples");
+    const qmat_status status = qmat_side_points_count(context, mesh, unit_positions, params->spacing, spaced->on_sides);
     if (status != QMAT_OK) return status;
   }
 
@@ -148,7 +147,7 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     const bool thin = thickness->values[i] <= counts->threshold;
     counts->thin += thin;
     offsets[i + 1] = offsets[i];
-    for (size_t k = 0; k < 3 && spaced->on_sides != NULL; k++) {
+    for (size_t k = 0; k < 3 && spaced->on_sides; k++) {
       offsets[i + 1] += spaced->on_sides[3 * i + k];
       counts->by_spacing += spaced->on_sides[3 * i + k];
     }
@@ -162,7 +161,7 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
                                              params->max_per_facet + 1);
     const int64_t wanted = by_area + by_thickness;
     const int64_t count = wanted < params->max_per_facet ? wanted : params->max_per_facet;
-    if (spaced->in_rows != NULL) {
+    if (spaced->in_rows) {
       const uint32_t *ids = mesh->triangles + 3 * i;
       const uint64_t rows =
           qmat_row_points_count(unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
@@ -318,7 +317,7 @@ static void place_samples(const mesh_sample_params *params, const double *unit_p
                           uint32_t facet, const spaced_points *spaced, size_t count, double *barycentrics) {
   const double *a = unit_positions + 3 * (size_t)ids[0], *b = unit_positions + 3 * (size_t)ids[1],
                *c = unit_positions + 3 * (size_t)ids[2];
-  for (int side = 0; side < 3 && spaced->on_sides != NULL; side++) {
+  for (int side = 0; side < 3 && spaced->on_sides; side++) {
     const size_t wanted = spaced->on_sides[3 * (size_t)facet + (size_t)side];
     const size_t placed = wanted < count ? wanted : count;
     qmat_side_points_fill(side, (uint32_t)placed, barycentrics);
@@ -326,7 +325,7 @@ static void place_samples(const mesh_sample_params *params, const double *unit_p
     count -= placed;
   }
   if (count == 0) return;
-  if (spaced->in_rows != NULL && spaced->in_rows[facet] > 0) {
+  if (spaced->in_rows && spaced->in_rows[facet] > 0) {
     qmat_row_points_fill(a, b, c, params->spacing, qmat_hash3((uint64_t)params->seed, facet, 0), count, barycentrics);
   } else {
     spread_samples(params, a, b, c, facet, count, barycentrics);
@@ -404,13 +403,14 @@ static qmat_status sample_facets(qmat_context *context, const mesh_sample_params
 
 static qmat_status fill_report(qmat_context *context, const qmat_mesh *mesh, const sample_counts *counts,
                                qmat_report *report) {
-  json_t *root = json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "samples", (json_int_t)(mesh->vertex_count + counts->added),
-      "vertices", (json_int_t)mesh->vertex_count, "added", (json_int_t)counts->added, "added_by_area",
-      (json_int_t)counts->by_area, "added_by_spacing", (json_int_t)counts->by_spacing, "added_by_thickness", (json_int_t)counts->by_thickness, "thin_facets",
-      (json_int_t)counts->thin, "degenerate_facets", (json_int_t)counts->degenerate, "capped",
-      (json_int_t)counts->capped, "dropped", (json_int_t)counts->dropped, "thickness_threshold", counts->threshold);
-  if (root == NULL || json_object_update(report->root, root) != 0) {
+  json_t *root = json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "samples",
+                           (json_int_t)(mesh->vertex_count + counts->added), "vertices", (json_int_t)mesh->vertex_count,
+                           "added", (json_int_t)counts->added, "added_by_area", (json_int_t)counts->by_area,
+                           "added_by_spacing", (json_int_t)counts->by_spacing, "added_by_thickness",
+                           (json_int_t)counts->by_thickness, "thin_facets", (json_int_t)counts->thin,
+                           "degenerate_facets", (json_int_t)counts->degenerate, "capped", (json_int_t)counts->capped,
+                           "dropped", (json_int_t)counts->dropped, "thickness_threshold", counts->threshold);
+  if (!root || json_object_update(report->root, root) != 0) {
     json_decref(root);
     return qmat_fail_memory(context, "the report");
   }
@@ -446,14 +446,14 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   spaced_points spaced = {NULL, NULL};
   sample_counts counts = {0};
   qmat_status status = QMAT_OK;
-  if (samples == NULL || report == NULL || unit_positions == NULL || areas == NULL || offsets == NULL) {
+  if (!samples || !report || !unit_positions || !areas || !offsets) {
     status = qmat_fail_memory(context, "the samples");
     goto done;
   }
   status = check_inputs(context, mesh, thickness);
   if (status == QMAT_OK) status = measure_areas(context, mesh, unit_positions, areas);
-  if (status == QMAT_OK) status = count_samples(context, params, mesh, unit_positions, thickness, areas, offsets, &spaced,
-                                                   &counts);
+  if (status == QMAT_OK)
+    status = count_samples(context, params, mesh, unit_positions, thickness, areas, offsets, &spaced, &counts);
   if (status != QMAT_OK) goto done;
   const uint64_t most = (uint64_t)params->max_samples;
   limit_samples(offsets, mesh->triangle_count, most > mesh->vertex_count ? most - mesh->vertex_count : 0, &counts);
@@ -463,7 +463,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   samples->positions = qmat_alloc(3 * samples->count, sizeof *samples->positions);
   samples->facets = qmat_alloc(samples->count, sizeof *samples->facets);
   samples->barycentrics = qmat_alloc(3 * samples->count, sizeof *samples->barycentrics);
-  if (samples->positions == NULL || samples->facets == NULL || samples->barycentrics == NULL) {
+  if (!samples->positions || !samples->facets || !samples->barycentrics) {
     status = qmat_fail_memory(context, "the samples");
     goto done;
   }
@@ -478,8 +478,8 @@ done:
     outputs[1] = &report->base;
     return QMAT_OK;
   }
-  if (samples != NULL) qmat_value_release(&samples->base);
-  if (report != NULL) qmat_value_release(&report->base);
+  if (samples) qmat_value_release(&samples->base);
+  if (report) qmat_value_release(&report->base);
   return status;
 }
 

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/node.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
+#include "core/node.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/initial/sample_thinning.h"
 
@@ -134,7 +134,7 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
 static qmat_status collect_vertex_facets(qmat_context *context, const qmat_mesh *mesh, vertex_facets *around) {
   around->offsets = qmat_arena_calloc(&context->arena, mesh->vertex_count + 2, sizeof *around->offsets);
   around->facets = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *around->facets);
-  if (around->offsets == NULL || around->facets == NULL) return qmat_fail_memory(context, "the facets around vertices");
+  if (!around->offsets || !around->facets) return qmat_fail_memory(context, "the facets around vertices");
   size_t *offsets = around->offsets;
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) offsets[mesh->triangles[i] + 2]++;
   for (size_t v = 0; v < mesh->vertex_count; v++) offsets[v + 2] += offsets[v + 1];
@@ -210,7 +210,7 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
   const double mean = sum / (double)measured;
   vertex_facets around;
   uint8_t *known = qmat_arena_alloc(&context->arena, count, sizeof *known);
-  if (known == NULL) return qmat_fail_memory(context, "the facets' states");
+  if (!known) return qmat_fail_memory(context, "the facets' states");
   qmat_status status = collect_vertex_facets(context, mesh, &around);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < count; i++) known[i] = states[i] == MEASURED;
@@ -235,7 +235,7 @@ static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *sur
   double *centroids = qmat_arena_alloc(&context->arena, count, 3 * sizeof *centroids);
   double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
   double *radii = qmat_arena_alloc(&context->arena, count, sizeof *radii);
-  if (centroids == NULL || normals == NULL || radii == NULL) return qmat_fail_memory(context, "the facets");
+  if (!centroids || !normals || !radii) return qmat_fail_memory(context, "the facets");
   for (size_t i = 0; i < count; i++) {
     const uint32_t *ids = mesh->triangles + 3 * i;
     const double *a = positions + 3 * (size_t)ids[0], *b = positions + 3 * (size_t)ids[1],
@@ -305,12 +305,11 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
   uint32_t *stand_ins = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *stand_ins);
   field = qmat_field_new();
-  if (field != NULL) {
+  if (field) {
     field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
     field->unit = qmat_strdup("model unit");
   }
-  if (rays == NULL || states == NULL || stand_ins == NULL || field == NULL || field->values == NULL ||
-      field->unit == NULL) {
+  if (!rays || !states || !stand_ins || !field || !field->values || field->unit == NULL) {
     status = qmat_fail_memory(context, "the thickness");
     goto done;
   }
@@ -330,7 +329,7 @@ done:
   qmat_surface_free(surface);
   if (status == QMAT_OK) {
     outputs[0] = &field->base;
-  } else if (field != NULL) {
+  } else if (field) {
     qmat_value_release(&field->base);
   }
   return status;

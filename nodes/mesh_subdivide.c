@@ -3,10 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/json_text.h"
-#include "core/node.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/vector.h"
+#include "core/json_text.h"
+#include "core/node.h"
 #include "io/soup.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/subdivision_osd.h"
@@ -337,7 +337,7 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
 }
 
 static qmat_status fail_too_fine(const subdivision *s, int level, int depth, const attempt *coarser) {
-  if (coarser->mesh == NULL) {
+  if (!coarser->mesh) {
     qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "level %d is measured with %.0f faces; at most %.0f are made", level,
               faces_at(s, depth), MOST_FACES);
     return qmat_fail_field(s->context, "level");

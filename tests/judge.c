@@ -77,7 +77,7 @@ static void stop(const char *path, const char *what) {
 }
 
 static void *need(void *memory) {
-  if (memory == NULL) stop("memory", "too little");
+  if (!memory) stop("memory", "too little");
   return memory;
 }
 
@@ -85,7 +85,7 @@ static void *need(void *memory) {
 
 static FILE *open_file(const char *path) {
   FILE *file = fopen(path, "r");
-  if (file == NULL) stop(path, strerror(errno));
+  if (!file) stop(path, strerror(errno));
   return file;
 }
 
@@ -480,10 +480,10 @@ static void judge_complex(medial *m, const double *components_wanted, const doub
   if (degenerate > 0) fail("degenerate edges or triangles", (double)degenerate, 0);
   if (twice > 0) fail("edges or triangles that are there twice", (double)twice, 0);
   if (missing > 0) fail("sides of triangles that are not listed as edges", (double)missing, 0);
-  if (components_wanted != NULL && (double)components != *components_wanted) {
+  if (components_wanted && (double)components != *components_wanted) {
     fail("components", (double)components, *components_wanted);
   }
-  if (euler_wanted != NULL && euler != *euler_wanted) fail("Euler characteristic", euler, *euler_wanted);
+  if (euler_wanted && euler != *euler_wanted) fail("Euler characteristic", euler, *euler_wanted);
 }
 
 static void judge_centres(const surface *s, const medial *m, double diagonal) {
@@ -564,7 +564,7 @@ int main(int argc, char **argv) {
   const double diagonal = length(sub(high, low));
   judge_complex(&m, check_components ? &components : NULL, check_euler ? &euler : NULL);
   judge_centres(&s, &m, diagonal);
-  if (known_path != NULL) {
+  if (known_path) {
     medial known = read_medial(known_path);
     if (known.simplex_count == 0) known.simplices[known.simplex_count++] = (simplex){.ids = {0}, .count = 1};
     judge_known(&m, &known, diagonal, near);

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
 #include "core/geometry/vector.h"
+#include "core/hash.h"
 
 enum { FIRST_CAPACITY = 1 << 14, PLACES = 1 << 14 };
 

@@ -110,8 +110,8 @@ static qmat_status number_primitives(qmat_context *context, qmat_envelope *envel
                                      size_t sphere_count, const uint32_t *edges, size_t edge_count,
                                      const uint32_t *triangles, size_t triangle_count) {
   qmat_status status = check_ids(context, edges, edge_count, 2, "edge", sphere_count);
-  if (!status) status = check_ids(context, triangles, triangle_count, 3, "triangle", sphere_count);
-  if (status) return status;
+  if (status == QMAT_OK) status = check_ids(context, triangles, triangle_count, 3, "triangle", sphere_count);
+  if (status != QMAT_OK) return status;
   /* Items are numbered with 32 bits. */
   if (triangle_count + edge_count + sphere_count > UINT32_MAX / 2)
     return qmat_fail_memory(context, "medial primitives");
@@ -299,8 +299,8 @@ qmat_status qmat_envelope_new(qmat_context *context, const double *spheres, size
   if (!envelope) return qmat_fail_memory(context, "medial primitives");
   qmat_status status =
       number_primitives(context, envelope, spheres, sphere_count, edges, edge_count, triangles, triangle_count);
-  if (!status) status = build_hierarchy(context, envelope);
-  if (status) {
+  if (status == QMAT_OK) status = build_hierarchy(context, envelope);
+  if (status != QMAT_OK) {
     qmat_envelope_free(envelope);
     return status;
   }
@@ -334,8 +334,8 @@ static inline double item_distance(const qmat_envelope *envelope, envelope_item 
   return qmat_sphere_distance(envelope->spheres + 4 * (size_t)item.slot, p);
 }
 
-/* The smallest distance that is at most `limit`, INFINITY when there is none, and the item that attains it; or the first
- * that is found below `enough`. */
+/* The smallest distance that is at most `limit`, INFINITY when there is none, and the item that attains it; or the
+ * first that is found below `enough`. */
 static double search(const qmat_envelope *envelope, const double p[3], double limit, double enough,
                      envelope_item *nearest) {
   if (envelope->node_count == 0) return INFINITY;

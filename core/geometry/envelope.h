@@ -9,9 +9,9 @@
 
 /* The enveloping volume of a medial mesh, made ready for distance questions: its slabs, the cones that are a side of no
  * slab, and the spheres that are an end of no cone or slab. F(p) is the minimum over all of them of the signed distance
- * (core/geometry/medial_distance.h; eq. 9 with a signed minimum): outside exactly the distance to the volume, inside negative
- * and no deeper than the true depth. F is 1-Lipschitz. After qmat_envelope_new it is only read: any number of threads
- * may ask at once, and the answer to a question does not depend on what was asked before. */
+ * (core/geometry/medial_distance.h; eq. 9 with a signed minimum): outside exactly the distance to the volume, inside
+ * negative and no deeper than the true depth. F is 1-Lipschitz. After qmat_envelope_new it is only read: any number of
+ * threads may ask at once, and the answer to a question does not depend on what was asked before. */
 typedef struct qmat_envelope qmat_envelope;
 
 /* Builds the search structure. `spheres` holds 4 * sphere_count doubles (x y z radius; radius >= 0), `edges`

@@ -16,8 +16,8 @@ typedef struct qmat_quadric {
  * sphere `m` (4 doubles) with the outward unit normal `n`. With a vector of another length it is the same square. */
 void qmat_quadric_add_plane(qmat_quadric *quadric, const double n[3], const double m[4], double weight);
 
-/* The outward unit normals of the two planes that are tangent to three spheres (4 doubles each). False where there are no
- * two such planes: collinear centres, or one sphere inside the hull of the others. */
+/* The outward unit normals of the two planes that are tangent to three spheres (4 doubles each). False where there are
+ * no two such planes: collinear centres, or one sphere inside the hull of the others. */
 bool qmat_tangent_normals(const double a[4], const double b[4], const double c[4], double normals[2][3]);
 
 /* Adds both tangent planes of the medial slab of three spheres (eq. 2), each with `weight`. False, and nothing added,

@@ -154,9 +154,9 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   set_ray(&ray, origin, direction, query.offset, 0, INFINITY);
   rtcOccluded1(surface->scene, &query.base, &ray);
   if (query.triangle == UINT32_MAX) return false;
-  if (distance != NULL) *distance = query.distance;
-  if (triangle != NULL) *triangle = query.triangle;
-  if (normal != NULL) {
+  if (distance) *distance = query.distance;
+  if (triangle) *triangle = query.triangle;
+  if (normal) {
     triangle_normal(surface, query.triangle, normal);
     const double length = sqrt(qmat_dot(normal, normal));
     for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
@@ -339,7 +339,7 @@ static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surfa
   surface->order = qmat_alloc(n, sizeof *surface->order);
   surface->nodes = qmat_alloc(2 * leaf_count, sizeof *surface->nodes);
   qmat_status status = QMAT_OK;
-  if (items == NULL || areas == NULL || surface->order == NULL || surface->nodes == NULL) {
+  if (!items || !areas || !surface->order || !surface->nodes) {
     status = qmat_fail_memory(context, "the winding number tree");
     goto done;
   }
@@ -408,7 +408,7 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   char config[64];
   snprintf(config, sizeof config, "ignore_config_files=1,threads=%d", qmat_threads(context));
   surface->device = rtcNewDevice(config);
-  if (surface->device == NULL) {
+  if (!surface->device) {
     return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree cannot start (error %d)", (int)rtcGetDeviceError(NULL));
   }
   rtcSetDeviceErrorFunction(surface->device, keep_message, &message);
@@ -419,14 +419,14 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   }
   surface->scene = rtcNewScene(surface->device);
   geometry = rtcNewGeometry(surface->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  if (surface->scene == NULL || geometry == NULL) goto check;
+  if (!surface->scene || !geometry) goto check;
   rtcSetSceneFlags(surface->scene, RTC_SCENE_FLAG_ROBUST);
   /* High quality would split triangles, and a ray would then cross them twice. */
   rtcSetSceneBuildQuality(surface->scene, RTC_BUILD_QUALITY_MEDIUM);
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
   float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                             mesh->vertex_count);
-  if (vertices == NULL) goto check;
+  if (!vertices) goto check;
   for (size_t i = 0; i < 3 * mesh->vertex_count; i++) vertices[i] = (float)surface->positions[i];
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh->triangles, 0,
                              3 * sizeof(uint32_t), mesh->triangle_count);
@@ -439,11 +439,11 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
                                     &surface->blocks);
 check:
   if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
-  if (status == QMAT_OK && (surface->scene == NULL || geometry == NULL)) {
+  if (status == QMAT_OK && (!surface->scene || !geometry)) {
     status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree made no scene");
   }
 done:
-  if (geometry != NULL) rtcReleaseGeometry(geometry);
+  if (geometry) rtcReleaseGeometry(geometry);
   rtcSetDeviceErrorFunction(surface->device, NULL, NULL);
   return status;
 }
@@ -451,12 +451,12 @@ done:
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
   *surface = NULL;
   qmat_surface *made = qmat_calloc(1, sizeof *made);
-  if (made == NULL) return qmat_fail_memory(context, "a surface");
+  if (!made) return qmat_fail_memory(context, "a surface");
   made->mesh = mesh;
   qmat_status status = qmat_frame_of_mesh(context, mesh, &made->frame);
   if (status != QMAT_OK) goto failed;
   made->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *made->positions);
-  if (made->positions == NULL) {
+  if (!made->positions) {
     status = qmat_fail_memory(context, "the vertices");
     goto failed;
   }
@@ -488,10 +488,10 @@ failed:
 }
 
 void qmat_surface_free(qmat_surface *surface) {
-  if (surface == NULL) return;
+  if (!surface) return;
   qmat_triangle_blocks_free(surface->blocks);
-  if (surface->scene != NULL) rtcReleaseScene(surface->scene);
-  if (surface->device != NULL) rtcReleaseDevice(surface->device);
+  if (surface->scene) rtcReleaseScene(surface->scene);
+  if (surface->device) rtcReleaseDevice(surface->device);
   qmat_free(surface->positions);
   qmat_free(surface->nodes);
   qmat_free(surface->order);

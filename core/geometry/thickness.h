@@ -4,8 +4,9 @@
 
 #include "core/value.h"
 
-/* Whether the thickness (per facet) and the samples are of this mesh: their counts fit, every facet is one of its own, and
- * the first samples are its vertices. QMAT_ERROR_GEOMETRY names the field "thickness" or "samples". Cost: linear. */
+/* Whether the thickness (per facet) and the samples are of this mesh: their counts fit, every facet is one of its own,
+ * and the first samples are its vertices. QMAT_ERROR_GEOMETRY names the field "thickness" or "samples". Cost: linear.
+ */
 qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                                  const qmat_samples *samples);
 

@@ -195,8 +195,8 @@ double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const d
   }
   const double distance = sqrt(query.square);
   if (query.triangle == UINT32_MAX || !(distance <= limit)) return INFINITY;
-  if (closest != NULL) memcpy(closest, query.closest, sizeof query.closest);
-  if (triangle != NULL) *triangle = query.triangle;
+  if (closest) memcpy(closest, query.closest, sizeof query.closest);
+  if (triangle) *triangle = query.triangle;
   return distance;
 }
 
@@ -257,7 +257,7 @@ static void bound_for_embree(const struct RTCBoundsFunctionArguments *args) {
 static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
   blocks->scene = rtcNewScene(device);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  if (blocks->scene != NULL && geometry != NULL) {
+  if (blocks->scene && geometry) {
     rtcSetSceneFlags(blocks->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(blocks->scene, RTC_BUILD_QUALITY_MEDIUM);
     rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)blocks->block_count);
@@ -267,7 +267,7 @@ static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
     rtcAttachGeometry(blocks->scene, geometry);
     rtcCommitScene(blocks->scene);
   }
-  if (geometry != NULL) rtcReleaseGeometry(geometry);
+  if (geometry) rtcReleaseGeometry(geometry);
 }
 
 /* A triangle to be put into a block. */
@@ -364,7 +364,7 @@ qmat_status qmat_triangle_blocks_new(qmat_context *context, struct RTCDeviceTy *
                                      const uint32_t *triangles, size_t count, qmat_triangle_blocks **blocks) {
   qmat_triangle_blocks *made = qmat_calloc(1, sizeof *made);
   *blocks = made;
-  if (made == NULL) return qmat_fail_memory(context, "the triangles");
+  if (!made) return qmat_fail_memory(context, "the triangles");
   *made = (qmat_triangle_blocks){
       .positions = positions, .triangles = triangles, .count = count, .block_count = (count + LANES - 1) / LANES};
   const qmat_status status = fill_blocks(context, made);
@@ -373,8 +373,8 @@ qmat_status qmat_triangle_blocks_new(qmat_context *context, struct RTCDeviceTy *
 }
 
 void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks) {
-  if (blocks == NULL) return;
-  if (blocks->scene != NULL) rtcReleaseScene(blocks->scene);
+  if (!blocks) return;
+  if (blocks->scene) rtcReleaseScene(blocks->scene);
   qmat_free(blocks->blocks);
   qmat_free(blocks);
 }

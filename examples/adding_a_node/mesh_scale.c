@@ -14,11 +14,11 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
   qmat_status status;
   qmat_mesh *scaled = qmat_mesh_new();
-  if (scaled != NULL) {
+  if (scaled) {
     scaled->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *scaled->positions);
     scaled->triangles = qmat_alloc(3 * mesh->triangle_count, sizeof *scaled->triangles);
   }
-  if (scaled == NULL || scaled->positions == NULL || scaled->triangles == NULL) {
+  if (!scaled || !scaled->positions || !scaled->triangles) {
     status = qmat_fail_memory(context, "the scaled mesh");
     goto done;
   }
@@ -33,7 +33,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 done:
   if (status == QMAT_OK) {
     outputs[0] = &scaled->base;
-  } else if (scaled != NULL) {
+  } else if (scaled) {
     qmat_value_release(&scaled->base);
   }
   return status;

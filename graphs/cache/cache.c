@@ -23,7 +23,7 @@ static const char tag_text[] =
     "# This folder is a cache of qmat: whatever is in it can be made again.\n"
     "# What a cache directory tag is: https://bford.info/cachedir/\n";
 
-// A line that follows a record's JSON holds the digest of that JSON.
+/* A line that follows a record's JSON holds the digest of that JSON. */
 static const char record_end[] = "\nsha256 ";
 
 /* ---- paths and files ---- */
@@ -48,7 +48,7 @@ static void warn(qmat_cache *cache, const char *what, const char *path, int numb
              reason ? reason : "unknown error");
 }
 
-// Makes a folder and those above it.
+/* Makes a folder and those above it. */
 static bool make_folders(char *path) {
   if (mkdir(path, 0777) == 0 || errno == EEXIST) return true;
   char *slash = strrchr(path, '/');
@@ -71,7 +71,7 @@ static bool write_all(int file, const void *bytes, size_t size) {
   return true;
 }
 
-// Makes a temporary that carries a lock for as long as its writer lives; -1 with errno.
+/* Makes a temporary that carries a lock for as long as its writer lives; -1 with errno. */
 static int make_temporary(qmat_cache *cache, char **path) {
   for (int attempt = 0; attempt < 1000; attempt++) {
     char name[64];
@@ -85,7 +85,7 @@ static int make_temporary(qmat_cache *cache, char **path) {
       return -1;
     }
     int file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    // File systems without locks have no sweepers that hold one either.
+    /* File systems without locks have no sweepers that hold one either. */
     if (file >= 0 && (flock(file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)) return file;
     int number = errno;
     if (file >= 0) close(file);
@@ -97,11 +97,11 @@ static int make_temporary(qmat_cache *cache, char **path) {
   return -1;
 }
 
-// Puts a whole file in its place, or nothing.
+/* Puts a whole file in its place, or nothing. */
 static bool place_file(qmat_cache *cache, const char *path, const void *bytes, size_t size) {
   char *temporary = NULL;
   bool done = false;
-  // A sweep may take a temporary in the moment before it is locked: then once more.
+  /* A sweep may take a temporary in the moment before it is locked: then once more. */
   for (int attempt = 0; attempt < 3 && !done; attempt++) {
     int file = make_temporary(cache, &temporary);
     done = file >= 0 && write_all(file, bytes, size) && (fsync(file) == 0 || errno == EINVAL) &&
@@ -120,7 +120,7 @@ static bool place_file(qmat_cache *cache, const char *path, const void *bytes, s
   return done;
 }
 
-// Makes the folders when they are needed first.
+/* Makes the folders when they are needed first. */
 static bool make_ready(qmat_cache *cache) {
   if (cache->ready) return true;
   if (cache->read_only) return false;
@@ -145,7 +145,7 @@ static bool make_ready(qmat_cache *cache) {
 }
 
 static bool read_file(const char *path, qmat_bytes *bytes) {
-  qmat_context nobody = {0};  // a missing file is no error here
+  qmat_context nobody = {0}; /* a missing file is no error here */
   return qmat_bytes_read_file(&nobody, path, bytes) == QMAT_OK;
 }
 
@@ -212,7 +212,8 @@ static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
   return false;
 }
 
-// Moves what is not what it should be out of the way; where that cannot be, it is remembered for as long as this lasts.
+/* Moves what is not what it should be out of the way; where that cannot be, it is remembered for as long as this lasts.
+ */
 static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
   char *from = path_of_digest(cache, kind, digest), *to = path_of_digest(cache, QMAT_CACHE_BAD, digest);
   bool moved = from && to && !cache->read_only && (rename(from, to) == 0 || unlink(from) == 0);
@@ -223,7 +224,7 @@ static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest
     cache->bad[cache->bad_count++] = *digest;
 }
 
-// The JSON of a record's bytes when they are whole and belong to that key.
+/* The JSON of a record's bytes when they are whole and belong to that key. */
 static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest *key) {
   const size_t tail = sizeof record_end - 1 + 64 + 1;
   qmat_digest wanted, digest;
@@ -242,7 +243,7 @@ static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest
   return NULL;
 }
 
-// Stores bytes in the folder.
+/* Stores bytes in the folder. */
 static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
   char *path = path_of_digest(cache, kind, digest);
@@ -297,17 +298,17 @@ static bool has_blob(qmat_cache *cache, const qmat_digest *digest, uint64_t size
          qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
 }
 
-// The blobs that the items of a list are in. Items are no lists themselves.
+/* The blobs that the items of a list are in. Items are no lists themselves. */
 typedef struct list_items {
   qmat_cache *cache;
   bool missing; /* one of them is not there, or not what it should be: that is not the list's fault */
 } list_items;
 
-// The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
-// twice.
+/* The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
+ * twice. */
 static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest,
                                const qmat_value_source *items) {
-  qmat_context nobody = {0};  // bad bytes are no error here
+  qmat_context nobody = {0}; /* bad bytes are no error here */
   qmat_value *value;
   if (qmat_value_deserialize(&nobody, bytes, size, items, &value) != QMAT_OK) return NULL;
   if (qmat_digest_equal(&value->digest, digest)) return value;
@@ -375,7 +376,8 @@ void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key) {
 
 /* ---- writing ---- */
 
-// Sends bytes to the remote cache. Of a blob it is enough that it is there; a record may be newer than the one that is.
+/* Sends bytes to the remote cache. Of a blob it is enough that it is there; a record may be newer than the one that is.
+ */
 static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
   const char *folder = kind_folders[kind];
@@ -384,7 +386,8 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
 }
 
-// Whether the blob is there as it should be. One that was damaged goes: a value that was made anew would not be stored.
+/* Whether the blob is there as it should be. One that was damaged goes: a value that was made anew would not be stored.
+ */
 static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   if (!has_locally(cache, digest, size)) return false;
   qmat_digest found;
@@ -395,7 +398,7 @@ static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   return sound;
 }
 
-// Stores the binary form of a value; gives what a record says of it.
+/* Stores the binary form of a value; gives what a record says of it. */
 static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added) {
   qmat_context nobody = {0};
   const qmat_digest *digest = &value->digest;
@@ -426,7 +429,7 @@ json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *a
   return stored;
 }
 
-// The blobs that a record names for one value: its own, and those of a list's items.
+/* The blobs that a record names for one value: its own, and those of a list's items. */
 static size_t blob_count(const json_t *stored) {
   return 1 + json_array_size(json_object_get(stored, "items"));
 }
@@ -492,7 +495,7 @@ typedef struct entry_list {
   size_t count, capacity;
 } entry_list;
 
-// Whether a file of this name is one that the cache makes.
+/* Whether a file of this name is one that the cache makes. */
 static bool is_ours(qmat_cache_kind kind, const char *name, qmat_digest *digest) {
   if (kind == QMAT_CACHE_TEMPORARY) return *name && strspn(name, "0123456789-") == strlen(name) && strlen(name) < 64;
   return qmat_digest_parse(name, digest);
@@ -555,7 +558,7 @@ static void delete_entry(const qmat_cache *cache, const qmat_cache_entry *entry,
   qmat_free(path);
 }
 
-// Whether a temporary is one that nobody writes any more.
+/* Whether a temporary is one that nobody writes any more. */
 static bool is_abandoned(const qmat_cache *cache, const qmat_cache_entry *entry) {
   char *path = path_of(cache, entry->kind, entry->name);
   int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
@@ -571,7 +574,7 @@ static int64_t now_nanoseconds(void) {
   return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
 }
 
-// The blob entry of that digest among those sorted by kind and name.
+/* The blob entry of that digest among those sorted by kind and name. */
 static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, const qmat_digest *digest) {
   qmat_cache_entry wanted = {.kind = QMAT_CACHE_BLOB};
   if (count == 0) return NULL;
@@ -579,7 +582,7 @@ static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, cons
   return bsearch(&wanted, entries, count, sizeof *entries, by_kind_and_name);
 }
 
-// Marks the blobs that a record names for one value; false when one of them is missing.
+/* Marks the blobs that a record names for one value; false when one of them is missing. */
 static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t count, bool *named) {
   bool complete = true;
   for (size_t i = 0; i < blob_count(stored); i++) {
@@ -594,7 +597,7 @@ static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t c
   return complete;
 }
 
-// Marks the blobs that records name (by their use), and deletes records of which one is missing.
+/* Marks the blobs that records name (by their use), and deletes records of which one is missing. */
 static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t count, qmat_cache_sweep *sweep) {
   const int64_t hour = (int64_t)3600 * 1000000000, now = now_nanoseconds();
   bool *named = qmat_calloc(count, sizeof *named);
@@ -605,7 +608,7 @@ static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t
     bool complete = record != NULL;
     for (size_t k = 0; k < json_array_size(outputs); k++)
       if (!mark_named(json_array_get(outputs, k), entries, count, named)) complete = false;
-    // Another process may have stored the blobs since they were listed.
+    /* Another process may have stored the blobs since they were listed. */
     if (record && !complete && now - entries[i].used > hour) delete_entry(cache, &entries[i], sweep);
     json_decref(record);
   }
@@ -637,7 +640,7 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   for (size_t i = 0; i < list.count; i++)
     if (list.entries[i].kind <= QMAT_CACHE_BLOB) total += list.entries[i].size;
   if (total > most_size) {
-    // Somewhat below the limit, so that not every run after this one has to do it again.
+    /* Somewhat below the limit, so that not every run after this one has to do it again. */
     uint64_t wanted = most_size - most_size / 10;
     qsort(list.entries, list.count, sizeof *list.entries, by_last_use);
     for (size_t i = 0; i < list.count && total > wanted; i++) {
@@ -655,7 +658,7 @@ qmat_cache_sweep qmat_cache_clear(qmat_cache *cache) {
   qmat_cache_entry *entries;
   size_t count;
   if (cache->read_only || !qmat_cache_list(cache, &entries, &count)) return sweep;
-  // Records first: they are sorted so, and nobody then reads one whose blobs go.
+  /* Records first: they are sorted so, and nobody then reads one whose blobs go. */
   for (size_t i = 0; i < count; i++)
     if (entries[i].kind != QMAT_CACHE_TEMPORARY || is_abandoned(cache, &entries[i]))
       delete_entry(cache, &entries[i], &sweep);

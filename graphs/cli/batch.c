@@ -40,7 +40,7 @@ static qmat_status add_asset(qmat_context *context, qmat_batch *batch, const cha
   return asset->stem ? QMAT_OK : qmat_fail_memory(context, "assets");
 }
 
-// Whether a folder's error is one to stop at: a folder that is not there holds no match.
+/* Whether a folder's error is one to stop at: a folder that is not there holds no match. */
 static int is_unreadable(const char *folder, int number) {
   (void)folder;
   return number != ENOENT && number != ENOTDIR;
@@ -128,7 +128,7 @@ static bool start(qmat_asset *asset) {
   extern char **environ;
   posix_spawn_file_actions_t actions;
   if (posix_spawn_file_actions_init(&actions) != 0) return false;
-  // What there is to say stands in the report.
+  /* What there is to say stands in the report. */
   int result = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
@@ -147,7 +147,7 @@ static void end(qmat_asset *asset, int status) {
   asset->result = json_load_file(asset->report, 0, NULL);
 }
 
-// Waits for a while for any process to end; NULL: none has.
+/* Waits for a while for any process to end; NULL: none has. */
 static qmat_asset *wait_for_one(qmat_batch *batch) {
   for (size_t i = 0; i < batch->count; i++) {
     qmat_asset *asset = &batch->assets[i];

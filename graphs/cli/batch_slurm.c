@@ -8,7 +8,7 @@
 #include "graphs/cli/batch.h"
 #include "io/bytes.h"
 
-// A word that a shell takes as it is.
+/* A word that a shell takes as it is. */
 static void put_quoted(qmat_writer *writer, const char *word) {
   qmat_put_text(writer, "'");
   for (; *word; word++) {
@@ -20,15 +20,16 @@ static void put_quoted(qmat_writer *writer, const char *word) {
   qmat_put_text(writer, "' ");
 }
 
-// Puts FOLDER/NAME, quoted.
+/* Puts FOLDER/NAME, quoted. */
 static void put_path(qmat_writer *writer, const char *folder, const char *name) {
   char path[4200];
   snprintf(path, sizeof path, "%s/%s", folder, name);
   put_quoted(writer, path);
 }
 
-// A script whose n-th task runs the command of asset n and leaves its exit code as FOLDER/n.exit, in one piece. A task
-// whose machine dies leaves none, and Slurm starts it again.
+/* A script whose n-th task runs the command of asset n and leaves its exit code as FOLDER/n.exit, in one piece. A task
+ */
+/* whose machine dies leaves none, and Slurm starts it again. */
 static qmat_status write_script(qmat_context *context, const qmat_batch *batch, const char *folder) {
   qmat_writer writer = {0};
   qmat_file *file = NULL;
@@ -52,7 +53,7 @@ static qmat_status write_script(qmat_context *context, const qmat_batch *batch, 
   return status;
 }
 
-// Runs a command of Slurm's and takes its first line; false when it fails.
+/* Runs a command of Slurm's and takes its first line; false when it fails. */
 static bool ask(qmat_writer *command, char *line, size_t size) {
   qmat_put_bytes(command, "", 1);
   line[0] = 0;
@@ -80,18 +81,18 @@ static bool submit(const qmat_batch *batch, int jobs, int threads, const char *f
   qmat_put_text(&command, " ");
   put_path(&command, folder, "array.sh");
   if (!ask(&command, job, size)) return false;
-  job[strspn(job, "0123456789")] = 0;  // "12;cluster"
+  job[strspn(job, "0123456789")] = 0; /* "12;cluster" */
   return *job != 0;
 }
 
-// Whether Slurm still has tasks of the job.
+/* Whether Slurm still has tasks of the job. */
 static bool is_alive(const char *job) {
   qmat_writer command = {0};
   char line[64];
   qmat_put_text(&command, "squeue --noheader --format=%i --jobs=");
   qmat_put_text(&command, job);
   qmat_put_text(&command, " 2>/dev/null");
-  // A job that is over for a while is not known any more, which is an error to squeue.
+  /* A job that is over for a while is not known any more, which is an error to squeue. */
   return ask(&command, line, sizeof line) && *line;
 }
 
@@ -107,7 +108,7 @@ static void exit_path(const char *folder, size_t index, char path[4200]) {
   snprintf(path, 4200, "%s/%zu.exit", folder, index);
 }
 
-// Takes what a task has left; false when it has not ended.
+/* Takes what a task has left; false when it has not ended. */
 static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   char path[4200];
   exit_path(folder, index, path);
@@ -116,7 +117,7 @@ static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   if (fscanf(file, "%d", &asset->exit_code) != 1) asset->exit_code = -1;
   fclose(file);
   unlink(path);
-  // The shell tells of a signal like this.
+  /* The shell tells of a signal like this. */
   asset->signal = asset->exit_code > 128 ? asset->exit_code - 128 : 0;
   asset->result = json_load_file(asset->report, 0, NULL);
   asset->seconds = json_real_value(json_object_get(asset->result, "seconds"));
@@ -133,7 +134,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     status = qmat_fail_hint(context, "without --engine slurm the batch runs here");
   }
   size_t left = status == QMAT_OK ? batch->count : 0;
-  // Files may be seen somewhat later than the end of the job, where folders are shared.
+  /* Files may be seen somewhat later than the end of the job, where folders are shared. */
   for (int patience = 10; left > 0 && patience > 0;) {
     if (stop()) {
       cancel(job);
@@ -157,7 +158,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     asset->exit_code = -1;
     observer(user, batch, asset);
   }
-  // Tasks that were cancelled may have ended since.
+  /* Tasks that were cancelled may have ended since. */
   for (size_t i = 0; i < batch->count; i++) {
     exit_path(folder, i, path);
     unlink(path);

@@ -14,7 +14,7 @@ const qmat_option qmat_cache_option_rows[] = {
     {0},
 };
 
-// "500MB", "1.5 GB" or bytes; units of 1000.
+/* "500MB", "1.5 GB" or bytes; units of 1000. */
 static bool parse_size(const char *text, uint64_t *size) {
   static const struct {
     const char *name;
@@ -57,7 +57,7 @@ qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invoca
   }
   if (given && (!*given || strcmp(given, "off") == 0) && !named) return QMAT_OK;
   char *folder = given ? qmat_strdup(given) : qmat_cache_default_folder();
-  // Without a home there is no place for a cache, which is no reason not to run.
+  /* Without a home there is no place for a cache, which is no reason not to run. */
   if (!folder) return given ? qmat_fail_memory(context, "cache") : QMAT_OK;
   options.folder = folder;
   qmat_status status = qmat_cache_open(context, &options, cache);

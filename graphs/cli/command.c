@@ -73,7 +73,7 @@ static qmat_status fail_unknown(qmat_context *context, const qmat_invocation *in
                  : qmat_fail_hint(context, "'qmat help %s' lists them", invocation->command->name);
 }
 
-// Takes one option, and its value from the next word if need be.
+/* Takes one option, and its value from the next word if need be. */
 static qmat_status take_option(qmat_context *context, qmat_invocation *invocation, char *const *words, size_t count,
                                size_t *at) {
   const char *word = words[*at], *value = NULL;

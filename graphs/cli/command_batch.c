@@ -12,11 +12,11 @@
 #include "graphs/cli/progress.h"
 #include "graphs/run/run_report.h"
 
-// One call of `qmat batch`.
+/* One call of `qmat batch`. */
 typedef struct batch_call {
   qmat_context *context;
   qmat_invocation *invocation;
-  const char *folder, *format, *input;  // --out, --format, and the graph's input that takes the model
+  const char *folder, *format, *input; /* --out, format--, and the graph's input that takes the model */
   char program[4096], reports[4096];
   int jobs, threads;
   bool json, quiet, slurm;
@@ -42,7 +42,7 @@ static bool is_input_file(const qmat_graph *graph, const qmat_graph_input *input
   return param->type == QMAT_PARAM_PATH && (param->flags & QMAT_PARAM_INPUT_FILE);
 }
 
-// The input of the graph that takes the model: the one that is asked for, or the only one that is a file.
+/* The input of the graph that takes the model: the one that is asked for, or the only one that is a file. */
 static qmat_status find_input(batch_call *call) {
   qmat_graph *graph = &call->invocation->graph;
   size_t found = 0;
@@ -86,7 +86,7 @@ __attribute__((format(printf, 2, 3))) static void add_word(word_list *list, cons
   list->words[list->count] = NULL;
 }
 
-// What the command line says of the cache and of parameters holds for every asset.
+/* What the command line says of the cache and of parameters holds for every asset. */
 static void add_shared_words(word_list *list, const qmat_invocation *invocation) {
   for (size_t i = 0; i < invocation->given_count; i++) {
     const qmat_given_option *given = &invocation->given[i];
@@ -117,7 +117,7 @@ static qmat_status make_command(const batch_call *call, size_t index, qmat_asset
     if (type->outputs[output->port].type != QMAT_FILE || !format) continue;
     char ending[64];
     qmat_param_format(format, graph->nodes[output->node].params, ending, sizeof ending);
-    // Of several files the names tell which is which.
+    /* Of several files the names tell which is which. */
     add_word(&list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, files > 1 ? "-" : "",
              files > 1 ? output->name : "", call->format ? call->format : ending);
   }
@@ -151,7 +151,7 @@ static void on_asset(void *user, const qmat_batch *batch, const qmat_asset *asse
             asset->state == QMAT_ASSET_DONE ? "ok" : "failed", asset->seconds);
 }
 
-// The columns that a name takes, as far as each of its characters takes one.
+/* The columns that a name takes, as far as each of its characters takes one. */
 static int columns_of(const char *name) {
   int columns = 0;
   for (; *name; name++) columns += ((unsigned char)*name & 0xc0) != 0x80;
@@ -195,7 +195,7 @@ static void print_table(const qmat_batch *batch) {
 
 /* ---- the call ---- */
 
-// Refuses a format that an output of the graph is not saved in.
+/* Refuses a format that an output of the graph is not saved in. */
 static qmat_status check_format(const batch_call *call) {
   const qmat_graph *graph = &call->invocation->graph;
   for (size_t i = 0; call->format && i < graph->output_count; i++) {
@@ -209,7 +209,7 @@ static qmat_status check_format(const batch_call *call) {
   return QMAT_OK;
 }
 
-// A folder for the reports of the assets. The machines of a cluster share the folder of the results, and no other.
+/* A folder for the reports of the assets. The machines of a cluster share the folder of the results, and no other. */
 static qmat_status make_report_folder(batch_call *call) {
   const char *temporary = getenv("TMPDIR");
   if (!temporary || !*temporary) temporary = "/tmp";
@@ -241,7 +241,7 @@ static qmat_status prepare(batch_call *call) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the engine is local or slurm, not '%s'", qmat_show(engine).text);
     return qmat_fail_field(context, "--engine");
   }
-  // A cluster has its own idea of how many fit.
+  /* A cluster has its own idea of how many fit. */
   call->jobs = call->slurm ? 0 : qmat_threads(context);
   qmat_status status = read_count(context, invocation, "jobs", 1024, &call->jobs);
   call->threads = call->slurm || call->jobs > qmat_threads(context) ? 1 : qmat_threads(context) / call->jobs;

@@ -6,7 +6,7 @@
 #include "graphs/cli/command.h"
 #include "graphs/run/run_report.h"
 
-// One call of `qmat cache`.
+/* One call of `qmat cache`. */
 typedef struct cache_call {
   qmat_context *context;
   const qmat_invocation *invocation;
@@ -51,7 +51,7 @@ static qmat_status stats(cache_call *call) {
   return QMAT_OK;
 }
 
-// The name and version of the node that a record is of.
+/* The name and version of the node that a record is of. */
 static const json_t *node_item(const json_t *record) {
   const json_t *items = json_object_get(record, "key");
   for (size_t i = 0; i < json_array_size(items); i++) {
@@ -134,7 +134,7 @@ static qmat_status show(cache_call *call) {
 
 static qmat_status verify(cache_call *call) {
   size_t broken = 0, incomplete = 0, checked = 0;
-  // Blobs stand after records: they are checked first, so that records of broken ones are found incomplete.
+  /* Blobs stand after records: they are checked first, so that records of broken ones are found incomplete. */
   for (size_t i = call->count; i-- > 0;) {
     const qmat_cache_entry *entry = &call->entries[i];
     if (entry->kind > QMAT_CACHE_BLOB) continue;

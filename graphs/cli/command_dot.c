@@ -4,7 +4,7 @@
 
 #include "graphs/cli/command.h"
 
-// One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip.
+/* One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip. */
 static const char *type_colour(qmat_value_type type) {
   static const char *const colours[QMAT_VALUE_TYPE_COUNT] = {
       [QMAT_SCENE] = "#7f7f7f",  [QMAT_MESH] = "#0072b2",  [QMAT_FIELD] = "#56b4e9",  [QMAT_SAMPLES] = "#009e73",
@@ -13,7 +13,7 @@ static const char *type_colour(qmat_value_type type) {
   return colours[type];
 }
 
-// Ids and descriptor names are ASCII words, but paths and texts of parameters are anything.
+/* Ids and descriptor names are ASCII words, but paths and texts of parameters are anything. */
 static void print_escaped(const char *text) {
   for (; *text; text++) {
     switch (*text) {
@@ -47,7 +47,7 @@ static void print_ports(const qmat_port *ports, size_t count, const char *prefix
   printf("</tr>");
 }
 
-// What a run would do: of several runs of a node, in several formats, the one that is least done.
+/* What a run would do: of several runs of a node, in several formats, the one that is least done. */
 static const qmat_run_step *step_of(const qmat_run *run, size_t node) {
   const qmat_run_step *found = NULL;
   for (size_t i = 0; i < run->step_count; i++)
@@ -55,7 +55,7 @@ static const qmat_run_step *step_of(const qmat_run *run, size_t node) {
   return found;
 }
 
-// Told by words and a number of the frame's lines too, not by colour alone.
+/* Told by words and a number of the frame's lines too, not by colour alone. */
 static const char *state_style(const qmat_run_step *step) {
   if (!step) return "";
   if (step->state == QMAT_STEP_HIT) return ", fillcolor=\"#d5eedd\"";

@@ -9,7 +9,7 @@
 #include "io/model.h"
 #include "nodes/nodes.h"
 
-// Control characters in a file's texts are not for the terminal.
+/* Control characters in a file's texts are not for the terminal. */
 static void print_text(const char *key, const char *text) {
   printf("  %s: ", key);
   for (; *text; text++) putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
@@ -42,7 +42,7 @@ static double number_of(const json_t *object, const char *key) {
   return json_is_number(value) ? json_number_value(value) : (double)NAN;
 }
 
-// Whether what the file states is refuted: the error is larger for certain.
+/* Whether what the file states is refuted: the error is larger for certain. */
 static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured) {
   const struct {
     const char *title, *stated, *most, *least;
@@ -68,7 +68,7 @@ static qmat_status compare(qmat_context *context, const json_t *facts, const jso
   return status;
 }
 
-// Runs a node with default parameters. `outputs` holds one pointer per port.
+/* Runs a node with default parameters. `outputs` holds one pointer per port. */
 static qmat_status run_node(qmat_context *context, const char *name, const qmat_value *const inputs[],
                             qmat_value *outputs[]) {
   const qmat_node *node = qmat_node_find(name);
@@ -80,7 +80,7 @@ static qmat_status run_node(qmat_context *context, const char *name, const qmat_
   return status;
 }
 
-// Makes of a mesh as it was read what the shipped graph takes as the solid's surface, in its place.
+/* Makes of a mesh as it was read what the shipped graph takes as the solid's surface, in its place. */
 static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
   static const char *const nodes[] = {"mesh.subdivide", "mesh.unite"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
@@ -94,7 +94,8 @@ static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
   return QMAT_OK;
 }
 
-// `mesh_choice` is the number of the mesh that the medial mesh describes, where the model is glTF, too; else "merged".
+/* `mesh_choice` is the number of the mesh that the medial mesh describes, where the model is glTF, too; else "merged".
+ */
 static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
                                  const qmat_medial *medial, const json_t *facts) {
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
@@ -120,8 +121,8 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
   return status;
 }
 
-// Prints what the file carries: the medial mesh of node `name`, or the only one. `carrier` (NULL: not known) tells
-// which mesh it is of.
+/* Prints what the file carries: the medial mesh of node `name`, or the only one. `carrier` (NULL: not known) tells
+ * which mesh it is of. */
 static qmat_status print_medial(qmat_context *context, const char *path, const char *name, const json_t *carrier,
                                 const char *against) {
   qmat_medial *medial;
@@ -148,7 +149,7 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
   return status;
 }
 
-// The one of that node, or all.
+/* The one of that node, or all. */
 static qmat_status print_medials(qmat_context *context, const char *path, const char *name, const char *against) {
   json_t *carriers = qmat_medial_carriers(context, path);
   if (!carriers) return context->error.status;
@@ -167,7 +168,7 @@ static qmat_status print_medials(qmat_context *context, const char *path, const 
     const qmat_error before = context->error;
     const qmat_status of_one =
         print_medial(context, path, json_string_value(json_object_get(carrier, "node")), carrier, against);
-    // The first error is told; the others are looked at all the same.
+    /* The first error is told; the others are looked at all the same. */
     if (status != QMAT_OK)
       context->error = before;
     else
@@ -197,7 +198,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   if (carried == QMAT_OK) {
     status = QMAT_OK;
   } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
-    status = carried;  // it has one that cannot be told apart or read, or should have one
+    status = carried; /* it has one that cannot be told apart or read, or should have one */
   } else if (!has_surface) {
     context->error = first;
   }

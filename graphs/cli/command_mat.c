@@ -7,7 +7,7 @@
 #include "graphs/node_json.h"
 #include "io/model.h"
 
-// The first input of the built-in graph is the argument, the others are options: one of each name.
+/* The first input of the built-in graph is the argument, the others are options: one of each name. */
 static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
   qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, &invocation->graph);
   if (status != QMAT_OK) return status;
@@ -35,7 +35,7 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   return status;
 }
 
-// Whether a file is to be saved that can hold a medial mesh for each mesh of a scene.
+/* Whether a file is to be saved that can hold a medial mesh for each mesh of a scene. */
 static bool saves_scene(const qmat_invocation *invocation) {
   for (size_t i = 0; i < invocation->given_count; i++) {
     if (strcmp(invocation->given[i].name, "output") != 0) continue;
@@ -48,9 +48,9 @@ static bool saves_scene(const qmat_invocation *invocation) {
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
   qmat_graph *graph = &invocation->graph;
   qmat_status status = qmat_graph_set_named(context, graph, graph->inputs[0].name, invocation->arguments[0]);
-  // The other formats hold one medial mesh, so that the meshes of a scene are taken as one.
+  /* The other formats hold one medial mesh, so that the meshes of a scene are taken as one. */
   if (status == QMAT_OK && !saves_scene(invocation)) status = qmat_graph_assign(context, graph, "model.mesh=merged");
-  // Whoever asks for a number of spheres wants that number, whatever the distance.
+  /* Whoever asks for a number of spheres wants that number, whatever the distance. */
   if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
       !qmat_invocation_value(invocation, "epsilon"))
     status = qmat_graph_set_named(context, graph, "epsilon", "0");

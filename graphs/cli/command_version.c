@@ -7,8 +7,9 @@
 #include "graphs/cli/command.h"
 #include "nodes/mesh/subdivision_osd.h"
 
-// What reads and computes is part of what makes a result, so a bug report needs it. The versions of libraries without
-// a function that tells it are those that the program was built with.
+/* What reads and computes is part of what makes a result, so a bug report needs it. The versions of libraries without
+ */
+/* a function that tells it are those that the program was built with. */
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   (void)context;
   printf("qmat %s\n", QMAT_VERSION);

@@ -10,7 +10,7 @@
 #include "graphs/cli/progress.h"
 #include "graphs/run/run_cache.h"
 
-// A file that the run depends on, as it was when it was read.
+/* A file that the run depends on, as it was when it was read. */
 typedef struct watched_file {
   char *path;
   const char *name; /* in `path`, without the folder */
@@ -42,7 +42,7 @@ static void add_file(watcher *watcher, const char *path, bool readable, const qm
     return;
   }
   watched_file file = {.path = copy, .name = slash ? slash + 1 : copy, .readable = readable, .digest = *digest};
-  // Folders are watched, not files: programs save by renaming a new file to the old one's name.
+  /* Folders are watched, not files: programs save by renaming a new file to the old one's name. */
   const uint32_t events = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVED_FROM | IN_DELETE;
   if (slash == copy) {
     file.folder = inotify_add_watch(watcher->inotify, "/", events);
@@ -60,7 +60,7 @@ static void add_as_it_is(watcher *watcher, const char *path) {
   add_file(watcher, path, readable, &digest);
 }
 
-// Takes the files that a run has read, or would have read had it come to that.
+/* Takes the files that a run has read, or would have read had it come to that. */
 static void on_run(void *user, const qmat_graph *graph, const qmat_run *run) {
   watcher *watcher = user;
   for (size_t i = 0; i < run->hashed_count; i++)
@@ -83,7 +83,7 @@ static bool has_changed(const watcher *watcher) {
   return false;
 }
 
-// Whether one of the events that wait is of a file of ours.
+/* Whether one of the events that wait is of a file of ours. */
 static bool take_events(const watcher *watcher) {
   _Alignas(struct inotify_event) char events[8192];
   bool ours = false;
@@ -100,14 +100,14 @@ static bool take_events(const watcher *watcher) {
   return ours;
 }
 
-// Waits until the bytes of a file are others; false: the program is to end.
+/* Waits until the bytes of a file are others; false: the program is to end. */
 static bool wait_for_change(const watcher *watcher) {
   struct pollfd waiting = {.fd = watcher->inotify, .events = POLLIN};
-  // What changed while it was read is seen here.
+  /* What changed while it was read is seen here. */
   for (bool changed = has_changed(watcher); !changed;) {
     if (qmat_interrupted()) return false;
     if (poll(&waiting, 1, 500) <= 0 || !take_events(watcher)) continue;
-    // Several files may be saved at once: until nothing has come for a while.
+    /* Several files may be saved at once: until nothing has come for a while. */
     while (poll(&waiting, 1, 60) > 0) take_events(watcher);
     changed = has_changed(watcher);
   }

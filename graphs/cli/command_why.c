@@ -13,7 +13,7 @@ static void print_why(const json_t *why) {
     printf("  %s\n", json_string_value(json_object_get(json_array_get(causes, i), "text")));
 }
 
-// Marks the nodes that the causes of a marked one lead to.
+/* Marks the nodes that the causes of a marked one lead to. */
 static void mark_causes(const qmat_run *run, const json_t *whys, bool *marked) {
   for (size_t i = json_array_size(whys); i-- > 0;) {
     const json_t *causes = json_object_get(json_array_get(whys, i), "causes");

@@ -30,7 +30,7 @@ static qmat_status read_threads(qmat_context *context, const char *text) {
   return QMAT_OK;
 }
 
-// Reads "NAME=PATH", or "PATH" when only one output of the graph is a file.
+/* Reads "NAME=PATH", or "PATH" when only one output of the graph is a file. */
 static qmat_status read_save(qmat_context *context, const qmat_graph *graph, const char *text, qmat_run_save *save) {
   const char *equals = strchr(text, '=');
   char name[QMAT_GRAPH_NAME_SIZE];
@@ -109,7 +109,7 @@ qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *inv
   return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
 }
 
-// A report of a failure must not replace what the run would have read or written, however early it failed.
+/* A report of a failure must not replace what the run would have read or written, however early it failed. */
 static bool may_write_error(const qmat_invocation *invocation, const char *path) {
   for (size_t i = 0; i < invocation->argument_count; i++)
     if (qmat_same_file(path, invocation->arguments[i])) return false;
@@ -130,7 +130,7 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
   return true;
 }
 
-// Whether a step before has told the same of the same mesh: what failed once is missing in all that comes after it.
+/* Whether a step before has told the same of the same mesh: what failed once is missing in all that comes after it. */
 static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
   for (size_t i = 0; i < step; i++) {
     const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
@@ -140,8 +140,8 @@ static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *
   return false;
 }
 
-// What readers of files left out, say: strings in the reports of steps that ran; and meshes that could not be
-// described.
+/* What readers of files left out, say: strings in the reports of steps that ran; and meshes that could not be
+ * described. */
 static void print_warnings(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
     const char *id = run->graph->nodes[run->steps[i].node].id;
@@ -200,7 +200,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   }
   if (status == QMAT_OK && !quiet && !dry) qmat_run_print(run, stdout);
   if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
-    // The first error is the one to be told, also when its report cannot be written.
+    /* The first error is the one to be told, also when its report cannot be written. */
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);
     qmat_save_json(context, report, report_path);

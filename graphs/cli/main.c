@@ -29,10 +29,10 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
 }
 
 int main(int argc, char **argv) {
-  // Only what tells which characters the terminal shows: numbers stay those of the C locale.
+  /* Only what tells which characters the terminal shows: numbers stay those of the C locale. */
   setlocale(LC_CTYPE, "");
   qmat_catch_interrupts();
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not the end of the program
+  signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is an error of writing, not the end of the program */
   qmat_context context = {0};
   const char *name = argc > 1 ? argv[1] : "help";
   if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";

@@ -13,7 +13,7 @@
 #include "core/json_text.h"
 #include "graphs/run/run_report.h"
 
-// The one variable of the program that can change: a signal has no other way to tell.
+/* The one variable of the program that can change: a signal has no other way to tell. */
 static volatile sig_atomic_t interrupted;
 
 static void on_interrupt(int number) {
@@ -75,7 +75,7 @@ static void print_event(const qmat_progress_view *view, const char *event, json_
   json_object_set_new(line, "steps", json_integer((json_int_t)view->step_count));
   if (more) json_object_update(line, more);
   char *text = qmat_json_text(line, JSON_COMPACT | JSON_REAL_PRECISION(9), NULL);
-  // In one piece, so that lines stay whole when others write to the same terminal.
+  /* In one piece, so that lines stay whole when others write to the same terminal. */
   if (text) fprintf(stderr, "%s\n", text);
   qmat_free(text);
   json_decref(line);
@@ -84,7 +84,7 @@ static void print_event(const qmat_progress_view *view, const char *event, json_
 
 /* ---- a line on a terminal ---- */
 
-// One line that never reaches the last column, so that the terminal does not wrap it.
+/* One line that never reaches the last column, so that the terminal does not wrap it. */
 typedef struct line_writer {
   char bytes[1024];
   size_t size;
@@ -98,7 +98,7 @@ static void put_code(line_writer *line, const char *code) {
   line->size += length;
 }
 
-// Text of one column a character, cut at the width. Node ids and types are ASCII, units nearly always.
+/* Text of one column a character, cut at the width. Node ids and types are ASCII, units nearly always. */
 static void put_text(line_writer *line, const char *text) {
   for (; *text && line->column < line->width && line->size + 1 < sizeof line->bytes; text++) {
     line->bytes[line->size++] = *text;
@@ -159,7 +159,7 @@ static bool on_progress(void *user, const char *node_id, const char *node_type, 
   (void)node_id;
   (void)node_type;
   qmat_progress_view *view = user;
-  // The runner asks once between nodes, without anything to tell.
+  /* The runner asks once between nodes, without anything to tell. */
   bool tells = done > 0 || total > 0;
   if (view->mode == QMAT_PROGRESS_TTY && tells) draw(view, done, total, unit, false);
   if (view->mode == QMAT_PROGRESS_JSON && tells)

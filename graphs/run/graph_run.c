@@ -84,7 +84,7 @@ void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
   }
 }
 
-// Adds a report's warnings to a list, with what each is of.
+/* Adds a report's warnings to a list, with what each is of. */
 static bool add_warnings(json_t *all, const char *name, const json_t *report) {
   const json_t *own = json_object_get(report, "warnings");
   for (size_t i = 0; i < json_array_size(own); i++) {
@@ -122,7 +122,7 @@ size_t qmat_folder_length(const char *path) {
   return slash ? (size_t)(slash - path) + 1 : 0;
 }
 
-// The folder of `path` as one that can be asked about; the caller frees it with qmat_free.
+/* The folder of `path` as one that can be asked about; the caller frees it with qmat_free. */
 static char *folder_of(const char *path) {
   size_t length = qmat_folder_length(path);
   char *folder = qmat_calloc(length + 2, 1);
@@ -147,7 +147,7 @@ bool qmat_same_file(const char *a, const char *b) {
   return same;
 }
 
-// Refuses a path that is the graph file or a file that a step reads.
+/* Refuses a path that is the graph file or a file that a step reads. */
 static qmat_status check_not_an_input(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
   if (qmat_same_file(path, run->graph->file)) {
     return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the graph file", what, path);
@@ -168,7 +168,7 @@ static qmat_status check_not_an_input(qmat_context *context, const qmat_run *run
   return QMAT_OK;
 }
 
-// So that a run of minutes does not end in a mistyped folder.
+/* So that a run of minutes does not end in a mistyped folder. */
 static qmat_status check_can_write(qmat_context *context, const char *path) {
   struct stat info;
   qmat_status status = QMAT_OK;
@@ -216,7 +216,7 @@ static int choice_of(const qmat_node *type, const void *params) {
   return choice;
 }
 
-// Marks `start` and what it depends on.
+/* Marks `start` and what it depends on. */
 static void mark_within(const qmat_graph *graph, size_t start, bool *within) {
   within[start] = true;
   for (size_t k = graph->node_count; k-- > 0;) {
@@ -276,7 +276,7 @@ static qmat_status plan_files(run_planner *planner) {
   return QMAT_OK;
 }
 
-// Whether file `index` is the first of its node that asks for its format, and the node does not run in it anyway.
+/* Whether file `index` is the first of its node that asks for its format, and the node does not run in it anyway. */
 static bool asks_for_step(const run_planner *planner, size_t index) {
   const qmat_graph *graph = planner->graph;
   size_t node = graph->outputs[planner->run->files[index].output].node;
@@ -362,7 +362,7 @@ static qmat_status plan_steps(run_planner *planner) {
   return QMAT_OK;
 }
 
-// The slot of an output port of a node that runs with its own parameters, or whose value is given.
+/* The slot of an output port of a node that runs with its own parameters, or whose value is given. */
 static qmat_status find_slot(run_planner *planner, size_t node, size_t port, size_t *slot) {
   const qmat_run *run = planner->run;
   if (!planner->replaced[node]) {
@@ -502,14 +502,15 @@ static void release_slot(qmat_run_slot *slot) {
   slot->value = NULL;
 }
 
-// Lets go of what nobody reads any more.
+/* Lets go of what nobody reads any more. */
 static void release_unread(qmat_run *run) {
   for (size_t i = 0; i < run->slot_count; i++)
     if (run->slots[i].readers == 0 && !run->slots[i].kept) release_slot(&run->slots[i]);
 }
 
-// Takes the outputs of a step that has run. False when a node before it was told to read something else: the cache had
-// other bytes for this step than it makes.
+/* Takes the outputs of a step that has run. False when a node before it was told to read something else: the cache had
+ */
+/* other bytes for this step than it makes. */
 static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *outputs) {
   const qmat_node *type = run->graph->nodes[step->node].type;
   bool steady = true;
@@ -518,7 +519,7 @@ static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *
     qmat_run_made *made = &step->made[port];
     bool same = slot->known && qmat_digest_equal(&slot->digest, &outputs[port]->digest);
     if (slot->known && !same) steady = false;
-    // A step that waits for another output of this one may already have taken the value that is there.
+    /* A step that waits for another output of this one may already have taken the value that is there. */
     if (slot->value && same) {
       qmat_value_release(outputs[port]);
     } else {
@@ -537,7 +538,7 @@ static bool take_outputs(qmat_run *run, qmat_run_step *step, qmat_value *const *
   return steady;
 }
 
-// One execution of a plan.
+/* One execution of a plan. */
 typedef struct executor {
   qmat_context *context;
   qmat_run *run;
@@ -556,7 +557,7 @@ static void unlock_cache(const executor *executor) {
   if (executor->lock) pthread_mutex_unlock(executor->lock);
 }
 
-// Sees to it that a value is there: from the cache, or else by running the step that makes it.
+/* Sees to it that a value is there: from the cache, or else by running the step that makes it. */
 static qmat_status need_value(executor *executor, size_t index) {
   qmat_run_slot *slot = &executor->run->slots[index];
   if (slot->value) return QMAT_OK;
@@ -576,7 +577,7 @@ static void tell_done(const executor *executor, size_t index) {
   if (observer && observer->done) observer->done(observer->user, executor->run, index);
 }
 
-// Finds how many values the lists have that a node cannot take whole; 0: none is given.
+/* Finds how many values the lists have that a node cannot take whole; 0: none is given. */
 static qmat_status count_lifted(qmat_context *context, const qmat_node *type, const qmat_value *const *inputs,
                                 size_t *count, const qmat_list **first) {
   *count = 0;
@@ -594,7 +595,7 @@ static qmat_status count_lifted(qmat_context *context, const qmat_node *type, co
   return QMAT_OK;
 }
 
-// A run of one step: `step` with value `item` of each list that it is given. Its outputs' slots come first.
+/* A run of one step: `step` with value `item` of each list that it is given. Its outputs' slots come first. */
 static qmat_status plan_item(qmat_context *context, const qmat_run *run, const qmat_run_step *step,
                              const qmat_value *const *inputs, size_t item, qmat_run *one) {
   const qmat_node *type = run->graph->nodes[step->node].type;
@@ -624,7 +625,7 @@ static qmat_status plan_item(qmat_context *context, const qmat_run *run, const q
   return QMAT_OK;
 }
 
-// A step that runs once for each value of the lists that it is given.
+/* A step that runs once for each value of the lists that it is given. */
 typedef struct lifted_step {
   executor *outer;
   size_t step;
@@ -635,7 +636,7 @@ typedef struct lifted_step {
   qmat_error first_error; /* why */
 } lifted_step;
 
-// What cannot be made of one item stands as a failure in the lists; the others go on.
+/* What cannot be made of one item stands as a failure in the lists; the others go on. */
 static qmat_status leave_out(lifted_step *lifted, qmat_context *context, size_t item, const qmat_value *failure) {
   const qmat_run *run = lifted->outer->run;
   qmat_run_step *step = &lifted->outer->run->steps[lifted->step];
@@ -654,7 +655,7 @@ static qmat_status leave_out(lifted_step *lifted, qmat_context *context, size_t 
   return QMAT_OK;
 }
 
-// Runs a step for one value of each list, or takes what the cache has of that. One of the threads of qmat_run_items.
+/* Runs a step for one value of each list, or takes what the cache has of that. One of the threads of qmat_run_items. */
 static qmat_status run_item(void *user, qmat_context *context, size_t item) {
   lifted_step *lifted = user;
   const qmat_run *run = lifted->outer->run;
@@ -687,7 +688,7 @@ static qmat_status run_item(void *user, qmat_context *context, size_t item) {
   return status == QMAT_ERROR_GEOMETRY ? leave_out(lifted, context, item, NULL) : status;
 }
 
-// The bytes of the values that a step is given for one item.
+/* The bytes of the values that a step is given for one item. */
 static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, size_t item) {
   size_t size = 0;
   for (size_t port = 0; port < qmat_input_count(type); port++)
@@ -696,7 +697,7 @@ static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, 
   return size;
 }
 
-// Fails when nothing could be made of any item, with the error of the first.
+/* Fails when nothing could be made of any item, with the error of the first. */
 static qmat_status check_any_made(const lifted_step *lifted, qmat_context *context, const qmat_list *first) {
   const qmat_list *made = lifted->outputs[0];
   for (size_t i = 0; i < made->count; i++)
@@ -727,7 +728,7 @@ static qmat_status run_items(executor *executor, size_t index, const qmat_value 
   return status;
 }
 
-// Runs a step once for each value of the lists that it is given; what it makes are lists of the same names.
+/* Runs a step once for each value of the lists that it is given; what it makes are lists of the same names. */
 static qmat_status run_lifted(executor *executor, size_t index, const qmat_value *const *inputs, const qmat_list *first,
                               qmat_value **outputs) {
   qmat_context *context = executor->context;
@@ -820,7 +821,7 @@ static void note_mesh(const qmat_run *run, qmat_run_step *step) {
   }
 }
 
-// Takes the run's name from the first scene.
+/* Takes the run's name from the first scene. */
 static qmat_status take_name(executor *executor, const qmat_run_step *step, bool *named) {
   qmat_run *run = executor->run;
   const qmat_node *type = run->graph->nodes[step->node].type;
@@ -836,14 +837,14 @@ static qmat_status take_name(executor *executor, const qmat_run_step *step, bool
   return QMAT_OK;
 }
 
-// Whether a step has made a list of its own accord, and not because it was given one.
+/* Whether a step has made a list of its own accord, and not because it was given one. */
 static bool made_list(const qmat_node *type, const qmat_run_step *step) {
   for (size_t port = 0; port < qmat_output_count(type); port++)
     if (type->outputs[port].list && step->made[port].items > 1) return true;
   return false;
 }
 
-// Refuses what later steps would refuse for the lengths of their lists, before the steps in between are run.
+/* Refuses what later steps would refuse for the lengths of their lists, before the steps in between are run. */
 static qmat_status check_list_lengths(executor *executor, size_t next) {
   const qmat_run *run = executor->run;
   qmat_context *context = executor->context;
@@ -919,7 +920,7 @@ static qmat_status execute_steps(executor *executor) {
   return status;
 }
 
-// Forgets what has been made, to start again.
+/* Forgets what has been made, to start again. */
 static void reset(qmat_run *run) {
   count_readers(run);
   for (size_t i = 0; i < run->slot_count; i++) {
@@ -941,7 +942,7 @@ qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_ru
   double start = now();
   qmat_status status = execute_steps(&executor);
   if (executor.unsteady) {
-    // What ran before this was noticed may rest on the wrong bytes.
+    /* What ran before this was noticed may rest on the wrong bytes. */
     reset(run);
     run->bypass = true;
     status = execute_steps(&executor);
@@ -967,7 +968,7 @@ void qmat_run_foresee(qmat_run *run) {
 
 /* ---- writing ---- */
 
-// The parts that will be files, side by side in one folder: the shape that qmat_file_save takes.
+/* The parts that will be files, side by side in one folder: the shape that qmat_file_save takes. */
 typedef struct part_group {
   qmat_file_part *parts;
   size_t count, capacity;
@@ -977,7 +978,7 @@ static qmat_status add_part(qmat_context *context, part_group *group, const char
                             size_t size) {
   if (qmat_grow((void **)&group->parts, &group->capacity, group->count + 1, sizeof *group->parts) != 0)
     return qmat_fail_memory(context, "output");
-  // The saver reads the bytes and the names only.
+  /* The saver reads the bytes and the names only. */
   group->parts[group->count++] = (qmat_file_part){.name = (char *)name, .size = size, .bytes = (uint8_t *)bytes};
   return QMAT_OK;
 }
@@ -987,7 +988,7 @@ static qmat_status digest_bytes(qmat_context *context, const void *bytes, size_t
   return status == QMAT_OK ? status : qmat_fail(context, status, "the digest of an output cannot be computed");
 }
 
-// Refuses side files that would overwrite an input: their names were not known before the run.
+/* Refuses side files that would overwrite an input: their names were not known before the run. */
 static qmat_status check_side_part(qmat_context *context, const qmat_run *run, const char *path, const char *name) {
   size_t folder = qmat_folder_length(path), length = strlen(name);
   char *side = qmat_alloc(folder + length + 1, 1);
@@ -1002,7 +1003,7 @@ static qmat_status check_side_part(qmat_context *context, const qmat_run *run, c
 static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run_file *file, part_group *group,
                                   char **text) {
   const qmat_value *value = run->slots[file->slot].value;
-  // Inside a group the first main part has no name, which stands for the path given to the saver.
+  /* Inside a group the first main part has no name, which stands for the path given to the saver. */
   const char *main_name = group->count == 0 ? "" : file->path + qmat_folder_length(file->path);
   if (qmat_value_item_type(value) == QMAT_REPORT) {
     json_t *root = qmat_report_json(value);
@@ -1010,7 +1011,7 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
     json_decref(root);
     if (!*text) return qmat_fail_memory(context, "report");
     size_t size = strlen(*text);
-    (*text)[size] = '\n';  // takes the place of the terminating zero
+    (*text)[size] = '\n'; /* takes the place of the terminating zero */
     file->bytes = size + 1;
     qmat_status status = digest_bytes(context, *text, file->bytes, &file->sha256);
     return status == QMAT_OK ? add_part(context, group, main_name, *text, file->bytes) : status;
@@ -1086,7 +1087,7 @@ static bool take_number(const json_t *report, const char *key, double *number) {
   return true;
 }
 
-// Takes one report into the summary; false when it lacks a number.
+/* Takes one report into the summary; false when it lacks a number. */
 static bool summarise_report(const json_t *report, qmat_run_summary *summary) {
   double spheres, epsilon, out, in;
   if (!take_number(report, "spheres", &spheres) || !(spheres >= 0 && spheres < 0x1p53) ||

@@ -12,7 +12,7 @@
 
 /* ---- JSON ---- */
 
-// A text that may not be UTF-8, as a path may be: JSON has no way to say it, so foreign bytes become '?'.
+/* A text that may not be UTF-8, as a path may be: JSON has no way to say it, so foreign bytes become '?'. */
 static json_t *text_json(const char *text) {
   json_t *json = json_string(text);
   if (json) return json;
@@ -91,7 +91,7 @@ static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
   return json;
 }
 
-// The first file that the run reads, or null.
+/* The first file that the run reads, or null. */
 static json_t *input_json(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
     const qmat_node *type = run->graph->nodes[run->steps[i].node].type;
@@ -105,7 +105,7 @@ static json_t *input_json(const qmat_run *run) {
   return json_null();
 }
 
-// Where results are kept, or null.
+/* Where results are kept, or null. */
 static json_t *cache_json(const qmat_run *run) {
   if (!run->cache) return json_null();
   size_t hits = 0;
@@ -120,7 +120,7 @@ static json_t *cache_json(const qmat_run *run) {
   return json;
 }
 
-// jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for.
+/* jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   json_t *nodes = json_array(), *outputs = json_array(), *report = json_object(), *brief = json_null();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
@@ -184,7 +184,7 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
   char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   if (!text) return qmat_fail_memory(context, "report");
   size_t length = strlen(text);
-  text[length] = '\n';  // takes the place of the terminating zero
+  text[length] = '\n'; /* takes the place of the terminating zero */
   qmat_file_part part = {.name = (char *)"", .size = length + 1, .bytes = (uint8_t *)text};
   const qmat_file file = {.base = {.type = QMAT_FILE}, .part_count = 1, .parts = &part};
   qmat_status status = qmat_file_save(context, &file, path);
@@ -194,7 +194,7 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
 
 /* ---- depfile ---- */
 
-// A path as Make and Ninja read it in a depfile.
+/* A path as Make and Ninja read it in a depfile. */
 static void put_escaped(qmat_writer *writer, const char *path) {
   for (; *path; path++) {
     if (*path == ' ' || *path == '#' || *path == '\\') qmat_put_text(writer, "\\");
@@ -213,7 +213,7 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
   qmat_put_text(&writer, ": ");
   put_escaped(&writer, run->graph->file);
   for (size_t i = 0; i < run->hashed_count; i++) {
-    // A file that was looked for and is not there cannot be waited for.
+    /* A file that was looked for and is not there cannot be waited for. */
     if (!run->hashed[i].readable) continue;
     qmat_put_text(&writer, " \\\n  ");
     put_escaped(&writer, run->hashed[i].path);
@@ -261,7 +261,7 @@ void qmat_format_bound(double fraction, char *text) {
     snprintf(text, 48, "0 %%");
     return;
   }
-  // Rounding up must not make 0.98 % of what is 0.98 % but for the last bit.
+  /* Rounding up must not make 0.98 % of what is 0.98 % but for the last bit. */
   double digits = floor(1 - floor(log10(percent)));
   double scale = pow(10, digits > 0 ? digits : 0);
   char number[40];
@@ -302,7 +302,7 @@ void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, c
            summary->meshes > 1 ? "mesh's diagonal" : "diagonal", between, in, end, proof);
 }
 
-// "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted.
+/* "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted. */
 static void describe_made(const qmat_port *port, const qmat_run_made *made, char *text, size_t size) {
   text[0] = 0;
   char number[32];
@@ -325,7 +325,7 @@ static int widest(int width, const char *text) {
   return length > width ? length : width;
 }
 
-// The columns that identify a step.
+/* The columns that identify a step. */
 static void print_step(const qmat_run *run, const qmat_run_step *step, FILE *out) {
   int id_width = 0, type_width = 0;
   for (size_t i = 0; i < run->step_count; i++) {
@@ -366,7 +366,7 @@ void qmat_run_print(const qmat_run *run, FILE *out) {
     for (size_t port = 0; port < qmat_output_count(node->type); port++) {
       char made[128];
       describe_made(&node->type->outputs[port], &step->made[port], made, sizeof made);
-      // The size of a file has been told already.
+      /* The size of a file has been told already. */
       if (!*made || (run->cache && node->type->outputs[port].type == QMAT_FILE)) continue;
       fprintf(out, "%s%s", joint, made);
       joint = ", ";

@@ -18,7 +18,7 @@ json_t *qmat_cache_records(qmat_cache *cache) {
   }
   for (size_t i = 0; i < count; i++) {
     json_t *record = entries[i].kind == QMAT_CACHE_RECORD ? qmat_cache_record(cache, &entries[i].digest) : NULL;
-    // Lists of side files are no results.
+    /* Lists of side files are no results. */
     if (json_object_get(record, "outputs"))
       json_array_append_new(records, record);
     else
@@ -35,7 +35,7 @@ static const char *text_of(const json_t *item, size_t index) {
   return text ? text : "";
 }
 
-// The tag that items are paired by: a text that is set and one that is not are the same parameter.
+/* The tag that items are paired by: a text that is set and one that is not are the same parameter. */
 static const char *group_of(const json_t *item) {
   return strcmp(text_of(item, 0), "unset") == 0 ? "param" : text_of(item, 0);
 }
@@ -71,7 +71,7 @@ static json_int_t made_at(const json_t *record) {
   return json_integer_value(json_object_get(record, "made"));
 }
 
-// The record of the same node type with the fewest other items, made before `until`.
+/* The record of the same node type with the fewest other items, made before `until`. */
 static const json_t *nearest(const json_t *records, const json_t *items, json_int_t until) {
   const json_t *best = NULL;
   size_t least = SIZE_MAX;
@@ -95,7 +95,7 @@ __attribute__((format(printf, 1, 2))) static json_t *sentence(const char *format
   va_start(arguments, format);
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  // What was cut may end within a character.
+  /* What was cut may end within a character. */
   json_t *json = json_string(text);
   for (size_t length = strlen(text); !json && length > 0; json = json_string(text)) text[--length] = 0;
   return json;
@@ -105,7 +105,7 @@ static const char *shown_value(const json_t *item) {
   return !item || strcmp(text_of(item, 0), "unset") == 0 ? "not set" : text_of(item, 2);
 }
 
-// The node that an input takes its value from, or "".
+/* The node that an input takes its value from, or "". */
 static const qmat_graph_node *maker_of(const qmat_run *run, const qmat_run_step *step, const char *input,
                                        const char **port) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
@@ -181,7 +181,7 @@ static void add_differences(const qmat_run *run, const qmat_run_step *step, cons
       add_difference(run, step, NULL, json_array_get(before, i), causes);
 }
 
-// A file of the step that cannot be read, so that its key is not known.
+/* A file of the step that cannot be read, so that its key is not known. */
 static void add_unreadable(const qmat_run *run, const qmat_run_step *step, json_t *causes) {
   const qmat_node *type = run->graph->nodes[step->node].type;
   for (size_t row = 0; row < qmat_param_count(type); row++) {
@@ -194,7 +194,7 @@ static void add_unreadable(const qmat_run *run, const qmat_run_step *step, json_
   }
 }
 
-// The nodes that have to run before it is known what this one takes.
+/* The nodes that have to run before it is known what this one takes. */
 static void add_waiting(const qmat_run *run, const qmat_run_step *step, json_t *causes) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   for (size_t port = 0; port < qmat_input_count(node->type); port++) {

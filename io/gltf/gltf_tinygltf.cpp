@@ -511,8 +511,8 @@ class Reader {
 }  // namespace
 
 qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t text_length,
-                                const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes,
-                                size_t mesh_count, qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts) {
+                                const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes, size_t mesh_count,
+                                qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts) {
   *counts = {};
   try {
     if (text_length > std::numeric_limits<unsigned int>::max()) return qmat_fail_memory(context, "the JSON of a glTF");

@@ -7,8 +7,8 @@
 
 /* One file of Universal Scene Description in memory: a layer, which is a tree of specs with named fields, as both the
  * text (.usda) and the binary crate (.usdc) hold it. Names of fields are those of the binary form: "specifier",
- * "typeName", "references", "default", "timeSamples", "targetPaths", ... Nothing is composed here: io/usd/usd_stage.h does
- * that. Source: OpenUSD's documentation of the file formats, and of the crate OpenUSD's own reader. */
+ * "typeName", "references", "default", "timeSamples", "targetPaths", ... Nothing is composed here: io/usd/usd_stage.h
+ * does that. Source: OpenUSD's documentation of the file formats, and of the crate OpenUSD's own reader. */
 
 /* What an element of a value is made of. */
 typedef enum qmat_usd_type {

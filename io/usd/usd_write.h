@@ -23,8 +23,8 @@ typedef struct qmat_usd_options {
  *    are, primvars:qmat:sphere; where there are edges;
  *  - "slabs", a Mesh of the triangles over all spheres with primvars:radius; where there are triangles;
  * the last three of purpose "guide", so that renderers show the skin. The customData of the Xform are those that
- * io/gltf/gltf_write.h puts into extras, without the blob; qmat_quantisation is the largest |dc| + |dr| that writing single
- * precision moved a sphere by.
+ * io/gltf/gltf_write.h puts into extras, without the blob; qmat_quantisation is the largest |dc| + |dr| that writing
+ * single precision moved a sphere by.
  * `*file` is sealed, has one part, and is released by the caller; NULL on failure. QMAT_ERROR_GEOMETRY for an empty
  * medial mesh or coordinates beyond single precision, QMAT_ERROR_MEMORY. One thread; the same bytes for the same input.
  * Cost: linear. */

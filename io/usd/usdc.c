@@ -255,7 +255,7 @@ static qmat_status find_section(const crate *c, const char *name, section *found
   for (uint64_t i = 0; i < count; i++) {
     const uint8_t *title = qmat_take_bytes(&reader, 16);
     uint64_t start = qmat_take_u64(&reader), size = qmat_take_u64(&reader);
-    if (title == NULL || strncmp((const char *)title, name, 16) != 0) continue;
+    if (!title || strncmp((const char *)title, name, 16) != 0) continue;
     if (start > c->size || size > c->size - start) return fail_short(c);
     *found = (section){.bytes = c->bytes + start, .size = (size_t)size};
     return QMAT_OK;

@@ -45,7 +45,7 @@ static const char *embree_instructions(void) {
 static void describe_embree(char *text, size_t size) {
   const RTCDevice device = rtcNewDevice("ignore_config_files=1,threads=1");
   const int version = device != NULL ? (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
-  if (device != NULL) rtcReleaseDevice(device);
+  if (device) rtcReleaseDevice(device);
   snprintf(text, size, "%d.%d.%d %s", version / 10000, version / 100 % 100, version % 100, embree_instructions());
 }
 

@@ -68,7 +68,7 @@ qmat_status collect(qmat_context *context, Triangulation &triangulation, qmat_te
   };
   std::vector<Cell> cells;
   cells.reserve(triangulation.number_of_finite_cells());
-  for (auto cell = triangulation.all_cells_begin(); cell != triangulation.all_cells_end(); ++cell) {
+  for (auto cell = triangulation.all_cells_begin(); cell != triangulation.all_cells_end(); cell++) {
     cell->info() = QMAT_NO_TETRAHEDRON;
     if (triangulation.is_infinite(cell)) continue;
     std::array<uint32_t, 4> ids;

@@ -12,7 +12,8 @@
 enum { MOST_ROUNDS = 8 };
 
 /* The middle of an edge as an inscribed sphere, when the interpolated one leaves the solid by more than the tolerance.
- * Both ends inscribed, the middle can leave it by at most (length^2 - change^2) / (2 length): short edges need no look. */
+ * Both ends inscribed, the middle can leave it by at most (length^2 - change^2) / (2 length): short edges need no look.
+ */
 static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance,
                         double middle[4]) {
   double square = 0;
@@ -122,7 +123,7 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
 }
 
 qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
-                               double tolerance, size_t *added) {
+                                        double tolerance, size_t *added) {
   *added = 0;
   for (int round = 0; round < MOST_ROUNDS; round++) {
     const size_t before = *added;

@@ -10,6 +10,6 @@
  * lies outside is left alone. `medial` is in the unit frame and not yet sealed, its new spheres come last. `*added` is
  * their number. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. */
 qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
-                               double tolerance, size_t *added);
+                                        double tolerance, size_t *added);
 
 #endif

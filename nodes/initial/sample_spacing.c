@@ -34,8 +34,8 @@ qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh,
   size_t long_sides = 0;
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
-    const double length = length_between(&positions[3 * (size_t)mesh->triangles[i]],
-                                         &positions[3 * (size_t)mesh->triangles[next]]);
+    const double length =
+        length_between(&positions[3 * (size_t)mesh->triangles[i]], &positions[3 * (size_t)mesh->triangles[next]]);
     counts[i] = (uint32_t)fmax(ceil(length / spacing) - 1, 0);
     long_sides += counts[i] > 0;
   }

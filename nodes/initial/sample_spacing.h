@@ -16,12 +16,12 @@ qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh,
 /* Writes the barycentrics (3 each) of `count` even points between corner `side` and the next. */
 void qmat_side_points_fill(int side, uint32_t count, double *barycentrics);
 
-/* How many points rows along the longest side put inside the triangle abc (3 doubles each). 0 where it is no larger than
- * the spacing asks for. */
+/* How many points rows along the longest side put inside the triangle abc (3 doubles each). 0 where it is no larger
+ * than the spacing asks for. */
 uint64_t qmat_row_points_count(const double *a, const double *b, const double *c, double spacing);
 
-/* Writes the barycentrics of `wanted` of these points, evenly picked; at most qmat_row_points_count of them. `key` makes
- * the small displacements that keep rows on parallel facets from lying on common spheres. */
+/* Writes the barycentrics of `wanted` of these points, evenly picked; at most qmat_row_points_count of them. `key`
+ * makes the small displacements that keep rows on parallel facets from lying on common spheres. */
 void qmat_row_points_fill(const double *a, const double *b, const double *c, double spacing, uint64_t key,
                           uint64_t wanted, double *barycentrics);
 

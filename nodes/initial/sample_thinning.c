@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
 #include "core/geometry/triangle.h"
+#include "core/hash.h"
 
 /* Each level's cells are half as wide as those of the one before; smaller radii search the finest level. */
 enum { LEVELS = 8, REPORT_EVERY = 65536 };
@@ -41,7 +41,7 @@ static qmat_status grid_init(qmat_context *context, sample_grid *grid, size_t co
   grid->bucket_mask = buckets - 1;
   grid->heads = qmat_arena_alloc(&context->arena, buckets, sizeof *grid->heads);
   grid->next = qmat_arena_alloc(&context->arena, count, LEVELS * sizeof *grid->next);
-  if (grid->heads == NULL || grid->next == NULL) return qmat_fail_memory(context, "the samples");
+  if (!grid->heads || !grid->next) return qmat_fail_memory(context, "the samples");
   for (size_t i = 0; i < buckets; i++) grid->heads[i] = NONE;
   return QMAT_OK;
 }

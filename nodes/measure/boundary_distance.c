@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
 #include "core/geometry/medial_distance.h"
+#include "core/hash.h"
 
 /* What lies no deeper in the envelope than this lies on its boundary, and what hi is raised by: more than rounding. */
 static const double rounding = 1e-9;
@@ -130,16 +130,16 @@ static qmat_status join_features(qmat_context *context, const qmat_medial *unit,
 }
 
 /* The mantle of a cone: what its tangent planes touch. At an angle around the axis the normal is the same all along. */
-typedef struct mantle {
+typedef struct cone_side {
   const double *a, *b;        /* the ends */
   double length;              /* of the mantle along itself */
   double axis[3], v[3], w[3]; /* orthonormal */
   double along, across;       /* the normal's parts along the axis and at right angles to it */
-} mantle;
+} cone_side;
 
 /* False where one end holds the other: there is none. */
-static bool make_mantle(const double *a, const double *b, mantle *m) {
-  *m = (mantle){.a = a, .b = b};
+static bool make_cone_side(const double *a, const double *b, cone_side *m) {
+  *m = (cone_side){.a = a, .b = b};
   const double length = distance(a, b), growth = b[3] - a[3];
   if (!(length > fabs(growth)) || !(fabs(growth / length) < 1)) return false;
   for (int k = 0; k < 3; k++) m->axis[k] = (b[k] - a[k]) / length;
@@ -158,11 +158,11 @@ static bool make_mantle(const double *a, const double *b, mantle *m) {
 }
 
 /* The medial sphere at t in [0, 1]. */
-static void mantle_sphere(const mantle *m, double t, double sphere[4]) {
+static void cone_side_sphere(const cone_side *m, double t, double sphere[4]) {
   for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * m->a[k] + t * m->b[k];
 }
 
-static void mantle_normal(const mantle *m, double angle, double normal[3]) {
+static void cone_side_normal(const cone_side *m, double angle, double normal[3]) {
   const double x = m->across * cos(angle), y = m->across * sin(angle);
   for (int k = 0; k < 3; k++) normal[k] = m->along * m->axis[k] + x * m->v[k] + y * m->w[k];
 }
@@ -200,9 +200,9 @@ static double feature_area(const features *f, size_t feature) {
   if (feature < f->sphere_count) return 4 * pi * f->spheres[4 * feature + 3] * f->spheres[4 * feature + 3];
   feature -= f->sphere_count;
   if (feature < f->edge_count) {
-    mantle m;
+    cone_side m;
     const uint32_t *ends = &f->edges[2 * feature];
-    if (!make_mantle(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return 0;
+    if (!make_cone_side(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return 0;
     return pi * (m.a[3] + m.b[3]) * m.across * m.length;
   }
   feature -= f->edge_count;
@@ -220,15 +220,15 @@ static void feature_point(const features *f, size_t feature, double x, double y,
   }
   feature -= f->sphere_count;
   if (feature < f->edge_count) {
-    mantle m;
+    cone_side m;
     double sphere[4], normal[3];
     const uint32_t *ends = &f->edges[2 * feature];
-    if (!make_mantle(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return;
+    if (!make_cone_side(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return;
     /* The radius is even in its square: r(t)^2 = (1 - x) ra^2 + x rb^2. */
     const double ra = m.a[3], rb = m.b[3], sum = ra + sqrt((1 - x) * ra * ra + x * rb * rb);
     const double t = sum > 0 ? x * (ra + rb) / sum : x;
-    mantle_sphere(&m, t, sphere);
-    mantle_normal(&m, 2 * pi * y, normal);
+    cone_side_sphere(&m, t, sphere);
+    cone_side_normal(&m, 2 * pi * y, normal);
     for (int k = 0; k < 3; k++) point[k] = sphere[k] + sphere[3] * normal[k];
     return;
   }
@@ -377,32 +377,32 @@ static bool look_at_sphere(const search *s, const patch *p, double middle[3], do
 }
 
 /* The patch's halves along the mantle and around it. */
-static void mantle_reach(const mantle *m, const patch *p, double *along, double *around) {
+static void cone_side_reach(const cone_side *m, const patch *p, double *along, double *around) {
   double sphere[4];
-  mantle_sphere(m, 0.5 * (p->at[0] + p->at[1]), sphere);
+  cone_side_sphere(m, 0.5 * (p->at[0] + p->at[1]), sphere);
   *along = 0.5 * m->length * (p->at[1] - p->at[0]);
   *around = 2 * sphere[3] * m->across * sin(0.25 * (p->at[3] - p->at[2]));
 }
 
-static mantle mantle_of(const features *f, const patch *p) {
-  mantle m;
+static cone_side cone_side_of(const features *f, const patch *p) {
+  cone_side m;
   const uint32_t *ends = &f->edges[2 * (p->feature - f->sphere_count)];
-  make_mantle(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m);
+  make_cone_side(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m);
   return m;
 }
 
-static bool look_at_mantle(const search *s, const patch *p, double middle[3], double *reach) {
+static bool query_cone_side(const search *s, const patch *p, double middle[3], double *reach) {
   const features *f = s->features;
   const size_t edge = p->feature - f->sphere_count;
-  const mantle m = mantle_of(f, p);
+  const cone_side m = cone_side_of(f, p);
   double sphere[4], ends[2][4], normal[3], along, around;
-  mantle_sphere(&m, 0.5 * (p->at[0] + p->at[1]), sphere);
-  mantle_normal(&m, 0.5 * (p->at[2] + p->at[3]), normal);
+  cone_side_sphere(&m, 0.5 * (p->at[0] + p->at[1]), sphere);
+  cone_side_normal(&m, 0.5 * (p->at[2] + p->at[3]), normal);
   for (int k = 0; k < 3; k++) middle[k] = sphere[k] + sphere[3] * normal[k];
-  mantle_reach(&m, p, &along, &around);
+  cone_side_reach(&m, p, &along, &around);
   *reach = along + around;
   const double spread = 2 * m.across * sin(0.25 * (p->at[3] - p->at[2]));
-  for (int e = 0; e < 2; e++) mantle_sphere(&m, p->at[e], ends[e]);
+  for (int e = 0; e < 2; e++) cone_side_sphere(&m, p->at[e], ends[e]);
   for (size_t i = f->apex_offsets[edge]; i < f->apex_offsets[edge + 1]; i++) {
     /* n.c + r is the same all along: so is the excess, and the ends have the least radius and the largest distance. */
     const double *apex = &f->spheres[4 * (size_t)f->apexes[i]];
@@ -429,10 +429,10 @@ static void look_at_cell(const patch *p, double middle[3], double *reach) {
   *reach = sqrt(3) * p->at[3];
 }
 
-static int mantle_children(const features *f, const patch *p) {
+static int cone_side_children(const features *f, const patch *p) {
   double along, around;
-  const mantle m = mantle_of(f, p);
-  mantle_reach(&m, p, &along, &around);
+  const cone_side m = cone_side_of(f, p);
+  cone_side_reach(&m, p, &along, &around);
   return along > 2 * around || around > 2 * along ? 2 : 4;
 }
 
@@ -464,12 +464,12 @@ static finding look_at(const search *s, const patch *p) {
   finding result = {.found = {0, 0}, .bound = {0, 0}};
   double middle[3], reach;
   const bool is_cell = p->feature == CELL, is_sphere = !is_cell && p->feature < f->sphere_count;
-  const bool is_mantle = !is_cell && !is_sphere && p->feature < f->sphere_count + f->edge_count;
+  const bool is_cone_side = !is_cell && !is_sphere && p->feature < f->sphere_count + f->edge_count;
   bool open = true;
   if (is_sphere)
     open = look_at_sphere(s, p, middle, &reach);
-  else if (is_mantle)
-    open = look_at_mantle(s, p, middle, &reach);
+  else if (is_cone_side)
+    open = query_cone_side(s, p, middle, &reach);
   else if (is_cell)
     look_at_cell(p, middle, &reach);
   else
@@ -507,7 +507,7 @@ static finding look_at(const search *s, const patch *p) {
     return result;
   }
   result.sides = sides;
-  if (sides) result.children = is_sphere ? 4 : is_mantle ? mantle_children(f, p) : is_cell ? 8 : 2;
+  if (sides) result.children = is_sphere ? 4 : is_cone_side ? cone_side_children(f, p) : is_cell ? 8 : 2;
   return result;
 }
 
@@ -539,10 +539,10 @@ static void split_sphere(const patch *p, patch children[4]) {
   memcpy(children[3].at, middles, sizeof middles);
 }
 
-static void split_mantle(const features *f, const patch *p, int count, patch children[]) {
+static void split_cone_side(const features *f, const patch *p, int count, patch children[]) {
   double along, around;
-  const mantle m = mantle_of(f, p);
-  mantle_reach(&m, p, &along, &around);
+  const cone_side m = cone_side_of(f, p);
+  cone_side_reach(&m, p, &along, &around);
   const double t = 0.5 * (p->at[0] + p->at[1]), angle = 0.5 * (p->at[2] + p->at[3]);
   for (int i = 0; i < count; i++) {
     if (along >= around || count == 4) children[i].at[i & 1 ? 0 : 1] = t;
@@ -568,7 +568,7 @@ static void split(const features *f, const patch *p, const finding *found, patch
   else if (p->feature < f->sphere_count)
     split_sphere(p, children);
   else if (p->feature < f->sphere_count + f->edge_count)
-    split_mantle(f, p, found->children, children);
+    split_cone_side(f, p, found->children, children);
   else
     split_triangle_in_two(p, children);
 }
@@ -581,9 +581,9 @@ static void add_roots(const features *f, size_t feature, uint8_t sides, patch_li
       list->items[list->count++] = root;
     }
   } else if (feature < f->sphere_count + f->edge_count) {
-    mantle m;
+    cone_side m;
     const uint32_t *ends = &f->edges[2 * (feature - f->sphere_count)];
-    if (!make_mantle(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return;
+    if (!make_cone_side(&f->spheres[4 * (size_t)ends[0]], &f->spheres[4 * (size_t)ends[1]], &m)) return;
     root.at[1] = 1;
     for (int quarter = 0; quarter < 4; quarter++) {
       root.at[2] = 0.5 * pi * quarter;

@@ -5,11 +5,11 @@
 #include <string.h>
 
 #include "nodes/measure/boundary_distance.h"
-#include "nodes/measure/protrusion.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 /* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
  * one look. */
-static double least_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+static double least_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
                                int threads) {
   const size_t primitives = qmat_envelope_primitive_count(envelope);
   double least = 0;
@@ -20,14 +20,14 @@ static double least_protrusion(const qmat_surface *surface, const qmat_medial *u
     const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
     for (int c = 0; c < count; c++)
       for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
-    least = fmax(least, qmat_protrusion_of_sphere(surface, middle));
+    least = fmax(least, qmat_envelope_to_surface_of_sphere(surface, middle));
   }
   return least;
 }
 
-static double largest_protrusion(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+static double largest_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
                                  double tolerance, double enough, int threads) {
-  enough = fmax(enough, least_protrusion(surface, unit, envelope, threads) + tolerance);
+  enough = fmax(enough, least_to_surface(surface, unit, envelope, threads) + tolerance);
   const size_t primitives = qmat_envelope_primitive_count(envelope);
   double largest = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
@@ -36,14 +36,15 @@ static double largest_protrusion(const qmat_surface *surface, const qmat_medial 
     const int count = qmat_envelope_primitive(envelope, i, ids);
     const double *spheres[3];
     for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
-    largest = fmax(largest, qmat_protrusion_bound(surface, spheres, count, enough, tolerance));
+    largest = fmax(largest, qmat_envelope_to_surface_bound(surface, spheres, count, enough, tolerance));
   }
   return largest;
 }
 
-qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                      const double *points, size_t point_count, double tolerance, double enough,
-                                      double threshold, qmat_medial_errors *errors) {
+qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_surface *surface,
+                                              const qmat_medial *unit, const double *points, size_t point_count,
+                                              double tolerance, double enough, double threshold,
+                                              qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
@@ -52,19 +53,20 @@ qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface 
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
   for (size_t i = 0; i < point_count; i++)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
-  status =
-      qmat_cover_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold, &errors->cover);
-  errors->surface_to_envelope = errors->cover.bound;
+  status = qmat_hausdorff_bound_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold,
+                                        &errors->bound);
+  errors->surface_to_envelope = errors->bound.bound;
   qmat_envelope_free(envelope);
   return status;
 }
 
-qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                           double tolerance, double enough, qmat_medial_errors *errors) {
+qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat_surface *surface,
+                                               const qmat_medial *unit, double tolerance, double enough,
+                                               qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
-  errors->envelope_to_surface = largest_protrusion(surface, unit, envelope, tolerance, enough, qmat_threads(context));
+  errors->envelope_to_surface = largest_to_surface(surface, unit, envelope, tolerance, enough, qmat_threads(context));
   qmat_envelope_free(envelope);
   return qmat_progress(context, 0, 0, "primitives measured");
 }
@@ -90,16 +92,16 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
                                           &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
-  errors->hollows = boundary.far_points;
-  errors->hollow_count = keep_inside(surface, errors->hollows, boundary.far_count);
+  errors->cavities = boundary.far_points;
+  errors->cavity_count = keep_inside(surface, errors->cavities, boundary.far_count);
   errors->doubts = boundary.doubts;
   errors->doubt_count = keep_inside(surface, errors->doubts, boundary.doubt_count);
   return status;
 }
 
 void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
-  qmat_free(errors->hollows);
+  qmat_free(errors->cavities);
   qmat_free(errors->doubts);
-  errors->hollows = errors->doubts = NULL;
-  errors->hollow_count = errors->doubt_count = 0;
+  errors->cavities = errors->doubts = NULL;
+  errors->cavity_count = errors->doubt_count = 0;
 }

@@ -2,17 +2,17 @@
 #ifndef QMAT_NODES_MEASURE_MEDIAL_ERRORS_H
 #define QMAT_NODES_MEASURE_MEDIAL_ERRORS_H
 
-#include "nodes/measure/cover.h"
+#include "nodes/measure/hausdorff_bound.h"
 
 /* How far a solid and the envelope of a medial mesh are apart, in the unit frame. Both are upper bounds. */
 typedef struct qmat_medial_errors {
   double surface_to_envelope; /* of F over the surface (eq. 9) */
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
-  qmat_cover cover;           /* where the surface is farther than the threshold */
+  qmat_hausdorff_bound bound; /* where the surface is farther than the threshold */
   double boundary_to_surface; /* of the distance of the envelope's boundary, on either side; 0: not measured */
-  size_t hollow_count, doubt_count;
-  double *hollows; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
-  double *doubts;  /* 3 each: places in the solid that may be as deep, though none was found that is */
+  size_t cavity_count, doubt_count;
+  double *cavities; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
+  double *doubts;   /* 3 each: places in the solid that may be as deep, though none was found that is */
 } qmat_medial_errors;
 
 /* `unit` is a medial mesh in the unit frame, sealed or not. Each measures by branch and bound on all threads, and its
@@ -21,14 +21,16 @@ typedef struct qmat_medial_errors {
 /* The surface's distance to the envelope, to within `tolerance` (> 0) of the truth where that is above `enough`; below,
  * `enough` is the answer: a plateau of small errors would take looks without number to tell from its highest place. A
  * first look is taken at the `point_count` points (3 doubles each, on the surface); `threshold` as in
- * qmat_cover_measure. */
-qmat_status qmat_medial_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                      const double *points, size_t point_count, double tolerance, double enough,
-                                      double threshold, qmat_medial_errors *errors);
+ * qmat_hausdorff_bound_measure. */
+qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_surface *surface,
+                                              const qmat_medial *unit, const double *points, size_t point_count,
+                                              double tolerance, double enough, double threshold,
+                                              qmat_medial_errors *errors);
 
 /* What spheres, cones and slabs leave the solid by, likewise. */
-qmat_status qmat_medial_protrusion_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                           double tolerance, double enough, qmat_medial_errors *errors);
+qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat_surface *surface,
+                                               const qmat_medial *unit, double tolerance, double enough,
+                                               qmat_medial_errors *errors);
 
 /* How far the envelope's boundary is from the surface on either side, closely enough to tell whether that is more than
  * `epsilon`; and where it may be, some of the places of it that lie so deep in the solid. */

@@ -517,10 +517,10 @@ class Union {
         plane.insert_constraint(vertex(same_[corners(t)[k]]), vertex(same_[corners(t)[(k + 1) % 3]]));
     for (const Cut &cut : cuts)
       if (cut.from != cut.to) plane.insert_constraint(vertex(cut.from), vertex(cut.to));
-    for (auto v = plane.finite_vertices_begin(); v != plane.finite_vertices_end(); ++v)
+    for (auto v = plane.finite_vertices_begin(); v != plane.finite_vertices_end(); v++)
       if (v->info().value == kNone) v->info().value = id_of(lift(group[0], view, v->point()));
     if (group.size() > 1) cover_faces(plane, group, view, vertex);
-    for (auto f = plane.finite_faces_begin(); f != plane.finite_faces_end(); ++f) {
+    for (auto f = plane.finite_faces_begin(); f != plane.finite_faces_end(); f++) {
       const Corners c = {f->vertex(0)->info().value, f->vertex(1)->info().value, f->vertex(2)->info().value};
       const int layers = group.size() > 1 ? f->info().layers : 1;
       if (layers != 0)

@@ -13,8 +13,8 @@ typedef struct qmat_collapse_log {
   uint32_t *owners; /* per sample */
 } qmat_collapse_log;
 
-/* Of an error that is asked for, collapses may reach this share at the control points: the rest is left to the surface
- * between them. */
+/* Of an error that is asked for, collapses may reach this share at the constraint points: the rest is left to the
+ * surface between them. */
 extern const double qmat_control_share;
 
 /* The sphere that each of `sphere_count` initial spheres has become part of after `count` collapses (`ends`: 2 per

@@ -2,8 +2,8 @@
 #ifndef QMAT_NODES_SIMPLIFY_COLLAPSE_COST_H
 #define QMAT_NODES_SIMPLIFY_COLLAPSE_COST_H
 
+#include "nodes/measure/surface_to_envelope.h"
 #include "nodes/simplify/collapse_candidates.h"
-#include "nodes/measure/coverage.h"
 
 /* What the order of collapses goes by. */
 typedef enum qmat_cost_kind {
@@ -21,9 +21,10 @@ double qmat_slab_cost(double error, double k, const double a[4], const double b[
 double qmat_pmat_cost(const double a[4], const double b[4]);
 
 /* The end of the edge of the newest preview to which a collapse leaves the least F at the points that both ends answer
- * for, of the first `point_count` control points, with that F: the largest. -INFINITY where there are none; of equals
- * the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
-qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_coverage *coverage, const qmat_complex *complex,
-                                      const qmat_collapse *collapse, size_t point_count, qmat_candidates *candidates);
+ * for, of the first `point_count` constraint points, with that F: the largest. -INFINITY where there are none; of
+ * equals the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
+qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                      const qmat_complex *complex, const qmat_collapse *collapse, size_t point_count,
+                                      qmat_candidates *candidates);
 
 #endif

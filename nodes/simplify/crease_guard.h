@@ -3,8 +3,8 @@
 #define QMAT_NODES_SIMPLIFY_CREASE_GUARD_H
 
 #include "core/geometry/medial_complex.h"
-#include "nodes/simplify/collapse_candidates.h"
 #include "nodes/initial/creases.h"
+#include "nodes/simplify/collapse_candidates.h"
 
 /* Keeps the sharp features of a medial mesh while it is simplified: its spheres of radius zero, as medial.features
  * makes them. They stay where they are, and so does the cone between two that follow each other on a crease. An inner

@@ -13,43 +13,45 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
 }
 
 /* Whether this slot is the first by which its point hangs on the collapse. */
-static bool is_first_slot(const qmat_coverage *coverage, const qmat_collapse *collapse, uint32_t slot) {
+static bool is_first_slot(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse, uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (coverage->witnesses[s] == collapse->kept || coverage->witnesses[s] == collapse->removed) return false;
+    if (to_envelope->witnesses[s] == collapse->kept || to_envelope->witnesses[s] == collapse->removed) return false;
   return true;
 }
 
-qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_coverage *coverage,
-                                   const qmat_collapse *collapse, size_t surface_count, size_t most) {
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit,
+                                   const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse,
+                                   size_t surface_count, size_t most) {
   if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   size_t slots = 0, skip = 0;
-  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += coverage->slot_counts[ends[e]];
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += to_envelope->slot_counts[ends[e]];
   const size_t stride = (slots + most - 1) / most;
   fit->count = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = qmat_coverage_first(coverage, ends[e]); slot != QMAT_NONE; slot = coverage->next[slot]) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(to_envelope, ends[e]); slot != QMAT_NONE;
+         slot = to_envelope->next[slot]) {
       if (skip > 0) {
         skip--;
         continue;
       }
       skip = stride - 1;
-      if (slot / 3 < surface_count && is_first_slot(coverage, collapse, slot)) fit->points[fit->count++] = slot / 3;
+      if (slot / 3 < surface_count && is_first_slot(to_envelope, collapse, slot)) fit->points[fit->count++] = slot / 3;
     }
   return QMAT_OK;
 }
 
-qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_coverage *coverage,
-                                  const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
-                                  double *error) {
+qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit,
+                                  qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                                  const qmat_collapse *collapse, const double sphere[4], double *error) {
   *error = 0;
-  const qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, sphere);
+  const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < fit->count; i++) {
     double foot[4], share;
-    const double f = qmat_coverage_star_foot(coverage, complex, collapse, sphere,
-                                             &coverage->points[3 * (size_t)fit->points[i]], foot, &share);
+    const double f = qmat_surface_to_envelope_star_foot(to_envelope, complex, collapse, sphere,
+                                                        &to_envelope->points[3 * (size_t)fit->points[i]], foot, &share);
     *error = qmat_larger(*error, fabs(f));
   }
   return QMAT_OK;
@@ -90,22 +92,22 @@ static void add_damping(qmat_quadric *sum, const double *sphere) {
   }
 }
 
-qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_coverage *coverage,
-                                const qmat_complex *complex, const qmat_collapse *collapse, double hopeless,
-                                double sphere[4], double *error) {
+qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit,
+                                qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                                const qmat_collapse *collapse, double hopeless, double sphere[4], double *error) {
   double current[4], worst = 0, last_worst = INFINITY;
   memcpy(current, sphere, sizeof current);
   *error = INFINITY;
   for (int step = 0;; step++) {
-    const qmat_status status = qmat_coverage_prepare(context, coverage, complex, collapse, current);
+    const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, current);
     if (status != QMAT_OK) return status;
     qmat_quadric sum = {.c = 0};
     last_worst = worst;
     worst = 0;
     for (size_t i = 0; i < fit->count; i++) {
-      const double *point = &coverage->points[3 * (size_t)fit->points[i]];
+      const double *point = &to_envelope->points[3 * (size_t)fit->points[i]];
       double foot[4], share;
-      const double f = qmat_coverage_star_foot(coverage, complex, collapse, current, point, foot, &share);
+      const double f = qmat_surface_to_envelope_star_foot(to_envelope, complex, collapse, current, point, foot, &share);
       worst = qmat_larger(worst, fabs(f));
       if (step == STEPS || !(share > 1e-3)) continue;
       double weight = 1;

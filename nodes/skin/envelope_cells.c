@@ -327,11 +327,11 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_
     if (failed) return qmat_fail_memory(context, "surface cells");
     for (size_t c = 0; c < chunk_count; c++) {
       qmat_status status = sort_out(context, cells, cell_capacity, list_capacity, &chunks[c], next);
-      if (status) return status;
+      if (status != QMAT_OK) return status;
     }
     first = end;
     qmat_status status = qmat_progress(context, cells->count, 0, "surface cells");
-    if (status) return status;
+    if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
 }
@@ -340,7 +340,7 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
                             int detail, double floor, qmat_cells *cells) {
   *cells = (qmat_cells){.finest = ldexp(base, -detail), .base = (uint32_t)1 << detail};
   qmat_status status = prepare_primitives(context, envelope, spheres, floor, &cells->primitives);
-  if (status) return status;
+  if (status != QMAT_OK) return status;
   const qmat_cell_primitives *p = &cells->primitives;
   size_t count = p->slab_count + p->cone_count + p->sphere_count;
 
@@ -386,7 +386,7 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
     goto done;
   }
   status = sort_out(context, cells, &cell_capacity, &list_capacity, &chunks[0], &level);
-  while (!status && level.count > 0) {
+  while (status == QMAT_OK && level.count > 0) {
     next.count = next.list_count = 0;
     status = halve(context, cells, &cell_capacity, &list_capacity, &level, chunks, &next);
     cell_batch swap = level;

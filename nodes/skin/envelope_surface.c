@@ -186,7 +186,7 @@ static qmat_status add_halved_cells(contour *c) {
   qmat_status status = QMAT_OK;
   if (table_init(&seen, 64)) return qmat_fail_memory(c->context, "surface cells");
   uint32_t seen_count = 0;
-  for (size_t i = 0; !status && i < c->cells.count; i++) {
+  for (size_t i = 0; status == QMAT_OK && i < c->cells.count; i++) {
     const qmat_cell *cell = &c->cells.cells[i];
     for (uint32_t size = 2 * cell->size; size < c->cells.base; size *= 2) {
       uint32_t place[3] = {cell->at[0] & ~(size - 1), cell->at[1] & ~(size - 1), cell->at[2] & ~(size - 1)};
@@ -423,7 +423,7 @@ static void fill_crossing(contour *c, size_t cell_id, unsigned e, crossing *x) {
 
 static qmat_status find_crossings(contour *c) {
   qmat_status status = assign_crossings(c);
-  if (status) return status;
+  if (status != QMAT_OK) return status;
   c->crossings = qmat_alloc(c->crossing_count, sizeof *c->crossings);
   c->crossing_at = qmat_alloc(3 * c->corner_count, sizeof *c->crossing_at);
   if (!c->crossings || !c->crossing_at) return qmat_fail_memory(c->context, "surface vertices");
@@ -885,7 +885,7 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
     grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
   }
   qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, &c.cells);
-  if (!status && c.cells.count == 0) {
+  if (status == QMAT_OK && c.cells.count == 0) {
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
   }
   grid->cell_count = c.cells.count;
@@ -893,11 +893,11 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
   qmat_status (*const steps[])(contour *) = {number_corners, find_split_edges, evaluate_corners, find_crossings,
                                              find_partners,  find_sheets,      place_sheets,     part_doubled_edges};
   size_t count = sizeof steps / sizeof *steps;
-  for (size_t i = 0; !status && i < count; i++) {
+  for (size_t i = 0; status == QMAT_OK && i < count; i++) {
     status = steps[i](&c);
-    if (!status) status = qmat_progress(context, i + 1, count + 1, "contouring steps");
+    if (status == QMAT_OK) status = qmat_progress(context, i + 1, count + 1, "contouring steps");
   }
-  if (!status) status = make_triangles(&c, surface);
+  if (status == QMAT_OK) status = make_triangles(&c, surface);
   contour_uninit(&c);
   return status;
 }

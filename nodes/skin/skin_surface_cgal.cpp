@@ -45,7 +45,7 @@ struct Soup {
 /* CGAL's order follows addresses: number vertices by position, start triangles at their smallest vertex, sort them. */
 Soup sorted_soup(const Polyhedron &polyhedron) {
   std::vector<Polyhedron::Vertex_const_handle> vertices;
-  for (auto v = polyhedron.vertices_begin(); v != polyhedron.vertices_end(); ++v) vertices.push_back(v);
+  for (auto v = polyhedron.vertices_begin(); v != polyhedron.vertices_end(); v++) vertices.push_back(v);
   const auto position = [](Polyhedron::Vertex_const_handle v) {
     return std::array<double, 3>{v->point().x() / kScale, v->point().y() / kScale, v->point().z() / kScale};
   };
@@ -57,7 +57,7 @@ Soup sorted_soup(const Polyhedron &polyhedron) {
     ids.emplace(&*v, static_cast<uint32_t>(soup.positions.size()));
     soup.positions.push_back(position(v));
   }
-  for (auto f = polyhedron.facets_begin(); f != polyhedron.facets_end(); ++f) {
+  for (auto f = polyhedron.facets_begin(); f != polyhedron.facets_end(); f++) {
     Triangle t;
     auto h = f->facet_begin();
     for (uint32_t &id : t) id = ids.at(&*(h++)->vertex());

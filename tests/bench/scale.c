@@ -18,8 +18,8 @@
 #include "core/geometry/thickness.h"
 #include "examples/models.h"
 #include "io/model.h"
-#include "nodes/nodes.h"
 #include "nodes/initial/sample_thinning.h"
+#include "nodes/nodes.h"
 #include "tests/bench/plain_delaunay_cgal.h"
 
 enum { MILLION = 1000000, GENERATED_RESOLUTION = 40 };
@@ -39,7 +39,7 @@ static void complain_of(const qmat_context *context) {
 static int write_surface(const char *path, const double *positions, size_t vertex_count, const uint32_t *triangles,
                          size_t triangle_count) {
   FILE *file = fopen(path, "w");
-  if (file == NULL) {
+  if (!file) {
     complain(path, strerror(errno));
     return 1;
   }
@@ -79,7 +79,7 @@ static int subdivide(surface *s) {
   uint32_t *middles = malloc(corners * sizeof *middles);
   double *positions = malloc(3 * (s->vertex_count + corners) * sizeof *positions);
   uint32_t *triangles = malloc(4 * corners * sizeof *triangles);
-  if (sides == NULL || middles == NULL || positions == NULL || triangles == NULL) {
+  if (!sides || !middles || !positions || !triangles) {
     complain("subdivision", "out of memory");
     free(sides), free(middles), free(positions), free(triangles);
     return 1;
@@ -124,7 +124,7 @@ static int write_million(const char *from, const char *to) {
   }
   surface s = {mesh->vertex_count, mesh->triangle_count, malloc(3 * mesh->vertex_count * sizeof(double)),
                malloc(3 * mesh->triangle_count * sizeof(uint32_t))};
-  int failed = s.positions == NULL || s.triangles == NULL;
+  int failed = s.positions == NULL || !s.triangles;
   if (!failed) {
     memcpy(s.positions, mesh->positions, 3 * s.vertex_count * sizeof(double));
     memcpy(s.triangles, mesh->triangles, 3 * s.triangle_count * sizeof(uint32_t));
@@ -181,7 +181,7 @@ static qmat_status run_node(qmat_context *context, const char *name, const qmat_
                             qmat_value *outputs[]) {
   double params[32]; /* for its alignment */
   const qmat_node *node = qmat_node_find(name);
-  if (node == NULL || node->params_size > sizeof params)
+  if (!node || node->params_size > sizeof params)
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "there is no node %s", name);
   qmat_params_default(node, params);
   return qmat_node_run(context, node, params, inputs, outputs);
@@ -200,7 +200,7 @@ static qmat_status time_cgal(qmat_context *context, const qmat_mesh *mesh, const
   double *points = qmat_arena_alloc(&context->arena, samples->count, 3 * sizeof *points);
   double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
   uint32_t *stand_ins = qmat_arena_alloc(&context->arena, samples->count, sizeof *stand_ins);
-  if (points == NULL || values == NULL || stand_ins == NULL) {
+  if (!points || !values || !stand_ins) {
     status = qmat_fail_memory(context, "samples");
   } else {
     qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, points);
@@ -251,14 +251,14 @@ static json_t *rounded(double number) {
 static json_t *make_row(const char *model, const json_t *report, const struct rusage *usage, const double cgal[2]) {
   json_t *row = json_object(), *stages = json_object();
   const json_t *node, *made;
-  double initialisation = 0, simplification = 0, vertices = 0;
+  double initialisation = 0, decimation = 0, vertices = 0;
   size_t i;
   const char *base = strrchr(model, '/');
   json_object_set_new(row, "model", json_string(base != NULL ? base + 1 : model));
   json_array_foreach(json_object_get(report, "nodes"), i, node) {
     const char *type = json_string_value(json_object_get(node, "type"));
     const double seconds = json_number_value(json_object_get(node, "seconds"));
-    if (type == NULL) continue;
+    if (!type) continue;
     json_object_set_new(stages, type, rounded(seconds));
     made = json_object_get(node, "report");
     if (strcmp(type, "scene.read") == 0) {
@@ -274,7 +274,7 @@ static json_t *make_row(const char *model, const json_t *report, const struct ru
       json_object_set(row, "initial_spheres", json_object_get(made, "spheres"));
     }
     if (strcmp(type, "medial.simplify") == 0) {
-      simplification = seconds;
+      decimation = seconds;
       json_object_set(row, "spheres", json_object_get(made, "spheres"));
       json_object_set(row, "collapses", json_object_get(made, "collapses"));
       json_object_set(row, "surface_to_envelope", json_object_get(made, "surface_to_envelope"));
@@ -287,8 +287,8 @@ static json_t *make_row(const char *model, const json_t *report, const struct ru
   json_object_set_new(row, "cpu_seconds", rounded(seconds_of(usage->ru_utime) + seconds_of(usage->ru_stime)));
   json_object_set_new(row, "peak_megabytes", rounded((double)usage->ru_maxrss / 1024));
   json_object_set_new(row, "microseconds_per_vertex", rounded(vertices > 0 ? 1e6 * seconds / vertices : 0));
-  json_object_set_new(row, "collapses_per_second", rounded(simplification > 0 ? collapses / simplification : 0));
-  json_object_set_new(row, "microseconds_per_collapse", rounded(collapses > 0 ? 1e6 * simplification / collapses : 0));
+  json_object_set_new(row, "collapses_per_second", rounded(decimation > 0 ? collapses / decimation : 0));
+  json_object_set_new(row, "microseconds_per_collapse", rounded(collapses > 0 ? 1e6 * decimation / collapses : 0));
   json_object_set_new(row, "initialisation_seconds", rounded(initialisation));
   json_object_set_new(row, "cgal_delaunay_seconds", rounded(cgal[0]));
   json_object_set_new(row, "cgal_delaunay_of_all_samples_seconds", rounded(cgal[1]));
@@ -312,7 +312,7 @@ static int measure(const char *qmat, const char *folder, const char *model, json
   if (time_delaunay(model, cgal) != 0) return 1;
   json_error_t error;
   json_t *report = json_load_file(report_path, 0, &error);
-  if (report == NULL) {
+  if (!report) {
     complain(report_path, error.text);
     return 1;
   }

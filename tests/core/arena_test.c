@@ -25,16 +25,16 @@ static void test_arena_arrays_are_aligned_padded_and_apart(void **state) {
   qmat_arena arena = {0};
   enum { ARRAYS = 500 };
   uint8_t *arrays[ARRAYS];
-  for (size_t i = 0; i < ARRAYS; ++i) { /* 0 .. 4 MB in all sizes, so that many blocks are made */
+  for (size_t i = 0; i < ARRAYS; i++) { /* 0 .. 4 MB in all sizes, so that many blocks are made */
     const size_t size = i % 7 == 0 ? i * 300 : i;
     arrays[i] = qmat_arena_alloc(&arena, size, 1);
     assert_aligned(arrays[i]);
     assert_padded(arrays[i], size);
     memset(arrays[i], (int)(i % 251), size);
   }
-  for (size_t i = 0; i < ARRAYS; ++i) {
+  for (size_t i = 0; i < ARRAYS; i++) {
     const size_t size = i % 7 == 0 ? i * 300 : i;
-    for (size_t k = 0; k < size; ++k) assert_int_equal(arrays[i][k], i % 251);
+    for (size_t k = 0; k < size; k++) assert_int_equal(arrays[i][k], i % 251);
   }
   qmat_arena_uninit(&arena);
 }
@@ -55,17 +55,17 @@ static void test_a_large_array_leaves_the_rest_of_the_block_in_use(void **state)
 static void test_calloc_clears_memory_that_was_used_before(void **state) {
   (void)state;
   qmat_arena arena = {0};
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 3; round++) {
     uint32_t *array = qmat_arena_calloc(&arena, 1000, sizeof *array);
     assert_aligned(array);
-    for (size_t i = 0; i < 1000; ++i) assert_int_equal(array[i], 0);
+    for (size_t i = 0; i < 1000; i++) assert_int_equal(array[i], 0);
     memset(array, 0xFF, 1000 * sizeof *array);
     qmat_arena_uninit(&arena);
     assert_null(arena.newest);
   }
   uint32_t *array = qmat_calloc(1000, sizeof *array);
   assert_aligned(array);
-  for (size_t i = 0; i < 1000; ++i) assert_int_equal(array[i], 0);
+  for (size_t i = 0; i < 1000; i++) assert_int_equal(array[i], 0);
   qmat_free(array);
 }
 
@@ -86,7 +86,7 @@ static void test_sizes_that_overflow_give_null(void **state) {
                              {SIZE_MAX / 8 + 2, 8},
                              {(size_t)1 << 32, (size_t)1 << 32},
                              {PTRDIFF_MAX, 1}};
-  for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
+  for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
     assert_null(qmat_arena_alloc(&arena, sizes[i][0], sizes[i][1]));
     assert_null(qmat_arena_calloc(&arena, sizes[i][0], sizes[i][1]));
     assert_null(qmat_alloc(sizes[i][0], sizes[i][1]));
@@ -112,7 +112,7 @@ static void test_zero_elements_give_a_valid_pointer(void **state) {
 
 static void test_heap_arrays_are_aligned_and_padded(void **state) {
   (void)state;
-  for (size_t size = 1; size < 200; ++size) {
+  for (size_t size = 1; size < 200; size++) {
     uint8_t *memory = qmat_alloc(size, 3);
     assert_aligned(memory);
     memset(memory, 0xAA, size * 3);
@@ -125,19 +125,19 @@ static void test_growing_keeps_contents_and_at_least_doubles(void **state) {
   (void)state;
   void *array = NULL;
   size_t capacity = 0, count = 0, moves = 0;
-  for (; count < 100000; ++count) {
+  for (; count < 100000; count++) {
     const size_t before = capacity;
     assert_int_equal(qmat_grow(&array, &capacity, count + 1, sizeof(uint32_t)), 0);
     assert_true(capacity > count);
     if (capacity != before) {
       assert_true(capacity >= 2 * before);
       assert_aligned(array);
-      ++moves;
+      moves++;
     }
     ((uint32_t *)array)[count] = (uint32_t)count;
   }
   assert_true(moves < 20);
-  for (size_t i = 0; i < count; ++i) assert_int_equal(((uint32_t *)array)[i], i);
+  for (size_t i = 0; i < count; i++) assert_int_equal(((uint32_t *)array)[i], i);
   assert_int_equal(qmat_grow(&array, &capacity, 5 * capacity + 1, sizeof(uint32_t)), 0);
   assert_int_equal(((uint32_t *)array)[99999], 99999);
   qmat_free(array);

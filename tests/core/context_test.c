@@ -19,9 +19,9 @@ static void assert_format(const qmat_context *context, const char *expected) {
 
 static void test_every_status_has_a_name_of_its_own_and_an_exit_code(void **state) {
   (void)state;
-  for (int i = QMAT_OK; i <= QMAT_CANCELLED; ++i) {
+  for (int i = QMAT_OK; i <= QMAT_CANCELLED; i++) {
     assert_string_not_equal(qmat_status_name((qmat_status)i), "unknown");
-    for (int k = QMAT_OK; k < i; ++k) {
+    for (int k = QMAT_OK; k < i; k++) {
       assert_string_not_equal(qmat_status_name((qmat_status)i), qmat_status_name((qmat_status)k));
     }
     const int expected = i == QMAT_OK ? 0 : i == QMAT_ERROR_USAGE ? 2 : i == QMAT_CANCELLED ? 3 : 1;
@@ -137,7 +137,7 @@ static void test_long_texts_are_cut_between_characters(void **state) {
   qmat_error_format(&context.error, text, sizeof text);
   snprintf(end, sizeof end, " (%s)", context.error.hint);
   assert_string_equal(text + strlen(text) - strlen(end), end); /* nothing was lost on the way to the last part */
-  for (size_t size = 1; size < 100; ++size) {
+  for (size_t size = 1; size < 100; size++) {
     memset(text, '#', sizeof text);
     qmat_error_format(&context.error, text, size);
     assert_true(strlen(text) < size);
@@ -159,7 +159,7 @@ static bool count_call(void *user, const char *node_id, const char *node_type, u
                        const char *unit) {
   counted_calls *counted = user;
   (void)total;
-  ++counted->calls;
+  counted->calls++;
   counted->last_done = done;
   snprintf(counted->node_id, sizeof counted->node_id, "%s", node_id);
   snprintf(counted->node_type, sizeof counted->node_type, "%s", node_type);
@@ -186,7 +186,7 @@ static void test_progress_is_reported_at_both_ends_and_rarely_between(void **sta
   assert_string_equal(counted.node_id, "a");
   assert_string_equal(counted.node_type, "b.c");
   assert_string_equal(counted.unit, "rays");
-  for (uint64_t done = 1; done < total; ++done) {
+  for (uint64_t done = 1; done < total; done++) {
     if (qmat_progress(&context, done, total, "rays") != QMAT_OK) fail();
   }
   const size_t before_the_end = counted.calls;

@@ -25,7 +25,7 @@ static void test_published_messages_give_their_digests(void **state) {
       {"abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq",
        "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1"},
   };
-  for (size_t i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < 3; i++) {
     qmat_hasher hasher;
     qmat_digest digest;
     assert_int_equal(qmat_hasher_init(&hasher), QMAT_OK);
@@ -43,7 +43,7 @@ static void test_a_million_letters_in_uneven_pieces_give_the_published_digest(vo
   qmat_digest digest;
   assert_int_equal(qmat_hasher_init(&hasher), QMAT_OK);
   size_t left = 1000000;
-  for (size_t piece = 0; left > 0; ++piece) {
+  for (size_t piece = 0; left > 0; piece++) {
     size_t size = piece % sizeof letters;
     if (size > left) size = left;
     qmat_hasher_add(&hasher, letters, size);
@@ -88,7 +88,7 @@ static void test_bytes_and_a_file_of_them_have_one_digest(void **state) {
   const int file = mkstemp(path);
   assert_true(file >= 0);
   static char bytes[200003]; /* more than one piece */
-  for (size_t i = 0; i < sizeof bytes; ++i) bytes[i] = (char)(i * i % 251);
+  for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (char)(i * i % 251);
   assert_int_equal(write(file, bytes, sizeof bytes), sizeof bytes);
   close(file);
   qmat_digest of_bytes, of_file;

@@ -43,7 +43,7 @@ static void test_counting_up_gives_uniform_independent_numbers(void **state) {
   enum { COUNT = 100000, BINS = 20 };
   size_t bins[BINS] = {0};
   double sum = 0, products = 0, last = 0.5;
-  for (uint64_t i = 0; i < COUNT; ++i) {
+  for (uint64_t i = 0; i < COUNT; i++) {
     const double number = qmat_hash_unit(qmat_hash3(1, i / 10, i % 10));
     ++bins[(size_t)(number * BINS)];
     sum += number;
@@ -53,7 +53,7 @@ static void test_counting_up_gives_uniform_independent_numbers(void **state) {
   assert_true(fabs(sum / COUNT - 0.5) < 5 * sqrt(1.0 / 12 / COUNT)); /* five standard deviations */
   assert_true(fabs(products / COUNT) < 5 * (1.0 / 12) / sqrt(COUNT));
   double chi_squared = 0;
-  for (size_t i = 0; i < BINS; ++i) {
+  for (size_t i = 0; i < BINS; i++) {
     const double expected = (double)COUNT / BINS, excess = (double)bins[i] - expected;
     chi_squared += excess * excess / expected;
   }
@@ -64,7 +64,7 @@ static void test_counting_up_gives_uniform_independent_numbers(void **state) {
 static void test_one_bit_of_a_counter_moves_half_of_the_bits(void **state) {
   (void)state;
   int changed = 0;
-  for (int bit = 0; bit < 64; ++bit) {
+  for (int bit = 0; bit < 64; bit++) {
     changed += __builtin_popcountll(qmat_hash3(3, 5, 9) ^ qmat_hash3(3, 5 ^ (UINT64_C(1) << bit), 9));
     changed += __builtin_popcountll(qmat_hash3(3, 5, 9) ^ qmat_hash3(3, 5, 9 ^ (UINT64_C(1) << bit)));
   }

@@ -116,7 +116,7 @@ static void check_fans(const qmat_model *model, int resolution) {
            *degree = calloc(model->vertex_count, sizeof *degree);
   uint32_t *start = calloc(model->vertex_count, sizeof *start);
   uint64_t *edges = calloc(3 * model->triangle_count, sizeof *edges);
-  assert_true(next != NULL && degree != NULL && edges != NULL && start != NULL);
+  assert_true(next && degree && edges && start);
   /* per corner: vertex, and the neighbour where the triangle begins -> the one where it ends */
   const size_t count = 3 * model->triangle_count;
   for (size_t i = 0; i < count; i++) {

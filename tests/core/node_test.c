@@ -150,7 +150,7 @@ static void test_texts_become_values(void **state) {
     const char *text;
     bool value;
   } bools[] = {{"true", true}, {"false", false}, {"yes", true}, {"no", false}, {"on", true}, {"off", false}};
-  for (size_t i = 0; i < 6; ++i) {
+  for (size_t i = 0; i < 6; i++) {
     assert_int_equal(parse(&context, "caps", bools[i].text, &params), QMAT_OK);
     assert_int_equal(params.caps, bools[i].value);
   }
@@ -250,7 +250,7 @@ static void test_the_check_asks_for_required_texts_ranges_and_rules(void **state
 static void test_formatted_values_read_back_to_themselves(void **state) {
   (void)state;
   qmat_context context = {0};
-  for (uint64_t round = 0; round < 2000; ++round) {
+  for (uint64_t round = 0; round < 2000; round++) {
     example_params params, again;
     qmat_params_default(&example, &params);
     qmat_params_default(&example, &again);
@@ -262,7 +262,7 @@ static void test_formatted_values_read_back_to_themselves(void **state) {
     params.method = (int)(round % 3);
     params.path = "x.off";
     char texts[9][64];
-    for (size_t i = 0; i < 9; ++i) {
+    for (size_t i = 0; i < 9; i++) {
       qmat_param_format(&example_rows[i], &params, texts[i], sizeof texts[i]);
       assert_int_equal(qmat_param_parse(&context, &example, &example_rows[i], texts[i], &again), QMAT_OK);
     }
@@ -318,7 +318,7 @@ static void test_numbers_are_read_in_full(void **state) {
                {"00012", 12},
                {"1e-99999999999999999999", 0},
                {"179769313486231570000000000000000000000%", 1797693134862315700000000000000000000.0}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     double number = -99;
     if (strcmp(cases[i].text, "1e400%") == 0) { /* beyond what a double holds, also after the percent */
       assert_false(qmat_parse_number(cases[i].text, &number));
@@ -335,7 +335,7 @@ static void test_what_is_not_a_plain_finite_number_is_refused(void **state) {
                                "nan",  "NAN(1)", "infinity", "e5",     ".",    "-",     "+",   "--1",
                                "1e",   "1e+",    "1,5",      "1.2.3",  "%",    "1%%",   "1% ", "1e400",
                                "1e5x", "\t1",    "1\n",      "-1e400", "١",    "1_000", ".e1", "-.%"};
-  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
     double number = -99;
     assert_false(qmat_parse_number(texts[i], &number));
     assert_true(number == -99);
@@ -371,12 +371,12 @@ static void test_numbers_are_written_short_and_exact(void **state) {
                {1000, "1000"},
                {-123456789012340, "-123456789012340"},
                {1e15, "1e+15"}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     char text[32];
     qmat_format_number(cases[i].number, text, sizeof text);
     assert_string_equal(text, cases[i].text);
   }
-  for (uint64_t i = 0; i < 5000; ++i) {
+  for (uint64_t i = 0; i < 5000; i++) {
     const uint64_t bits = qmat_hash3(9, i, 0);
     double number, again;
     memcpy(&number, &bits, sizeof number);
@@ -423,9 +423,9 @@ static void test_the_nearest_name_is_found_within_the_limit(void **state) {
                {"scene.write", NULL},
                {"y", NULL},
                {"", NULL}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     const char *nearest = qmat_nearest_name(cases[i].text, names, 5);
-    if (cases[i].nearest == NULL) {
+    if (!cases[i].nearest) {
       assert_null(nearest);
     } else {
       assert_non_null(nearest);

@@ -135,7 +135,7 @@ static qmat_list *list_example(void) {
   assert_non_null(list);
   list->names[0] = qmat_strdup("K\xc3\xb6rper");
   list->names[1] = qmat_strdup("");
-  for (size_t i = 0; i < 2; ++i) {
+  for (size_t i = 0; i < 2; i++) {
     list->items[i] = &field_example()->base;
     assert_int_equal(qmat_value_seal(&context, list->items[i]), QMAT_OK);
   }
@@ -233,7 +233,7 @@ static void test_new_values_are_empty_and_can_be_released_at_once(void **state) 
                           &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_chain_new()->base,
                           &qmat_report_new()->base,  &qmat_file_new()->base,   &qmat_failure_new()->base,
                           &qmat_list_new(0)->base};
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     assert_non_null(values[type]);
     assert_int_equal(values[type]->type, type);
     assert_int_equal(values[type]->references, 1);
@@ -275,7 +275,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              [QMAT_FILE] = 4 + 8,
                              [QMAT_FAILURE] = 10,
                              [QMAT_LIST] = 2 * (3 * 8 + 10)};
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type);
     assert_int_equal(qmat_value_bytes(value), expected[type]);
     qmat_value_release(value);
@@ -285,7 +285,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
 static void test_every_type_is_read_back_to_the_same_bytes_and_digest(void **state) {
   (void)state;
   qmat_context context = {0};
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type), *again = NULL;
     uint8_t *bytes, *bytes_again;
     size_t size, size_again;
@@ -398,7 +398,7 @@ static void test_long_arrays_come_back_whole(void **state) {
   mesh->vertex_count = mesh->triangle_count = COUNT;
   mesh->positions = qmat_alloc(3 * COUNT, sizeof(double));
   mesh->triangles = qmat_alloc(3 * COUNT, sizeof(uint32_t));
-  for (size_t i = 0; i < 3 * COUNT; ++i) {
+  for (size_t i = 0; i < 3 * COUNT; i++) {
     mesh->positions[i] = qmat_hash_unit(qmat_hash3(1, i, 0)) - 0.5;
     mesh->triangles[i] = (uint32_t)(qmat_hash3(2, i, 0) % COUNT);
   }
@@ -425,7 +425,7 @@ static void test_empty_values_are_valid(void **state) {
                           &qmat_samples_new()->base, &qmat_medial_new()->base,
                           &qmat_chain_new()->base,   &qmat_report_new()->base};
   enum { COUNT = sizeof values / sizeof *values };
-  for (size_t i = 0; i < COUNT; ++i) {
+  for (size_t i = 0; i < COUNT; i++) {
     assert_sealed(&context, values[i]);
     uint8_t *bytes;
     size_t size;
@@ -434,20 +434,20 @@ static void test_empty_values_are_valid(void **state) {
     assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &again), QMAT_OK);
     assert_memory_equal(&again->digest, &values[i]->digest, sizeof again->digest);
     if (again->type == QMAT_MEDIAL) assert_null(((const qmat_medial *)again)->region_offsets);
-    for (size_t k = 0; k < i; ++k) {
+    for (size_t k = 0; k < i; k++) {
       assert_memory_not_equal(&values[i]->digest, &values[k]->digest, sizeof values[i]->digest);
     }
     qmat_free(bytes);
     qmat_value_release(again);
   }
-  for (size_t i = 0; i < COUNT; ++i) qmat_value_release(values[i]);
+  for (size_t i = 0; i < COUNT; i++) qmat_value_release(values[i]);
 }
 
 static void test_every_bit_of_content_moves_the_digest(void **state) {
   (void)state;
   qmat_context context = {0};
   qmat_digest digests[6];
-  for (int change = 0; change < 6; ++change) {
+  for (int change = 0; change < 6; change++) {
     qmat_mesh *mesh = mesh_example();
     if (change == 1) mesh->closed = false;
     if (change == 2) mesh->oriented = false;
@@ -457,7 +457,7 @@ static void test_every_bit_of_content_moves_the_digest(void **state) {
     assert_sealed(&context, &mesh->base);
     digests[change] = mesh->base.digest;
     qmat_value_release(&mesh->base);
-    for (int k = 0; k < change; ++k) assert_memory_not_equal(&digests[change], &digests[k], sizeof(qmat_digest));
+    for (int k = 0; k < change; k++) assert_memory_not_equal(&digests[change], &digests[k], sizeof(qmat_digest));
   }
 }
 
@@ -465,7 +465,7 @@ static void test_a_report_has_one_digest_for_any_order_of_its_keys(void **state)
   (void)state;
   qmat_context context = {0};
   qmat_report *a = qmat_report_new(), *b = qmat_report_new();
-  for (int i = 0; i < 50; ++i) {
+  for (int i = 0; i < 50; i++) {
     char first[16], second[16];
     snprintf(first, sizeof first, "key%d", i);
     snprintf(second, sizeof second, "key%d", 49 - i);
@@ -737,7 +737,7 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
 static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
   (void)state;
   const char *const bad[] = {"/etc", "..", ".", "a\\b", "../x", "a/../../b", "a//b", "a/", "./a"};
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     qmat_file *file = file_example();
     set_part_name(file, 2, bad[i]);
     char line[128];
@@ -777,13 +777,13 @@ static qmat_status read_exactly(qmat_context *context, const uint8_t *bytes, siz
 static void test_cut_bytes_are_refused_at_every_length(void **state) {
   (void)state;
   qmat_context context = {0};
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type), *again;
     uint8_t *bytes;
     size_t size;
     assert_sealed(&context, value);
     assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
-    for (size_t cut = 0; cut < size; ++cut) {
+    for (size_t cut = 0; cut < size; cut++) {
       again = value;
       assert_int_equal(read_exactly(&context, bytes, cut, &again), QMAT_ERROR_FORMAT);
       assert_null(again);
@@ -817,25 +817,25 @@ static void test_spoilt_bytes_give_an_error_or_what_they_say(void **state) {
   (void)state;
   qmat_context context = {0};
   size_t refused = 0, accepted = 0;
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type), *again;
     uint8_t *bytes, *written;
     size_t size, written_size;
     assert_sealed(&context, value);
     assert_int_equal(qmat_value_serialize(&context, value, &bytes, &size), QMAT_OK);
-    for (size_t i = 0; i < size; ++i) {
+    for (size_t i = 0; i < size; i++) {
       const uint8_t before = bytes[i];
-      for (int change = 0; change < 10; ++change) {
+      for (int change = 0; change < 10; change++) {
         bytes[i] = (uint8_t)(change < 8 ? before ^ (1 << change) : change == 8 ? 0xFF : 0x7F);
         if (bytes[i] == before) continue;
         const qmat_status status = read_exactly(&context, bytes, size, &again);
         if (status != QMAT_OK) {
           assert_int_equal(status, QMAT_ERROR_FORMAT);
           assert_null(again);
-          ++refused;
+          refused++;
           continue;
         }
-        ++accepted;
+        accepted++;
         if (type != QMAT_REPORT) { /* JSON has many spellings of one value */
           assert_int_equal(qmat_value_serialize(&context, again, &written, &written_size), QMAT_OK);
           assert_int_equal(written_size, size);
@@ -914,7 +914,7 @@ static void test_content_that_breaks_a_rule_is_a_format_error_when_read(void **s
 }
 
 static void *retain_and_release(void *value) {
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 20000; i++) {
     const qmat_mesh *mesh = (const qmat_mesh *)qmat_value_retain(value);
     if (mesh->triangles[0] != 0) return value;
     qmat_value_release((qmat_value *)mesh);
@@ -930,11 +930,11 @@ static void test_references_are_counted_across_threads(void **state) {
   qmat_mesh *mesh = mesh_example();
   assert_sealed(&context, &mesh->base);
   pthread_t threads[THREADS];
-  for (int i = 0; i < THREADS; ++i) {
+  for (int i = 0; i < THREADS; i++) {
     assert_ptr_equal(qmat_value_retain(&mesh->base), &mesh->base);
     assert_int_equal(pthread_create(&threads[i], NULL, retain_and_release, mesh), 0);
   }
-  for (int i = 0; i < THREADS; ++i) {
+  for (int i = 0; i < THREADS; i++) {
     void *result;
     assert_int_equal(pthread_join(threads[i], &result), 0);
     assert_null(result);
@@ -967,7 +967,7 @@ void *__wrap_aligned_alloc(size_t alignment, size_t size) {
 static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing(void **state) {
   (void)state;
   qmat_context context = {0};
-  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; ++type) {
+  for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type), *again = value;
     uint8_t *bytes, *none;
     size_t size, none_size;
@@ -977,7 +977,7 @@ static void test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing
     assert_int_equal(qmat_value_serialize(&context, value, &none, &none_size), QMAT_ERROR_MEMORY);
     assert_null(none);
     size_t granted = 0;
-    for (qmat_status status = QMAT_ERROR_MEMORY; status != QMAT_OK; ++granted) {
+    for (qmat_status status = QMAT_ERROR_MEMORY; status != QMAT_OK; granted++) {
       allocations_left = granted;
       status = qmat_value_deserialize(&context, bytes, size, &known_items, &again);
       if (status == QMAT_OK) break;
@@ -1018,7 +1018,7 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   assert_int_equal(qmat_value_deserialize(&context, bytes, size, NULL, &value), QMAT_ERROR_FORMAT);
   assert_non_null(strstr(context.error.message, "an item is not at hand"));
   assert_null(value);
-  for (size_t cut = 0; cut < size; ++cut) {
+  for (size_t cut = 0; cut < size; cut++) {
     uint8_t *part = copy_of(bytes, cut); /* to the byte, so that reading beyond is noticed */
     assert_int_equal(qmat_value_deserialize(&context, part, cut, &known_items, &value), QMAT_ERROR_FORMAT);
     qmat_free(part);
@@ -1061,7 +1061,7 @@ static void test_failures_stand_among_the_items_of_a_list_but_are_not_all_of_the
   assert_string_equal(qmat_value_failure(qmat_value_at(&list->base, 0)), "it is flat");
   assert_null(qmat_value_failure(qmat_value_at(&list->base, 1)));
   qmat_list *failures = qmat_list_new(2);
-  for (size_t i = 0; i < 2; ++i) {
+  for (size_t i = 0; i < 2; i++) {
     failures->items[i] = qmat_value_retain(list->items[0]);
     failures->names[i] = qmat_strdup("a");
   }

@@ -111,7 +111,7 @@ typedef struct mistake {
 #define HEAD "qmat: 1\nnodes:\n"
 
 static const mistake mistakes[] = {
-    // The shape of the file.
+    /* The shape of the file. */
     {"", 1, 1, "empty", NULL},
     {"# nothing\n", 1, 1, "empty", NULL},
     {"~", 1, 1, "empty", NULL},
@@ -127,13 +127,13 @@ static const mistake mistakes[] = {
     {"? { a: b }\n: 1\n", 1, 3, "single name", NULL},
     {"qmat: 1\nnodes: { \"a\\0b\": 1 }\n", 2, 10, "zero character", NULL},
     {"{a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: {a: 1}}}}}}}}}}}}}}}}}", 1, 65, "nested", NULL},
-    // The version.
+    /* The version. */
     {"nodes: { a: { type: test.number } }\n", 1, 1, "version of the graph language is missing", "qmat: 1"},
     {"qmat: 2\nnodes: 1\n", 1, 7, "version 2", NULL},
     {"future: 1\nqmat: 2\n", 2, 7, "version 2", NULL},
     {"qmat: one\n", 1, 7, "is a number, not 'one'", NULL},
     {"qmat:\n", 1, 6, "value is missing", NULL},
-    // Keys.
+    /* Keys. */
     {"qmat: 1\nnods: { }\n", 2, 1, "no key 'nods'", "'nodes'"},
     {"qmat: 1\nnodes: {}\nqmat: 1\n", 3, 1, "'qmat' is given twice; the first is on line 1", NULL},
     {HEAD "  a: { type: test.number, parms: { } }\n", 3, 27, "no key 'parms'", "'params'"},
@@ -141,7 +141,7 @@ static const mistake mistakes[] = {
     {"qmat: 1\nnodes: {}\n", 2, 8, "has no nodes", NULL},
     {"qmat: 1\nnodes: 7\n", 2, 8, "mapping belongs here, not '7'", "type"},
     {"qmat: 1\nnodes:\n", 2, 7, "nothing is given", "type"},
-    // Nodes.
+    /* Nodes. */
     {HEAD "  1a: { type: test.number }\n", 3, 3, "cannot name a node", NULL},
     {HEAD "  a.b: { type: test.number }\n", 3, 3, "cannot name a node", NULL},
     {HEAD "  a: { type: test.number }\n  a: { type: test.number }\n", 4, 3, "given twice; the first is on line 3",
@@ -150,7 +150,7 @@ static const mistake mistakes[] = {
     {HEAD "  a: test.number\n", 3, 6, "mapping belongs here", "type"},
     {HEAD "  a: { type: test.nunber }\n", 3, 14, "no node type 'test.nunber'", "'test.number'"},
     {HEAD "  a: { type: { } }\n", 3, 14, "single value", NULL},
-    // Parameters.
+    /* Parameters. */
     {HEAD "  a: { type: test.number, params: { valu: 3 } }\n", 3, 37, "no parameter 'valu'", "'value'"},
     {HEAD "  a: { type: test.number, params: { xyzzyx: 3 } }\n", 3, 37, "no parameter", "value, repeat, negate, path"},
     {HEAD "  a: { type: test.number, params: { value: 101 } }\n", 3, 44, "between -100 and 100", NULL},
@@ -163,7 +163,7 @@ static const mistake mistakes[] = {
     {HEAD "  a: { type: test.number, params: 3 }\n", 3, 35, "mapping belongs", "name: value"},
     {HEAD "  a: { type: test.number, params: { path: '' } }\n", 3, 43, "must not be empty", NULL},
     {HEAD "  a: { type: test.print, params: { format: tex } }\n", 3, 44, "txt, csv or pair", "'txt'"},
-    // Wiring.
+    /* Wiring. */
     {HEAD "  a: { type: test.number }\n  b: { type: test.add, in: { frist: a.number } }\n", 4, 30, "no input 'frist'",
      "'first'"},
     {HEAD "  a: { type: test.number }\n  b: { type: test.add, in: { first: a.nmber } }\n", 4, 37, "no output 'nmber'",
@@ -187,7 +187,7 @@ static const mistake mistakes[] = {
           "  b: { type: test.add, in: { first: z.number, second: a.sum } }\n"
           "outputs: { s: d.sum }\n",
      5, 37, "cycle: c -> a -> b -> c", NULL},
-    // Inputs and outputs.
+    /* Inputs and outputs. */
     {"qmat: 1\ninputs: { n: a.valu }\nnodes: { a: { type: test.number } }\n", 2, 14, "no parameter 'valu'", "'value'"},
     {"qmat: 1\ninputs: { n: b.value }\nnodes: { a: { type: test.number } }\n", 2, 14, "no node 'b'", "nodes: a"},
     {"qmat: 1\ninputs: { n: a }\nnodes: { a: { type: test.number } }\n", 2, 14, "node.parameter", "'a.value'"},
@@ -241,7 +241,7 @@ static void test_every_cut_of_a_graph_is_refused_or_read_but_never_more(void **s
   for (size_t size = 0; size < sizeof good_yaml; size++) {
     qmat_context context = {0};
     qmat_graph graph;
-    char *cut = malloc(size + 1);  // exactly as long, so that reading on is found
+    char *cut = malloc(size + 1); /* exactly as long, so that reading on is found */
     assert_non_null(cut);
     memcpy(cut, good_yaml, size);
     qmat_status status = qmat_graph_read_text(&context, &test_registry, "g.yaml", cut, size, &graph);
@@ -281,12 +281,12 @@ static void test_oversized_graphs_are_refused(void **state) {
   memset(text, ' ', size);
   assert_int_equal(qmat_graph_read_text(&context, &test_registry, "g.yaml", text, size, &graph), QMAT_ERROR_USAGE);
   assert_non_null(strstr(context.error.message, "bytes"));
-  // More keys than a mapping may have.
+  /* More keys than a mapping may have. */
   size_t used = 0;
   for (int i = 0; i <= QMAT_TREE_MAX_ENTRIES; i++) used += (size_t)snprintf(text + used, size - used, "k%d: 1\n", i);
   assert_int_equal(qmat_graph_read_text(&context, &test_registry, "g.yaml", text, used, &graph), QMAT_ERROR_USAGE);
   assert_int_equal(context.error.line, QMAT_TREE_MAX_ENTRIES + 1);
-  // Deep nesting stops long before the end of the text.
+  /* Deep nesting stops long before the end of the text. */
   memset(text, '{', size - 1);
   assert_int_equal(qmat_graph_read_text(&context, &test_registry, "g.yaml", text, size - 1, &graph), QMAT_ERROR_USAGE);
   free(text);
@@ -392,7 +392,7 @@ static void test_rules_between_parameters_point_at_the_parameter(void **state) {
   qmat_context_uninit(&context);
 }
 
-// The suite's own locale may be C alone, so one with a comma is built if the system can.
+/* The suite's own locale may be C alone, so one with a comma is built if the system can. */
 static bool use_comma_locale(char *folder) {
   if (setlocale(LC_ALL, "de_DE.UTF-8")) return true;
   char command[160];

@@ -16,7 +16,7 @@
 
 enum { RINGS = 12, SECTORS = 24, VERTICES = 2 + (RINGS - 1) * SECTORS, TRIANGLES = 2 * SECTORS * (RINGS - 1) };
 
-// A ball of radius 2 around (1, 0, 0).
+/* A ball of radius 2 around (1, 0, 0). */
 typedef struct ball {
   double positions[3 * VERTICES];
   uint32_t triangles[3 * TRIANGLES];
@@ -119,7 +119,7 @@ static void test_a_mesh_in_memory_becomes_spheres_inside_it(void **state) {
   assert_int_equal(json_integer_value(json_object_get(report, "spheres")), medial.sphere_count);
   json_decref(report);
   qmat_text_free(text);
-  // Nothing that was not asked for has run.
+  /* Nothing that was not asked for has run. */
   ok(job, qmat_job_run_report(job, &text));
   report = json_loads(text, 0, NULL);
   assert_int_equal(json_array_size(json_object_get(report, "nodes")), 8);
@@ -200,7 +200,7 @@ static void test_mistakes_are_results_with_a_problem(void **state) {
   assert_non_null(strstr(qmat_job_error(job)->hint, ".glb"));
   qmat_medial_view medial;
   assert_int_equal(qmat_job_medial(job, "simple.medial", &medial), QMAT_RESULT_USAGE);
-  // No model is given.
+  /* No model is given. */
   assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_USAGE);
   assert_string_equal(qmat_job_error(job)->field, "path");
   assert_int_equal(qmat_job_run(job, -1, NULL, NULL), QMAT_RESULT_USAGE);
@@ -271,7 +271,7 @@ static void test_a_job_takes_from_the_cache_what_another_has_made(void **state) 
 
 static void test_the_shipped_graph_is_the_built_in_one(void **state) {
   (void)state;
-  // Tests run in the folder of the source.
+  /* Tests run in the folder of the source. */
   qmat_job *job;
   ok(job, qmat_job_new_from_file(&job, "graphs/qmat_plus.yaml"));
   ball b;

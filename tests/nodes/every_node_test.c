@@ -297,7 +297,7 @@ static int make_fixture(void **state) {
   assert_non_null(mkdtemp(made.folder));
   snprintf(made.files[0], sizeof made.files[0], "%s/model.off", made.folder);
   snprintf(made.files[1], sizeof made.files[1], "%s/medial.ma", made.folder);
-  // Slender, since work grows with the surface measured in squared diagonals. The second comes last: its file stays.
+  /* Slender, since work grows with the surface measured in squared diagonals. The second comes last: its file stays. */
   qmat_model model;
   assert_int_equal(qmat_model_make_box(2, 0.3, 0.2, 6, &model), QMAT_OK);
   make_solid(WORLD_OTHER, &model);
@@ -381,7 +381,7 @@ static void test_every_text_is_there_and_reads_alike(void **state) {
   for (size_t i = 0; i < qmat_node_count; i++) {
     const qmat_node *node = qmat_nodes[i];
     check_line(node, "summary", node->summary);
-    // What the node does, in the third person: "Makes ...", "Reads ...".
+    /* What the node does, in the third person: "Makes ...", "Reads ...". */
     const size_t verb = strcspn(node->summary, " ");
     if (node->summary[verb - 1] != 's') fail_msg("%s: not as in \"Makes ...\": %s", node->name, node->summary);
     if (!node->doc || !*node->doc || node->doc[strlen(node->doc) - 1] != '.' || strstr(node->doc, "  "))
@@ -437,7 +437,7 @@ static void check_default(const qmat_node *node, const qmat_param *param) {
     case QMAT_PARAM_INT:
       assert_true(number == floor(number) && param->min == floor(param->min) && param->max == floor(param->max));
       assert_true(fabs(param->min) <= 0x1p53 && fabs(param->max) <= 0x1p53);
-      // fall through
+      /* fall through */
     case QMAT_PARAM_FLOAT:
       assert_true(isfinite(param->min) && isfinite(param->max) && param->min < param->max);
       if (!(number >= param->min && number <= param->max))
@@ -502,7 +502,7 @@ static void test_ports_have_a_name_of_their_own_and_a_type(void **state) {
     check_ports(node, node->outputs, qmat_output_count(node));
     assert_in_range(qmat_output_count(node), 1, MOST_PORTS);
     for (size_t port = 0; port < qmat_output_count(node); port++) assert_false(node->outputs[port].optional);
-    // A parameter and an input of one name could not be told apart in an error.
+    /* A parameter and an input of one name could not be told apart in an error. */
     for (size_t port = 0; port < qmat_input_count(node); port++)
       assert_null(qmat_param_find(node, node->inputs[port].name));
   }
@@ -572,7 +572,7 @@ static bool may_go_on(void *user, const char *node_id, const char *node_type, ui
   if (total > 0) assert_true(done <= total);
   const double time = now();
   if (watch->stopped > 0) fail_msg("%s asks again after it was told to stop", node_type);
-  if (watch->context != NULL) watch->context->progress_time = 0;
+  if (watch->context) watch->context->progress_time = 0;
   if (watch->calls++ < watch->stop_at && (watch->deadline == 0 || time < watch->deadline)) return true;
   watch->stopped = time;
   return false;
@@ -607,7 +607,7 @@ static void test_defaults_pass_the_check_and_run(void **state) {
     if (qmat_params_check(&context, run.node, run.params) != QMAT_OK || execute(&context, &run) != QMAT_OK)
       fail_msg("%s: %s", run.node->name, context.error.message);
     for (size_t port = 0; port < qmat_output_count(run.node); port++) {
-      // An input that is handed on has the references of its owners too.
+      /* An input that is handed on has the references of its owners too. */
       bool is_input = false;
       for (size_t k = 0; k < qmat_input_count(run.node); k++) is_input = is_input || run.inputs[k] == run.outputs[port];
       if (!is_input) assert_int_equal(run.outputs[port]->references, 1);
@@ -653,7 +653,7 @@ static void try_param(const qmat_node *node, const qmat_param *param, const char
   const double start = now();
   if (status == QMAT_OK && !execute_patiently(&context, &run, &status))
     print_message("%s: %s=%s was stopped after %.1f s\n", node->name, param->name, text, now() - start);
-  // With a choice another parameter may be what does not fit: the spacing of an algorithm that is not the default.
+  /* With a choice another parameter may be what does not fit: the spacing of an algorithm that is not the default. */
   const qmat_error *error = &context.error;
   const bool names_it =
       param->type == QMAT_PARAM_ENUM ? is_named(node, error) : strcmp(error->field, param->name) == 0 || error->file[0];
@@ -686,7 +686,7 @@ static void test_every_parameter_at_its_bounds_runs_or_is_refused_by_name(void *
           try_param(node, param, text);
           qmat_format_number(param->max, text, sizeof text);
           try_param(node, param, text);
-          // What is nearly nothing is where things are divided by.
+          /* What is nearly nothing is where things are divided by. */
           if (param->type == QMAT_PARAM_FLOAT && param->min <= 0) try_param(node, param, "1e-300");
           break;
         default:
@@ -1019,7 +1019,7 @@ static void try_shortages(subject *run, const char *what) {
   release_outputs(run);
   qmat_context_uninit(&context);
   assert_true(needed > 0);
-  // Memory that stays short from some point on, and a single allocation that fails.
+  /* Memory that stays short from some point on, and a single allocation that fails. */
   const size_t most = *what ? FEWER_SHORTAGES : MOST_SHORTAGES;
   for (size_t k = 0; k < 2 * most && k / 2 < needed; k++) {
     context = (qmat_context){.threads = 1};

@@ -541,7 +541,7 @@ static void expect_error(const pipeline *p, qmat_status status, const char *fiel
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   const qmat_value *inputs[] = {&p->mesh->base, &p->thickness->base, &p->samples->base};
   assert_int_equal(pipeline_run(&context, "medial.delaunay", "", inputs, outputs), status);
-  if (field != NULL) assert_string_equal(context.error.field, field);
+  if (field) assert_string_equal(context.error.field, field);
   qmat_context_uninit(&context);
 }
 

@@ -181,7 +181,7 @@ static void test_the_groove_between_two_balls_is_the_farthest(void **state) {
   subject_free(&s);
 }
 
-static void test_a_hollow_in_the_envelope_counts(void **state) {
+static void test_a_cavity_in_the_envelope_counts(void **state) {
   (void)state;
   /* Six balls at the sides of a cube leave room around its centre: the boundary there is 1.3 - 0.8 = 0.5 from it. */
   double balls[24];
@@ -520,7 +520,7 @@ int main(void) {
       cmocka_unit_test(test_cones_and_slabs_by_hand),
       cmocka_unit_test(test_a_sheet_alone_makes_the_boundary_where_it_is_wide),
       cmocka_unit_test(test_the_groove_between_two_balls_is_the_farthest),
-      cmocka_unit_test(test_a_hollow_in_the_envelope_counts),
+      cmocka_unit_test(test_a_cavity_in_the_envelope_counts),
       cmocka_unit_test(test_certified_exactly_where_epsilon_holds),
       cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
       cmocka_unit_test(test_an_open_surface_is_never_certified),

@@ -30,7 +30,7 @@ static pipeline made[MODEL_COUNT];
 static const char *const sampling = "spacing=8% n_f=0";
 
 static const pipeline *model(model_name name) {
-  if (made[name].mesh == NULL)
+  if (!made[name].mesh)
     pipeline_make(&made[name], pipeline_model(models[name].name, models[name].resolution), sampling, "");
   return &made[name];
 }
@@ -379,7 +379,7 @@ static void test_one_sided_holds_the_surface_alone(void **state) {
     result one = simplify(p, "epsilon=6% error=one_sided"), two = simplify(p, "epsilon=6% error=two_sided");
     check_errors(p, &one, 0.06, false);
     check_errors(p, &two, 0.06, true);
-    assert_int_equal(pipeline_count(one.report, "refused_by_protrusion"), 0);
+    assert_int_equal(pipeline_count(one.report, "refused_by_envelope_to_surface"), 0);
     release(&one);
     release(&two);
   }
@@ -619,7 +619,7 @@ static void test_progress_function_cancels(void **state) {
 /* How often a run asks whether it may go on when no time is too short, by what it is at. */
 typedef struct {
   qmat_context *context;
-  size_t control_points, collapses;
+  size_t constraint_points, collapses;
 } questions;
 
 static bool count_question(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
@@ -627,7 +627,7 @@ static bool count_question(void *user, const char *node_id, const char *node_typ
   (void)node_id, (void)node_type, (void)done, (void)total;
   questions *asked = user;
   asked->context->progress_time = 0;
-  asked->control_points += strcmp(unit, "control points") == 0;
+  asked->constraint_points += strcmp(unit, "constraint points") == 0;
   asked->collapses += strcmp(unit, "collapses") == 0;
   return true;
 }
@@ -641,7 +641,7 @@ static void test_it_asks_whether_to_go_on_at_every_few_points_and_collapses(void
   context.progress_user = &asked;
   result r;
   assert_int_equal(try_simplify(&context, p, p->medial, "epsilon=4%", &r), QMAT_OK);
-  assert_true(asked.control_points >= (p->samples->count + p->mesh->triangle_count) / 2048);
+  assert_true(asked.constraint_points >= (p->samples->count + p->mesh->triangle_count) / 2048);
   assert_true(asked.collapses >= (p->medial->sphere_count - r.medial->sphere_count) / 16);
   release(&r);
   qmat_context_uninit(&context);

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "core/geometry/envelope.h"
-#include "core/hash.h"
 #include "core/geometry/medial_build.h"
+#include "core/hash.h"
 #include "core/node.h"
 #include "tests/shapes.h"
 

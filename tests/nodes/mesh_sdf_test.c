@@ -20,13 +20,13 @@ static qmat_status try_spaced_sdf(qmat_context *context, qmat_mesh *mesh, const 
   double params[8];
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
-  if (cone_angle != NULL) {
+  if (cone_angle) {
     assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "cone_angle"), cone_angle, params), QMAT_OK);
   }
-  if (rays != NULL) {
+  if (rays) {
     assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "rays"), rays, params), QMAT_OK);
   }
-  if (spacing != NULL) {
+  if (spacing) {
     assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "spacing"), spacing, params), QMAT_OK);
   }
   const qmat_value *inputs[1] = {&mesh->base};

@@ -109,9 +109,9 @@ static json_t *extra(json_t *root, const char *key) {
 static void test_the_report_goes_into_the_extras_with_what_quantisation_adds(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
-  qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:i, s:f}", "epsilon", 0.02,
-                                              "surface_to_envelope", 0.011, "envelope_to_surface", 0.013, "certified",
-                                              1, "spheres", 3, "diagonal", 8.0));
+  qmat_report *report =
+      make_report(json_pack("{s:f, s:f, s:f, s:b, s:i, s:f}", "epsilon", 0.02, "surface_to_envelope", 0.011,
+                            "envelope_to_surface", 0.013, "certified", 1, "spheres", 3, "diagonal", 8.0));
   qmat_file *file = must_write(medial, (wiring){.report = report}, NULL);
   json_t *root = glb_root(file);
   assert_near(json_real_value(extra(root, "qmat_epsilon")), 0.02, 0);
@@ -149,9 +149,9 @@ static void test_what_is_certified_stays_so_where_quantisation_can_be_fine_enoug
   } cases[] = {{0.01, true, "0"}, {0.01999, true, "0"}, {0.02 - 1e-12, false, "0"}, {0.0199, false, "6"}};
   qmat_medial *medial = make_medial();
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    qmat_report *report = make_report(json_pack("{s:f, s:f, s:f, s:b, s:f}", "epsilon", 0.02, "surface_to_envelope",
-                                                0.001, "envelope_to_surface", cases[i].error, "certified", 1,
-                                                "diagonal", 6.7));
+    qmat_report *report =
+        make_report(json_pack("{s:f, s:f, s:f, s:b, s:f}", "epsilon", 0.02, "surface_to_envelope", 0.001,
+                              "envelope_to_surface", cases[i].error, "certified", 1, "diagonal", 6.7));
     const char *const settings[][2] = {{"position_bits", cases[i].position_bits}, {NULL, NULL}};
     qmat_file *file = must_write(medial, (wiring){.report = report}, settings);
     json_t *root = glb_root(file);
@@ -227,7 +227,8 @@ static void test_scene_and_skin_name_and_show_the_node(void **state) {
 static void test_each_format_is_made(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
-  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"}, {"ma", "3 1 0"}, {"ply", "ply"}, {"usda", "#usda 1.0\n"}, {"usdz", "PK\3\4"}};
+  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"},           {"ma", "3 1 0"},
+                                           {"ply", "ply"},  {"usda", "#usda 1.0\n"}, {"usdz", "PK\3\4"}};
   for (size_t i = 0; i < 6; i++) {
     const char *const settings[][2] = {{"format", formats[i][0]}, {NULL, NULL}};
     qmat_file *file = must_write(medial, (wiring){0}, settings);

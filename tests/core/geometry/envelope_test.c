@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "core/hash.h"
 #include "core/geometry/medial_distance.h"
+#include "core/hash.h"
 
 #define EXACT 1e-14
 

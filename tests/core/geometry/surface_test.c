@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-#include "core/hash.h"
 #include "core/geometry/thickness.h"
+#include "core/hash.h"
 #include "tests/shapes.h"
 
 static double uniform(uint64_t stream, uint64_t index, double low, double high) {
@@ -574,7 +574,7 @@ static void test_thread_count_does_not_change_an_answer(void **state) {
     answers[t] = calloc(8 * COUNT, sizeof **answers);
     uint8_t *inside = calloc(COUNT, 1);
     double *points = calloc(3 * COUNT, sizeof *points);
-    assert_true(answers[t] != NULL && inside != NULL && points != NULL);
+    assert_true(answers[t] && inside && points);
     for (size_t i = 0; i < 3 * COUNT; i++) points[i] = uniform(6, i, -0.5, 0.5);
     qmat_surface_inside_many(surface, points, COUNT, inside, threads[t]);
     for (size_t i = 0; i < COUNT; i++) {

@@ -98,7 +98,7 @@ static const qmat_param scale_rows[] = {{.name = "factor",
                                          .offset = offsetof(scale_params, whole)},
                                         {0}};
 
-// Not constant: a test raises its version.
+/* Not constant: a test raises its version. */
 static qmat_node test_scale = {.name = "test.scale",
                                .version = 1,
                                .summary = "A product",
@@ -198,9 +198,9 @@ typedef struct fixture {
   char folder[64], cache_folder[80], model[80];
   bool read_only;
   char warning[400];
-  double result;     // of the last run
-  char states[64];   // of its steps, by their first letters
-  char why[4][512];  // of its steps, foreseen: all sentences
+  double result;    // of the last run
+  char states[64];  // of its steps, by their first letters
+  char why[4][512]; /* of its steps, foreseen: all sentences */
 } fixture;
 
 static int set_up(void **state) {
@@ -257,7 +257,7 @@ static void tell_why(fixture *f, const qmat_run *run) {
   json_decref(records);
 }
 
-// Reads the model, multiplies it twice. With `dry` only the states and reasons.
+/* Reads the model, multiplies it twice. With `dry` only the states and reasons. */
 static void run_graph(fixture *f, const char *factor, const char *last_factor, bool dry, bool force) {
   char text[512];
   snprintf(text, sizeof text,
@@ -300,7 +300,7 @@ static void foresee(fixture *f, const char *factor) {
   run_graph(f, factor, "2", true, false);
 }
 
-// Where the cache keeps the value of a number.
+/* Where the cache keeps the value of a number. */
 static void blob_path(const fixture *f, double number, char path[256]) {
   qmat_context context = {0};
   qmat_value *value;
@@ -813,7 +813,7 @@ static void test_a_key_is_the_digest_of_its_items_with_their_lengths(void **stat
   json_decref(items);
 }
 
-// What a key is made of, for one node type.
+/* What a key is made of, for one node type. */
 typedef struct key_facts {
   const qmat_node *type;
   void *params;
@@ -828,7 +828,7 @@ static void make_key(const key_facts *facts, qmat_digest *key) {
   json_decref(items);
 }
 
-// The key must be none of those before it, and is added to them.
+/* The key must be none of those before it, and is added to them. */
 static void add_key(const key_facts *facts, qmat_digest *keys, size_t *count, const char *what) {
   assert_true(*count < 256);
   make_key(facts, &keys[*count]);

@@ -28,13 +28,13 @@ static const char ball_graph[] =
     "  text:  { type: test.print, in: { number: ball.report } }\n"
     "outputs: { ball: ball.medial, text: text.file }\n";
 
-// A folder of its own for every test, and where its files are.
+/* A folder of its own for every test, and where its files are. */
 typedef struct fixture {
   qmat_context context;
   qmat_graph graph;
   qmat_run run;
   char folder[40], paths[4][80];
-  char log[256];  // ids of the nodes that ran
+  char log[256]; /* ids of the nodes that ran */
 } fixture;
 
 static int set_up(void **state) {
@@ -340,7 +340,7 @@ static void test_the_report_tells_every_node_file_and_the_summary(void **state) 
   fixture *f = *state;
   read_graph(f, ball_graph);
   test_ok(&f->context, qmat_graph_assign(&f->context, &f->graph, "text.label=L"));
-  // The printing node reads "value", which the ball's report does not have: it prints 0.
+  /* The printing node reads "value", which the ball's report does not have: it prints 0. */
   const qmat_run_save save = {1, in_folder(f, 0, "ball.csv")};
   run_all(f, (qmat_run_options){.saves = &save, .save_count = 1});
   json_t *report = qmat_run_report(&f->context, &f->run);
@@ -378,7 +378,7 @@ static void test_the_report_tells_every_node_file_and_the_summary(void **state) 
   assert_string_equal(path, f->paths[0]);
   assert_string_equal(format, "csv");
   assert_int_equal(bytes, 4);
-  // printf 'L,0\n' | sha256sum
+  /* printf 'L,0\n' | sha256sum */
   assert_string_equal(sha256, "a763d8a221db10f076b8511edc192f7ed7c8602f24d3483435b9e86bbd81d70d");
   assert_int_equal(json_unpack(json_object_get(report, "summary"), "{s:i, s:s, s:i, s:s}", "spheres", &spheres, "text",
                                &text, "triangles", &triangles, "name", &name),

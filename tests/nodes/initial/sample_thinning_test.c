@@ -50,11 +50,11 @@ static void test_other_sides_and_other_planes_are_kept(void **state) {
   (void)state;
   cloud c = {0};
   add(&c, 0, 0, 0, 0, 0, 1, 0.1);
-  add(&c, 0, 0, -0.001, 0, 0, -1, 0.1); /* the other side of a sheet */
-  add(&c, 0.01, 0, 0, 1, 0, 0, 0.1);    /* around a crease */
-  add(&c, 0.02, 0, 0.012, 0, 0, 1, 0.1); /* a step */
+  add(&c, 0, 0, -0.001, 0, 0, -1, 0.1);   /* the other side of a sheet */
+  add(&c, 0.01, 0, 0, 1, 0, 0, 0.1);      /* around a crease */
+  add(&c, 0.02, 0, 0.012, 0, 0, 1, 0.1);  /* a step */
   add(&c, 0.02, 0, -0.008, 0, 0, 1, 0.1); /* within the detail */
-  add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);     /* without a normal */
+  add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);      /* without a normal */
   add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);
   thin(&c, 0.1, 0.01);
   const uint32_t expected[] = {0, 1, 2, 3, 0, 5, 6};

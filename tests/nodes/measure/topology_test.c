@@ -58,14 +58,14 @@ static void test_small_complexes_by_hand(void **state) {
   check_complex(5, ring, 3, NULL, 0, 3, 1, 0);
   static const uint32_t slab[] = {0, 1, 2};
   check_complex(3, ring, 3, slab, 1, 1, 0, 0);
-  static const uint32_t hollow[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
-  check_complex(4, NULL, 0, hollow, 4, 1, 0, 1);
-  check_complex(4, NULL, 0, hollow, 3, 1, 0, 0); /* one side open */
+  static const uint32_t cavity[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
+  check_complex(4, NULL, 0, cavity, 4, 1, 0, 1);
+  check_complex(4, NULL, 0, cavity, 3, 1, 0, 0); /* one side open */
   static const uint32_t fan[] = {0, 1, 2, 0, 1, 3, 0, 1, 4};
   check_complex(5, NULL, 0, fan, 3, 1, 0, 0);
 }
 
-/* A hollow tetrahedron with a strip of two slabs at one of its sides: the strip is none of its walls. */
+/* A cavity tetrahedron with a strip of two slabs at one of its sides: the strip is none of its walls. */
 static void test_walls_of_a_void_by_hand(void **state) {
   (void)state;
   static const uint32_t triangles[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 2, 3, 4, 3, 4, 5};
@@ -110,7 +110,7 @@ static void test_empty_triangles_by_hand(void **state) {
   qmat_context_uninit(&context);
 }
 
-static void test_hollows_that_share_a_side_are_two(void **state) {
+static void test_cavities_that_share_a_side_are_two(void **state) {
   (void)state;
   /* Tetrahedra over and under the triangle 0 1 2: their edges in common lie on three triangles. */
   static const uint32_t two[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 0, 1, 4, 0, 2, 4, 1, 2, 4};
@@ -281,7 +281,7 @@ int main(void) {
       cmocka_unit_test(test_small_complexes_by_hand),
       cmocka_unit_test(test_walls_of_a_void_by_hand),
       cmocka_unit_test(test_empty_triangles_by_hand),
-      cmocka_unit_test(test_hollows_that_share_a_side_are_two),
+      cmocka_unit_test(test_cavities_that_share_a_side_are_two),
       cmocka_unit_test(test_surfaces_without_a_side_are_told_over_z2),
       cmocka_unit_test(test_random_complexes_have_the_rank_of_full_elimination),
       cmocka_unit_test(test_a_large_sheet_with_flaps_is_done_at_once),

@@ -89,13 +89,13 @@ static void test_published_candidates_are_the_optimum_or_the_middle(void **state
   (void)state;
   static const double spheres[] = {0, 0, 0, 0.1, 0.2, 0, 0, 0.3, 0.2, 0.2, 0, 0.1};
   static const uint32_t edges[] = {0, 1}, slab[] = {0, 1, 2};
-  static const double optimum[] = {0.1, 0.25, -0.5, 0.05}, hollow[] = {0.1, 0.25, -0.5, -0.05};
+  static const double optimum[] = {0.1, 0.25, -0.5, 0.05}, cavity[] = {0.1, 0.25, -0.5, -0.05};
   static const double far_away[] = {0.1, 5, 0, 0.05}, middle[] = {0.1, 0, 0, 0.2};
   fixture f;
   qmat_candidates c;
   make(&f, spheres, 3, edges, 1, NULL, 0);
   const uint32_t edge = qmat_complex_find_edge(&f.complex, 0, 1);
-  const struct { const double *held, *expected; } cases[] = {{optimum, optimum}, {hollow, middle}, {far_away, middle}};
+  const struct { const double *held, *expected; } cases[] = {{optimum, optimum}, {cavity, middle}, {far_away, middle}};
   for (size_t i = 0; i < 3; i++) {
     memset(f.quadrics, 0, 3 * sizeof *f.quadrics);
     hold_sphere(&f.quadrics[1], cases[i].held);
@@ -190,15 +190,16 @@ static void test_hausdorff_cost_is_the_largest_distance_of_all_points_that_the_e
       witnesses[3 * i + 1] = witnesses[3 * i + 2] = QMAT_NONE;
       weights[3 * i] = 1;
     }
-    qmat_coverage coverage;
+    qmat_surface_to_envelope to_envelope;
     qmat_collapse collapse = {0};
     qmat_candidates c;
-    assert_int_equal(qmat_coverage_init(&f.context, &coverage, POINTS, points, limits, witnesses, weights, SPHERES),
-                     QMAT_OK);
+    assert_int_equal(
+        qmat_surface_to_envelope_init(&f.context, &to_envelope, POINTS, points, limits, witnesses, weights, SPHERES),
+        QMAT_OK);
     const uint32_t edge = qmat_complex_find_edge(&f.complex, 0, 1);
     assert_int_equal(qmat_complex_preview(&f.context, &f.complex, edge, &collapse), QMAT_OK);
     const size_t counted = POINTS - 10;
-    assert_int_equal(qmat_hausdorff_candidates(&f.context, &coverage, &f.complex, &collapse, counted, &c), QMAT_OK);
+    assert_int_equal(qmat_hausdorff_candidates(&f.context, &to_envelope, &f.complex, &collapse, counted, &c), QMAT_OK);
     assert_int_equal(c.count, 1);
     double best = INFINITY, of_candidate = -INFINITY;
     for (size_t e = 0; e < 2; e++) {
@@ -211,7 +212,7 @@ static void test_hausdorff_cost_is_the_largest_distance_of_all_points_that_the_e
     assert_near(c.errors[0], best, 1e-9);
     assert_near(of_candidate, best, 1e-9);
     qmat_collapse_uninit(&collapse);
-    qmat_coverage_uninit(&coverage);
+    qmat_surface_to_envelope_uninit(&to_envelope);
     tear_down(&f);
   }
 }
@@ -221,17 +222,17 @@ static void test_an_edge_without_points_keeps_its_larger_end_and_costs_least(voi
   static const double spheres[] = {0, 0, 0, 1, 3, 0, 0, 2};
   static const uint32_t edges[] = {0, 1};
   fixture f;
-  qmat_coverage coverage;
+  qmat_surface_to_envelope to_envelope;
   qmat_collapse collapse = {0};
   qmat_candidates c;
   make(&f, spheres, 2, edges, 1, NULL, 0);
-  assert_int_equal(qmat_coverage_init(&f.context, &coverage, 0, NULL, NULL, NULL, NULL, 2), QMAT_OK);
+  assert_int_equal(qmat_surface_to_envelope_init(&f.context, &to_envelope, 0, NULL, NULL, NULL, NULL, 2), QMAT_OK);
   assert_int_equal(qmat_complex_preview(&f.context, &f.complex, 0, &collapse), QMAT_OK);
-  assert_int_equal(qmat_hausdorff_candidates(&f.context, &coverage, &f.complex, &collapse, 0, &c), QMAT_OK);
+  assert_int_equal(qmat_hausdorff_candidates(&f.context, &to_envelope, &f.complex, &collapse, 0, &c), QMAT_OK);
   assert_memory_equal(c.spheres[0], &spheres[4], 4 * sizeof(double));
   assert_true(c.errors[0] == -INFINITY);
   qmat_collapse_uninit(&collapse);
-  qmat_coverage_uninit(&coverage);
+  qmat_surface_to_envelope_uninit(&to_envelope);
   tear_down(&f);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/control_points.h"
+#include "nodes/measure/constraint_points.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,12 +9,13 @@
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
-#include "nodes/measure/inner_points.h"
+#include "nodes/measure/interior_points.h"
 #include "nodes/measure/point_grid.h"
 
 enum { FINEST_GRID = 256 };
 
-/* The grid's spacing as a share of epsilon. What happens between is bounded afterwards (nodes/measure/medial_errors.h). */
+/* The grid's spacing as a share of epsilon. What happens between is bounded afterwards (nodes/measure/medial_errors.h).
+ */
 static const double spacing_share = 0.4;
 
 /* Into how many parts a length is divided. */
@@ -183,7 +184,7 @@ static const double content_with_sphere = 0.5, content_with_star = 0.9;
 /* About a tenth of a second of looks at single spheres: more far points than that are worth a search structure. */
 static const size_t most_sphere_looks = 100000000;
 
-static void store(qmat_control_points *control, size_t i, const witness *w) {
+static void store(qmat_constraint_points *control, size_t i, const witness *w) {
   memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
   memcpy(&control->weights[3 * i], w->weights, sizeof w->weights);
   control->distances[i] = w->distance;
@@ -217,7 +218,7 @@ static void look_around_in_facet(const answering *a, const double *point, size_t
 }
 
 /* Also without a bound every point needs some witness. */
-static bool is_far(const qmat_control_points *control, size_t i, double enough) {
+static bool is_far(const qmat_constraint_points *control, size_t i, double enough) {
   return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= enough);
 }
 
@@ -227,10 +228,10 @@ enum { SLICE = 1 << 11 };
 /* The end of the slice that starts at `first`, of `count`; QMAT_CANCELLED. */
 static qmat_status next_slice(qmat_context *context, size_t first, size_t count, size_t *last) {
   *last = count - first < SLICE ? count : first + SLICE;
-  return qmat_progress(context, first, count, "control points");
+  return qmat_progress(context, first, count, "constraint points");
 }
 
-static size_t count_far(const qmat_control_points *control, double enough) {
+static size_t count_far(const qmat_constraint_points *control, double enough) {
   size_t far = 0;
   for (size_t i = 0; i < control->count; i++) far += is_far(control, i, enough);
   return far;
@@ -239,7 +240,7 @@ static size_t count_far(const qmat_control_points *control, double enough) {
 /* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
  * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
 static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double enough,
-                                   qmat_control_points *control) {
+                                   qmat_constraint_points *control) {
   const qmat_complex *complex = a->complex;
   const int threads = qmat_threads(context);
   for (size_t first = 0, last; first < control->count; first = last) {
@@ -295,7 +296,7 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
 
 /* The same for many points: the nearest primitive of all. */
 static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double enough,
-                                qmat_control_points *control) {
+                                qmat_constraint_points *control) {
   qmat_envelope *envelope;
   qmat_status status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
@@ -314,7 +315,7 @@ static qmat_status ask_envelope(qmat_context *context, const qmat_complex *compl
   return status;
 }
 
-static qmat_status allocate(qmat_context *context, qmat_control_points *control) {
+static qmat_status allocate(qmat_context *context, qmat_constraint_points *control) {
   qmat_arena *arena = &context->arena;
   control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
   control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
@@ -323,7 +324,7 @@ static qmat_status allocate(qmat_context *context, qmat_control_points *control)
   control->inner_limits =
       qmat_arena_calloc(arena, control->count - control->surface_count, sizeof *control->inner_limits);
   if (!control->points || !control->witnesses || !control->weights || !control->distances || !control->inner_limits)
-    return qmat_fail_memory(context, "control points");
+    return qmat_fail_memory(context, "constraint points");
   return QMAT_OK;
 }
 
@@ -377,11 +378,11 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   }
   shell->places = qmat_arena_alloc(arena, capacity, sizeof *shell->places);
   double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
-  if (!shell->places || !points) return qmat_fail_memory(context, "control points");
+  if (!shell->places || !points) return qmat_fail_memory(context, "constraint points");
   size_t count = 0;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     if (t % SLICE == 0) {
-      const qmat_status status = qmat_progress(context, t, mesh->triangle_count, "control points");
+      const qmat_status status = qmat_progress(context, t, mesh->triangle_count, "constraint points");
       if (status != QMAT_OK) return status;
     }
     const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
@@ -428,9 +429,9 @@ static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, 
 
 /* Where each facet's grid starts behind the samples. The spacing grows until no more than `most` points are added. */
 static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
-                               size_t *starts, qmat_control_points *control) {
+                               size_t *starts, qmat_constraint_points *control) {
   for (;; control->spacing *= 1.25) {
-    const qmat_status status = qmat_progress(context, 0, 0, "control points");
+    const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
     if (status != QMAT_OK) return status;
     size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -446,7 +447,7 @@ static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, con
 /* The places on the surface, with witnesses of what answers around them. */
 static qmat_status look_on_surface(qmat_context *context, const answering *a, const double *positions,
                                    const double *unit_samples, const size_t *starts, double content, double enough,
-                                   qmat_control_points *control) {
+                                   qmat_constraint_points *control) {
   const qmat_mesh *mesh = a->mesh;
   const size_t samples = control->sample_count;
   memcpy(control->points, unit_samples, 3 * samples * sizeof *unit_samples);
@@ -482,7 +483,7 @@ static qmat_status look_on_surface(qmat_context *context, const answering *a, co
 }
 
 static qmat_status ask_for_far_points(qmat_context *context, const answering *a, double enough,
-                                      qmat_control_points *control) {
+                                      qmat_constraint_points *control) {
   const size_t far = count_far(control, enough);
   if (far == 0) return QMAT_OK;
   if (far * a->complex->vertex_count > most_sphere_looks) return ask_envelope(context, a->complex, enough, control);
@@ -492,10 +493,10 @@ static qmat_status ask_for_far_points(qmat_context *context, const answering *a,
 qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
                                      const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
-                                     qmat_control_points *control) {
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing};
+                                     qmat_constraint_points *control) {
+  *control = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing};
   size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
-  if (!starts) return qmat_fail_memory(context, "control points");
+  if (!starts) return qmat_fail_memory(context, "constraint points");
   answering a;
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
   if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, control);
@@ -506,21 +507,21 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
   return status == QMAT_OK ? ask_for_far_points(context, &a, enough, control) : status;
 }
 
-qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                     const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                     size_t most, bool inside, qmat_control_points *control) {
+qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                        const qmat_medial *medial, const qmat_complex *complex, double epsilon,
+                                        size_t most, bool inside, qmat_constraint_points *control) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_control_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
+  *control = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   answering a;
-  qmat_inner_points inner = {.count = 0};
+  qmat_interior_points inner = {.count = 0};
   double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
-  if (!starts || !unit_samples) return qmat_fail_memory(context, "control points");
+  if (!starts || !unit_samples) return qmat_fail_memory(context, "constraint points");
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
-  if (status == QMAT_OK && inside) status = qmat_inner_points_find(context, complex, epsilon, &inner);
+  if (status == QMAT_OK && inside) status = qmat_interior_points_find(context, complex, epsilon, &inner);
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
   if (status != QMAT_OK) return status;
@@ -546,9 +547,9 @@ qmat_status qmat_control_points_make(qmat_context *context, const qmat_surface *
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
-                                   qmat_control_points *control) {
-  *control =
-      (qmat_control_points){.count = extra->surface_count + extra->inner_count, .surface_count = extra->surface_count};
+                                   qmat_constraint_points *control) {
+  *control = (qmat_constraint_points){.count = extra->surface_count + extra->inner_count,
+                                      .surface_count = extra->surface_count};
   qmat_status status = allocate(context, control);
   qmat_envelope *envelope;
   if (status == QMAT_OK) status = envelope_of(context, complex, &envelope);
@@ -582,13 +583,13 @@ qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *co
   return QMAT_OK;
 }
 
-qmat_status qmat_control_points_join(qmat_context *context, const qmat_control_points *base, const uint32_t *witnesses,
-                                     const double *weights, const uint32_t *ids, const qmat_control_points *extra,
-                                     qmat_control_points *joined) {
-  *joined = (qmat_control_points){.count = base->count + extra->count,
-                                  .sample_count = base->sample_count,
-                                  .surface_count = base->surface_count + extra->surface_count,
-                                  .spacing = base->spacing};
+qmat_status qmat_constraint_points_join(qmat_context *context, const qmat_constraint_points *base,
+                                        const uint32_t *witnesses, const double *weights, const uint32_t *ids,
+                                        const qmat_constraint_points *extra, qmat_constraint_points *joined) {
+  *joined = (qmat_constraint_points){.count = base->count + extra->count,
+                                     .sample_count = base->sample_count,
+                                     .surface_count = base->surface_count + extra->surface_count,
+                                     .spacing = base->spacing};
   const qmat_status status = allocate(context, joined);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < joined->count; i++) {
@@ -596,7 +597,7 @@ qmat_status qmat_control_points_join(qmat_context *context, const qmat_control_p
     const size_t place = inside ? i - joined->surface_count : i;
     const size_t own = inside ? base->count - base->surface_count : base->surface_count;
     const bool is_base = place < own;
-    const qmat_control_points *source = is_base ? base : extra;
+    const qmat_constraint_points *source = is_base ? base : extra;
     const size_t j = (inside ? source->surface_count : 0) + (is_base ? place : place - own);
     memcpy(&joined->points[3 * i], &source->points[3 * j], 3 * sizeof *joined->points);
     memcpy(&joined->weights[3 * i], &(is_base ? weights : extra->weights)[3 * j], 3 * sizeof *joined->weights);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/patch_fit.h"
+#include "nodes/simplify/neighbourhood_fit.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -19,9 +19,9 @@ enum { SPHERES = 3, RINGS = 25, POINTS = 4 * RINGS };
 typedef struct {
   qmat_context context;
   qmat_complex complex;
-  qmat_coverage coverage;
+  qmat_surface_to_envelope to_envelope;
   qmat_collapse collapse;
-  qmat_patch_fit fit;
+  qmat_neighbourhood_fit fit;
   double points[3 * POINTS], limits[POINTS], weights[3 * POINTS];
   uint32_t witnesses[3 * POINTS];
 } chain;
@@ -59,17 +59,17 @@ static void make_chain(chain *c, int spheres) {
     c->witnesses[3 * i] = x < 0.5 ? 0 : x < 2 || spheres < 3 ? 1 : 2;
     c->witnesses[3 * i + 1] = c->witnesses[3 * i + 2] = QMAT_NONE;
   }
-  assert_int_equal(qmat_coverage_init(&c->context, &c->coverage, POINTS, c->points, c->limits, c->witnesses, c->weights,
-                                      (size_t)spheres),
+  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->to_envelope, POINTS, c->points, c->limits,
+                                                 c->witnesses, c->weights, (size_t)spheres),
                    QMAT_OK);
   const uint32_t edge = qmat_complex_find_edge(&c->complex, 0, 1);
   assert_int_equal(qmat_complex_preview(&c->context, &c->complex, edge, &c->collapse), QMAT_OK);
 }
 
 static void free_chain(chain *c) {
-  qmat_patch_fit_uninit(&c->fit);
+  qmat_neighbourhood_fit_uninit(&c->fit);
   qmat_collapse_uninit(&c->collapse);
-  qmat_coverage_uninit(&c->coverage);
+  qmat_surface_to_envelope_uninit(&c->to_envelope);
   qmat_complex_uninit(&c->complex);
   qmat_context_uninit(&c->context);
 }
@@ -77,10 +77,10 @@ static void free_chain(chain *c) {
 static double fit(chain *c, size_t others) {
   static const uint32_t neighbour = 2;
   double error;
-  assert_int_equal(qmat_patch_fit_start(&c->context, &c->fit, &c->coverage, &c->complex, &c->collapse, merged,
-                                        &neighbour, others, POINTS, 0.05),
+  assert_int_equal(qmat_neighbourhood_fit_start(&c->context, &c->fit, &c->to_envelope, &c->complex, &c->collapse,
+                                                merged, &neighbour, others, POINTS, 0.05),
                    QMAT_OK);
-  qmat_patch_fit_run(&c->fit, &c->complex, false, &error);
+  qmat_neighbourhood_fit_run(&c->fit, &c->complex, false, &error);
   return error;
 }
 
@@ -90,7 +90,7 @@ static void test_two_spheres_fit_a_capsule_which_one_does_not(void **state) {
   make_chain(&c, SPHERES);
   assert_true(fit(&c, 0) > 0.05); /* the wrong sphere stays */
   double error = fit(&c, 1);
-  for (int i = 0; i < 3; i++) qmat_patch_fit_run(&c.fit, &c.complex, false, &error);
+  for (int i = 0; i < 3; i++) qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
   assert_true(error < 1e-3);
   static const double expected[2][4] = {{0, 0, 0, 1}, {4, 0, 0, 1}};
   for (int i = 0; i < 2; i++)
@@ -108,8 +108,8 @@ static void test_places_get_what_is_asked_of_them(void **state) {
   /* F is 0.02 here, beside the capsule; it has to be 0. */
   static const double beside[3] = {2, 1.02, 0};
   double error, before;
-  assert_int_equal(qmat_patch_fit_add(&c.context, &c.fit, beside, QMAT_PLACE_INSIDE, 0), QMAT_OK);
-  qmat_patch_fit_run(&c.fit, &c.complex, false, &error);
+  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, beside, QMAT_PLACE_INSIDE, 0), QMAT_OK);
+  qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
   assert_true(error <= c.fit.held);
   assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], beside) <= 0);
   free_chain(&c);
@@ -120,8 +120,8 @@ static void test_places_get_what_is_asked_of_them(void **state) {
   static const double border[3] = {2, 0, 0.94};
   before = qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border);
   assert_true(before < -0.055);
-  assert_int_equal(qmat_patch_fit_add(&c.context, &c.fit, border, QMAT_PLACE_BORDER, 0.05), QMAT_OK);
-  qmat_patch_fit_run(&c.fit, &c.complex, false, &error);
+  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, border, QMAT_PLACE_BORDER, 0.05), QMAT_OK);
+  qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
   assert_true(error <= c.fit.held);
   assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border) >= -0.05);
   free_chain(&c);
@@ -133,7 +133,7 @@ static void test_again_is_no_worse(void **state) {
   make_chain(&c, SPHERES);
   const double first = fit(&c, 1);
   double second;
-  qmat_patch_fit_run(&c.fit, &c.complex, true, &second);
+  qmat_neighbourhood_fit_run(&c.fit, &c.complex, true, &second);
   assert_true(second <= first);
   free_chain(&c);
 }

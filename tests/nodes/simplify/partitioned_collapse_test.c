@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/collapse_in_parts.h"
+#include "nodes/simplify/partitioned_collapse.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -18,7 +18,7 @@
 #include "tests/shortage.h"
 
 /* A flat box with sides of 2 by 2 by 0.1, and its sheet: a square lattice of SIDE * SIDE spheres, not quite in the
- * middle, each cell two slabs. Of every sphere the places above and below on the box are control points. */
+ * middle, each cell two slabs. Of every sphere the places above and below on the box are constraint points. */
 enum { SIDE = 140, SPHERES = SIDE * SIDE, POINTS = 2 * SPHERES };
 
 static const double half_height = 0.05, limit = 0.004;
@@ -29,8 +29,8 @@ typedef struct sheet {
   qmat_surface *surface;
   qmat_medial *medial;
   double *spheres, *depths; /* unit frame */
-  qmat_control_points control;
-  qmat_simplification run;
+  qmat_constraint_points control;
+  qmat_decimation run;
 } sheet;
 
 static qmat_medial *make_medial(qmat_context *context) {
@@ -83,9 +83,9 @@ static void make_sheet(sheet *s) {
 
 /* The run before its first collapse. */
 static void start(sheet *s) {
-  qmat_control_points *c = &s->control;
+  qmat_constraint_points *c = &s->control;
   const double *points = c->points;
-  *c = (qmat_control_points){
+  *c = (qmat_constraint_points){
       .count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = c->points, .spacing = INFINITY};
   qmat_arena *arena = &s->context.arena;
   c->witnesses = qmat_arena_alloc(arena, POINTS, 3 * sizeof(uint32_t));
@@ -98,22 +98,22 @@ static void start(sheet *s) {
     c->weights[3 * (size_t)i] = 1;
     c->distances[i] = qmat_sphere_distance(&s->spheres[4 * (size_t)(i / 2)], &points[3 * (size_t)i]);
   }
-  s->run = (qmat_simplification){.context = &s->context,
-                                 .surface = s->surface,
-                                 .rules = {.limit = limit,
-                                           .share = 1,
-                                           .finest = limit,
-                                           .k = 1e-5,
-                                           .topology = QMAT_TOPOLOGY_GUARD,
-                                           .features = QMAT_FEATURES_SHARP,
-                                           .crease_share = 0.5,
-                                           .has_target = true,
-                                           .target_euler = 1}};
+  s->run = (qmat_decimation){.context = &s->context,
+                             .surface = s->surface,
+                             .rules = {.limit = limit,
+                                       .share = 1,
+                                       .finest = limit,
+                                       .k = 1e-5,
+                                       .topology = QMAT_TOPOLOGY_GUARD,
+                                       .features = QMAT_FEATURES_SHARP,
+                                       .crease_share = 0.5,
+                                       .has_target = true,
+                                       .target_euler = 1}};
   assert_int_equal(qmat_complex_init(&s->context, &s->run.complex, s->medial, s->spheres), QMAT_OK);
 }
 
 static void end(sheet *s) {
-  qmat_simplification_uninit(&s->run);
+  qmat_decimation_uninit(&s->run);
   qmat_context_uninit(&s->context);
   s->context = (qmat_context){.threads = 1};
 }
@@ -172,7 +172,7 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
   }
   for (size_t v = 0; v < c->vertex_count; v++) {
     const double depth = -qmat_surface_signed_distance(s->surface, &c->spheres[4 * v]);
-    assert_true(s->run.protrusion.depths[v] <= depth + 1e-9);
+    assert_true(s->run.to_surface.depths[v] <= depth + 1e-9);
     assert_true(c->spheres[4 * v + 3] - depth <= limit);
   }
   /* What is known of an edge's protrusion is true all along it. */
@@ -182,12 +182,12 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
       for (size_t k = 0; k < 4; k++)
         sphere[k] = (1 - 0.25 * i) * c->spheres[4 * (size_t)c->edges[2 * e] + k] +
                     0.25 * i * c->spheres[4 * (size_t)c->edges[2 * e + 1] + k];
-      const double protrusion = sphere[3] + qmat_surface_signed_distance(s->surface, sphere);
-      assert_true(protrusion <= s->run.protrusion.edge_bounds[e] + 1e-9);
-      assert_true(protrusion <= limit);
+      const double to_surface = sphere[3] + qmat_surface_signed_distance(s->surface, sphere);
+      assert_true(to_surface <= s->run.to_surface.edge_bounds[e] + 1e-9);
+      assert_true(to_surface <= limit);
     }
   /* It goes on from there. */
-  assert_int_equal(qmat_simplification_run(&s->run), QMAT_OK);
+  assert_int_equal(qmat_decimation_run(&s->run), QMAT_OK);
   assert_true(s->run.complex.live_vertices < 40);
   end(s);
 }
@@ -242,8 +242,8 @@ static void test_spheres_in_one_place_are_one_part(void **state) {
 static void test_what_depends_on_the_order_is_not_done_in_parts(void **state) {
   sheet *s = *state;
   start(s);
-  qmat_simplification_rules *rules = &s->run.rules;
-  const qmat_simplification_rules good = *rules;
+  qmat_decimation_rules *rules = &s->run.rules;
+  const qmat_decimation_rules good = *rules;
   qmat_complex *c = &s->run.complex;
   assert_true(qmat_can_collapse_in_parts(rules, c));
   rules->on_exceed = QMAT_EXCEED_RAISE;

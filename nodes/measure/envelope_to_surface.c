@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/protrusion.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -145,12 +145,12 @@ static bool search_piece(search *s, const piece *p, int level) {
   return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
 }
 
-double qmat_protrusion_of_sphere(const qmat_surface *surface, const double sphere[4]) {
+double qmat_envelope_to_surface_of_sphere(const qmat_surface *surface, const double sphere[4]) {
   return sphere[3] + qmat_surface_signed_distance(surface, sphere);
 }
 
-double qmat_protrusion_bound(const qmat_surface *surface, const double *const spheres[], int count, double enough,
-                             double tolerance) {
+double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double *const spheres[], int count,
+                                      double enough, double tolerance) {
   piece p = {.count = count};
   search s = {.surface = surface,
               .content = enough,
@@ -172,19 +172,20 @@ double qmat_protrusion_bound(const qmat_surface *surface, const double *const sp
  */
 static const double lattice_share = 0.5, widest_spacing = 0.005;
 
-qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrusion, const qmat_surface *surface,
-                                 const qmat_complex *complex, const double *depths, double limit) {
-  *protrusion = (qmat_protrusion){.limit = limit};
+qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_to_surface *to_surface,
+                                          const qmat_surface *surface, const qmat_complex *complex,
+                                          const double *depths, double limit) {
+  *to_surface = (qmat_envelope_to_surface){.limit = limit};
   const double spacing = limit < INFINITY ? lattice_share * limit : widest_spacing;
-  const qmat_status status = qmat_depth_lattice_init(context, &protrusion->lattice, surface,
+  const qmat_status status = qmat_depth_lattice_init(context, &to_surface->lattice, surface,
                                                      spacing < widest_spacing ? spacing : widest_spacing);
   if (status != QMAT_OK) return status;
-  protrusion->depths = qmat_alloc(complex->vertex_count, sizeof(double));
-  protrusion->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
-  protrusion->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
-  if (!protrusion->depths || !protrusion->edge_bounds || !protrusion->triangle_bounds)
+  to_surface->depths = qmat_alloc(complex->vertex_count, sizeof(double));
+  to_surface->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
+  to_surface->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
+  if (!to_surface->depths || !to_surface->edge_bounds || !to_surface->triangle_bounds)
     return qmat_fail_memory(context, "protrusion bounds");
-  memcpy(protrusion->depths, depths, complex->vertex_count * sizeof *depths);
+  memcpy(to_surface->depths, depths, complex->vertex_count * sizeof *depths);
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads)
   for (size_t i = 0; i < complex->edge_count + complex->triangle_count; i++) {
@@ -196,64 +197,65 @@ qmat_status qmat_protrusion_init(qmat_context *context, qmat_protrusion *protrus
       memcpy(p.spheres[k], &complex->spheres[4 * v], sizeof p.spheres[k]);
       p.depths[k] = depths[v];
     }
-    *(is_edge ? &protrusion->edge_bounds[id] : &protrusion->triangle_bounds[id]) = bound_from_corners(&p);
+    *(is_edge ? &to_surface->edge_bounds[id] : &to_surface->triangle_bounds[id]) = bound_from_corners(&p);
   }
   return QMAT_OK;
 }
 
-void qmat_protrusion_uninit(qmat_protrusion *protrusion) {
-  qmat_depth_lattice_uninit(&protrusion->lattice);
-  qmat_free(protrusion->depths);
-  qmat_free(protrusion->edge_bounds);
-  qmat_free(protrusion->triangle_bounds);
-  qmat_free(protrusion->new_edge_bounds);
-  qmat_free(protrusion->new_triangle_bounds);
-  *protrusion = (qmat_protrusion){0};
+void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *to_surface) {
+  qmat_depth_lattice_uninit(&to_surface->lattice);
+  qmat_free(to_surface->depths);
+  qmat_free(to_surface->edge_bounds);
+  qmat_free(to_surface->triangle_bounds);
+  qmat_free(to_surface->new_edge_bounds);
+  qmat_free(to_surface->new_triangle_bounds);
+  *to_surface = (qmat_envelope_to_surface){0};
 }
 
 /* Asks for what the tests of a star read, all at once. */
-static void fetch_bounds(const qmat_protrusion *protrusion, const qmat_complex *complex, const qmat_collapse *c) {
+static void fetch_bounds(const qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+                         const qmat_collapse *c) {
   for (size_t t = 0; t < c->triangle_count; t++) {
-    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->kept_triangles[t]]);
-    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&protrusion->triangle_bounds[c->removed_triangles[t]]);
+    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&to_surface->triangle_bounds[c->kept_triangles[t]]);
+    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&to_surface->triangle_bounds[c->removed_triangles[t]]);
   }
   for (size_t n = 0; n < c->neighbour_count; n++) {
-    __builtin_prefetch(&protrusion->depths[c->neighbours[n]]);
+    __builtin_prefetch(&to_surface->depths[c->neighbours[n]]);
     __builtin_prefetch(&complex->spheres[4 * (size_t)c->neighbours[n]]);
-    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->kept_edges[n]]);
-    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&protrusion->edge_bounds[c->removed_edges[n]]);
+    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&to_surface->edge_bounds[c->kept_edges[n]]);
+    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&to_surface->edge_bounds[c->removed_edges[n]]);
   }
 }
 
-bool qmat_protrusion_test_sphere(qmat_protrusion *protrusion, const qmat_complex *complex,
-                                 const qmat_collapse *collapse, const double sphere[4]) {
+bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+                                          const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   double depth = -INFINITY, gap;
-  fetch_bounds(protrusion, complex, collapse);
+  fetch_bounds(to_surface, complex, collapse);
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    depth = maximum(depth, protrusion->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
-  if (!(depth > 0 && sphere[3] - depth <= protrusion->limit)) {
-    const double near = qmat_depth_lattice_near(&protrusion->lattice, sphere, &gap);
+    depth = maximum(depth, to_surface->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
+  if (!(depth > 0 && sphere[3] - depth <= to_surface->limit)) {
+    const double near = qmat_depth_lattice_near(&to_surface->lattice, sphere, &gap);
     depth = maximum(depth, near - gap);
-    if (!(depth > 0 && sphere[3] - depth <= protrusion->limit))
-      depth = qmat_depth_lattice_exact_near(&protrusion->lattice, sphere, near, gap);
+    if (!(depth > 0 && sphere[3] - depth <= to_surface->limit))
+      depth = qmat_depth_lattice_exact_near(&to_surface->lattice, sphere, near, gap);
   }
-  protrusion->sphere_depth = depth;
-  return depth > 0 && sphere[3] - depth <= protrusion->limit;
+  to_surface->sphere_depth = depth;
+  return depth > 0 && sphere[3] - depth <= to_surface->limit;
 }
 
-bool qmat_protrusion_test_midpoints(qmat_protrusion *protrusion, const qmat_complex *complex,
-                                    const qmat_collapse *collapse, const double sphere[4]) {
+bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+                                             const qmat_collapse *collapse, const double sphere[4]) {
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
     if (sphere[3] == 0 && other[3] == 0) continue; /* a crease, which lies on the surface */
     const double half = 0.5 * distance(sphere, other);
-    if (half < protrusion->sphere_depth || half < protrusion->depths[collapse->neighbours[n]]) continue;
+    if (half < to_surface->sphere_depth || half < to_surface->depths[collapse->neighbours[n]]) continue;
     double middle[3], gap;
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
-    const double near = qmat_depth_lattice_near(&protrusion->lattice, middle, &gap);
+    const double near = qmat_depth_lattice_near(&to_surface->lattice, middle, &gap);
     if (near > gap) continue;
-    if (near < -gap || !qmat_surface_inside(protrusion->lattice.surface, middle)) return false;
+    if (near < -gap || !qmat_surface_inside(to_surface->lattice.surface, middle)) return false;
   }
   return true;
 }
@@ -266,32 +268,33 @@ static double growth(const double *from, const double *to) {
 /* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
 static const double content_share = 0.8, smallest_share = 0.15;
 
-qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrusion, const qmat_complex *complex,
-                                 const qmat_collapse *collapse, const double sphere[4], bool *kept) {
-  if (qmat_grow((void **)&protrusion->new_edge_bounds, &protrusion->new_edge_capacity, collapse->neighbour_count,
+qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_to_surface *to_surface,
+                                          const qmat_complex *complex, const qmat_collapse *collapse,
+                                          const double sphere[4], bool *kept) {
+  if (qmat_grow((void **)&to_surface->new_edge_bounds, &to_surface->new_edge_capacity, collapse->neighbour_count,
                 sizeof(double)) ||
-      qmat_grow((void **)&protrusion->new_triangle_bounds, &protrusion->new_triangle_capacity, collapse->triangle_count,
+      qmat_grow((void **)&to_surface->new_triangle_bounds, &to_surface->new_triangle_capacity, collapse->triangle_count,
                 sizeof(double)))
     return qmat_fail_memory(context, "protrusion bounds");
   const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
   const double removed_growth =
       collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
-  search s = {.lattice = &protrusion->lattice,
-              .content = content_share * protrusion->limit,
-              .limit = protrusion->limit,
-              .smallest = smallest_share * protrusion->limit,
+  search s = {.lattice = &to_surface->lattice,
+              .content = content_share * to_surface->limit,
+              .limit = to_surface->limit,
+              .smallest = smallest_share * to_surface->limit,
               .tolerance = 0};
   piece p;
   memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
-  p.depths[0] = protrusion->sphere_depth;
+  p.depths[0] = to_surface->sphere_depth;
   *kept = true;
   for (size_t t = 0; t < collapse->triangle_count + collapse->neighbour_count && *kept; t++) {
     const bool is_edge = t >= collapse->triangle_count;
     const size_t id = is_edge ? t - collapse->triangle_count : t;
     const uint32_t mine = is_edge ? collapse->kept_edges[id] : collapse->kept_triangles[id];
     const uint32_t theirs = is_edge ? collapse->removed_edges[id] : collapse->removed_triangles[id];
-    const double *bounds = is_edge ? protrusion->edge_bounds : protrusion->triangle_bounds;
-    double *result = is_edge ? &protrusion->new_edge_bounds[id] : &protrusion->new_triangle_bounds[id];
+    const double *bounds = is_edge ? to_surface->edge_bounds : to_surface->triangle_bounds;
+    double *result = is_edge ? &to_surface->new_edge_bounds[id] : &to_surface->new_triangle_bounds[id];
     double bound = INFINITY;
     if (mine != QMAT_NONE) bound = bounds[mine] + kept_growth;
     if (theirs != QMAT_NONE) bound = minimum(bound, bounds[theirs] + removed_growth);
@@ -299,58 +302,58 @@ qmat_status qmat_protrusion_test(qmat_context *context, qmat_protrusion *protrus
     for (int k = 1; k < p.count; k++) {
       const uint32_t v = is_edge ? collapse->neighbours[id] : collapse->triangle_pairs[2 * id + (size_t)k - 1];
       memcpy(p.spheres[k], &complex->spheres[4 * (size_t)v], sizeof p.spheres[k]);
-      p.depths[k] = protrusion->depths[v];
+      p.depths[k] = to_surface->depths[v];
     }
     bound = minimum(bound, bound_from_corners(&p));
     if (is_edge) /* an edge of a triangle is as good as the triangle */
-      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > protrusion->limit; i++)
+      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > to_surface->limit; i++)
         if (collapse->triangle_pairs[i] == collapse->neighbours[id])
-          bound = minimum(bound, protrusion->new_triangle_bounds[i / 2]);
-    if (bound > protrusion->limit) {
+          bound = minimum(bound, to_surface->new_triangle_bounds[i / 2]);
+    if (bound > to_surface->limit) {
       s.found = s.bound = -INFINITY;
       memcpy(s.place, sphere, sizeof s.place);
       *kept = search_piece(&s, &p, 0);
       bound = s.bound;
-      protrusion->failed = maximum(s.found, protrusion->limit);
-      memcpy(protrusion->failed_place, s.place, sizeof s.place);
+      to_surface->failed = maximum(s.found, to_surface->limit);
+      memcpy(to_surface->failed_place, s.place, sizeof s.place);
     }
     *result = bound;
   }
   return QMAT_OK;
 }
 
-void qmat_protrusion_commit(qmat_protrusion *protrusion, const qmat_collapse *collapse) {
-  protrusion->depths[collapse->kept] = protrusion->sphere_depth;
+void qmat_envelope_to_surface_commit(qmat_envelope_to_surface *to_surface, const qmat_collapse *collapse) {
+  to_surface->depths[collapse->kept] = to_surface->sphere_depth;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const uint32_t edge = collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
-    protrusion->edge_bounds[edge] = protrusion->new_edge_bounds[n];
+    to_surface->edge_bounds[edge] = to_surface->new_edge_bounds[n];
   }
   for (size_t t = 0; t < collapse->triangle_count; t++) {
     const uint32_t triangle =
         collapse->kept_triangles[t] != QMAT_NONE ? collapse->kept_triangles[t] : collapse->removed_triangles[t];
-    protrusion->triangle_bounds[triangle] = protrusion->new_triangle_bounds[t];
+    to_surface->triangle_bounds[triangle] = to_surface->new_triangle_bounds[t];
   }
 }
 
-void qmat_protrusion_bound_edge(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
-                                double bound) {
-  double *known = &protrusion->edge_bounds[qmat_complex_find_edge(complex, a, b)];
+void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *to_surface, const qmat_complex *complex, uint32_t a,
+                                         uint32_t b, double bound) {
+  double *known = &to_surface->edge_bounds[qmat_complex_find_edge(complex, a, b)];
   *known = minimum(*known, bound);
 }
 
-void qmat_protrusion_bound_triangle(qmat_protrusion *protrusion, const qmat_complex *complex, uint32_t a, uint32_t b,
-                                    uint32_t c, double bound) {
-  double *known = &protrusion->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
+void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+                                             uint32_t a, uint32_t b, uint32_t c, double bound) {
+  double *known = &to_surface->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
   *known = minimum(*known, bound);
 }
 
-double qmat_protrusion_largest_bound(const qmat_protrusion *protrusion, const qmat_complex *complex) {
+double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *to_surface, const qmat_complex *complex) {
   double largest = 0;
   for (size_t v = 0; v < complex->vertex_count; v++)
-    if (complex->vertex_alive[v]) largest = maximum(largest, complex->spheres[4 * v + 3] - protrusion->depths[v]);
+    if (complex->vertex_alive[v]) largest = maximum(largest, complex->spheres[4 * v + 3] - to_surface->depths[v]);
   for (size_t e = 0; e < complex->edge_count; e++)
-    if (complex->edge_alive[e]) largest = maximum(largest, protrusion->edge_bounds[e]);
+    if (complex->edge_alive[e]) largest = maximum(largest, to_surface->edge_bounds[e]);
   for (size_t t = 0; t < complex->triangle_count; t++)
-    if (complex->triangle_alive[t]) largest = maximum(largest, protrusion->triangle_bounds[t]);
+    if (complex->triangle_alive[t]) largest = maximum(largest, to_surface->triangle_bounds[t]);
   return largest;
 }

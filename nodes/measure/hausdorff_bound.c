@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/cover.h"
+#include "nodes/measure/hausdorff_bound.h"
 
 #include <math.h>
 #include <string.h>
@@ -13,7 +13,7 @@ typedef struct facet_search {
   const qmat_envelope *envelope;
   const double *spheres;
   double tolerance;
-  double found, bound; /* the largest F found, and the largest bound of a finished piece */
+  double found, bound;          /* the largest F found, and the largest bound of a finished piece */
   double worst, worst_point[3]; /* the largest F found on this facet */
 } facet_search;
 
@@ -75,17 +75,17 @@ static void search_piece(facet_search *search, double corners[3][3]) {
   search_piece(search, high);
 }
 
-qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surface, const qmat_envelope *envelope,
-                               const double *spheres, double known, double tolerance, double threshold,
-                               qmat_cover *cover) {
+qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surface *surface,
+                                         const qmat_envelope *envelope, const double *spheres, double known,
+                                         double tolerance, double threshold, qmat_hausdorff_bound *result) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
   const size_t count = mesh->triangle_count, slice = 1 << 12;
-  *cover = (qmat_cover){.found = known, .bound = known};
-  cover->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *cover->points);
-  cover->facets = qmat_arena_alloc(&context->arena, count, sizeof *cover->facets);
+  *result = (qmat_hausdorff_bound){.found = known, .bound = known};
+  result->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *result->points);
+  result->facets = qmat_arena_alloc(&context->arena, count, sizeof *result->facets);
   double *worst = qmat_arena_alloc(&context->arena, count, sizeof *worst);
-  if (!cover->points || !cover->facets || !worst) return qmat_fail_memory(context, "the cover");
+  if (!result->points || !result->facets || !worst) return qmat_fail_memory(context, "the Hausdorff bound");
   const int threads = qmat_threads(context);
   double bound = known;
   for (size_t first = 0; first < count; first += slice) {
@@ -106,15 +106,15 @@ qmat_status qmat_cover_measure(qmat_context *context, const qmat_surface *surfac
       search_piece(&search, corners);
       bound = fmax(bound, search.bound);
       worst[t] = search.worst;
-      memcpy(&cover->points[3 * t], search.worst_point, sizeof search.worst_point);
+      memcpy(&result->points[3 * t], search.worst_point, sizeof search.worst_point);
     }
   }
   for (size_t t = 0; t < count; t++) {
-    cover->found = fmax(cover->found, worst[t]);
+    result->found = fmax(result->found, worst[t]);
     if (!(worst[t] > threshold)) continue;
-    memmove(&cover->points[3 * cover->count], &cover->points[3 * t], 3 * sizeof *cover->points);
-    cover->facets[cover->count++] = (uint32_t)t;
+    memmove(&result->points[3 * result->count], &result->points[3 * t], 3 * sizeof *result->points);
+    result->facets[result->count++] = (uint32_t)t;
   }
-  cover->bound = bound;
+  result->bound = bound;
   return QMAT_OK;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_SIMPLIFY_HOLLOW_FILLING_H
-#define QMAT_NODES_SIMPLIFY_HOLLOW_FILLING_H
+#ifndef QMAT_NODES_SIMPLIFY_CAVITY_FILLING_H
+#define QMAT_NODES_SIMPLIFY_CAVITY_FILLING_H
 
 #include "core/geometry/surface.h"
 
@@ -11,7 +11,7 @@
  * `places`: 3 * count, unit frame, inside the solid; those that no such sphere fits are left. `*added`: how many
  * spheres, 0 after a failure. QMAT_ERROR_MEMORY, which leaves the medial mesh as it was. One thread. Cost: places by
  * spheres, and for each place up to 32 bounds of how far a cone protrudes. */
-qmat_status qmat_hollows_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
-                              double epsilon, qmat_medial *medial, size_t *added);
+qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
+                               double epsilon, qmat_medial *medial, size_t *added);
 
 #endif

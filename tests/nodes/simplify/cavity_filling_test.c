@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/hollow_filling.h"
+#include "nodes/simplify/cavity_filling.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -11,9 +11,9 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
-#include "nodes/simplify/collapse_chain.h"
+#include "nodes/measure/envelope_to_surface.h"
 #include "nodes/measure/medial_errors.h"
-#include "nodes/measure/protrusion.h"
+#include "nodes/simplify/collapse_chain.h"
 #include "tests/nodes/pipeline.h"
 
 /* A bar of 3 x 1 x 1 with a medial sphere near each end, and its unit frame's scale. */
@@ -50,7 +50,7 @@ static void free_bar(bar *b) {
 
 static size_t fill(bar *b, const double *places, size_t count) {
   size_t added = 99;
-  assert_int_equal(qmat_hollows_fill(&b->context, b->surface, places, count, epsilon, b->medial, &added), QMAT_OK);
+  assert_int_equal(qmat_cavities_fill(&b->context, b->surface, places, count, epsilon, b->medial, &added), QMAT_OK);
   return added;
 }
 
@@ -67,7 +67,7 @@ static void test_the_middle_of_a_bar_by_hand(void **state) {
   assert_near(m->spheres[11], 0.5 * b.scale + 0.9 * epsilon, 1e-12);
   /* The cone to the nearer end leaves the bar most at the new sphere. */
   const double *const ends[2] = {&m->spheres[4], &m->spheres[8]};
-  assert_near(qmat_protrusion_bound(b.surface, ends, 2, 0, 1e-6), 0.9 * epsilon, 1e-6);
+  assert_near(qmat_envelope_to_surface_bound(b.surface, ends, 2, 0, 1e-6), 0.9 * epsilon, 1e-6);
   assert_int_equal(m->edge_count, 1);
   assert_int_equal(m->edges[0], 1);
   assert_int_equal(m->edges[1], 2);
@@ -102,7 +102,7 @@ static void test_places_that_nothing_fits_are_left(void **state) {
   assert_int_equal(qmat_medial_set_simplices(&context, medial, NULL, 0, NULL, 0), QMAT_OK);
   size_t added;
   assert_true(-qmat_surface_signed_distance(surface, place) > 0);
-  assert_int_equal(qmat_hollows_fill(&context, surface, place, 1, epsilon, medial, &added), QMAT_OK);
+  assert_int_equal(qmat_cavities_fill(&context, surface, place, 1, epsilon, medial, &added), QMAT_OK);
   assert_int_equal(added, 0);
   assert_int_equal(medial->sphere_count, 1);
   qmat_value_release(&medial->base);
@@ -112,29 +112,30 @@ static void test_places_that_nothing_fits_are_left(void **state) {
 }
 
 /* The notch that is found in the corners of a bar's envelope is filled, in a few steps, within epsilon. */
-static void test_hollows_are_found_and_filled(void **state) {
+static void test_cavities_are_found_and_filled(void **state) {
   (void)state;
   bar b;
   make_bar(&b, false);
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double wide = 0.1; /* what the corners of the bar need */
   assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
-  assert_true(errors.hollow_count > 0);
+  assert_true(errors.cavity_count > 0);
   assert_true(errors.boundary_to_surface > wide);
-  for (int i = 0; i < 8 && errors.hollow_count > 0; i++) {
+  for (int i = 0; i < 8 && errors.cavity_count > 0; i++) {
     size_t added;
     assert_int_equal(
-        qmat_hollows_fill(&b.context, b.surface, errors.hollows, errors.hollow_count, wide, b.medial, &added), QMAT_OK);
+        qmat_cavities_fill(&b.context, b.surface, errors.cavities, errors.cavity_count, wide, b.medial, &added),
+        QMAT_OK);
     assert_true(added > 0);
     qmat_medial_errors_uninit(&errors);
     assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
   }
-  assert_int_equal(errors.hollow_count, 0);
+  assert_int_equal(errors.cavity_count, 0);
   assert_true(errors.boundary_to_surface <= wide);
   for (size_t e = 0; e < b.medial->edge_count; e++) {
     const double *const ends[2] = {&b.medial->spheres[4 * (size_t)b.medial->edges[2 * e]],
                                    &b.medial->spheres[4 * (size_t)b.medial->edges[2 * e + 1]]};
-    assert_true(qmat_protrusion_bound(b.surface, ends, 2, 0, 1e-5) <= wide + 1e-5);
+    assert_true(qmat_envelope_to_surface_bound(b.surface, ends, 2, 0, 1e-5) <= wide + 1e-5);
   }
   qmat_medial_errors_uninit(&errors);
   free_bar(&b);
@@ -144,7 +145,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_middle_of_a_bar_by_hand),
       cmocka_unit_test(test_places_that_nothing_fits_are_left),
-      cmocka_unit_test(test_hollows_are_found_and_filled),
+      cmocka_unit_test(test_cavities_are_found_and_filled),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

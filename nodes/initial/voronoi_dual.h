@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_INITIAL_MEDIAL_DUAL_H
-#define QMAT_NODES_INITIAL_MEDIAL_DUAL_H
+#ifndef QMAT_NODES_INITIAL_VORONOI_DUAL_H
+#define QMAT_NODES_INITIAL_VORONOI_DUAL_H
 
-#include "core/node.h"
 #include "core/geometry/surface.h"
+#include "core/node.h"
 
 typedef enum { QMAT_COMPLETION_THIN, QMAT_COMPLETION_ALL } qmat_completion;
 typedef enum { QMAT_RADIUS_DISTANCE, QMAT_RADIUS_CIRCUMRADIUS } qmat_radius_rule;

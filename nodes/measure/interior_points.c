@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/inner_points.h"
+#include "nodes/measure/interior_points.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -70,10 +70,10 @@ static void enter_sphere(const double *sphere, uint32_t vertex, double depth, do
       }
 }
 
-qmat_status qmat_inner_points_find(qmat_context *context, const qmat_complex *complex, double depth,
-                                   qmat_inner_points *inner) {
+qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex *complex, double depth,
+                                      qmat_interior_points *inner) {
   qmat_arena *arena = &context->arena;
-  *inner = (qmat_inner_points){.count = 0};
+  *inner = (qmat_interior_points){.count = 0};
   double low = INFINITY, high = -INFINITY;
   for (size_t v = 0; v < complex->vertex_count; v++) {
     const double *s = &complex->spheres[4 * v];
@@ -89,7 +89,7 @@ qmat_status qmat_inner_points_find(qmat_context *context, const qmat_complex *co
   const placed_sphere *placed = place_spheres(context, complex, depth, low, extent, &count);
   float *depths = qmat_arena_calloc(arena, nodes, sizeof *depths);
   uint32_t *owners = qmat_arena_alloc(arena, nodes, sizeof *owners);
-  if (!placed || !depths || !owners) return qmat_fail_memory(context, "inner points");
+  if (!placed || !depths || !owners) return qmat_fail_memory(context, "interior points");
   for (size_t i = 0; i < count; i++)
     enter_sphere(&complex->spheres[4 * (size_t)placed[i].vertex], placed[i].vertex, depth, low, spacing, along, depths,
                  owners);
@@ -100,7 +100,7 @@ qmat_status qmat_inner_points_find(qmat_context *context, const qmat_complex *co
   inner->distances = qmat_arena_alloc(arena, inner->count, sizeof *inner->distances);
   inner->limits = qmat_arena_alloc(arena, inner->count, sizeof *inner->limits);
   if (!inner->points || !inner->spheres || !inner->distances || !inner->limits)
-    return qmat_fail_memory(context, "inner points");
+    return qmat_fail_memory(context, "interior points");
   size_t next = 0;
   for (size_t i = 0; i < count; i++) {
     const double *sphere = &complex->spheres[4 * (size_t)placed[i].vertex];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/coverage.h"
+#include "nodes/measure/surface_to_envelope.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -11,7 +11,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_build.h"
-#include "nodes/measure/control_points.h"
+#include "nodes/measure/constraint_points.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
@@ -23,7 +23,7 @@
 typedef struct {
   qmat_context context;
   qmat_complex complex;
-  qmat_coverage coverage;
+  qmat_surface_to_envelope to_envelope;
   qmat_collapse collapse;
 } chain;
 
@@ -42,14 +42,15 @@ static void make_chain(chain *c, double *limits) {
   for (uint32_t i = 0; i < LINKS; i++) edges[2 * i] = i, edges[2 * i + 1] = i + 1;
   assert_int_equal(qmat_medial_set_simplices(&c->context, medial, edges, LINKS, NULL, 0), QMAT_OK);
   assert_int_equal(qmat_complex_init(&c->context, &c->complex, medial, NULL), QMAT_OK);
-  assert_int_equal(qmat_coverage_init(&c->context, &c->coverage, POINTS, points, limits, witnesses, weights, LINKS + 1),
+  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->to_envelope, POINTS, points, limits, witnesses,
+                                                 weights, LINKS + 1),
                    QMAT_OK);
   qmat_value_release(&medial->base);
 }
 
 static void free_chain(chain *c) {
   qmat_collapse_uninit(&c->collapse);
-  qmat_coverage_uninit(&c->coverage);
+  qmat_surface_to_envelope_uninit(&c->to_envelope);
   qmat_complex_uninit(&c->complex);
   qmat_context_uninit(&c->context);
 }
@@ -59,13 +60,14 @@ static bool try_merge(chain *c, uint32_t a, uint32_t b, const double sphere[4]) 
   assert_int_not_equal(edge, QMAT_NONE);
   assert_int_equal(qmat_complex_preview(&c->context, &c->complex, edge, &c->collapse), QMAT_OK);
   bool kept;
-  assert_int_equal(qmat_coverage_test(&c->context, &c->coverage, &c->complex, &c->collapse, sphere, QMAT_NONE, &kept),
-                   QMAT_OK);
+  assert_int_equal(
+      qmat_surface_to_envelope_test(&c->context, &c->to_envelope, &c->complex, &c->collapse, sphere, QMAT_NONE, &kept),
+      QMAT_OK);
   return kept;
 }
 
 static void merge(chain *c, const double sphere[4]) {
-  qmat_coverage_commit(&c->coverage, &c->collapse);
+  qmat_surface_to_envelope_commit(&c->to_envelope, &c->collapse);
   assert_int_equal(qmat_complex_collapse(&c->context, &c->complex, &c->collapse, sphere), QMAT_OK);
 }
 
@@ -79,11 +81,11 @@ static void test_witness_is_carried_along_while_it_holds(void **state) {
   assert_true(try_merge(&c, 3, 4, end));
   merge(&c, end);
   const uint32_t kept = c.collapse.kept;
-  assert_int_equal(c.coverage.witnesses[6], kept);
-  assert_int_equal(c.coverage.witnesses[7], QMAT_NONE);
-  assert_near(c.coverage.weights[6], 1, 0);
-  assert_int_equal(qmat_coverage_first(&c.coverage, kept) / 3, 2);
-  assert_int_equal(qmat_coverage_first(&c.coverage, c.collapse.removed), QMAT_NONE);
+  assert_int_equal(c.to_envelope.witnesses[6], kept);
+  assert_int_equal(c.to_envelope.witnesses[7], QMAT_NONE);
+  assert_near(c.to_envelope.weights[6], 1, 0);
+  assert_int_equal(qmat_surface_to_envelope_first(&c.to_envelope, kept) / 3, 2);
+  assert_int_equal(qmat_surface_to_envelope_first(&c.to_envelope, c.collapse.removed), QMAT_NONE);
   free_chain(&c);
 }
 
@@ -96,11 +98,11 @@ static void test_another_witness_is_searched_for_when_it_moves_away(void **state
   const double end[4] = {3, 0, 0, 1};
   assert_true(try_merge(&c, 2, 3, end));
   merge(&c, end);
-  const uint32_t *w = &c.coverage.witnesses[3];
+  const uint32_t *w = &c.to_envelope.witnesses[3];
   assert_true((w[0] == 1 || w[1] == 1) && (w[0] == c.collapse.kept || w[1] == c.collapse.kept));
   assert_int_equal(w[2], QMAT_NONE);
-  assert_near(c.coverage.weights[3], 0.5, 1e-12);
-  assert_near(c.coverage.weights[4], 0.5, 1e-12);
+  assert_near(c.to_envelope.weights[3], 0.5, 1e-12);
+  assert_near(c.to_envelope.weights[4], 0.5, 1e-12);
   free_chain(&c);
 }
 
@@ -111,9 +113,9 @@ static void test_point_that_nothing_reaches_refuses_and_is_named(void **state) {
   make_chain(&c, limits);
   const double shorter[4] = {3, 0, 0, 1}, thinner[4] = {2, 0, 0, 0.9}, thin_enough[4] = {2, 0, 0, 0.95};
   assert_false(try_merge(&c, 3, 4, shorter)); /* leaves the end of the chain: 0.45 from the point there */
-  assert_int_equal(c.coverage.failed_point, 2);
+  assert_int_equal(c.to_envelope.failed_point, 2);
   assert_false(try_merge(&c, 1, 2, thinner));
-  assert_int_equal(c.coverage.failed_point, 1);
+  assert_int_equal(c.to_envelope.failed_point, 1);
   limits[1] = 0.151;
   assert_true(try_merge(&c, 1, 2, thinner));
   limits[1] = 0.1001;
@@ -131,12 +133,14 @@ static void test_failed_point_is_tried_first(void **state) {
   bool kept;
   const double end[4] = {4, 0, 0, 1};
   assert_true(try_merge(&c, 3, 4, end));
-  assert_int_equal(qmat_coverage_test(&c.context, &c.coverage, &c.complex, &c.collapse, end, 0, &kept), QMAT_OK);
+  assert_int_equal(qmat_surface_to_envelope_test(&c.context, &c.to_envelope, &c.complex, &c.collapse, end, 0, &kept),
+                   QMAT_OK);
   assert_true(kept); /* a point whose witness the collapse does not touch does not decide about it */
   const double shorter[4] = {3, 0, 0, 1};
-  assert_int_equal(qmat_coverage_test(&c.context, &c.coverage, &c.complex, &c.collapse, shorter, 2, &kept), QMAT_OK);
+  assert_int_equal(
+      qmat_surface_to_envelope_test(&c.context, &c.to_envelope, &c.complex, &c.collapse, shorter, 2, &kept), QMAT_OK);
   assert_false(kept);
-  assert_int_equal(c.coverage.failed_point, 2);
+  assert_int_equal(c.to_envelope.failed_point, 2);
   free_chain(&c);
 }
 
@@ -147,8 +151,8 @@ typedef struct {
   qmat_context context;
   qmat_surface *surface;
   qmat_complex complex;
-  qmat_control_points control;
-  qmat_coverage coverage;
+  qmat_constraint_points control;
+  qmat_surface_to_envelope to_envelope;
   qmat_collapse collapse;
   double *limits;
 } model;
@@ -167,22 +171,23 @@ static void make_model(model *m, qmat_mesh *mesh, double epsilon, bool with_regi
   qmat_frame_spheres_to_unit(qmat_surface_frame(m->surface), medial->spheres, medial->sphere_count, spheres);
   assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
   qmat_free(spheres);
-  assert_int_equal(qmat_control_points_make(&m->context, m->surface, m->p.samples, medial, &m->complex, epsilon, 3000,
-                                            true, &m->control),
+  assert_int_equal(qmat_constraint_points_make(&m->context, m->surface, m->p.samples, medial, &m->complex, epsilon,
+                                               3000, true, &m->control),
                    QMAT_OK);
   m->limits = qmat_alloc(m->control.count, sizeof *m->limits);
   for (size_t i = 0; i < m->control.count; i++)
     m->limits[i] = i < m->control.surface_count ? fmax(epsilon, m->control.distances[i])
                                                 : m->control.inner_limits[i - m->control.surface_count];
-  assert_int_equal(qmat_coverage_init(&m->context, &m->coverage, m->control.count, m->control.points, m->limits,
-                                      m->control.witnesses, m->control.weights, m->complex.vertex_count),
-                   QMAT_OK);
+  assert_int_equal(
+      qmat_surface_to_envelope_init(&m->context, &m->to_envelope, m->control.count, m->control.points, m->limits,
+                                    m->control.witnesses, m->control.weights, m->complex.vertex_count),
+      QMAT_OK);
 }
 
 static void free_model(model *m) {
   qmat_free(m->limits);
   qmat_collapse_uninit(&m->collapse);
-  qmat_coverage_uninit(&m->coverage);
+  qmat_surface_to_envelope_uninit(&m->to_envelope);
   qmat_complex_uninit(&m->complex);
   qmat_surface_free(m->surface);
   qmat_context_uninit(&m->context);
@@ -191,12 +196,12 @@ static void free_model(model *m) {
 
 /* Every used slot is in exactly the list of its vertex; nothing else is in a list. */
 static void check_lists(const model *m) {
-  const qmat_coverage *c = &m->coverage;
+  const qmat_surface_to_envelope *c = &m->to_envelope;
   size_t used = 0, listed = 0;
   for (size_t slot = 0; slot < 3 * c->point_count; slot++) used += c->witnesses[slot] != QMAT_NONE;
   for (uint32_t v = 0; v < m->complex.vertex_count; v++) {
     uint32_t previous = QMAT_NONE;
-    for (uint32_t slot = qmat_coverage_first(c, v); slot != QMAT_NONE; slot = c->next[slot]) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(c, v); slot != QMAT_NONE; slot = c->next[slot]) {
       assert_true(slot < 3 * c->point_count);
       assert_int_equal(c->witnesses[slot], v);
       assert_int_equal(c->previous[slot], previous);
@@ -222,8 +227,8 @@ static bool is_live_triangle(const qmat_complex *complex, const uint32_t *corner
 
 /* F at the point's witness, after a look at whether that is one. */
 static double checked_witness(const model *m, size_t point) {
-  const uint32_t *w = &m->coverage.witnesses[3 * point];
-  const double *share = &m->coverage.weights[3 * point];
+  const uint32_t *w = &m->to_envelope.witnesses[3 * point];
+  const double *share = &m->to_envelope.weights[3 * point];
   double sum = 0, sphere[4] = {0, 0, 0, 0};
   int corners = 0;
   while (corners < 3 && w[corners] != QMAT_NONE) corners++;
@@ -243,7 +248,7 @@ static double checked_witness(const model *m, size_t point) {
   assert_near(sum, 1, ROUNDING);
   if (corners == 2) assert_int_not_equal(qmat_complex_find_edge(&m->complex, w[0], w[1]), QMAT_NONE);
   if (corners == 3) assert_true(is_live_triangle(&m->complex, w));
-  return qmat_sphere_distance(sphere, &m->coverage.points[3 * point]);
+  return qmat_sphere_distance(sphere, &m->to_envelope.points[3 * point]);
 }
 
 /* The envelope of what is alive. */
@@ -296,8 +301,8 @@ static uint32_t random_live_edge(random_numbers *random, const qmat_complex *com
 /* Whether every point of the collapse's two regions is within its limit of the new complex, by asking all of it. */
 static void check_refusal(model *m, const double sphere[4]) {
   const uint32_t kept = m->collapse.kept, removed = m->collapse.removed;
-  const double *point = &m->control.points[3 * (size_t)m->coverage.failed_point];
-  const double limit = m->limits[m->coverage.failed_point];
+  const double *point = &m->control.points[3 * (size_t)m->to_envelope.failed_point];
+  const double limit = m->limits[m->to_envelope.failed_point];
   /* The failed point is out of reach of the merged sphere and of the link's untouched edges at least. */
   assert_true(qmat_sphere_distance(sphere, point) > limit);
   for (size_t n = 0; n < m->collapse.neighbour_count; n++) {
@@ -311,7 +316,7 @@ static void check_refusal(model *m, const double sphere[4]) {
   }
   bool served = false;
   for (size_t k = 0; k < 3; k++) {
-    const uint32_t v = m->coverage.witnesses[3 * (size_t)m->coverage.failed_point + k];
+    const uint32_t v = m->to_envelope.witnesses[3 * (size_t)m->to_envelope.failed_point + k];
     served |= v == kept || v == removed;
   }
   assert_true(served);
@@ -334,7 +339,8 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least, size_t che
     sphere[3] = fmax(sphere[3], 0);
     bool kept;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
-    assert_int_equal(qmat_coverage_test(&m->context, &m->coverage, &m->complex, &m->collapse, sphere, QMAT_NONE, &kept),
+    assert_int_equal(qmat_surface_to_envelope_test(&m->context, &m->to_envelope, &m->complex, &m->collapse, sphere,
+                                                   QMAT_NONE, &kept),
                      QMAT_OK);
     if (!kept) {
       if (refused++ % 10 == 0) check_refusal(m, sphere);
@@ -342,7 +348,7 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least, size_t che
       continue;
     }
     idle = 0;
-    qmat_coverage_commit(&m->coverage, &m->collapse);
+    qmat_surface_to_envelope_commit(&m->to_envelope, &m->collapse);
     assert_int_equal(qmat_complex_collapse(&m->context, &m->complex, &m->collapse, sphere), QMAT_OK);
     if (++collapses % every == 0 && checked < 2 * checks) {
       check(m);
@@ -387,7 +393,7 @@ static void test_without_limits_everything_may_collapse(void **state) {
     const double *a = &m.complex.spheres[4 * (size_t)m.complex.edges[2 * (size_t)edge]];
     const double sphere[4] = {a[0], a[1], a[2], a[3]};
     assert_int_equal(qmat_complex_preview(&m.context, &m.complex, edge, &m.collapse), QMAT_OK);
-    qmat_coverage_commit(&m.coverage, &m.collapse); /* of no test at all */
+    qmat_surface_to_envelope_commit(&m.to_envelope, &m.collapse); /* of no test at all */
     assert_int_equal(qmat_complex_collapse(&m.context, &m.complex, &m.collapse, sphere), QMAT_OK);
   }
   check_lists(&m);

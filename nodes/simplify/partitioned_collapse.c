@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/collapse_in_parts.h"
+#include "nodes/simplify/partitioned_collapse.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -13,13 +13,13 @@ enum { MOST_IN_A_PART = 1 << 14 };
 /* Of the vertices of a part this share is left. */
 static const double left_share = 0.25;
 
-static bool has_features(const qmat_simplification_rules *rules, const qmat_complex *complex) {
+static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex) {
   for (size_t v = 0; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
     if (complex->spheres[4 * v + 3] == 0) return true;
   return false;
 }
 
-bool qmat_can_collapse_in_parts(const qmat_simplification_rules *rules, const qmat_complex *complex) {
+bool qmat_can_collapse_in_parts(const qmat_decimation_rules *rules, const qmat_complex *complex) {
   return complex->vertex_count > MOST_IN_A_PART && rules->on_exceed == QMAT_EXCEED_SKIP &&
          rules->cost == QMAT_COST_SLAB && !rules->published && rules->protect == QMAT_PROTECT_OFF &&
          (double)rules->vertices <= left_share * (double)complex->vertex_count && !has_features(rules, complex);
@@ -43,8 +43,8 @@ typedef struct part_rest {
 
 typedef struct divided {
   qmat_context *context;
-  qmat_simplification *whole;
-  qmat_control_points *control;
+  qmat_decimation *whole;
+  qmat_constraint_points *control;
   double *depths; /* per vertex, and so on */
   size_t part_count;
   uint32_t *parts;        /* per vertex */
@@ -166,12 +166,12 @@ static uint32_t *renumber(qmat_arena *arena, const divided *d, const part_rows *
   return own;
 }
 
-/* The control points that hang on the part alone. */
-static qmat_status take_points(qmat_context *context, const divided *d, size_t part, qmat_control_points *own) {
-  const qmat_control_points *all = d->control;
+/* The constraint points that hang on the part alone. */
+static qmat_status take_points(qmat_context *context, const divided *d, size_t part, qmat_constraint_points *own) {
+  const qmat_constraint_points *all = d->control;
   const size_t first = d->points.starts[part];
   qmat_arena *arena = &context->arena;
-  *own = (qmat_control_points){.count = d->points.starts[part + 1] - first, .spacing = all->spacing};
+  *own = (qmat_constraint_points){.count = d->points.starts[part + 1] - first, .spacing = all->spacing};
   const uint32_t *items = &d->points.items[first];
   own->points = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
   own->weights = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
@@ -179,7 +179,7 @@ static qmat_status take_points(qmat_context *context, const divided *d, size_t p
   own->inner_limits = qmat_arena_alloc(arena, own->count, sizeof(double));
   own->witnesses = renumber(arena, d, &d->points, part, all->witnesses, 3);
   if (!own->points || !own->weights || !own->distances || !own->inner_limits || !own->witnesses)
-    return qmat_fail_memory(context, "control points");
+    return qmat_fail_memory(context, "constraint points");
   for (size_t i = 0; i < own->count; i++) {
     const size_t j = items[i];
     memcpy(&own->points[3 * i], &all->points[3 * j], 3 * sizeof(double));
@@ -200,14 +200,14 @@ static int64_t share_of(const divided *d, size_t part, int64_t number) {
 }
 
 /* Sets the part up as a medial mesh of its own. */
-static qmat_status start_part(qmat_context *context, const divided *d, size_t part, qmat_control_points *control,
-                              qmat_simplification *own) {
-  const qmat_simplification *whole = d->whole;
+static qmat_status start_part(qmat_context *context, const divided *d, size_t part, qmat_constraint_points *control,
+                              qmat_decimation *own) {
+  const qmat_decimation *whole = d->whole;
   const qmat_complex *c = &whole->complex;
   qmat_arena *arena = &context->arena;
   const size_t first = d->vertices.starts[part], count = d->vertices.starts[part + 1] - first;
   const uint32_t *vertices = &d->vertices.items[first];
-  *own = (qmat_simplification){.context = context, .surface = whole->surface, .rules = whole->rules};
+  *own = (qmat_decimation){.context = context, .surface = whole->surface, .rules = whole->rules};
   double *spheres = qmat_arena_alloc(arena, count, 4 * sizeof *spheres);
   double *depths = qmat_arena_alloc(arena, count, sizeof *depths);
   uint8_t *locked = qmat_arena_alloc(arena, count, 1);
@@ -230,7 +230,7 @@ static qmat_status start_part(qmat_context *context, const divided *d, size_t pa
   own->rules.vertices = (size_t)ceil(left_share * (double)count);
   qmat_status status = qmat_complex_init(context, &own->complex, &medial, spheres);
   if (status == QMAT_OK) status = take_points(context, d, part, control);
-  if (status == QMAT_OK) status = qmat_simplification_init(own, control, depths);
+  if (status == QMAT_OK) status = qmat_decimation_init(own, control, depths);
   own->rules.target_euler = own->euler + share_of(d, part, whole->rules.target_euler - whole->euler);
   return status;
 }
@@ -253,7 +253,7 @@ static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint3
 }
 
 /* Gives back to the whole what is left of a part: what belongs to one part is written by it alone. */
-static qmat_status end_part(divided *d, size_t part, const qmat_simplification *own) {
+static qmat_status end_part(divided *d, size_t part, const qmat_decimation *own) {
   qmat_complex *all = &d->whole->complex;
   const qmat_complex *c = &own->complex;
   const uint32_t *vertices = &d->vertices.items[d->vertices.starts[part]];
@@ -263,20 +263,20 @@ static qmat_status end_part(divided *d, size_t part, const qmat_simplification *
     const uint32_t v = vertices[i];
     d->gone[v] = !c->vertex_alive[i];
     memcpy(&all->spheres[4 * (size_t)v], &c->spheres[4 * i], 4 * sizeof(double));
-    d->depths[v] = own->protrusion.depths[i];
+    d->depths[v] = own->to_surface.depths[i];
     d->whole->quadrics[v] = own->quadrics[i];
   }
   for (size_t i = 0; i < own->control->count; i++)
     for (size_t k = 0; k < 3; k++) {
-      const uint32_t vertex = own->coverage.witnesses[3 * i + k];
+      const uint32_t vertex = own->to_envelope.witnesses[3 * i + k];
       d->control->witnesses[3 * (size_t)points[i] + k] = vertex == QMAT_NONE ? QMAT_NONE : vertices[vertex];
-      d->control->weights[3 * (size_t)points[i] + k] = own->coverage.weights[3 * i + k];
+      d->control->weights[3 * (size_t)points[i] + k] = own->to_envelope.weights[3 * i + k];
     }
   rest->counts = own->counts;
-  rest->questions = own->protrusion.lattice.questions;
-  if (take_rows(vertices, c->edge_alive, c->edges, own->protrusion.edge_bounds, c->edge_count, 2, &rest->edge_count,
+  rest->questions = own->to_surface.lattice.questions;
+  if (take_rows(vertices, c->edge_alive, c->edges, own->to_surface.edge_bounds, c->edge_count, 2, &rest->edge_count,
                 &rest->edges, &rest->edge_bounds) ||
-      take_rows(vertices, c->triangle_alive, c->triangles, own->protrusion.triangle_bounds, c->triangle_count, 3,
+      take_rows(vertices, c->triangle_alive, c->triangles, own->to_surface.triangle_bounds, c->triangle_count, 3,
                 &rest->triangle_count, &rest->triangles, &rest->triangle_bounds))
     return qmat_fail_memory(own->context, "a part of the medial mesh");
   atomic_fetch_add(&d->done, c->vertex_count);
@@ -284,12 +284,12 @@ static qmat_status end_part(divided *d, size_t part, const qmat_simplification *
 }
 
 static qmat_status collapse_part(qmat_context *context, divided *d, size_t part) {
-  qmat_simplification own;
-  qmat_control_points control;
+  qmat_decimation own;
+  qmat_constraint_points control;
   qmat_status status = start_part(context, d, part, &control, &own);
-  if (status == QMAT_OK) status = qmat_simplification_run(&own);
+  if (status == QMAT_OK) status = qmat_decimation_run(&own);
   if (status == QMAT_OK) status = end_part(d, part, &own);
-  qmat_simplification_uninit(&own);
+  qmat_decimation_uninit(&own);
   qmat_arena_uninit(&context->arena);
   return status;
 }
@@ -383,37 +383,38 @@ static qmat_status join(const divided *d, const uint32_t *ids, qmat_medial *medi
 
 /* What the parts know of the protrusion of their edges and triangles, where it is more than their corners say. */
 static void carry_bounds(const divided *d, const uint32_t *ids) {
-  qmat_simplification *whole = d->whole;
+  qmat_decimation *whole = d->whole;
   for (size_t p = 0; p < d->part_count; p++) {
     const part_rest *rest = &d->rests[p];
     for (size_t i = 0; i < rest->edge_count; i++) {
       const uint32_t *ends = &rest->edges[2 * i];
-      qmat_protrusion_bound_edge(&whole->protrusion, &whole->complex, ids[ends[0]], ids[ends[1]], rest->edge_bounds[i]);
+      qmat_envelope_to_surface_bound_edge(&whole->to_surface, &whole->complex, ids[ends[0]], ids[ends[1]],
+                                          rest->edge_bounds[i]);
     }
     for (size_t i = 0; i < rest->triangle_count; i++) {
       const uint32_t *t = &rest->triangles[3 * i];
-      qmat_protrusion_bound_triangle(&whole->protrusion, &whole->complex, ids[t[0]], ids[t[1]], ids[t[2]],
-                                     rest->triangle_bounds[i]);
+      qmat_envelope_to_surface_bound_triangle(&whole->to_surface, &whole->complex, ids[t[0]], ids[t[1]], ids[t[2]],
+                                              rest->triangle_bounds[i]);
     }
   }
 }
 
 static void add_counts(const divided *d) {
-  qmat_simplification *whole = d->whole;
+  qmat_decimation *whole = d->whole;
   for (size_t p = 0; p < d->part_count; p++) {
     const part_rest *rest = &d->rests[p];
     whole->counts.collapses += rest->counts.collapses;
     whole->counts.refused_by_surface += rest->counts.refused_by_surface;
-    whole->counts.refused_by_coverage += rest->counts.refused_by_coverage;
-    whole->counts.refused_by_protrusion += rest->counts.refused_by_protrusion;
+    whole->counts.refused_by_surface_to_envelope += rest->counts.refused_by_surface_to_envelope;
+    whole->counts.refused_by_envelope_to_surface += rest->counts.refused_by_envelope_to_surface;
     whole->counts.refused_by_topology += rest->counts.refused_by_topology;
-    whole->protrusion.lattice.questions += rest->questions;
+    whole->to_surface.lattice.questions += rest->questions;
   }
 }
 
 /* Puts what is left together in place of the whole. */
 static qmat_status put_together(divided *d) {
-  qmat_simplification *whole = d->whole;
+  qmat_decimation *whole = d->whole;
   qmat_arena *arena = &d->context->arena;
   const size_t before = whole->complex.vertex_count;
   uint32_t *ids = qmat_arena_alloc(arena, before, sizeof *ids);
@@ -440,7 +441,7 @@ static qmat_status put_together(divided *d) {
   qmat_complex_uninit(&whole->complex);
   whole->complex = left;
   qmat_value_release(&medial->base);
-  if (status == QMAT_OK) status = qmat_simplification_init(whole, d->control, d->depths);
+  if (status == QMAT_OK) status = qmat_decimation_init(whole, d->control, d->depths);
   if (status != QMAT_OK) return status;
   carry_bounds(d, ids);
   add_counts(d);
@@ -456,17 +457,16 @@ static void free_rests(const divided *d) {
   }
 }
 
-qmat_status qmat_collapse_in_parts(qmat_simplification *simplification, qmat_control_points *control,
-                                   const double *depths) {
-  qmat_context *context = simplification->context;
-  const qmat_complex *c = &simplification->complex;
-  divided d = {.context = context, .whole = simplification, .control = control};
+qmat_status qmat_collapse_in_parts(qmat_decimation *decimation, qmat_constraint_points *control, const double *depths) {
+  qmat_context *context = decimation->context;
+  const qmat_complex *c = &decimation->complex;
+  divided d = {.context = context, .whole = decimation, .control = control};
   d.depths = qmat_arena_alloc(&context->arena, c->vertex_count, sizeof *d.depths);
-  simplification->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *simplification->quadrics);
-  if (!d.depths || !simplification->quadrics) return qmat_fail_memory(context, "parts of the medial mesh");
+  decimation->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *decimation->quadrics);
+  if (!d.depths || !decimation->quadrics) return qmat_fail_memory(context, "parts of the medial mesh");
   memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
-  qmat_medial_quadrics_add(c, simplification->quadrics);
-  simplification->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
+  qmat_medial_quadrics_add(c, decimation->quadrics);
+  decimation->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
   qmat_status status = divide(&d);
   if (status == QMAT_OK) status = collapse_parts(&d);
   if (status == QMAT_OK) status = put_together(&d);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/hollow_filling.h"
+#include "nodes/simplify/cavity_filling.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -7,11 +7,11 @@
 
 #include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
-#include "nodes/measure/protrusion.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 /* How far a new sphere leaves the solid, as a share of epsilon: the first with which a cone keeps within epsilon. */
-static const double protrusions[] = {0.9, 0.6, 0.3, 0};
-enum { PROTRUSIONS = sizeof protrusions / sizeof *protrusions };
+static const double to_surface_errors[] = {0.9, 0.6, 0.3, 0};
+enum { PROTRUSIONS = sizeof to_surface_errors / sizeof *to_surface_errors };
 
 /* Cones to so many of the nearest spheres are tried. */
 enum { MOST_NEIGHBOURS = 8 };
@@ -22,10 +22,10 @@ static const double tolerance_share = 0.01, enough_share = 0.5;
 typedef struct {
   double depth;
   size_t place;
-} hollow;
+} cavity;
 
 static int compare_depths(const void *a, const void *b) {
-  const hollow *x = a, *y = b;
+  const cavity *x = a, *y = b;
   if (x->depth != y->depth) return x->depth > y->depth ? -1 : 1;
   return x->place < y->place ? -1 : x->place > y->place;
 }
@@ -64,11 +64,12 @@ static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_
   const size_t found = find_nearest(spheres, count, place, nearest);
   memcpy(sphere, place, 3 * sizeof *place);
   for (int p = 0; p < PROTRUSIONS; p++) {
-    sphere[3] = depth + protrusions[p] * epsilon;
+    sphere[3] = depth + to_surface_errors[p] * epsilon;
     for (size_t n = 0; n < found; n++) {
       const double *const ends[2] = {sphere, &spheres[4 * (size_t)nearest[n]]};
       *neighbour = nearest[n];
-      if (qmat_protrusion_bound(surface, ends, 2, enough_share * epsilon, tolerance_share * epsilon) <= epsilon)
+      if (qmat_envelope_to_surface_bound(surface, ends, 2, enough_share * epsilon, tolerance_share * epsilon) <=
+          epsilon)
         return true;
     }
   }
@@ -114,22 +115,22 @@ static qmat_status extend(qmat_context *context, qmat_medial *medial, const doub
   return QMAT_OK;
 }
 
-qmat_status qmat_hollows_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
-                              double epsilon, qmat_medial *medial, size_t *added) {
+qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
+                               double epsilon, qmat_medial *medial, size_t *added) {
   const size_t before = medial->sphere_count;
   *added = 0;
-  hollow *hollows = qmat_arena_alloc(&context->arena, count, sizeof *hollows);
+  cavity *cavities = qmat_arena_alloc(&context->arena, count, sizeof *cavities);
   double *spheres = qmat_arena_alloc(&context->arena, before + count, 4 * sizeof *spheres);
   uint32_t *neighbours = qmat_arena_alloc(&context->arena, count, sizeof *neighbours);
-  if (!hollows || !spheres || !neighbours) return qmat_fail_memory(context, "the medial mesh");
+  if (!cavities || !spheres || !neighbours) return qmat_fail_memory(context, "the medial mesh");
   if (before) memcpy(spheres, medial->spheres, 4 * before * sizeof *spheres);
-  for (size_t i = 0; i < count; i++) hollows[i] = (hollow){-qmat_surface_signed_distance(surface, &places[3 * i]), i};
-  if (count) qsort(hollows, count, sizeof *hollows, compare_depths);
+  for (size_t i = 0; i < count; i++) cavities[i] = (cavity){-qmat_surface_signed_distance(surface, &places[3 * i]), i};
+  if (count) qsort(cavities, count, sizeof *cavities, compare_depths);
   for (size_t i = 0; i < count; i++) {
-    const double *place = &places[3 * hollows[i].place];
+    const double *place = &places[3 * cavities[i].place];
     double *sphere = &spheres[4 * (before + *added)];
-    if (!(hollows[i].depth > 0) || is_held(&spheres[4 * before], *added, place)) continue;
-    if (fit_sphere(surface, spheres, before + *added, place, hollows[i].depth, epsilon, sphere, &neighbours[*added]))
+    if (!(cavities[i].depth > 0) || is_held(&spheres[4 * before], *added, place)) continue;
+    if (fit_sphere(surface, spheres, before + *added, place, cavities[i].depth, epsilon, sphere, &neighbours[*added]))
       ++*added;
   }
   if (*added == 0) return QMAT_OK;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_SIMPLIFY_SIMPLIFIER_H
-#define QMAT_NODES_SIMPLIFY_SIMPLIFIER_H
+#ifndef QMAT_NODES_SIMPLIFY_SIMPLIFY_SETUP_H
+#define QMAT_NODES_SIMPLIFY_SIMPLIFY_SETUP_H
 
 #include "core/node.h"
 #include "nodes/descriptor/sampled_solid.h"
-#include "nodes/simplify/simplification.h"
+#include "nodes/simplify/decimation.h"
 
 typedef enum { QMAT_COMPAT_OFF, QMAT_COMPAT_QMAT } qmat_compatibility;
 
@@ -145,7 +145,7 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
 
 /* The rules that the parameters ask for. QMAT_ERROR_MEMORY. */
 qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *params, const qmat_mesh *mesh,
-                                const qmat_initial_medial *initial, qmat_simplification_rules *rules);
+                                const qmat_initial_medial *initial, qmat_decimation_rules *rules);
 
 /* Whether the parameters ask for collapses that are the same for every epsilon. */
 bool qmat_simplify_in_order(const qmat_simplify_params *params);
@@ -155,8 +155,8 @@ typedef struct qmat_ordered_collapses {
   qmat_simplify_params params; /* with what compat sets */
   qmat_surface *surface;
   qmat_initial_medial initial;
-  qmat_control_points control;
-  qmat_simplification simplification;
+  qmat_constraint_points control;
+  qmat_decimation decimation;
 } qmat_ordered_collapses;
 
 /* Does them with the inputs of qmat_simplify_prepare. Free with qmat_ordered_collapses_uninit, also after a failure.

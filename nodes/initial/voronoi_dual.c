@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/initial/medial_dual.h"
+#include "nodes/initial/voronoi_dual.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/json_text.h"
 #include "core/geometry/medial_build.h"
 #include "core/geometry/thickness.h"
+#include "core/json_text.h"
 #include "nodes/initial/delaunay_cgal.h"
 #include "nodes/initial/edge_halving.h"
 #include "nodes/initial/sample_thinning.h"

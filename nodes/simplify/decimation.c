@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/simplification.h"
+#include "nodes/simplify/decimation.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,49 +19,50 @@ static size_t late_stage(size_t initial) {
 }
 
 /* Whether the collapses are the same for every limit. */
-static bool in_order(const qmat_simplification *s) {
+static bool in_order(const qmat_decimation *s) {
   return s->rules.on_exceed != QMAT_EXCEED_SKIP;
 }
 
-static bool is_two_sided(const qmat_simplification *s) {
+static bool is_two_sided(const qmat_decimation *s) {
   return s->rules.error == QMAT_ERROR_TWO_SIDED;
 }
 
 /* Levels by which what is held rises: twelve to each doubling of the finest. Beyond the whole model nothing is held. */
 enum { LEVELS_TO_A_DOUBLING = 12 };
 
-static double held_at(const qmat_simplification *s, int level) {
+static double held_at(const qmat_decimation *s, int level) {
   const double part = exp2((double)(level % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING);
   const double error = ldexp(part, level / LEVELS_TO_A_DOUBLING) * s->rules.finest;
   return error <= 1 ? qmat_control_share * error : INFINITY;
 }
 
-/* Points that the initial medial mesh leaves farther away are kept from getting worse. An inner point that is deeper
- * than what is held has to stay inside the envelope, lest it be hollow. */
-static void hold(qmat_simplification *s, int level) {
-  const qmat_control_points *control = s->control;
+/* Points that the initial medial mesh leaves farther away are kept from getting worse. An interior point that is deeper
+ * than what is held has to stay inside the envelope, lest it be cavity. */
+static void hold(qmat_decimation *s, int level) {
+  const qmat_constraint_points *control = s->control;
   s->level = level;
   s->held = held_at(s, level);
-  for (size_t i = 0; i < control->surface_count; i++) s->coverage.limits[i] = fmax(s->held, control->distances[i]);
+  for (size_t i = 0; i < control->surface_count; i++) s->to_envelope.limits[i] = fmax(s->held, control->distances[i]);
   for (size_t i = control->surface_count; i < control->count; i++)
-    s->coverage.limits[i] = -control->distances[i] > s->held ? 0 : INFINITY;
-  s->protrusion.limit = is_two_sided(s) ? s->held : INFINITY;
+    s->to_envelope.limits[i] = -control->distances[i] > s->held ? 0 : INFINITY;
+  s->to_surface.limit = is_two_sided(s) ? s->held : INFINITY;
 }
 
 /* False where the next level is above the limit, or there is none. */
-static bool hold_next(qmat_simplification *s) {
+static bool hold_next(qmat_decimation *s) {
   if (!(s->held < INFINITY) || held_at(s, s->level + 1) > s->rules.limit) return false;
   hold(s, s->level + 1);
   return true;
 }
 
-static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
+static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   if (s->rules.cost == QMAT_COST_PMAT) {
     qmat_candidates_find_larger(&s->complex, s->quadrics, edge, c);
   } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
     const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
     if (status != QMAT_OK) return status;
-    return qmat_hausdorff_candidates(s->context, &s->coverage, &s->complex, &s->collapse, s->control->surface_count, c);
+    return qmat_hausdorff_candidates(s->context, &s->to_envelope, &s->complex, &s->collapse, s->control->surface_count,
+                                     c);
   } else if (s->rules.published) {
     qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
   } else {
@@ -71,7 +72,7 @@ static qmat_status find_candidates(qmat_simplification *s, uint32_t edge, qmat_c
 }
 
 /* What an edge at sharp features may collapse to, whatever is held; where there is nothing the candidates stay. */
-static void prefer_features(const qmat_simplification *s, uint32_t edge, qmat_candidates *c) {
+static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
   double asked;
   if (s->rules.cost == QMAT_COST_SLAB &&
@@ -81,7 +82,7 @@ static void prefer_features(const qmat_simplification *s, uint32_t edge, qmat_ca
 }
 
 /* The cost of the best candidate. */
-static qmat_status set_cost(qmat_simplification *s, uint32_t edge) {
+static qmat_status set_cost(qmat_decimation *s, uint32_t edge) {
   qmat_candidates c;
   const qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
@@ -97,14 +98,14 @@ static qmat_status set_cost(qmat_simplification *s, uint32_t edge) {
   return QMAT_OK;
 }
 
-static qmat_status fill_heap(qmat_simplification *s) {
+static qmat_status fill_heap(qmat_decimation *s) {
   const size_t count = s->complex.edge_count;
   s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
   s->stale = qmat_arena_alloc(&s->context->arena, count, sizeof *s->stale);
   s->asked = qmat_arena_alloc(&s->context->arena, count, sizeof *s->asked);
   s->fitted_errors = qmat_arena_calloc(&s->context->arena, count, sizeof *s->fitted_errors);
-  s->settled = qmat_arena_calloc(&s->context->arena, s->complex.vertex_count, sizeof *s->settled);
-  if (!s->failed_points || !s->stale || !s->asked || !s->fitted_errors || !s->settled)
+  s->converged = qmat_arena_calloc(&s->context->arena, s->complex.vertex_count, sizeof *s->converged);
+  if (!s->failed_points || !s->stale || !s->asked || !s->fitted_errors || !s->converged)
     return qmat_fail_memory(s->context, "the heap of edges");
   qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
   if (status != QMAT_OK) return status;
@@ -127,17 +128,17 @@ static qmat_status fill_heap(qmat_simplification *s) {
 }
 
 /* The sample's owner: the corner of its witness with the largest weight. */
-static uint32_t owner_of(const qmat_coverage *coverage, size_t point) {
+static uint32_t owner_of(const qmat_surface_to_envelope *to_envelope, size_t point) {
   uint32_t best = 0;
   for (uint32_t k = 1; k < 3; k++)
-    if (coverage->witnesses[3 * point + k] != QMAT_NONE &&
-        coverage->weights[3 * point + k] > coverage->weights[3 * point + best])
+    if (to_envelope->witnesses[3 * point + k] != QMAT_NONE &&
+        to_envelope->weights[3 * point + k] > to_envelope->weights[3 * point + best])
       best = k;
-  return coverage->witnesses[3 * point + best];
+  return to_envelope->witnesses[3 * point + best];
 }
 
 /* Room for every collapse, and who answers for the samples before the first. */
-static qmat_status start_log(qmat_simplification *s) {
+static qmat_status start_log(qmat_decimation *s) {
   const size_t most = s->complex.vertex_count, samples = s->control->sample_count;
   qmat_arena *arena = &s->context->arena;
   s->log.ends = qmat_arena_alloc(arena, most, 2 * sizeof(uint32_t));
@@ -146,11 +147,11 @@ static qmat_status start_log(qmat_simplification *s) {
   s->log.owners = qmat_arena_alloc(arena, samples, sizeof(uint32_t));
   if (!s->log.ends || !s->log.merged || !s->log.errors || !s->log.owners)
     return qmat_fail_memory(s->context, "the collapses");
-  for (size_t i = 0; i < samples; i++) s->log.owners[i] = owner_of(&s->coverage, i);
+  for (size_t i = 0; i < samples; i++) s->log.owners[i] = owner_of(&s->to_envelope, i);
   return QMAT_OK;
 }
 
-qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_points *control, const double *depths) {
+qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_points *control, const double *depths) {
   qmat_context *context = s->context;
   const qmat_complex *c = &s->complex;
   s->control = control;
@@ -174,38 +175,39 @@ qmat_status qmat_simplification_init(qmat_simplification *s, const qmat_control_
   for (size_t i = 0; i < control->count; i++)
     limits[i] = i < control->surface_count ? fmax(limit, control->distances[i])
                                            : control->inner_limits[i - control->surface_count];
-  qmat_status status = qmat_coverage_init(context, &s->coverage, control->count, control->points, limits,
-                                          control->witnesses, control->weights, c->vertex_count);
+  qmat_status status = qmat_surface_to_envelope_init(context, &s->to_envelope, control->count, control->points, limits,
+                                                     control->witnesses, control->weights, c->vertex_count);
   if (status == QMAT_OK) status = fill_heap(s);
   if (status != QMAT_OK) return status;
   s->held = limit;
-  status = qmat_protrusion_init(context, &s->protrusion, s->surface, c, depths,
-                                !is_two_sided(s) ? INFINITY
-                                : in_order(s)    ? s->rules.finest
-                                                 : s->rules.limit);
-  if (is_two_sided(s)) s->protrusion.limit = limit;
+  status = qmat_envelope_to_surface_init(context, &s->to_surface, s->surface, c, depths,
+                                         !is_two_sided(s) ? INFINITY
+                                         : in_order(s)    ? s->rules.finest
+                                                          : s->rules.limit);
+  if (is_two_sided(s)) s->to_surface.limit = limit;
   if (status != QMAT_OK || !in_order(s)) return status;
   hold(s, 0);
   return start_log(s);
 }
 
-void qmat_simplification_uninit(qmat_simplification *s) {
+void qmat_decimation_uninit(qmat_decimation *s) {
   qmat_collapse_uninit(&s->collapse);
   qmat_sphere_fit_uninit(&s->fit);
-  qmat_patch_fit_uninit(&s->patch);
+  qmat_neighbourhood_fit_uninit(&s->neighbourhood);
   qmat_free(s->saved);
-  qmat_coverage_uninit(&s->coverage);
-  qmat_protrusion_uninit(&s->protrusion);
+  qmat_surface_to_envelope_uninit(&s->to_envelope);
+  qmat_envelope_to_surface_uninit(&s->to_surface);
   qmat_complex_uninit(&s->complex);
 }
 
 /* A loose edge all of whose responsible region is thin: a tubular feature (section 3.4). */
-static bool is_tubular(const qmat_simplification *s, uint32_t edge) {
+static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   if (s->complex.edge_triangles[edge]) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   bool any = false;
   for (int k = 0; k < 2; k++)
-    for (uint32_t slot = qmat_coverage_first(&s->coverage, ends[k]); slot != QMAT_NONE; slot = s->coverage.next[slot]) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(&s->to_envelope, ends[k]); slot != QMAT_NONE;
+         slot = s->to_envelope.next[slot]) {
       if (slot / 3 >= s->control->sample_count) continue;
       if (!s->rules.thin[slot / 3]) return false;
       any = true;
@@ -213,7 +215,7 @@ static bool is_tubular(const qmat_simplification *s, uint32_t edge) {
   return any;
 }
 
-static bool is_protected(const qmat_simplification *s, uint32_t vertex) {
+static bool is_protected(const qmat_decimation *s, uint32_t vertex) {
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
   for (size_t i = 0; i < count; i++)
@@ -222,7 +224,7 @@ static bool is_protected(const qmat_simplification *s, uint32_t vertex) {
 }
 
 /* Leaves of the candidates what protection allows: a protected end keeps its sphere. */
-static bool apply_protection(const qmat_simplification *s, uint32_t edge, qmat_candidates *c, bool *bound) {
+static bool apply_protection(const qmat_decimation *s, uint32_t edge, qmat_candidates *c, bool *bound) {
   if (is_tubular(s, edge)) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   const bool first = is_protected(s, ends[0]), second = is_protected(s, ends[1]);
@@ -254,7 +256,7 @@ static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
  * forgiven. Sharp features are left however few the others are. */
 enum { SPHERES_PER_FAULT = 128 };
 
-static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
+static bool keeps_topology(const qmat_decimation *s, int64_t *change) {
   bool link_condition;
   *change = euler_change(&s->collapse, &link_condition);
   if (s->rules.topology == QMAT_TOPOLOGY_PRESERVE) return link_condition;
@@ -267,18 +269,18 @@ static bool keeps_topology(const qmat_simplification *s, int64_t *change) {
 typedef enum { DONE, REFUSED, EXCEEDED } outcome;
 
 /* Why the newest test of a sphere failed. */
-typedef enum { BY_NOTHING, BY_SPHERE, BY_MIDPOINT, BY_COVERAGE, BY_PROTRUSION } refusal;
+typedef enum { BY_NOTHING, BY_SPHERE, BY_MIDPOINT, BY_SURFACE_TO_ENVELOPE, BY_ENVELOPE_TO_SURFACE } refusal;
 
-static bool holds_protrusion(const qmat_simplification *s) {
+static bool holds_to_surface(const qmat_decimation *s) {
   return s->held < INFINITY && is_two_sided(s);
 }
 
-static bool is_inner(const qmat_simplification *s, size_t point) {
+static bool is_inner(const qmat_decimation *s, size_t point) {
   return point >= s->control->surface_count;
 }
 
 /* Whether the newest preview merges into a sharp feature. */
-static bool merges_feature(const qmat_simplification *s) {
+static bool merges_feature(const qmat_decimation *s) {
   return qmat_crease_guard_is_feature(&s->creases, s->collapse.kept) ||
          qmat_crease_guard_is_feature(&s->creases, s->collapse.removed);
 }
@@ -286,26 +288,28 @@ static bool merges_feature(const qmat_simplification *s) {
 /* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may. A
  * sharp feature lies on the surface.
  */
-static outcome test_inside(qmat_simplification *s, const double *sphere) {
+static outcome test_inside(qmat_decimation *s, const double *sphere) {
   const bool on_surface = merges_feature(s);
-  const bool kept = qmat_protrusion_test_sphere(&s->protrusion, &s->complex, &s->collapse, sphere) || on_surface;
+  const bool kept =
+      qmat_envelope_to_surface_test_sphere(&s->to_surface, &s->complex, &s->collapse, sphere) || on_surface;
   s->refusal = BY_SPHERE;
-  const bool inside = s->rules.published || on_surface || s->protrusion.sphere_depth > 0;
+  const bool inside = s->rules.published || on_surface || s->to_surface.sphere_depth > 0;
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
   s->refusal = BY_MIDPOINT;
-  if (!s->rules.published && !qmat_protrusion_test_midpoints(&s->protrusion, &s->complex, &s->collapse, sphere))
+  if (!s->rules.published &&
+      !qmat_envelope_to_surface_test_midpoints(&s->to_surface, &s->complex, &s->collapse, sphere))
     return REFUSED;
-  return kept || !(sphere[3] - s->protrusion.sphere_depth > s->protrusion.limit) ? DONE : EXCEEDED;
+  return kept || !(sphere[3] - s->to_surface.sphere_depth > s->to_surface.limit) ? DONE : EXCEEDED;
 }
 
 /* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
  * they exceed it, `*asked` is no more than what would have to be held. */
-static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uint32_t first, outcome *result,
+static qmat_status test_sphere(qmat_decimation *s, const double *sphere, uint32_t first, outcome *result,
                                double *asked) {
   bool kept;
-  s->coverage.found_count = 0;
+  s->to_envelope.found_count = 0;
   *result = test_inside(s, sphere);
-  *asked = sphere[3] - s->protrusion.sphere_depth;
+  *asked = sphere[3] - s->to_surface.sphere_depth;
   if (*result != DONE) {
     s->counts.refused_by_surface++;
     return QMAT_OK;
@@ -313,24 +317,25 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
   *result = EXCEEDED;
   if (s->held < INFINITY) {
     const qmat_status status =
-        qmat_coverage_test(s->context, &s->coverage, &s->complex, &s->collapse, sphere, first, &kept);
+        qmat_surface_to_envelope_test(s->context, &s->to_envelope, &s->complex, &s->collapse, sphere, first, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
-      s->counts.refused_by_coverage++;
-      s->refusal = BY_COVERAGE;
-      *asked = fmax(s->held, is_inner(s, s->coverage.failed_point) ? -s->control->distances[s->coverage.failed_point]
-                                                                   : s->coverage.failed_distance);
+      s->counts.refused_by_surface_to_envelope++;
+      s->refusal = BY_SURFACE_TO_ENVELOPE;
+      *asked =
+          fmax(s->held, is_inner(s, s->to_envelope.failed_point) ? -s->control->distances[s->to_envelope.failed_point]
+                                                                 : s->to_envelope.failed_distance);
       return QMAT_OK;
     }
   }
-  if (holds_protrusion(s)) {
+  if (holds_to_surface(s)) {
     const qmat_status status =
-        qmat_protrusion_test(s->context, &s->protrusion, &s->complex, &s->collapse, sphere, &kept);
+        qmat_envelope_to_surface_test(s->context, &s->to_surface, &s->complex, &s->collapse, sphere, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
-      s->counts.refused_by_protrusion++;
-      s->refusal = BY_PROTRUSION;
-      *asked = s->protrusion.failed;
+      s->counts.refused_by_envelope_to_surface++;
+      s->refusal = BY_ENVELOPE_TO_SURFACE;
+      *asked = s->to_surface.failed;
       return QMAT_OK;
     }
   }
@@ -341,7 +346,7 @@ static qmat_status test_sphere(qmat_simplification *s, const double *sphere, uin
 /* The largest error that is recorded: more than the whole model. */
 static const double most_error = 2;
 
-static void record(qmat_simplification *s, const double *sphere) {
+static void record(qmat_decimation *s, const double *sphere) {
   const size_t i = s->log.count++;
   s->log.ends[2 * i] = s->collapse.kept;
   s->log.ends[2 * i + 1] = s->collapse.removed;
@@ -350,19 +355,19 @@ static void record(qmat_simplification *s, const double *sphere) {
 }
 
 /* Does what the newest preview and the newest test allow. */
-static qmat_status commit(qmat_simplification *s, const double *sphere) {
+static qmat_status commit(qmat_decimation *s, const double *sphere) {
   if (in_order(s)) record(s, sphere);
-  if (holds_protrusion(s))
-    qmat_protrusion_commit(&s->protrusion, &s->collapse);
+  if (holds_to_surface(s))
+    qmat_envelope_to_surface_commit(&s->to_surface, &s->collapse);
   else
-    s->protrusion.depths[s->collapse.kept] = s->protrusion.sphere_depth;
-  qmat_coverage_commit(&s->coverage, &s->collapse);
+    s->to_surface.depths[s->collapse.kept] = s->to_surface.sphere_depth;
+  qmat_surface_to_envelope_commit(&s->to_envelope, &s->collapse);
   qmat_crease_guard_commit(&s->creases, &s->complex, &s->collapse, sphere);
   return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
 }
 
-/* A fit looks at so many control points at most, and at so many when it polishes what is left. */
-enum { FITTED_POINTS = 256, POLISHED_POINTS = 1024 };
+/* A fit looks at so many constraint points at most, and at so many when it polishes what is left. */
+enum { FITTED_POINTS = 256, FINAL_REFIT_POINTS = 1024 };
 
 /* A sphere whose sampled error is this many times what is held is not worth a test. */
 static const double worth_testing = 1.1;
@@ -372,22 +377,22 @@ static const double less_hope = 0.6;
 
 /* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
  * look good as they are. */
-static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
+static qmat_status try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
                               outcome *result) {
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
   int least = 0;
-  qmat_status status =
-      qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count, FITTED_POINTS);
+  qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->to_envelope, &s->collapse,
+                                              s->control->surface_count, FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
-    status =
-        qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, c->spheres[i], &errors[i]);
+    status = qmat_sphere_fit_error(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, c->spheres[i],
+                                   &errors[i]);
     if (errors[i] < errors[least]) least = i;
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   s->refusal = BY_NOTHING;
   if (status == QMAT_OK)
-    status = qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse,
-                                 s->rules.patches ? less_hope * s->held : s->held, sphere, &error);
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse,
+                                 s->rules.neighbourhoods ? less_hope * s->held : s->held, sphere, &error);
   s->fitted_errors[edge] = error;
   memcpy(s->fitted, sphere, sizeof s->fitted);
   if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
@@ -399,47 +404,47 @@ static qmat_status try_fitted(qmat_simplification *s, uint32_t edge, const qmat_
   return status;
 }
 
-typedef struct qmat_patch_state {
+typedef struct qmat_neighbourhood_state {
   double *at, value;
-} patch_state;
+} neighbourhood_state;
 
-static qmat_status save(qmat_simplification *s, double *values, size_t count) {
+static qmat_status save(qmat_decimation *s, double *values, size_t count) {
   if (qmat_grow((void **)&s->saved, &s->saved_capacity, s->saved_count + count, sizeof *s->saved))
     return qmat_fail_memory(s->context, "a patch");
-  for (size_t i = 0; i < count; i++) s->saved[s->saved_count++] = (patch_state){&values[i], values[i]};
+  for (size_t i = 0; i < count; i++) s->saved[s->saved_count++] = (neighbourhood_state){&values[i], values[i]};
   return QMAT_OK;
 }
 
 /* Remembers a sphere and the bounds of what hangs on it. */
-static qmat_status save_star(qmat_simplification *s, uint32_t vertex) {
+static qmat_status save_star(qmat_decimation *s, uint32_t vertex) {
   qmat_status status = save(s, &s->complex.spheres[4 * (size_t)vertex], 4);
-  if (status == QMAT_OK) status = save(s, &s->protrusion.depths[vertex], 1);
+  if (status == QMAT_OK) status = save(s, &s->to_surface.depths[vertex], 1);
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->protrusion.edge_bounds[at[i]], 1);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->to_surface.edge_bounds[at[i]], 1);
   at = qmat_complex_triangles_at(&s->complex, vertex, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->protrusion.triangle_bounds[at[i]], 1);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->to_surface.triangle_bounds[at[i]], 1);
   return status;
 }
 
-static void restore(qmat_simplification *s) {
+static void restore(qmat_decimation *s) {
   for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
 }
 
 /* Moves a sphere whatever is held; what is known of its protrusion stays true. */
-static qmat_status place(qmat_simplification *s, uint32_t vertex, const double *sphere, bool *inside) {
-  qmat_protrusion *protrusion = &s->protrusion;
-  const double limit = protrusion->limit;
+static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphere, bool *inside) {
+  qmat_envelope_to_surface *to_surface = &s->to_surface;
+  const double limit = to_surface->limit;
   bool kept;
   qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
   if (status != QMAT_OK) return status;
-  protrusion->limit = INFINITY;
-  *inside = qmat_protrusion_test_sphere(protrusion, &s->complex, &s->collapse, sphere);
+  to_surface->limit = INFINITY;
+  *inside = qmat_envelope_to_surface_test_sphere(to_surface, &s->complex, &s->collapse, sphere);
   if (*inside) {
-    status = qmat_protrusion_test(s->context, protrusion, &s->complex, &s->collapse, sphere, &kept);
-    if (status == QMAT_OK) qmat_protrusion_commit(protrusion, &s->collapse);
+    status = qmat_envelope_to_surface_test(s->context, to_surface, &s->complex, &s->collapse, sphere, &kept);
+    if (status == QMAT_OK) qmat_envelope_to_surface_commit(to_surface, &s->collapse);
   }
-  protrusion->limit = limit;
+  to_surface->limit = limit;
   if (status == QMAT_OK && *inside) status = qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
   return status;
 }
@@ -448,53 +453,53 @@ static qmat_status place(qmat_simplification *s, uint32_t vertex, const double *
 static const double margin = 0.02;
 
 /* Asks for what the newest test has refused. */
-static qmat_status ask_for_refused(qmat_simplification *s, const double *sphere, bool *asked) {
-  const double *centre = s->refusal == BY_SPHERE ? sphere : s->protrusion.failed_place;
+static qmat_status ask_for_refused(qmat_decimation *s, const double *sphere, bool *asked) {
+  const double *centre = s->refusal == BY_SPHERE ? sphere : s->to_surface.failed_place;
   *asked = true;
-  if (s->refusal == BY_COVERAGE) {
-    const size_t point = s->coverage.failed_point;
-    return qmat_patch_fit_add(s->context, &s->patch, &s->coverage.points[3 * point],
-                              is_inner(s, point) ? QMAT_PLACE_INSIDE : QMAT_PLACE_SURFACE,
-                              s->coverage.limits[point] - margin * s->held);
+  if (s->refusal == BY_SURFACE_TO_ENVELOPE) {
+    const size_t point = s->to_envelope.failed_point;
+    return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->to_envelope.points[3 * point],
+                                      is_inner(s, point) ? QMAT_PLACE_INSIDE : QMAT_PLACE_SURFACE,
+                                      s->to_envelope.limits[point] - margin * s->held);
   }
   double closest[3];
   uint32_t triangle;
   *asked = s->refusal != BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
   if (!*asked) return QMAT_OK;
   qmat_surface_distance(s->surface, centre, INFINITY, closest, &triangle);
-  return qmat_patch_fit_add(s->context, &s->patch, closest, QMAT_PLACE_BORDER, (1 - margin) * s->held);
+  return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, closest, QMAT_PLACE_BORDER, (1 - margin) * s->held);
 }
 
 /* Tests a sphere of the patch, which is placed; number 0 is the collapse's. */
-static qmat_status test_in_patch(qmat_simplification *s, uint32_t edge, int number, outcome *result) {
+static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int number, outcome *result) {
   double asked;
   const qmat_status status =
       number == 0 ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
-                  : qmat_complex_preview_move(s->context, &s->complex, s->patch.vertices[number], &s->collapse);
-  return status == QMAT_OK ? test_sphere(s, s->patch.spheres[number], QMAT_NONE, result, &asked) : status;
+                  : qmat_complex_preview_move(s->context, &s->complex, s->neighbourhood.vertices[number], &s->collapse);
+  return status == QMAT_OK ? test_sphere(s, s->neighbourhood.spheres[number], QMAT_NONE, result, &asked) : status;
 }
 
 /* Tests the spheres of the patch: `*suspect` first, which becomes the one that is refused, and the collapse last, which
  * is then the newest preview. */
-static qmat_status test_patch(qmat_simplification *s, uint32_t edge, uint32_t removed, int *suspect, outcome *result,
-                              bool *again) {
-  qmat_patch_fit *patch = &s->patch;
+static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *suspect,
+                                      outcome *result, bool *again) {
+  qmat_neighbourhood_fit *neighbourhood = &s->neighbourhood;
   bool inside = true;
   qmat_status status = QMAT_OK;
   *result = REFUSED;
   *again = false;
-  for (int i = -1; i < patch->count && status == QMAT_OK; i++) {
-    status = place(s, i < 0 ? removed : patch->vertices[i], patch->spheres[i < 0 ? 0 : i], &inside);
+  for (int i = -1; i < neighbourhood->count && status == QMAT_OK; i++) {
+    status = place(s, i < 0 ? removed : neighbourhood->vertices[i], neighbourhood->spheres[i < 0 ? 0 : i], &inside);
     if (!inside) return status;
   }
   const int first = *suspect;
-  for (int i = 0; i <= patch->count && status == QMAT_OK; i++) {
-    const int number = i == 0 ? first : i % patch->count;
-    if (i > 0 && number == first && (number > 0 || patch->count == 1)) continue;
-    status = test_in_patch(s, edge, number, result);
+  for (int i = 0; i <= neighbourhood->count && status == QMAT_OK; i++) {
+    const int number = i == 0 ? first : i % neighbourhood->count;
+    if (i > 0 && number == first && (number > 0 || neighbourhood->count == 1)) continue;
+    status = test_in_neighbourhood(s, edge, number, result);
     if (status != QMAT_OK || *result == DONE) continue;
     *suspect = number;
-    return ask_for_refused(s, patch->spheres[number], again);
+    return ask_for_refused(s, neighbourhood->spheres[number], again);
   }
   return status;
 }
@@ -504,32 +509,33 @@ enum { MOST_FITS = 6 };
 
 /* Up to this error (of its own fit) a sphere is worth a fit of the patch, and up to that error a fit of the patch is
  * worth a test, as shares of what is held. */
-static const double worth_a_patch = 1.3, worth_placing = 1.02;
+static const double worth_a_neighbourhood = 1.3, worth_placing = 1.02;
 
 /* The collapse of the newest preview with the sphere around which its own fit ended, and with its neighbours fitted too
  * unless it is left `alone`. Where it can be done they are placed, and it is the newest preview and test; else nothing
  * has changed. */
-static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, outcome *result) {
+static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, outcome *result) {
   const qmat_collapse *c = &s->collapse;
-  uint32_t others[QMAT_PATCH_SPHERES];
+  uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];
   const uint32_t removed = c->removed;
   size_t count = 0;
-  for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_PATCH_SPHERES; n++)
+  for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_NEIGHBOURHOOD_SPHERES; n++)
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
         !(s->protecting && is_protected(s, c->neighbours[n])))
       others[count++] = c->neighbours[n];
-  qmat_status status = qmat_patch_fit_start(s->context, &s->patch, &s->coverage, &s->complex, c, s->fitted, others,
-                                            count, s->control->surface_count, s->held);
+  qmat_status status = qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->to_envelope, &s->complex, c,
+                                                    s->fitted, others, count, s->control->surface_count, s->held);
   bool again = true;
   int suspect = 0;
   for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != DONE; i++) {
     double error;
-    qmat_patch_fit_run(&s->patch, &s->complex, i % 2 == 1, &error);
+    qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, i % 2 == 1, &error);
     if (!(error <= worth_placing * s->held)) return status;
     s->saved_count = 0;
     status = save_star(s, removed);
-    for (int k = 0; k < s->patch.count && status == QMAT_OK; k++) status = save_star(s, s->patch.vertices[k]);
-    if (status == QMAT_OK) status = test_patch(s, edge, removed, &suspect, result, &again);
+    for (int k = 0; k < s->neighbourhood.count && status == QMAT_OK; k++)
+      status = save_star(s, s->neighbourhood.vertices[k]);
+    if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &suspect, result, &again);
     if (status == QMAT_OK && *result == DONE) return status;
     restore(s);
     if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
@@ -538,20 +544,20 @@ static qmat_status try_patch(qmat_simplification *s, uint32_t edge, bool alone, 
 }
 
 /* A cone that leaves the solid in its middle does so wherever the spheres move that little. */
-static qmat_status try_patches(qmat_simplification *s, uint32_t edge, outcome *result) {
+static qmat_status try_neighbourhoods(qmat_decimation *s, uint32_t edge, outcome *result) {
   qmat_status status = QMAT_OK;
   if (s->refusal == BY_MIDPOINT) return status;
-  if (s->fitted_errors[edge] <= worth_testing * s->held) status = try_patch(s, edge, true, result);
-  if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= worth_a_patch * s->held)
-    status = try_patch(s, edge, false, result);
+  if (s->fitted_errors[edge] <= worth_testing * s->held) status = try_neighbourhood(s, edge, true, result);
+  if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= worth_a_neighbourhood * s->held)
+    status = try_neighbourhood(s, edge, false, result);
   return status;
 }
 
 /* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
-static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *result) {
+static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, outcome *result) {
   qmat_candidates c;
   *result = REFUSED;
-  s->patch.count = 0; /* that of an edge tried before is none of this one's */
+  s->neighbourhood.count = 0; /* that of an edge tried before is none of this one's */
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
   double asked;
@@ -581,9 +587,9 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   const bool fits = s->fitting && !bound;
   for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
     sphere = c.spheres[i];
-    const size_t refused = s->counts.refused_by_coverage;
+    const size_t refused = s->counts.refused_by_surface_to_envelope;
     status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
-    if (s->counts.refused_by_coverage > refused) s->failed_points[edge] = s->coverage.failed_point;
+    if (s->counts.refused_by_surface_to_envelope > refused) s->failed_points[edge] = s->to_envelope.failed_point;
     if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
     exceeded |= *result == EXCEEDED;
   }
@@ -591,9 +597,9 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
   if (status == QMAT_OK && fits) {
     status = try_fitted(s, edge, &c, fitted, result);
     sphere = fitted;
-    if (s->rules.patches && status == QMAT_OK && *result != DONE) {
-      status = try_patches(s, edge, result);
-      sphere = s->patch.spheres[0];
+    if (s->rules.neighbourhoods && status == QMAT_OK && *result != DONE) {
+      status = try_neighbourhoods(s, edge, result);
+      sphere = s->neighbourhood.spheres[0];
     }
   }
   if (status == QMAT_OK && *result == DONE) {
@@ -608,19 +614,19 @@ static qmat_status try_collapse(qmat_simplification *s, uint32_t edge, outcome *
  * moves, only for one that goes. */
 static const double worth_another_fit = 2;
 
-static bool is_locked(const qmat_simplification *s, uint32_t edge) {
+static bool is_locked(const qmat_decimation *s, uint32_t edge) {
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   return s->locked && (s->locked[ends[0]] || s->locked[ends[1]]);
 }
 
-static void queue_again(qmat_simplification *s, uint32_t edge) {
+static void queue_again(qmat_decimation *s, uint32_t edge) {
   if (s->heap.places[edge] != QMAT_NONE || is_locked(s, edge)) return;
   if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > worth_another_fit * s->held) return;
   qmat_edge_heap_update(&s->heap, edge);
 }
 
 /* New costs around the merged vertex, and another chance for the refused edges of its neighbours. */
-static void update_neighbourhood(qmat_simplification *s) {
+static void update_neighbourhood(qmat_decimation *s) {
   const qmat_collapse *c = &s->collapse;
   if (c->removed != QMAT_NONE) {
     qmat_quadric_add(&s->quadrics[c->kept], &s->quadrics[c->removed]);
@@ -635,27 +641,27 @@ static void update_neighbourhood(qmat_simplification *s) {
     s->stale[at[i]] = 1;
     queue_again(s, at[i]);
   }
-  s->settled[c->kept] = 0;
+  s->converged[c->kept] = 0;
   if (!s->fitting) return; /* all get another chance then */
   for (size_t n = 0; n < c->neighbour_count; n++) {
-    s->settled[c->neighbours[n]] = 0;
+    s->converged[c->neighbours[n]] = 0;
     at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
     for (size_t i = 0; i < count; i++) queue_again(s, at[i]);
   }
 }
 
-static bool may_go_on(const qmat_simplification *s) {
+static bool may_go_on(const qmat_decimation *s) {
   const size_t live = s->complex.live_vertices;
   return live > 1 && !(s->rules.vertices > 0 && live <= s->rules.vertices);
 }
 
-static qmat_status report_progress(const qmat_simplification *s) {
+static qmat_status report_progress(const qmat_decimation *s) {
   const size_t initial = s->complex.vertex_count;
   return qmat_progress(s->context, initial - s->complex.live_vertices, initial, "collapses");
 }
 
 /* Takes over what a test finds of a sphere of the patch that has been placed. */
-static qmat_status settle(qmat_simplification *s, uint32_t vertex) {
+static qmat_status settle(qmat_decimation *s, uint32_t vertex) {
   double sphere[4], asked;
   outcome result;
   memcpy(sphere, &s->complex.spheres[4 * (size_t)vertex], sizeof sphere);
@@ -668,10 +674,10 @@ static qmat_status settle(qmat_simplification *s, uint32_t vertex) {
 }
 
 /* Collapses until the heap is empty; `*ended` when the rules want no more. */
-static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
+static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
-    qmat_status status = s->rules.patches || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
+    qmat_status status = s->rules.neighbourhoods || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
     if (status != QMAT_OK) return status;
     const uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
@@ -690,7 +696,8 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
     if (result == DONE) {
       s->counts.collapses++;
       update_neighbourhood(s);
-      for (int i = 1; i < s->patch.count && status == QMAT_OK; i++) status = settle(s, s->patch.vertices[i]);
+      for (int i = 1; i < s->neighbourhood.count && status == QMAT_OK; i++)
+        status = settle(s, s->neighbourhood.vertices[i]);
       if (status != QMAT_OK) return status;
     } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
       *ended = !hold_next(s);
@@ -704,25 +711,26 @@ static qmat_status collapse_edges(qmat_simplification *s, bool *ended) {
 static const double least_gain = 0.02;
 
 /* Fits every sphere to the surface where that lowers its largest error; not those that did not move and whose
- * neighbours have not moved since. Each looks at `most` control points. */
-static qmat_status refit(qmat_simplification *s, size_t most, size_t *moved) {
+ * neighbours have not moved since. Each looks at `most` constraint points. */
+static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
-    if (!s->complex.vertex_alive[v] || s->settled[v] || (s->protecting && is_protected(s, v)) ||
+    if (!s->complex.vertex_alive[v] || s->converged[v] || (s->protecting && is_protected(s, v)) ||
         qmat_crease_guard_is_feature(&s->creases, v))
       continue;
-    s->settled[v] = 1;
+    s->converged[v] = 1;
     qmat_status status = report_progress(s);
     if (status == QMAT_OK) status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_gather(s->context, &s->fit, &s->coverage, &s->collapse, s->control->surface_count, most);
+      status =
+          qmat_sphere_fit_gather(s->context, &s->fit, &s->to_envelope, &s->collapse, s->control->surface_count, most);
     double sphere[4], before, after;
     memcpy(sphere, &s->complex.spheres[4 * (size_t)v], sizeof sphere);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_error(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, sphere, &before);
+      status = qmat_sphere_fit_error(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, sphere, &before);
     if (status == QMAT_OK)
-      status =
-          qmat_sphere_fit_run(s->context, &s->fit, &s->coverage, &s->complex, &s->collapse, INFINITY, sphere, &after);
+      status = qmat_sphere_fit_run(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, INFINITY, sphere,
+                                   &after);
     if (status != QMAT_OK) return status;
     if (!(after <= (1 - least_gain) * before)) continue;
     outcome result;
@@ -739,21 +747,21 @@ static qmat_status refit(qmat_simplification *s, size_t most, size_t *moved) {
   return QMAT_OK;
 }
 
-static void queue_all(qmat_simplification *s) {
+static void queue_all(qmat_decimation *s) {
   for (uint32_t e = 0; e < s->complex.edge_count; e++)
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
 }
 
 /* The edges that may collapse with what is held now. */
-static void queue_raised(qmat_simplification *s) {
+static void queue_raised(qmat_decimation *s) {
   for (uint32_t e = 0; e < s->complex.edge_count; e++)
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->asked[e] <= s->held)
       qmat_edge_heap_update(&s->heap, e);
 }
 
-qmat_status qmat_simplification_run(qmat_simplification *s) {
+qmat_status qmat_decimation_run(qmat_decimation *s) {
   bool ended = s->held > s->rules.limit; /* where even the lowest level is above it */
-  qmat_status status = s->rules.patches ? QMAT_OK : collapse_edges(s, &ended);
+  qmat_status status = s->rules.neighbourhoods ? QMAT_OK : collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
          hold_next(s)) {
     queue_raised(s);
@@ -767,33 +775,33 @@ qmat_status qmat_simplification_run(qmat_simplification *s) {
     if (i == 0) queue_all(s);
     status = collapse_edges(s, &ended);
     if (status != QMAT_OK || ended) return status;
-    if ((i > 0 || s->rules.patches) && s->counts.collapses == collapses) break;
+    if ((i > 0 || s->rules.neighbourhoods) && s->counts.collapses == collapses) break;
     if ((status = refit(s, FITTED_POINTS, &moved)) != QMAT_OK) return status;
   }
   /* What is left of the error is made small for its own sake. */
-  size_t moved = s->rules.polish;
+  size_t moved = s->rules.final_refit;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
-    status = refit(s, POLISHED_POINTS, &moved);
+    status = refit(s, FINAL_REFIT_POINTS, &moved);
   return status;
 }
 
 /* Where collapses come in order the merged sphere inherits the regions of both ends (section 3.3): who answers does not
  * depend on the limits that were tested. */
-static qmat_status set_regions(const qmat_simplification *s, const uint32_t *ids, qmat_medial *medial) {
+static qmat_status set_regions(const qmat_decimation *s, const uint32_t *ids, qmat_medial *medial) {
   const size_t samples = s->control->sample_count;
   uint32_t *owners = qmat_arena_alloc(&s->context->arena, samples, sizeof *owners);
   uint32_t *roots = qmat_arena_alloc(&s->context->arena, s->complex.vertex_count, sizeof *roots);
   if (!owners || !roots) return qmat_fail_memory(s->context, "responsible regions");
   if (in_order(s)) qmat_collapse_roots(s->log.ends, s->log.count, s->complex.vertex_count, roots);
   for (size_t i = 0; i < samples; i++) {
-    uint32_t owner = in_order(s) ? s->log.owners[i] : owner_of(&s->coverage, i);
+    uint32_t owner = in_order(s) ? s->log.owners[i] : owner_of(&s->to_envelope, i);
     if (in_order(s) && owner != QMAT_NONE) owner = roots[owner];
     owners[i] = owner == QMAT_NONE ? QMAT_NONE : ids[owner];
   }
   return qmat_medial_set_regions(s->context, owners, samples, medial);
 }
 
-qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_medial *medial) {
+qmat_status qmat_decimation_extract(const qmat_decimation *s, qmat_medial *medial) {
   const qmat_complex *c = &s->complex;
   qmat_arena *arena = &s->context->arena;
   uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
@@ -826,31 +834,30 @@ qmat_status qmat_simplification_extract(const qmat_simplification *s, qmat_media
 }
 
 /* The bounds of the protrusion of edges and triangles, where they say more than their corners do. */
-static void carry_bounds(const qmat_simplification *from, const uint32_t *ids, qmat_simplification *to) {
+static void carry_bounds(const qmat_decimation *from, const uint32_t *ids, qmat_decimation *to) {
   for (size_t e = 0; e < from->complex.edge_count; e++) {
     if (!from->complex.edge_alive[e]) continue;
     const uint32_t *ends = &from->complex.edges[2 * e];
-    qmat_protrusion_bound_edge(&to->protrusion, &to->complex, ids[ends[0]], ids[ends[1]],
-                               from->protrusion.edge_bounds[e]);
+    qmat_envelope_to_surface_bound_edge(&to->to_surface, &to->complex, ids[ends[0]], ids[ends[1]],
+                                        from->to_surface.edge_bounds[e]);
   }
   for (size_t t = 0; t < from->complex.triangle_count; t++) {
     if (!from->complex.triangle_alive[t]) continue;
     const uint32_t *corners = &from->complex.triangles[3 * t];
-    qmat_protrusion_bound_triangle(&to->protrusion, &to->complex, ids[corners[0]], ids[corners[1]], ids[corners[2]],
-                                   from->protrusion.triangle_bounds[t]);
+    qmat_envelope_to_surface_bound_triangle(&to->to_surface, &to->complex, ids[corners[0]], ids[corners[1]],
+                                            ids[corners[2]], from->to_surface.triangle_bounds[t]);
   }
 }
 
-qmat_status qmat_simplification_resume(const qmat_simplification *from, const qmat_medial *left,
-                                       const qmat_extra_points *extra, qmat_control_points *control,
-                                       qmat_simplification *to) {
+qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
+                                   qmat_constraint_points *control, qmat_decimation *to) {
   qmat_context *context = from->context;
   qmat_arena *arena = &context->arena;
   const qmat_complex *c = &from->complex;
   uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
   double *depths = qmat_arena_alloc(arena, left->sphere_count, sizeof *depths);
   to->quadrics = qmat_arena_calloc(arena, left->sphere_count, sizeof *to->quadrics);
-  qmat_control_points further;
+  qmat_constraint_points further;
   qmat_status status = ids && depths && to->quadrics ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
   if (status == QMAT_OK) status = qmat_complex_init(context, &to->complex, left, NULL);
   if (status == QMAT_OK) status = qmat_extra_points_make(context, &to->complex, extra, &further);
@@ -859,16 +866,16 @@ qmat_status qmat_simplification_resume(const qmat_simplification *from, const qm
   for (size_t v = 0; v < c->vertex_count; v++) {
     if (!c->vertex_alive[v]) continue;
     ids[v] = next;
-    depths[next] = from->protrusion.depths[v];
+    depths[next] = from->to_surface.depths[v];
     to->quadrics[next++] = from->quadrics[v];
   }
   for (size_t v = next; v < left->sphere_count; v++)
     depths[v] = -qmat_surface_signed_distance(from->surface, &left->spheres[4 * v]);
   status = qmat_crease_guard_renumber(context, &from->creases, ids, left->sphere_count, &to->creases);
   if (status != QMAT_OK) return status;
-  status = qmat_control_points_join(context, from->control, from->coverage.witnesses, from->coverage.weights, ids,
-                                    &further, control);
-  if (status == QMAT_OK) status = qmat_simplification_init(to, control, depths);
+  status = qmat_constraint_points_join(context, from->control, from->to_envelope.witnesses, from->to_envelope.weights,
+                                       ids, &further, control);
+  if (status == QMAT_OK) status = qmat_decimation_init(to, control, depths);
   if (status != QMAT_OK) return status;
   carry_bounds(from, ids, to);
   to->counts = from->counts;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/protrusion.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -63,12 +63,12 @@ static void test_spheres_in_a_cube_by_hand(void **state) {
   make_solid(&s, shape_box(1, 1, 1));
   /* In the unit frame the cube's half side is 1 / sqrt(12). */
   const double half = 1 / sqrt(12.0);
-  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0, 0, 0, half}), 0, 1e-12);
-  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0, 0, 0, half + 0.1}), 0.1, 1e-12);
-  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){0.1, 0, 0, half}), 0.1, 1e-12);
-  assert_near(qmat_protrusion_of_sphere(s.surface, (const double[4]){half + 0.2, 0, 0, 0.1}), 0.3, 1e-12);
+  assert_near(qmat_envelope_to_surface_of_sphere(s.surface, (const double[4]){0, 0, 0, half}), 0, 1e-12);
+  assert_near(qmat_envelope_to_surface_of_sphere(s.surface, (const double[4]){0, 0, 0, half + 0.1}), 0.1, 1e-12);
+  assert_near(qmat_envelope_to_surface_of_sphere(s.surface, (const double[4]){0.1, 0, 0, half}), 0.1, 1e-12);
+  assert_near(qmat_envelope_to_surface_of_sphere(s.surface, (const double[4]){half + 0.2, 0, 0, 0.1}), 0.3, 1e-12);
   const double sphere[4] = {0, 0.05, 0, half}, *const one[1] = {sphere};
-  assert_near(qmat_protrusion_bound(s.surface, one, 1, -INFINITY, 1e-6), 0.05, 1e-12);
+  assert_near(qmat_envelope_to_surface_bound(s.surface, one, 1, -INFINITY, 1e-6), 0.05, 1e-12);
   free_solid(&s);
 }
 
@@ -86,10 +86,10 @@ static void test_bound_between_the_corners_of_an_l_by_hand(void **state) {
   qmat_frame_spheres_to_unit(qmat_surface_frame(s.surface), touching, 1, touching);
   const double *const cone[2] = {a, b};
   /* The way runs through the inner corner itself: h is 0 there, negative elsewhere. */
-  assert_near(qmat_protrusion_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0, 1e-6);
-  assert_near(qmat_protrusion_of_sphere(s.surface, touching), 0.25 * scale, 1e-12);
+  assert_near(qmat_envelope_to_surface_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0, 1e-6);
+  assert_near(qmat_envelope_to_surface_of_sphere(s.surface, touching), 0.25 * scale, 1e-12);
   for (int k = 0; k < 2; k++) a[k] += 0.25 * scale, b[k] += 0.25 * scale; /* half way out: through (1.25, 1.25) */
-  assert_near(qmat_protrusion_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0.25 * scale, 1e-6);
+  assert_near(qmat_envelope_to_surface_bound(s.surface, cone, 2, -INFINITY, 1e-6), 0.25 * scale, 1e-6);
   free_solid(&s);
 }
 
@@ -110,7 +110,7 @@ static void check_random_primitives(qmat_mesh *mesh, uint64_t seed) {
     if (round % 7 == 0) memcpy(spheres[count - 1], spheres[0], sizeof spheres[0]); /* degenerate */
     const double most = sampled(s.surface, corners, count, 40, &gap);
     const double tolerance = round % 2 ? 1e-3 : 1e-2;
-    const double bound = qmat_protrusion_bound(s.surface, corners, count, -INFINITY, tolerance);
+    const double bound = qmat_envelope_to_surface_bound(s.surface, corners, count, -INFINITY, tolerance);
     assert_true(bound >= most - ROUNDING);
     /* Between the samples h may be larger by the slopes of both terms. */
     double slope = 1;
@@ -121,9 +121,10 @@ static void check_random_primitives(qmat_mesh *mesh, uint64_t seed) {
       }
     assert_true(bound <= most + tolerance + 2 * slope * gap + ROUNDING);
     /* Where more than that is not of interest, what is asked for comes back. */
-    assert_near(qmat_protrusion_bound(s.surface, corners, count, bound + 0.1, tolerance), bound + 0.1, ROUNDING);
+    assert_near(qmat_envelope_to_surface_bound(s.surface, corners, count, bound + 0.1, tolerance), bound + 0.1,
+                ROUNDING);
     const double half = most - 0.05;
-    const double again = qmat_protrusion_bound(s.surface, corners, count, half, tolerance);
+    const double again = qmat_envelope_to_surface_bound(s.surface, corners, count, half, tolerance);
     assert_true(again >= most - ROUNDING && again <= most + tolerance + 2 * slope * gap + ROUNDING);
   }
   free_solid(&s);
@@ -146,7 +147,7 @@ typedef struct {
   qmat_context context;
   qmat_surface *surface;
   qmat_complex complex;
-  qmat_protrusion protrusion;
+  qmat_envelope_to_surface to_surface;
   qmat_collapse collapse;
 } model;
 
@@ -161,14 +162,15 @@ static void make_model(model *m, qmat_mesh *mesh, double limit) {
   assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
   for (size_t v = 0; v < medial->sphere_count; v++)
     depths[v] = -qmat_surface_signed_distance(m->surface, &spheres[4 * v]);
-  assert_int_equal(qmat_protrusion_init(&m->context, &m->protrusion, m->surface, &m->complex, depths, limit), QMAT_OK);
+  assert_int_equal(qmat_envelope_to_surface_init(&m->context, &m->to_surface, m->surface, &m->complex, depths, limit),
+                   QMAT_OK);
   qmat_free(spheres);
   qmat_free(depths);
 }
 
 static void free_model(model *m) {
   qmat_collapse_uninit(&m->collapse);
-  qmat_protrusion_uninit(&m->protrusion);
+  qmat_envelope_to_surface_uninit(&m->to_surface);
   qmat_complex_uninit(&m->complex);
   qmat_surface_free(m->surface);
   qmat_context_uninit(&m->context);
@@ -178,21 +180,21 @@ static void free_model(model *m) {
 /* What is known of a vertex, an edge or a triangle holds on a dense grid of it. */
 static void check_vertex(const model *m, uint32_t v) {
   const double depth = -qmat_surface_signed_distance(m->surface, &m->complex.spheres[4 * (size_t)v]);
-  assert_true(m->protrusion.depths[v] <= depth + ROUNDING);
+  assert_true(m->to_surface.depths[v] <= depth + ROUNDING);
 }
 
 static void check_edge(const model *m, uint32_t e, int steps) {
   const double *spheres[2];
   double gap;
   for (size_t k = 0; k < 2; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.edges[2 * (size_t)e + k]];
-  assert_true(m->protrusion.edge_bounds[e] >= sampled(m->surface, spheres, 2, steps, &gap) - ROUNDING);
+  assert_true(m->to_surface.edge_bounds[e] >= sampled(m->surface, spheres, 2, steps, &gap) - ROUNDING);
 }
 
 static void check_triangle(const model *m, uint32_t t, int steps) {
   const double *spheres[3];
   double gap;
   for (size_t k = 0; k < 3; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.triangles[3 * (size_t)t + k]];
-  assert_true(m->protrusion.triangle_bounds[t] >= sampled(m->surface, spheres, 3, steps, &gap) - ROUNDING);
+  assert_true(m->to_surface.triangle_bounds[t] >= sampled(m->surface, spheres, 3, steps, &gap) - ROUNDING);
 }
 
 static void check_all(const model *m, int steps) {
@@ -210,12 +212,12 @@ static void check_star(const model *m, uint32_t v, int steps) {
   check_vertex(m, v);
   const uint32_t *at = qmat_complex_edges_at(&m->complex, v, &count);
   for (size_t i = 0; i < count; i++) {
-    assert_true(m->protrusion.edge_bounds[at[i]] <= m->protrusion.limit);
+    assert_true(m->to_surface.edge_bounds[at[i]] <= m->to_surface.limit);
     check_edge(m, at[i], steps);
   }
   at = qmat_complex_triangles_at(&m->complex, v, &count);
   for (size_t i = 0; i < count; i++) {
-    assert_true(m->protrusion.triangle_bounds[at[i]] <= m->protrusion.limit);
+    assert_true(m->to_surface.triangle_bounds[at[i]] <= m->to_surface.limit);
     check_triangle(m, at[i], steps);
   }
 }
@@ -255,23 +257,23 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least) {
     sphere[3] = fmax(sphere[3], 0);
     bool kept = true;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
-    const bool good = qmat_protrusion_test_sphere(&m->protrusion, &m->complex, &m->collapse, sphere);
+    const bool good = qmat_envelope_to_surface_test_sphere(&m->to_surface, &m->complex, &m->collapse, sphere);
     const double depth = -qmat_surface_signed_distance(m->surface, sphere);
-    assert_true(m->protrusion.sphere_depth <= depth + ROUNDING);
-    if (fabs(depth) > 1e-7 && fabs(sphere[3] - depth - m->protrusion.limit) > 1e-7)
-      assert_int_equal(good, depth > 0 && sphere[3] - depth <= m->protrusion.limit);
+    assert_true(m->to_surface.sphere_depth <= depth + ROUNDING);
+    if (fabs(depth) > 1e-7 && fabs(sphere[3] - depth - m->to_surface.limit) > 1e-7)
+      assert_int_equal(good, depth > 0 && sphere[3] - depth <= m->to_surface.limit);
     idle++;
     by_sphere += !good;
     if (!good) continue;
-    const bool inside = qmat_protrusion_test_midpoints(&m->protrusion, &m->complex, &m->collapse, sphere);
+    const bool inside = qmat_envelope_to_surface_test_midpoints(&m->to_surface, &m->complex, &m->collapse, sphere);
     check_midpoints(m, sphere, inside);
     by_midpoints += !inside;
     if (!inside) continue;
-    assert_int_equal(qmat_protrusion_test(&m->context, &m->protrusion, &m->complex, &m->collapse, sphere, &kept),
-                     QMAT_OK);
+    assert_int_equal(
+        qmat_envelope_to_surface_test(&m->context, &m->to_surface, &m->complex, &m->collapse, sphere, &kept), QMAT_OK);
     by_limit += !kept;
     if (!kept) continue;
-    qmat_protrusion_commit(&m->protrusion, &m->collapse);
+    qmat_envelope_to_surface_commit(&m->to_surface, &m->collapse);
     assert_int_equal(qmat_complex_collapse(&m->context, &m->complex, &m->collapse, sphere), QMAT_OK);
     if (collapses++ % 8 == 0) check_star(m, m->collapse.kept, 6);
     idle = 0;
@@ -301,9 +303,12 @@ static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void *
   model m;
   make_model(&m, shape_box(1, 1, 1), INFINITY);
   assert_int_equal(qmat_complex_preview(&m.context, &m.complex, 0, &m.collapse), QMAT_OK);
-  assert_true(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){0, 0, 0, 9}));
-  assert_false(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){0.3, 0, 0, 0}));
-  assert_false(qmat_protrusion_test_sphere(&m.protrusion, &m.complex, &m.collapse, (const double[4]){5, 0, 0, 9}));
+  assert_true(
+      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){0, 0, 0, 9}));
+  assert_false(
+      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){0.3, 0, 0, 0}));
+  assert_false(
+      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){5, 0, 0, 9}));
   free_model(&m);
 }
 

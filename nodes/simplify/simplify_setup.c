@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/simplifier.h"
+#include "nodes/simplify/simplify_setup.h"
 
 #include <math.h>
 
@@ -13,10 +13,11 @@ const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
 const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
-/* The control points of collapses in order, which are there for any epsilon, are those of so many times the finest. */
+/* The constraint points of collapses in order, which are there for any epsilon, are those of so many times the finest.
+ */
 static const double control_error = 2;
 
-enum { MOST_CONTROL_POINTS = 600000 };
+enum { MOST_CONSTRAINT_POINTS = 600000 };
 
 /* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
  * digits. */
@@ -121,24 +122,24 @@ static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mes
 }
 
 qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *p, const qmat_mesh *mesh,
-                                const qmat_initial_medial *initial, qmat_simplification_rules *rules) {
-  *rules = (qmat_simplification_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
-                                       .share = 1,
-                                       .finest = p->finest,
-                                       .vertices = (size_t)p->vertices,
-                                       .most_cost = p->most_cost,
-                                       .k = p->k,
-                                       .cost = (qmat_cost_kind)p->cost,
-                                       .published = p->compat == QMAT_COMPAT_QMAT,
-                                       .error = (qmat_error_kind)p->error,
-                                       .on_exceed = (qmat_exceed_rule)p->on_exceed,
-                                       .topology = (qmat_topology_policy)p->topology,
-                                       .protect = (qmat_protection)p->protect,
-                                       .features = (qmat_feature_rule)p->features,
-                                       .crease_share = p->crease,
-                                       .refits = (int)p->refits,
-                                       .thin = initial->thin,
-                                       .has_target = mesh->closed && mesh->oriented};
+                                const qmat_initial_medial *initial, qmat_decimation_rules *rules) {
+  *rules = (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
+                                   .share = 1,
+                                   .finest = p->finest,
+                                   .vertices = (size_t)p->vertices,
+                                   .most_cost = p->most_cost,
+                                   .k = p->k,
+                                   .cost = (qmat_cost_kind)p->cost,
+                                   .published = p->compat == QMAT_COMPAT_QMAT,
+                                   .error = (qmat_error_kind)p->error,
+                                   .on_exceed = (qmat_exceed_rule)p->on_exceed,
+                                   .topology = (qmat_topology_policy)p->topology,
+                                   .protect = (qmat_protection)p->protect,
+                                   .features = (qmat_feature_rule)p->features,
+                                   .crease_share = p->crease,
+                                   .refits = (int)p->refits,
+                                   .thin = initial->thin,
+                                   .has_target = mesh->closed && mesh->oriented};
   return rules->has_target ? find_target_euler(context, mesh, &rules->target_euler) : QMAT_OK;
 }
 
@@ -153,7 +154,7 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   const qmat_medial *medial = (const qmat_medial *)inputs[3];
   *o = (qmat_ordered_collapses){.params = *params};
   apply_compatibility(&o->params);
-  qmat_simplification *run = &o->simplification;
+  qmat_decimation *run = &o->decimation;
   qmat_status status = qmat_simplify_prepare(context, &o->params, inputs, &o->surface, &o->initial);
   if (status != QMAT_OK) return status;
   run->context = context;
@@ -161,14 +162,14 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   status = qmat_simplify_rules(context, &o->params, mesh, &o->initial, &run->rules);
   if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
-    status =
-        qmat_control_points_make(context, o->surface, samples, medial, &run->complex, control_error * o->params.finest,
-                                 MOST_CONTROL_POINTS, run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
-  if (status == QMAT_OK) status = qmat_simplification_init(run, &o->control, o->initial.depths);
-  return status == QMAT_OK ? qmat_simplification_run(run) : status;
+    status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,
+                                         control_error * o->params.finest, MOST_CONSTRAINT_POINTS,
+                                         run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
+  if (status == QMAT_OK) status = qmat_decimation_init(run, &o->control, o->initial.depths);
+  return status == QMAT_OK ? qmat_decimation_run(run) : status;
 }
 
 void qmat_ordered_collapses_uninit(qmat_ordered_collapses *o) {
-  qmat_simplification_uninit(&o->simplification);
+  qmat_decimation_uninit(&o->decimation);
   qmat_surface_free(o->surface);
 }

@@ -1,46 +1,46 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/patch_fit.h"
+#include "nodes/simplify/neighbourhood_fit.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "core/geometry/vector.h"
 
-enum { MOST_PLACES = 512, VARIABLES = 4 * QMAT_PATCH_SPHERES };
+enum { MOST_PLACES = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 
 /* A slab or loose cone of the patch, prepared with the spheres of the newest step, and the ball that holds it. */
-typedef struct qmat_patch_part {
+typedef struct qmat_neighbourhood_part {
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
   int moving[3];        /* which sphere of the fit each corner is, or -1 */
   qmat_primitive primitive;
   qmat_primitive_ball ball;
-} patch_part;
+} neighbourhood_part;
 
-typedef struct qmat_patch_place {
+typedef struct qmat_neighbourhood_place {
   double point[3];
   double slack; /* how much more than `held` F may be; of a border, how much less it may be below 0 */
   qmat_place_kind kind;
   uint32_t part; /* the nearest one, of the newest step */
-} patch_place;
+} neighbourhood_place;
 
-void qmat_patch_fit_uninit(qmat_patch_fit *fit) {
+void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit) {
   qmat_free(fit->parts);
   qmat_free(fit->places);
-  *fit = (qmat_patch_fit){.count = 0};
+  *fit = (qmat_neighbourhood_fit){.count = 0};
 }
 
-static int moving_index(const qmat_patch_fit *fit, uint32_t vertex) {
+static int moving_index(const qmat_neighbourhood_fit *fit, uint32_t vertex) {
   for (int i = 0; i < fit->count; i++)
     if (fit->vertices[i] == vertex) return i;
   return -1;
 }
 
-static bool has_corner(const patch_part *part, uint32_t vertex) {
+static bool has_corner(const neighbourhood_part *part, uint32_t vertex) {
   return part->vertices[0] == vertex || part->vertices[1] == vertex || part->vertices[2] == vertex;
 }
 
 /* Adds a simplex of the complex as the collapse leaves it, unless it vanishes or is there already. */
-static qmat_status add_part(qmat_context *context, qmat_patch_fit *fit, const qmat_collapse *collapse,
+static qmat_status add_part(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_collapse *collapse,
                             const uint32_t *vertices, int count) {
   uint32_t corners[3] = {QMAT_NONE, QMAT_NONE, QMAT_NONE};
   for (int k = 0; k < count; k++) {
@@ -55,7 +55,7 @@ static qmat_status add_part(qmat_context *context, qmat_patch_fit *fit, const qm
   }
   if (qmat_grow((void **)&fit->parts, &fit->part_capacity, fit->part_count + 1, sizeof *fit->parts))
     return qmat_fail_memory(context, "the fit of a patch");
-  patch_part *part = &fit->parts[fit->part_count++];
+  neighbourhood_part *part = &fit->parts[fit->part_count++];
   for (int k = 0; k < 3; k++) {
     part->vertices[k] = corners[k];
     part->moving[k] = corners[k] == QMAT_NONE ? -1 : moving_index(fit, corners[k]);
@@ -63,7 +63,7 @@ static qmat_status add_part(qmat_context *context, qmat_patch_fit *fit, const qm
   return QMAT_OK;
 }
 
-static qmat_status add_star(qmat_context *context, qmat_patch_fit *fit, const qmat_complex *complex,
+static qmat_status add_star(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_complex *complex,
                             const qmat_collapse *collapse, uint32_t vertex, int corners) {
   size_t count;
   const uint32_t *at = corners == 3 ? qmat_complex_triangles_at(complex, vertex, &count)
@@ -75,33 +75,36 @@ static qmat_status add_star(qmat_context *context, qmat_patch_fit *fit, const qm
   return status;
 }
 
-qmat_status qmat_patch_fit_add(qmat_context *context, qmat_patch_fit *fit, const double *point, qmat_place_kind kind,
-                               double limit) {
+qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood_fit *fit, const double *point,
+                                       qmat_place_kind kind, double limit) {
   if (qmat_grow((void **)&fit->places, &fit->place_capacity, fit->place_count + 1, sizeof *fit->places))
     return qmat_fail_memory(context, "the fit of a patch");
-  patch_place *place = &fit->places[fit->place_count++];
-  *place = (patch_place){.kind = kind, .slack = kind == QMAT_PLACE_BORDER ? fit->held - limit : limit - fit->held};
+  neighbourhood_place *place = &fit->places[fit->place_count++];
+  *place =
+      (neighbourhood_place){.kind = kind, .slack = kind == QMAT_PLACE_BORDER ? fit->held - limit : limit - fit->held};
   memcpy(place->point, point, sizeof place->point);
   return QMAT_OK;
 }
 
 /* Whether this slot is the first by which its point hangs on the patch. */
-static bool is_first_slot(const qmat_patch_fit *fit, const qmat_coverage *coverage, uint32_t removed, uint32_t slot) {
+static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *to_envelope,
+                          uint32_t removed, uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (coverage->witnesses[s] == removed || moving_index(fit, coverage->witnesses[s]) >= 0) return false;
+    if (to_envelope->witnesses[s] == removed || moving_index(fit, to_envelope->witnesses[s]) >= 0) return false;
   return true;
 }
 
-qmat_status qmat_patch_fit_start(qmat_context *context, qmat_patch_fit *fit, const qmat_coverage *coverage,
-                                 const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
-                                 const uint32_t *vertices, size_t count, size_t surface_count, double held) {
+qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
+                                         const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                                         const qmat_collapse *collapse, const double sphere[4],
+                                         const uint32_t *vertices, size_t count, size_t surface_count, double held) {
   fit->held = held;
   fit->part_count = fit->place_count = 0;
   fit->worst = 0;
   fit->count = 1;
   fit->vertices[0] = collapse->kept;
   memcpy(fit->spheres[0], sphere, sizeof fit->spheres[0]);
-  for (size_t i = 0; i < count && fit->count < QMAT_PATCH_SPHERES; i++) {
+  for (size_t i = 0; i < count && fit->count < QMAT_NEIGHBOURHOOD_SPHERES; i++) {
     fit->vertices[fit->count] = vertices[i];
     memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)vertices[i]], 4 * sizeof(double));
   }
@@ -109,23 +112,23 @@ qmat_status qmat_patch_fit_start(qmat_context *context, qmat_patch_fit *fit, con
   for (int corners = 3; corners >= 2; corners--)
     for (int i = -1; i < fit->count && status == QMAT_OK; i++)
       status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
-  size_t slots = coverage->slot_counts[collapse->removed], at = 0;
-  for (int i = 0; i < fit->count; i++) slots += coverage->slot_counts[fit->vertices[i]];
+  size_t slots = to_envelope->slot_counts[collapse->removed], at = 0;
+  for (int i = 0; i < fit->count; i++) slots += to_envelope->slot_counts[fit->vertices[i]];
   const size_t stride = (slots + MOST_PLACES - 1) / MOST_PLACES;
   for (int i = -1; i < fit->count && status == QMAT_OK; i++)
-    for (uint32_t slot = qmat_coverage_first(coverage, i < 0 ? collapse->removed : fit->vertices[i]);
-         slot != QMAT_NONE && status == QMAT_OK; slot = coverage->next[slot], at++) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(to_envelope, i < 0 ? collapse->removed : fit->vertices[i]);
+         slot != QMAT_NONE && status == QMAT_OK; slot = to_envelope->next[slot], at++) {
       const size_t point = slot / 3;
-      if (at % stride == 0 && point < surface_count && is_first_slot(fit, coverage, collapse->removed, slot))
-        status =
-            qmat_patch_fit_add(context, fit, &coverage->points[3 * point], QMAT_PLACE_SURFACE, coverage->limits[point]);
+      if (at % stride == 0 && point < surface_count && is_first_slot(fit, to_envelope, collapse->removed, slot))
+        status = qmat_neighbourhood_fit_add(context, fit, &to_envelope->points[3 * point], QMAT_PLACE_SURFACE,
+                                            to_envelope->limits[point]);
     }
   return status;
 }
 
-static void prepare(qmat_patch_fit *fit, const qmat_complex *complex, double spheres[][4]) {
+static void prepare(qmat_neighbourhood_fit *fit, const qmat_complex *complex, double spheres[][4]) {
   for (size_t i = 0; i < fit->part_count; i++) {
-    patch_part *part = &fit->parts[i];
+    neighbourhood_part *part = &fit->parts[i];
     const int corners = part->vertices[2] == QMAT_NONE ? 2 : 3;
     const double *at[3];
     for (int k = 0; k < corners; k++)
@@ -135,12 +138,12 @@ static void prepare(qmat_patch_fit *fit, const qmat_complex *complex, double sph
 }
 
 /* F at a place, and the weights of the corners of its nearest part, which is looked for from the last one on. */
-static double find_foot(const qmat_patch_fit *fit, patch_place *place, double weights[3]) {
+static double find_foot(const qmat_neighbourhood_fit *fit, neighbourhood_place *place, double weights[3]) {
   uint32_t nearest = place->part;
   double best = qmat_primitive_foot(&fit->parts[nearest].primitive, place->point, weights);
   for (uint32_t i = 0; i < fit->part_count; i++) {
     if (i == place->part) continue;
-    const patch_part *part = &fit->parts[i];
+    const neighbourhood_part *part = &fit->parts[i];
     double w[3];
     if (qmat_primitive_is_farther(&part->ball, place->point, best)) continue;
     const double f = qmat_primitive_foot(&part->primitive, place->point, w);
@@ -154,7 +157,7 @@ static double find_foot(const qmat_patch_fit *fit, patch_place *place, double we
 }
 
 /* By how much F is wrong; above `held` in size where it is not what is asked. */
-static double error_at(const patch_place *place, double f) {
+static double error_at(const neighbourhood_place *place, double f) {
   switch (place->kind) {
     case QMAT_PLACE_INSIDE:
       return qmat_larger(0, f - place->slack);
@@ -172,9 +175,10 @@ typedef struct {
 } equations;
 
 /* Adds weight times the square of the linearised error of a place. */
-static void add_place(const qmat_patch_fit *fit, const qmat_complex *complex, double spheres[][4],
-                      const patch_place *place, const double weights[3], double error, double weight, equations *e) {
-  const patch_part *part = &fit->parts[place->part];
+static void add_place(const qmat_neighbourhood_fit *fit, const qmat_complex *complex, double spheres[][4],
+                      const neighbourhood_place *place, const double weights[3], double error, double weight,
+                      equations *e) {
+  const neighbourhood_part *part = &fit->parts[place->part];
   double foot[3] = {0, 0, 0}, row[12];
   int columns[12], count = 0;
   for (int k = 0; k < 3 && part->vertices[k] != QMAT_NONE; k++) {
@@ -235,8 +239,8 @@ enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
 enum { STEPS_OF_HOPE = 3 };
 static const double hope = 2;
 
-void qmat_patch_fit_run(qmat_patch_fit *fit, const qmat_complex *complex, bool again, double *error) {
-  double current[QMAT_PATCH_SPHERES][4];
+void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex *complex, bool again, double *error) {
+  double current[QMAT_NEIGHBOURHOOD_SPHERES][4];
   equations e;
   const size_t bytes = (size_t)fit->count * sizeof *current;
   memcpy(current, fit->spheres, bytes);
@@ -251,7 +255,7 @@ void qmat_patch_fit_run(qmat_patch_fit *fit, const qmat_complex *complex, bool a
     const double last_worst = fit->worst;
     double worst = 0;
     for (size_t i = 0; i < fit->place_count; i++) {
-      patch_place *place = &fit->places[i];
+      neighbourhood_place *place = &fit->places[i];
       double weights[3], weight = 1;
       const double wrong = error_at(place, find_foot(fit, place, weights));
       worst = qmat_larger(worst, fabs(wrong));

@@ -1,0 +1,387 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/surface_to_envelope.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+
+typedef struct qmat_new_witness {
+  uint32_t point, vertices[3];
+  double weights[3];
+} new_witness;
+
+static void link_slot(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
+  const uint32_t head = to_envelope->heads[vertex];
+  to_envelope->next[slot] = head;
+  to_envelope->previous[slot] = QMAT_NONE;
+  if (head != QMAT_NONE) to_envelope->previous[head] = slot;
+  to_envelope->heads[vertex] = slot;
+  to_envelope->slot_counts[vertex]++;
+}
+
+static void unlink_slot(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
+  const uint32_t next = to_envelope->next[slot], previous = to_envelope->previous[slot];
+  if (next != QMAT_NONE) to_envelope->previous[next] = previous;
+  if (previous != QMAT_NONE)
+    to_envelope->next[previous] = next;
+  else
+    to_envelope->heads[vertex] = next;
+  to_envelope->slot_counts[vertex]--;
+}
+
+qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                          size_t point_count, const double *points, double *limits,
+                                          const uint32_t *witnesses, const double *weights, size_t vertex_count) {
+  *to_envelope = (qmat_surface_to_envelope){.point_count = point_count, .points = points, .limits = limits};
+  if (point_count >= QMAT_NONE / 3) return qmat_fail_memory(context, "constraint points");
+  to_envelope->witnesses = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  to_envelope->weights = qmat_alloc(point_count, 3 * sizeof(double));
+  to_envelope->next = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  to_envelope->previous = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  to_envelope->heads = qmat_alloc(vertex_count, sizeof(uint32_t));
+  to_envelope->slot_counts = qmat_calloc(vertex_count, sizeof(uint32_t));
+  to_envelope->marks = qmat_calloc(point_count, sizeof(uint32_t));
+  if (!to_envelope->witnesses || !to_envelope->weights || !to_envelope->next || !to_envelope->previous ||
+      !to_envelope->heads || !to_envelope->slot_counts || !to_envelope->marks)
+    return qmat_fail_memory(context, "constraint points");
+  if (point_count > 0) {
+    memcpy(to_envelope->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
+    memcpy(to_envelope->weights, weights, 3 * point_count * sizeof *weights);
+  }
+  for (size_t v = 0; v < vertex_count; v++) to_envelope->heads[v] = QMAT_NONE;
+  for (size_t slot = 0; slot < 3 * point_count; slot++)
+    if (witnesses[slot] != QMAT_NONE) link_slot(to_envelope, (uint32_t)slot, witnesses[slot]);
+  return QMAT_OK;
+}
+
+void qmat_surface_to_envelope_uninit(qmat_surface_to_envelope *to_envelope) {
+  qmat_free(to_envelope->witnesses);
+  qmat_free(to_envelope->weights);
+  qmat_free(to_envelope->next);
+  qmat_free(to_envelope->previous);
+  qmat_free(to_envelope->heads);
+  qmat_free(to_envelope->slot_counts);
+  qmat_free(to_envelope->marks);
+  qmat_free(to_envelope->found);
+  qmat_free(to_envelope->star.items);
+  qmat_free(to_envelope->star.balls);
+  qmat_free(to_envelope->link.items);
+  qmat_free(to_envelope->link.balls);
+  *to_envelope = (qmat_surface_to_envelope){0};
+}
+
+/* F at the witness after the collapse: an upper bound of F there. */
+static double witness_distance(const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                               const qmat_collapse *collapse, const double sphere[4], size_t point) {
+  double s[4] = {0, 0, 0, 0};
+  for (size_t k = 0; k < 3; k++) {
+    const uint32_t vertex = to_envelope->witnesses[3 * point + k];
+    if (vertex == QMAT_NONE) break;
+    const double weight = to_envelope->weights[3 * point + k];
+    const double *corner =
+        vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
+    for (int i = 0; i < 4; i++) s[i] += weight * corner[i];
+  }
+  return qmat_sphere_distance(s, &to_envelope->points[3 * point]);
+}
+
+/* A slab or loose cone of a star. */
+typedef struct qmat_star_part {
+  qmat_primitive primitive;
+  uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
+} star_part;
+
+static qmat_status add_part(qmat_context *context, qmat_star_parts *parts, const double *const spheres[3],
+                            const uint32_t vertices[3]) {
+  if (qmat_grow((void **)&parts->items, &parts->item_capacity, parts->count + 1, sizeof *parts->items) ||
+      qmat_grow((void **)&parts->balls, &parts->ball_capacity, parts->count + 1, sizeof *parts->balls))
+    return qmat_fail_memory(context, "the star of a collapse");
+  star_part *part = &parts->items[parts->count];
+  memcpy(part->vertices, vertices, sizeof part->vertices);
+  qmat_primitive_prepare(spheres, vertices[2] == QMAT_NONE ? 2 : 3, &part->primitive, &parts->balls[parts->count]);
+  parts->count++;
+  return QMAT_OK;
+}
+
+/* Collapses leave the vertices of the link where they are, so that `sphere` stands for both ends of the edge. */
+static const double *corner(const qmat_complex *complex, const qmat_collapse *collapse, const double *sphere,
+                            uint32_t vertex) {
+  return vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
+}
+
+static qmat_status add_simplex(qmat_context *context, qmat_star_parts *parts, const qmat_complex *complex,
+                               const qmat_collapse *collapse, const double *sphere, uint32_t a, uint32_t b,
+                               uint32_t c) {
+  const uint32_t vertices[3] = {a, b, c};
+  const double *spheres[3] = {corner(complex, collapse, sphere, a), corner(complex, collapse, sphere, b), NULL};
+  if (c != QMAT_NONE) spheres[2] = corner(complex, collapse, sphere, c);
+  return add_part(context, parts, spheres, vertices);
+}
+
+qmat_status qmat_surface_to_envelope_prepare(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                             const qmat_complex *complex, const qmat_collapse *collapse,
+                                             const double sphere[4]) {
+  qmat_status status = QMAT_OK;
+  to_envelope->star.count = to_envelope->link.count = 0;
+  to_envelope->link_known = false;
+  for (size_t t = 0; t < collapse->triangle_count && status == QMAT_OK; t++)
+    status = add_simplex(context, &to_envelope->star, complex, collapse, sphere, collapse->kept,
+                         collapse->triangle_pairs[2 * t], collapse->triangle_pairs[2 * t + 1]);
+  for (size_t n = 0; n < collapse->neighbour_count && status == QMAT_OK; n++) {
+    bool loose = true;
+    for (size_t i = 0; i < 2 * collapse->triangle_count && loose; i++)
+      loose = collapse->triangle_pairs[i] != collapse->neighbours[n];
+    if (loose)
+      status = add_simplex(context, &to_envelope->star, complex, collapse, sphere, collapse->kept,
+                           collapse->neighbours[n], QMAT_NONE);
+  }
+  to_envelope->prepared = status == QMAT_OK;
+  return status;
+}
+
+static bool is_touched(const qmat_collapse *collapse, const uint32_t *vertices, int count) {
+  for (int k = 0; k < count; k++)
+    if (vertices[k] == collapse->kept || vertices[k] == collapse->removed) return true;
+  return false;
+}
+
+/* Prepares the primitives of the link's vertices that the collapse does not touch. */
+static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                const qmat_complex *complex, const qmat_collapse *collapse) {
+  qmat_status status = QMAT_OK;
+  for (size_t n = 0; n < collapse->neighbour_count; n++) {
+    const uint32_t vertex = collapse->neighbours[n];
+    size_t count;
+    const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
+      if (!is_touched(collapse, t, 3))
+        status = add_simplex(context, &to_envelope->link, complex, collapse, NULL, t[0], t[1], t[2]);
+    }
+    at = qmat_complex_edges_at(complex, vertex, &count);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
+      if (!complex->edge_triangles[at[i]] && !is_touched(collapse, ends, 2))
+        status = add_simplex(context, &to_envelope->link, complex, collapse, NULL, ends[0], ends[1], QMAT_NONE);
+    }
+  }
+  to_envelope->link_known = status == QMAT_OK;
+  return status;
+}
+
+/* The nearest primitive of the merged vertex's star. */
+static double search_star(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse,
+                          const double sphere[4], const double *point, new_witness *witness) {
+  double best = qmat_sphere_distance(sphere, point);
+  *witness = (new_witness){witness->point, {collapse->kept, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+  for (size_t i = 0; i < to_envelope->star.count; i++) {
+    double weights[3];
+    if (qmat_primitive_is_farther(&to_envelope->star.balls[i], point, best)) continue;
+    const star_part *part = &to_envelope->star.items[i];
+    const double f = qmat_primitive_foot(&part->primitive, point, weights);
+    if (!(f < best)) continue;
+    best = f;
+    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->weights, weights, sizeof witness->weights);
+  }
+  return best;
+}
+
+/* The nearest primitive of the link, or the first that comes as close as `enough`. */
+static double search_link(const qmat_surface_to_envelope *to_envelope, const double *point, double enough,
+                          new_witness *witness) {
+  double best = INFINITY;
+  for (size_t i = 0; i < to_envelope->link.count; i++) {
+    double weights[3];
+    if (qmat_primitive_is_farther(&to_envelope->link.balls[i], point, best)) continue;
+    const star_part *part = &to_envelope->link.items[i];
+    const double f = qmat_primitive_foot(&part->primitive, point, weights);
+    if (!(f < best)) continue;
+    best = f;
+    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->weights, weights, sizeof witness->weights);
+    if (best <= enough) break;
+  }
+  return best;
+}
+
+static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                              const qmat_collapse *collapse, const double sphere[4], uint32_t point, bool *kept) {
+  if (to_envelope->marks[point] == to_envelope->stamp) return QMAT_OK;
+  to_envelope->marks[point] = to_envelope->stamp;
+  const double limit = to_envelope->limits[point];
+  if (witness_distance(to_envelope, complex, collapse, sphere, point) <= limit) return QMAT_OK;
+  if (!to_envelope->prepared) {
+    const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
+    if (status != QMAT_OK) return status;
+  }
+  if (qmat_grow((void **)&to_envelope->found, &to_envelope->found_capacity, to_envelope->found_count + 1,
+                sizeof *to_envelope->found))
+    return qmat_fail_memory(context, "witnesses");
+  new_witness *witness = &to_envelope->found[to_envelope->found_count];
+  witness->point = point;
+  const double *p = &to_envelope->points[3 * (size_t)point];
+  const double star = search_star(to_envelope, collapse, sphere, p, witness);
+  if (star <= limit) {
+    to_envelope->found_count++;
+    return QMAT_OK;
+  }
+  if (!to_envelope->link_known) {
+    const qmat_status status = prepare_link(context, to_envelope, complex, collapse);
+    if (status != QMAT_OK) return status;
+  }
+  const double link = search_link(to_envelope, p, limit, witness);
+  if (link <= limit) {
+    to_envelope->found_count++;
+    return QMAT_OK;
+  }
+  to_envelope->failed_distance = fmin(star, link);
+  to_envelope->failed_point = point;
+  *kept = false;
+  return QMAT_OK;
+}
+
+double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                                          const qmat_collapse *collapse, const double sphere[4], const double point[3],
+                                          double foot[4], double *share) {
+  new_witness witness = {.point = QMAT_NONE};
+  const double distance = search_star(to_envelope, collapse, sphere, point, &witness);
+  *share = witness.weights[0];
+  for (int i = 0; i < 4; i++) foot[i] = witness.weights[0] * sphere[i];
+  for (size_t k = 1; k < 3 && witness.vertices[k] != QMAT_NONE; k++)
+    for (size_t i = 0; i < 4; i++)
+      foot[i] += witness.weights[k] * complex->spheres[4 * (size_t)witness.vertices[k] + i];
+  return distance;
+}
+
+/* Every point is looked at once in a walk over several lists: a new stamp marks those that were. */
+static void start_marks(qmat_surface_to_envelope *to_envelope) {
+  if (++to_envelope->stamp > 0) return;
+  memset(to_envelope->marks, 0, to_envelope->point_count * sizeof *to_envelope->marks);
+  to_envelope->stamp = 1;
+}
+
+qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                                 const qmat_complex *complex, const qmat_collapse *collapse,
+                                                 const double sphere[4], size_t point_count, double *error) {
+  qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
+  if (status == QMAT_OK) status = prepare_link(context, to_envelope, complex, collapse);
+  if (status != QMAT_OK) return status;
+  *error = -INFINITY;
+  start_marks(to_envelope);
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    for (uint32_t slot = to_envelope->heads[ends[e]]; slot != QMAT_NONE; slot = to_envelope->next[slot]) {
+      const uint32_t point = slot / 3;
+      if (point >= point_count || to_envelope->marks[point] == to_envelope->stamp) continue;
+      to_envelope->marks[point] = to_envelope->stamp;
+      const double *p = &to_envelope->points[3 * (size_t)point];
+      new_witness witness = {.point = point};
+      double f = witness_distance(to_envelope, complex, collapse, sphere, point);
+      if (f > *error) f = fmin(f, search_star(to_envelope, collapse, sphere, p, &witness));
+      if (f > *error) f = fmin(f, search_link(to_envelope, p, *error, &witness));
+      *error = fmax(*error, f);
+    }
+  return QMAT_OK;
+}
+
+/* What a look at the slot will read: the lists run through memory at random, and waiting for it takes longer than the
+ * look.
+ */
+static inline void fetch_ahead(const qmat_surface_to_envelope *to_envelope, uint32_t slot) {
+  if (slot == QMAT_NONE) return;
+  const size_t point = slot / 3;
+  __builtin_prefetch(&to_envelope->next[slot]);
+  __builtin_prefetch(&to_envelope->marks[point]);
+  __builtin_prefetch(&to_envelope->limits[point]);
+  __builtin_prefetch(&to_envelope->witnesses[3 * point]);
+  __builtin_prefetch(&to_envelope->weights[3 * point]);
+  __builtin_prefetch(&to_envelope->points[3 * point]);
+}
+
+static bool touches(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse, uint32_t point) {
+  for (size_t k = 0; k < 3; k++) {
+    const uint32_t vertex = to_envelope->witnesses[3 * (size_t)point + k];
+    if (vertex != QMAT_NONE && (vertex == collapse->kept || vertex == collapse->removed)) return true;
+  }
+  return false;
+}
+
+qmat_status qmat_surface_to_envelope_test(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+                                          const qmat_complex *complex, const qmat_collapse *collapse,
+                                          const double sphere[4], uint32_t first, bool *kept) {
+  *kept = true;
+  to_envelope->found_count = 0;
+  to_envelope->prepared = false;
+  start_marks(to_envelope);
+  qmat_status status = QMAT_OK;
+  if (first != QMAT_NONE && touches(to_envelope, collapse, first))
+    status = test_point(context, to_envelope, complex, collapse, sphere, first, kept);
+  const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+    for (uint32_t slot = to_envelope->heads[ends[e]], next; slot != QMAT_NONE && status == QMAT_OK && *kept;
+         slot = next) {
+      next = to_envelope->next[slot];
+      fetch_ahead(to_envelope, next);
+      status = test_point(context, to_envelope, complex, collapse, sphere, slot / 3, kept);
+    }
+  return status;
+}
+
+/* Drops a witness slot, which is linked at `vertex`; the last used slot of the point takes its place. */
+static void drop_corner(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
+  unlink_slot(to_envelope, slot, vertex);
+  uint32_t last = slot;
+  while (last % 3 < 2 && to_envelope->witnesses[last + 1] != QMAT_NONE) last++;
+  if (last != slot) {
+    const uint32_t moved = to_envelope->witnesses[last];
+    unlink_slot(to_envelope, last, moved);
+    to_envelope->witnesses[slot] = moved;
+    to_envelope->weights[slot] = to_envelope->weights[last];
+    link_slot(to_envelope, slot, moved);
+  }
+  to_envelope->witnesses[last] = QMAT_NONE;
+  to_envelope->weights[last] = 0;
+}
+
+/* The witnesses of `removed` become those of `kept`. */
+static void merge_lists(qmat_surface_to_envelope *to_envelope, uint32_t kept, uint32_t removed) {
+  uint32_t tail = QMAT_NONE;
+  for (uint32_t slot = to_envelope->heads[removed]; slot != QMAT_NONE;) {
+    const uint32_t next = to_envelope->next[slot], first = slot - slot % 3;
+    uint32_t twin = first;
+    while (twin < first + 3 && to_envelope->witnesses[twin] != kept) twin++;
+    if (twin < first + 3) {
+      to_envelope->weights[twin] += to_envelope->weights[slot];
+      drop_corner(to_envelope, slot, removed);
+    } else {
+      to_envelope->witnesses[slot] = kept;
+      tail = slot;
+    }
+    slot = next;
+  }
+  if (tail != QMAT_NONE) {
+    to_envelope->next[tail] = to_envelope->heads[kept];
+    if (to_envelope->heads[kept] != QMAT_NONE) to_envelope->previous[to_envelope->heads[kept]] = tail;
+    to_envelope->heads[kept] = to_envelope->heads[removed];
+  }
+  to_envelope->slot_counts[kept] += to_envelope->slot_counts[removed];
+  to_envelope->heads[removed] = QMAT_NONE;
+  to_envelope->slot_counts[removed] = 0;
+}
+
+void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse) {
+  if (collapse->removed != QMAT_NONE) merge_lists(to_envelope, collapse->kept, collapse->removed);
+  for (size_t i = 0; i < to_envelope->found_count; i++) {
+    const new_witness *w = &to_envelope->found[i];
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t slot = 3 * w->point + (uint32_t)k;
+      if (to_envelope->witnesses[slot] != QMAT_NONE) unlink_slot(to_envelope, slot, to_envelope->witnesses[slot]);
+      to_envelope->witnesses[slot] = w->vertices[k];
+      to_envelope->weights[slot] = w->weights[k];
+      if (w->vertices[k] != QMAT_NONE) link_slot(to_envelope, slot, w->vertices[k]);
+    }
+  }
+  to_envelope->found_count = 0;
+}
