@@ -7,6 +7,7 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"
+#include "io/scanner.h"
 #include "io/usd/usd_scene.h"
 
 static const struct {
@@ -42,10 +43,6 @@ static const char *base_name(const char *path) {
 static const char *ending_of(const char *base) {
   const char *dot = strrchr(base, '.');
   return dot && dot != base ? dot : base + strlen(base);
-}
-
-static bool is_word(const char *text, size_t length, const char *word) {
-  return length == strlen(word) && memcmp(text, word, length) == 0;
 }
 
 qmat_format qmat_format_of_name(const char *path) {
@@ -89,12 +86,12 @@ qmat_format qmat_format_of_bytes(const qmat_bytes *bytes) {
   const char *word = qmat_scan_token(&scanner, &length);
   if (length == 0) return QMAT_FORMAT_UNKNOWN;
   if (word[0] == '{') return QMAT_FORMAT_GLTF;
-  if (length >= 3 && length <= 8 && is_word(word + length - 3, 3, "OFF")) return QMAT_FORMAT_OFF;
-  if (is_word(word, length, "ply")) return QMAT_FORMAT_PLY;
-  if (is_word(word, length, "solid")) return QMAT_FORMAT_STL;
+  if (length >= 3 && length <= 8 && qmat_is_word(word + length - 3, 3, "OFF")) return QMAT_FORMAT_OFF;
+  if (qmat_is_word(word, length, "ply")) return QMAT_FORMAT_PLY;
+  if (qmat_is_word(word, length, "solid")) return QMAT_FORMAT_STL;
   static const char *const obj_words[] = {"v", "vn", "vt", "vp", "f", "o", "g", "s", "mtllib", "usemtl"};
   for (size_t i = 0; i < sizeof obj_words / sizeof obj_words[0]; i++) {
-    if (is_word(word, length, obj_words[i])) return QMAT_FORMAT_OBJ;
+    if (qmat_is_word(word, length, obj_words[i])) return QMAT_FORMAT_OBJ;
   }
   return QMAT_FORMAT_UNKNOWN;
 }

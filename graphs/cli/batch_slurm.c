@@ -7,6 +7,7 @@
 
 #include "graphs/cli/batch.h"
 #include "io/bytes.h"
+#include "io/save.h"
 
 /* A word that a shell takes as it is. */
 static void put_quoted(qmat_writer *writer, const char *word) {

@@ -3,11 +3,11 @@
 
 #include "graphs/cli/command.h"
 #include "graphs/run/graph_run.h"
-#include "io/bytes.h"
 #include "io/extract.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/model.h"
+#include "io/save.h"
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const char *from = invocation->arguments[0], *to = qmat_invocation_value(invocation, "output");

@@ -13,7 +13,7 @@
 #include "core/json_text.h"
 #include "graphs/run/parallel_items.h"
 #include "graphs/run/run_cache.h"
-#include "io/bytes.h"
+#include "io/save.h"
 
 static double now(void) {
   struct timespec time;

@@ -9,6 +9,7 @@
 #include "graphs/node_json.h"
 #include "graphs/run/run_cache.h"
 #include "io/bytes.h"
+#include "io/save.h"
 
 /* ---- JSON ---- */
 

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/geometry/medial_build.h"
+#include "io/scanner.h"
 
 static qmat_status read_count(qmat_scanner *scanner, const char *what, uint64_t bytes_each, size_t *count) {
   int64_t number = 0;
@@ -20,7 +21,7 @@ static qmat_status read_sphere(qmat_scanner *scanner, double sphere[4]) {
   static const char *const names[4] = {"the x coordinate of a sphere", "the y coordinate of a sphere",
                                        "the z coordinate of a sphere", "the radius of a sphere"};
   for (int k = 0; k < 4; k++) {
-    if (!qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "the file ends where %s should stand", names[k]);
+    if (!qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "expected %s, found the end of the file", names[k]);
     const qmat_scanner here = *scanner;
     qmat_status status = qmat_scan_number(scanner, names[k], &sphere[k]);
     if (status != QMAT_OK) return status;

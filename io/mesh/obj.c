@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "io/mesh/mesh_formats.h"
+#include "io/scanner.h"
 
 static qmat_status read_vertex(qmat_scanner *scanner, qmat_soup *soup) {
   static const char *const names[3] = {"the x coordinate of a vertex", "the y coordinate of a vertex",

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "io/mesh/mesh_formats.h"
+#include "io/scanner.h"
 
 /* The keyword [ST][C][N][4][n]OFF and what follows it on its line. A file without a keyword starts with its counts. */
 static qmat_status read_keyword(qmat_scanner *scanner) {

@@ -5,6 +5,7 @@
 
 #include "core/node.h"
 #include "io/mesh/mesh_formats.h"
+#include "io/scanner.h"
 
 typedef enum scalar { I8, U8, I16, U16, I32, U32, F32, F64, NO_SCALAR } scalar;
 
@@ -47,10 +48,6 @@ typedef struct ply {
 
 /* ---- header ---- */
 
-static bool is_word(const char *token, size_t length, const char *word) {
-  return length == strlen(word) && memcmp(token, word, length) == 0;
-}
-
 static scalar scalar_named(const char *token, size_t length) {
   static const struct {
     const char *name;
@@ -59,7 +56,7 @@ static scalar scalar_named(const char *token, size_t length) {
                {"ushort", U16}, {"uint16", U16},  {"int", I32},    {"int32", I32},  {"uint", U32},  {"uint32", U32},
                {"float", F32},  {"float32", F32}, {"double", F64}, {"float64", F64}};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-    if (is_word(token, length, names[i].name)) return names[i].type;
+    if (qmat_is_word(token, length, names[i].name)) return names[i].type;
   }
   return NO_SCALAR;
 }
@@ -67,13 +64,13 @@ static scalar scalar_named(const char *token, size_t length) {
 static qmat_status read_format(ply *p) {
   size_t length;
   const char *token = qmat_scan_token_on_line(&p->scanner, &length);
-  p->ascii = is_word(token, length, "ascii");
-  p->reader.big_endian = is_word(token, length, "binary_big_endian");
-  if (!p->ascii && !p->reader.big_endian && !is_word(token, length, "binary_little_endian")) {
+  p->ascii = qmat_is_word(token, length, "ascii");
+  p->reader.big_endian = qmat_is_word(token, length, "binary_big_endian");
+  if (!p->ascii && !p->reader.big_endian && !qmat_is_word(token, length, "binary_little_endian")) {
     return qmat_scan_fail(&p->scanner, "the format must be ascii, binary_little_endian or binary_big_endian");
   }
   token = qmat_scan_token_on_line(&p->scanner, &length);
-  if (!is_word(token, length, "1.0")) return qmat_scan_fail(&p->scanner, "only version 1.0 of PLY is read");
+  if (!qmat_is_word(token, length, "1.0")) return qmat_scan_fail(&p->scanner, "only version 1.0 of PLY is read");
   return QMAT_OK;
 }
 
@@ -87,9 +84,9 @@ static qmat_status read_element(ply *p) {
   element *e = &p->elements[p->element_count];
   *e = (element){.first_property = p->property_count};
   snprintf(e->name, sizeof e->name, "%.*s", length < 31 ? (int)length : 31, token);
-  if (is_word(token, length, "vertex")) e->kind = VERTEX;
-  if (is_word(token, length, "face")) e->kind = FACE;
-  if (is_word(token, length, "tristrips")) e->kind = STRIPS;
+  if (qmat_is_word(token, length, "vertex")) e->kind = VERTEX;
+  if (qmat_is_word(token, length, "face")) e->kind = FACE;
+  if (qmat_is_word(token, length, "tristrips")) e->kind = STRIPS;
   for (size_t i = 0; e->kind != ELSE && i < p->element_count; i++) {
     if (p->elements[i].kind == e->kind) {
       return qmat_scan_fail(&p->scanner, "the element '%s' is there twice", e->name);
@@ -110,7 +107,7 @@ static qmat_status read_property(ply *p) {
   property property = {.counter = NO_SCALAR};
   size_t length;
   const char *token = qmat_scan_token_on_line(&p->scanner, &length);
-  bool list = is_word(token, length, "list");
+  bool list = qmat_is_word(token, length, "list");
   if (list) {
     token = qmat_scan_token_on_line(&p->scanner, &length);
     property.counter = scalar_named(token, length);
@@ -130,7 +127,7 @@ static qmat_status read_property(ply *p) {
     property.role = (role)(X + (token[0] - 'x'));
   }
   if ((e->kind == FACE || e->kind == STRIPS) && list &&
-      (is_word(token, length, "vertex_indices") || is_word(token, length, "vertex_index"))) {
+      (qmat_is_word(token, length, "vertex_indices") || qmat_is_word(token, length, "vertex_index"))) {
     property.role = CORNERS;
   }
   for (size_t i = e->first_property; property.role != OTHER && i < p->property_count; i++) {
@@ -206,7 +203,7 @@ static qmat_status read_header(ply *p, const qmat_bytes *bytes) {
   size_t length;
   bool format = false;
   const char *token = qmat_scan_token_on_line(scanner, &length);
-  if (!is_word(token, length, "ply")) {
+  if (!qmat_is_word(token, length, "ply")) {
     scanner->at = token;
     return qmat_scan_fail(scanner, "this is no PLY file: it does not start with 'ply'");
   }
@@ -218,16 +215,16 @@ static qmat_status read_header(ply *p, const qmat_bytes *bytes) {
     const qmat_scanner line = *scanner;
     qmat_status status = QMAT_OK;
     token = qmat_scan_token_on_line(scanner, &length);
-    if (is_word(token, length, "format")) {
+    if (qmat_is_word(token, length, "format")) {
       status = read_format(p);
       format = true;
-    } else if (is_word(token, length, "element")) {
+    } else if (qmat_is_word(token, length, "element")) {
       status = read_element(p);
-    } else if (is_word(token, length, "property")) {
+    } else if (qmat_is_word(token, length, "property")) {
       status = read_property(p);
-    } else if (is_word(token, length, "end_header")) {
+    } else if (qmat_is_word(token, length, "end_header")) {
       break;
-    } else if (!is_word(token, length, "comment") && !is_word(token, length, "obj_info")) {
+    } else if (!qmat_is_word(token, length, "comment") && !qmat_is_word(token, length, "obj_info")) {
       return qmat_scan_fail(&line, "'%.*s' is no keyword of a PLY header", length < 24 ? (int)length : 24, token);
     }
     if (status != QMAT_OK) return status;

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "io/mesh/mesh_formats.h"
+#include "io/scanner.h"
 
 enum { HEADER = 84, FACET = 50 };
 

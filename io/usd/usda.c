@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "io/scanner.h"
 #include "io/usd/usd.h"
 
 /* A text that grows, or numbers that do: what a value is collected in before its size is known. */
@@ -169,14 +170,10 @@ static const char *peek_name(parser *p, size_t *length) {
   return at;
 }
 
-static bool is_word(const char *text, size_t length, const char *word) {
-  return length == strlen(word) && memcmp(text, word, length) == 0;
-}
-
 static bool accept_word(parser *p, const char *word) {
   size_t length;
   const char *name = peek_name(p, &length);
-  if (!is_word(name, length, word)) return false;
+  if (!qmat_is_word(name, length, word)) return false;
   p->scanner.at += length;
   return true;
 }
@@ -501,7 +498,7 @@ static qmat_status take_type(parser *p, const char **name, type_shape *shape) {
   if (length == 0) return fail_expected(p, "the name of a type");
   *shape = (type_shape){.type = QMAT_USD_UNREAD};
   for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
-    if (is_word(text, length, shapes[i].name)) *shape = shapes[i];
+    if (qmat_is_word(text, length, shapes[i].name)) *shape = shapes[i];
   }
   p->scanner.at += length;
   if (p->scanner.at[0] == '[' && p->scanner.at[1] == ']') {
@@ -639,17 +636,17 @@ static qmat_status take_any(parser *p, qmat_usd_value *value) {
   }
   const char *name = peek_name(p, &length);
   if (length == 0) return take_untyped_number(p, value);
-  if (is_word(name, length, "None")) {
+  if (qmat_is_word(name, length, "None")) {
     p->scanner.at += length;
     *value = (qmat_usd_value){.type = QMAT_USD_BLOCK};
     return QMAT_OK;
   }
-  bool truth = is_word(name, length, "true");
+  bool truth = qmat_is_word(name, length, "true");
   const qmat_usd_value *made;
-  if (truth || is_word(name, length, "false")) {
+  if (truth || qmat_is_word(name, length, "false")) {
     p->scanner.at += length;
     made = qmat_usd_bool_value(p->context, p->layer, truth);
-  } else if (is_word(name, length, "inf") || is_word(name, length, "nan")) {
+  } else if (qmat_is_word(name, length, "inf") || qmat_is_word(name, length, "nan")) {
     return take_untyped_number(p, value);
   } else {
     const char *token;
@@ -1006,7 +1003,7 @@ static qmat_status take_property(parser *p, qmat_usd_spec *owner) {
   if (edits && edit == QMAT_USD_ORDERED && peek(p) != 0) {
     size_t length;
     const char *word = peek_name(p, &length);
-    bool names = is_word(word, length, "nameChildren"), properties = is_word(word, length, "properties");
+    bool names = qmat_is_word(word, length, "nameChildren"), properties = qmat_is_word(word, length, "properties");
     if (names || properties) {
       p->scanner.at += length;
       qmat_usd_value *order = new_value(p);

@@ -2,6 +2,7 @@
 #include "io/model.h"
 
 #include "io/mesh/ma.h"
+#include "io/save.h"
 #include "tests/io/files.h"
 
 static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

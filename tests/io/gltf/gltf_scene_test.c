@@ -9,6 +9,7 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_write.h"
 #include "io/model.h"
+#include "io/save.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/io/medial_examples.h"
 

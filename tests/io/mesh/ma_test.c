@@ -43,7 +43,7 @@ static void test_spheres_edges_and_triangles_are_read_and_sorted(void **state) {
 static void test_bad_files_are_refused_with_the_place(void **state) {
   (void)state;
   static const char *const cases[][2] = {
-      {"x", "file:1:1: the number of spheres is 'x', which is no whole number"},
+      {"x", "file:1:1: the number of spheres is 'x', not a whole number"},
       {"0 0 0\n", "file:1:6: the medial mesh has no spheres"},
       {"4000000000 0 0\nv 0 0 0 1\n", "file:1:11: the number of spheres is 4000000000, more than the file can hold"},
       {"1 4000000000 0\nv 0 0 0 1\n", "file:1:13: the number of edges is 4000000000, more than the file can hold"},
@@ -51,8 +51,8 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
       {"1 0 0\nv 0 0 0 -1\n", "file:2:9: sphere 0: the radius of a sphere is negative"},
       {"1 0 0\nv 0 nan 0 1\n", "file:2:5: sphere 0: the y coordinate of a sphere is not finite"},
       {"1 0 0\nv 0 0 1e999 1\n", "file:2:7: sphere 0: the z coordinate of a sphere is not finite"},
-      {"1 0 0\nv 0 0 0\n", "file:3:1: sphere 0: the file ends where the radius of a sphere should stand"},
-      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 0 2\n", "file:4:5: edge 0: the number of a sphere is '2', not one of 0 to 1"},
+      {"1 0 0\nv 0 0 0\n", "file:3:1: sphere 0: expected the radius of a sphere, found the end of the file"},
+      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 0 2\n", "file:4:5: edge 0: the number of a sphere is '2', outside 0 to 1"},
       {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 1 1\n", "file:4:6: edge 0: the edge names sphere 1 twice"},
       {"2 0 1\nv 0 0 0 1\nv 1 0 0 1\nf 1 0 1\n", "file:4:8: triangle 0: the triangle names sphere 1 twice"},
       {"1 0 0\nw 0 0 0 1\n", "file:2:1: a line should start with v, e or f"},

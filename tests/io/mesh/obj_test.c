@@ -57,7 +57,7 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
   (void)state;
   static const char *const cases[][2] = {
       {"v 0 0\nv 1 1 1\n", "file:1:6: vertex 0: the line ends before the z coordinate of a vertex"},
-      {"v 0 0,5 0\n", "file:1:5: vertex 0: the y coordinate of a vertex is '0,5', which is no number"},
+      {"v 0 0,5 0\n", "file:1:5: vertex 0: the y coordinate of a vertex is '0,5', not a number"},
       {"v 0 0 0\nf 1 2 3\n", "file:2:5: facet 0: vertex 2 is named, but 1 are defined so far"},
       {"v 0 0 0\nf 1 1 -2\n", "file:2:7: facet 0: vertex -2 is named, but 1 are defined so far"},
       {"v 0 0 0\nf 0 1 1\n", "file:2:3: facet 0: vertex 0 is named, but OBJ counts vertices from 1"},

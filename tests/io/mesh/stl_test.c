@@ -84,7 +84,7 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
       {"hello",
        "file: this is no STL file: it does not start with 'solid', and binary STL has at least 84 bytes, not 5"},
       {"solid x\nfacet normal 0 0\n outer",
-       "file:3:2: facet 0: a coordinate of a normal is 'outer', which is no number"},
+       "file:3:2: facet 0: a coordinate of a normal is 'outer', not a number"},
       {"solid x\nfacet normal 0 0 1 outer loop vertex 0 0 0 vertex 0 0 0 endloop",
        "file:2:57: facet 0: 'vertex' should stand here"},
       {"solid x\nfacet normal 0 0 1 outer loop", "file:2:30: facet 0: the file ends where 'vertex' should stand"},
