@@ -11,7 +11,7 @@
 #include "core/node.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
-#include "nodes/measure/topology.h"
+#include "nodes/measure/topology_report.h"
 
 typedef struct medial_evaluate_params {
   double epsilon;   /* 0: nothing is to be certified */
@@ -45,7 +45,6 @@ typedef struct evaluation {
   double largest_gap, mean_gap; /* of max(0, F) over the samples of the surface */
   double deepest, mean_offset;  /* of -F and |F| */
   qmat_boundary_distance boundary;
-  qmat_topology topology, solid_topology;
   size_t spheres_outside, degenerate_cones, degenerate_slabs, duplicate_spheres;
 } evaluation;
 
@@ -223,23 +222,7 @@ static qmat_status count_degenerate(evaluation *e) {
 
 /* ---- the report ---- */
 
-static int set_topology(json_t *root, const qmat_topology *t, bool partly, const char *const keys[4]) {
-  int bad = 0;
-  if (t->known || partly) {
-    bad |= json_object_set_new(root, keys[0], json_integer((json_int_t)t->euler));
-    bad |= qmat_json_set_count(root, keys[1], t->components);
-  }
-  if (t->known) {
-    bad |= qmat_json_set_count(root, keys[2], t->loops);
-    bad |= qmat_json_set_count(root, keys[3], t->voids);
-  }
-  return bad;
-}
-
 static qmat_status make_report(const evaluation *e, qmat_report *report) {
-  static const char *const of_medial[] = {"euler_characteristic", "components", "loops", "voids"};
-  static const char *const of_solid[] = {"euler_characteristic_of_solid", "components_of_solid", "loops_of_solid",
-                                         "voids_of_solid"};
   const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
   const qmat_boundary_distance *b = &e->boundary;
   const double surface_to_envelope = e->surface_to_envelope.hi + e->deviation,
@@ -254,7 +237,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
       {"surface_to_envelope_at_least", fmax(e->surface_to_envelope.lo - e->deviation, 0)},
       {"surface_to_envelope_sampled", e->largest_gap},
       {"surface_to_envelope_mean", e->mean_gap},
-      {"surface_buried_sampled", e->deepest},
+      {"surface_depth_in_envelope_sampled", e->deepest},
       {"surface_offset_mean", e->mean_offset},
       {"envelope_to_surface", envelope_to_surface},
       {"envelope_to_surface_at_least", fmax(b->either_side.lo - e->deviation, 0)},
@@ -282,9 +265,9 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
   if (e->deviation > 0) bad |= json_object_set_new(report->root, "deviation", json_real(e->deviation));
-  bad |= set_topology(report->root, &e->topology, true, of_medial);
-  bad |= set_topology(report->root, &e->solid_topology, false, of_solid);
-  return bad ? qmat_fail_memory(e->context, "the report") : qmat_value_seal(e->context, &report->base);
+  if (bad) return qmat_fail_memory(e->context, "the report");
+  const qmat_status status = qmat_topology_report(e->context, &e->unit, e->surface, report->root);
+  return status == QMAT_OK ? qmat_value_seal(e->context, &report->base) : status;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -300,8 +283,6 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK)
     status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance, true,
                                             (size_t)params->samples, &e.boundary);
-  if (status == QMAT_OK) status = qmat_topology_of_medial(context, &e.unit, &e.topology);
-  if (status == QMAT_OK) status = qmat_topology_of_solid(context, e.surface, &e.solid_topology);
   if (status == QMAT_OK) status = count_spheres_outside(&e);
   if (status == QMAT_OK) status = count_degenerate(&e);
   if (status == QMAT_OK) status = make_report(&e, report);
@@ -357,7 +338,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 3,
+    .version = 4,
     .summary = "Proves how far a medial mesh and a surface are apart",
     .doc =
         "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
@@ -369,7 +350,8 @@ const qmat_node qmat_node_medial_evaluate = {
         " the truth is less, and more of a medial mesh of ten thousand simplices and more. surface_to_envelope "
         "and envelope_to_surface together bound the two-sided distance between the surface and the envelope's "
         "boundary but for surface that lies deep within the envelope, in a gap that it fills: "
-        "surface_buried_sampled shows how deep. certified says that the surface is closed and oriented and that "
+        "surface_depth_in_envelope_sampled shows how deep. certified says that the surface is closed and oriented and "
+        "that "
         "both are at most epsilon; of other surfaces all is an estimate. The deviation of a mesh that stands for a "
         "subdivision surface (mesh.subdivide) is part of all bounds, which then are towards the limit surface, as sure "
         "as the deviation is. Loops and voids are Betti numbers over "

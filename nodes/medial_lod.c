@@ -19,7 +19,7 @@ static qmat_status fill_report(qmat_context *context, const medial_lod_params *p
                 {"triangles", medial->triangle_count},
                 {"collapses", collapses}};
   int bad = json_object_set_new(report->root, "epsilon", json_real(params->epsilon));
-  bad |= json_object_set_new(report->root, "held", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
+  bad |= json_object_set_new(report->root, "threshold", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].count);
   return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
@@ -84,7 +84,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_lod = {
     .name = "medial.lod",
-    .version = 1,
+    .version = 2,
     .summary = "Takes a medial mesh of any number of spheres or any error out of a chain",
     .doc =
         "The collapses of the chain are done up to the wanted number of spheres, or as long as both errors are "

@@ -9,6 +9,7 @@
 #include "nodes/measure/envelope_to_surface.h"
 #include "nodes/measure/medial_errors.h"
 #include "nodes/measure/topology.h"
+#include "nodes/measure/topology_report.h"
 #include "nodes/simplify/cavity_filling.h"
 #include "nodes/simplify/partitioned_collapse.h"
 #include "nodes/simplify/simplify_setup.h"
@@ -167,17 +168,12 @@ static int report_run(json_t *root, const qmat_decimation *run, size_t initial_s
   bad |= qmat_json_set_count(root, "triangles", unit->triangle_count);
   bad |= qmat_json_set_count(root, "collapses", run->counts.collapses);
   bad |= qmat_json_set_count(root, "constraint_points", run->control->count);
-  bad |= qmat_json_set_count(root, "refused_by_surface", run->counts.refused_by_surface);
+  bad |= qmat_json_set_count(root, "refused_by_inside_test", run->counts.refused_by_inside_test);
   bad |= qmat_json_set_count(root, "refused_by_surface_to_envelope", run->counts.refused_by_surface_to_envelope);
   bad |= qmat_json_set_count(root, "refused_by_envelope_to_surface", run->counts.refused_by_envelope_to_surface);
   bad |= qmat_json_set_count(root, "refused_by_protection", run->counts.refused_by_protection);
   bad |= qmat_json_set_count(root, "refused_by_topology", run->counts.refused_by_topology);
-  bad |= report_features(run, root);
-  bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)run->euler));
-  if (run->rules.has_target)
-    bad |=
-        json_object_set_new(root, "euler_characteristic_of_solid", json_integer((json_int_t)run->rules.target_euler));
-  return bad;
+  return bad | report_features(run, root);
 }
 
 static qmat_status make_report(const simplifier *s, const qmat_medial *unit, const qmat_medial_errors *errors,
@@ -186,9 +182,9 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   json_t *root = report->root;
   int bad = report_run(root, run, s->initial_count, unit);
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
-  bad |= qmat_json_set_count(root, "filled", filled);
-  bad |= qmat_json_set_count(root, "moves", run->moves);
-  bad |= qmat_json_set_count(root, "surface_questions", s->dense.to_surface.lattice.questions);
+  bad |= qmat_json_set_count(root, "cavity_filling_spheres", filled);
+  bad |= qmat_json_set_count(root, "sphere_moves", run->moves);
+  bad |= qmat_json_set_count(root, "surface_distance_queries", s->dense.to_surface.lattice.questions);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
@@ -380,7 +376,6 @@ static qmat_status open_voids(simplifier *s, attempt *a) {
     if (status != QMAT_OK) return status;
     if (!opened) break;
     int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
-    bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler - 1));
     bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors.surface_to_envelope + s->deviation));
     if (bad) return qmat_fail_memory(s->context, "the report");
   }
@@ -451,7 +446,6 @@ static qmat_status close_loops(simplifier *s, attempt *a) {
     if (status != QMAT_OK || !closed) return status;
     const double before = json_real_value(json_object_get(root, "envelope_to_surface"));
     int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
-    bad |= json_object_set_new(root, "euler_characteristic", json_integer((json_int_t)topology.euler + 1));
     bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, to_surface + s->deviation)));
     if (bad) return qmat_fail_memory(s->context, "the report");
   }
@@ -499,7 +493,8 @@ static qmat_status report_in_order(qmat_context *context, const qmat_ordered_col
   const qmat_decimation *run = &o->decimation;
   json_t *root = report->root;
   int bad = report_run(root, run, run->complex.vertex_count, unit);
-  bad |= json_object_set_new(root, "held", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
+  bad |=
+      json_object_set_new(root, "threshold", json_real(run->log.count > 0 ? run->log.errors[run->log.count - 1] : 0));
   bad |= report_errors(root, epsilon, deviation, errors);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
@@ -523,6 +518,7 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
                                                 least_reported * bound, &errors);
   if (status == QMAT_OK)
     status = report_in_order(context, &o, o.params.epsilon > 0 ? epsilon : 0, deviation, medial, &errors, report);
+  if (status == QMAT_OK) status = qmat_topology_report(context, medial, o.surface, report->root);
   if (status == QMAT_OK) {
     qmat_frame_spheres_to_model(qmat_surface_frame(o.surface), medial->spheres, medial->sphere_count, medial->spheres);
     status = qmat_value_seal(context, &medial->base);
@@ -556,6 +552,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) status = open_voids(&s, &best);
   if (status == QMAT_OK) status = close_loops(&s, &best);
+  if (status == QMAT_OK) status = qmat_topology_report(context, best.medial, s.surface, best.report->root);
   if (status == QMAT_OK) {
     double *spheres = best.medial->spheres;
     qmat_frame_spheres_to_model(qmat_surface_frame(s.surface), spheres, best.medial->sphere_count, spheres);
@@ -627,7 +624,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 10,
+    .version = 11,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "

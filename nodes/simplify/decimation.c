@@ -311,7 +311,7 @@ static qmat_status test_sphere(qmat_decimation *s, const double *sphere, uint32_
   *result = test_inside(s, sphere);
   *asked = sphere[3] - s->to_surface.sphere_depth;
   if (*result != DONE) {
-    s->counts.refused_by_surface++;
+    s->counts.refused_by_inside_test++;
     return QMAT_OK;
   }
   *result = EXCEEDED;

@@ -22,7 +22,7 @@ typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE }
 
 /* What was done, and what was refused by which test. */
 typedef struct qmat_collapse_counts {
-  size_t collapses, refused_by_surface, refused_by_surface_to_envelope, refused_by_envelope_to_surface,
+  size_t collapses, refused_by_inside_test, refused_by_surface_to_envelope, refused_by_envelope_to_surface,
       refused_by_protection, refused_by_topology;
 } qmat_collapse_counts;
 

@@ -404,7 +404,7 @@ static void add_counts(const divided *d) {
   for (size_t p = 0; p < d->part_count; p++) {
     const part_rest *rest = &d->rests[p];
     whole->counts.collapses += rest->counts.collapses;
-    whole->counts.refused_by_surface += rest->counts.refused_by_surface;
+    whole->counts.refused_by_inside_test += rest->counts.refused_by_inside_test;
     whole->counts.refused_by_surface_to_envelope += rest->counts.refused_by_surface_to_envelope;
     whole->counts.refused_by_envelope_to_surface += rest->counts.refused_by_envelope_to_surface;
     whole->counts.refused_by_topology += rest->counts.refused_by_topology;

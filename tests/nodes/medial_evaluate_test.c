@@ -131,7 +131,7 @@ static void test_a_ball_that_leaves_a_cube_by_hand(void **state) {
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1.2, 0.01);
   check_bounds(&s, report, "envelope_to_surface", 1 - 1.2 / sqrt(3), 0.01);
   check_bounds(&s, report, "envelope_out_of_solid", 0.2, 0.01);
-  assert_near(pipeline_number(report, "surface_buried_sampled") * s.diagonal, 0.2, 0.01);
+  assert_near(pipeline_number(report, "surface_depth_in_envelope_sampled") * s.diagonal, 0.2, 0.01);
   qmat_value_release(&report->base);
   subject_free(&s);
 }

@@ -66,13 +66,13 @@ static void test_a_chain_by_hand_at_every_level(void **state) {
   assert_memory_equal(m->edges, ((uint32_t[]){0, 1}), 2 * sizeof(uint32_t));
   assert_memory_equal(m->region_samples, ((uint32_t[]){1, 3, 0, 4}), 4 * sizeof(uint32_t));
   assert_int_equal(pipeline_count(report, "collapses"), 2);
-  assert_near(pipeline_number(report, "held"), 0.0039, 0);
+  assert_near(pipeline_number(report, "threshold"), 0.0039, 0);
   qmat_value_release(&m->base);
   qmat_value_release(&report->base);
 
   m = take(chain, "epsilon=0.39%", 1, &report); /* so close below an error that the rest is not left */
   assert_int_equal(m->sphere_count, 4);
-  assert_near(pipeline_number(report, "held"), 0, 0);
+  assert_near(pipeline_number(report, "threshold"), 0, 0);
   qmat_value_release(&m->base);
   qmat_value_release(&report->base);
 
