@@ -218,7 +218,7 @@ bool qmat_scan_word(qmat_scanner *scanner, const char *word) {
 }
 
 /* The next token, shortened and printable. */
-static const char *quote_token(const qmat_scanner *scanner, char text[32]) {
+static void quote_token(const qmat_scanner *scanner, char text[32]) {
   size_t length = 0;
   for (const char *at = scanner->at; !ends_token(scanner, at); at++) {
     if (length == 28) {
@@ -228,17 +228,24 @@ static const char *quote_token(const qmat_scanner *scanner, char text[32]) {
     text[length++] = *at >= ' ' && *at <= '~' ? *at : '?';
   }
   text[length] = '\0';
-  return text;
 }
 
-static qmat_status fail_token(qmat_scanner *scanner, const char *what, const char *complaint) {
+qmat_status qmat_scan_expected(const qmat_scanner *scanner, const char *what) {
   char text[32];
-  if (!qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "expected %s, found the end of the file", what);
-  return qmat_scan_fail(scanner, "%s is '%s', %s", what, quote_token(scanner, text), complaint);
+  if (scanner->at >= scanner->end) return qmat_scan_fail(scanner, "expected %s, found the end of the file", what);
+  quote_token(scanner, text);
+  if (!*text) return qmat_scan_fail(scanner, "expected %s, found the end of the line", what);
+  return qmat_scan_fail(scanner, "expected %s, found '%s'", what, text);
+}
+
+static qmat_status fail_token(const qmat_scanner *scanner, const char *what, const char *complaint) {
+  char text[32];
+  quote_token(scanner, text);
+  return qmat_scan_fail(scanner, "%s is '%s', %s", what, text, complaint);
 }
 
 qmat_status qmat_scan_number(qmat_scanner *scanner, const char *what, double *number) {
-  if (!qmat_scan_find(scanner)) return fail_token(scanner, what, "");
+  if (!qmat_scan_find(scanner)) return qmat_scan_expected(scanner, what);
   const char *after = qmat_scan_double(scanner->at, scanner->end, number);
   if (!after || !ends_token(scanner, after)) return fail_token(scanner, what, "not a number");
   scanner->at = after;
@@ -246,7 +253,7 @@ qmat_status qmat_scan_number(qmat_scanner *scanner, const char *what, double *nu
 }
 
 qmat_status qmat_scan_integer(qmat_scanner *scanner, const char *what, int64_t least, int64_t most, int64_t *number) {
-  if (!qmat_scan_find(scanner)) return fail_token(scanner, what, "");
+  if (!qmat_scan_find(scanner)) return qmat_scan_expected(scanner, what);
   const char *at = scanner->at;
   bool negative = *at == '-';
   if (*at == '-' || *at == '+') at++;
@@ -274,6 +281,17 @@ qmat_status qmat_scan_integer(qmat_scanner *scanner, const char *what, int64_t l
   }
   *number = value;
   scanner->at = at;
+  return QMAT_OK;
+}
+
+qmat_status qmat_scan_vertex(qmat_scanner *scanner, bool on_line, double point[3]) {
+  static const char *const names[3] = {"the x coordinate of a vertex", "the y coordinate of a vertex",
+                                       "the z coordinate of a vertex"};
+  for (int k = 0; k < 3; k++) {
+    if (on_line && !qmat_scan_find_on_line(scanner)) return qmat_scan_expected(scanner, names[k]);
+    qmat_status status = qmat_scan_number(scanner, names[k], &point[k]);
+    if (status != QMAT_OK) return status;
+  }
   return QMAT_OK;
 }
 

@@ -60,6 +60,12 @@ qmat_status qmat_scan_integer(qmat_scanner *scanner, const char *what, int64_t l
  * so that memory can be taken for the count. */
 qmat_status qmat_scan_count(qmat_scanner *scanner, const char *what, size_t bytes_each, size_t *count);
 
+/* Reads the x, y and z of a vertex from the next three tokens, on any line or on this line only. Errors as above. */
+qmat_status qmat_scan_vertex(qmat_scanner *scanner, bool on_line, double point[3]);
+
+/* QMAT_ERROR_FORMAT "expected WHAT, found TOKEN" at the scanner's place, where TOKEN may be the end of the line or of
+ * the file. */
+qmat_status qmat_scan_expected(const qmat_scanner *scanner, const char *what);
 /* QMAT_ERROR_FORMAT at the scanner's place, with file, line and column. */
 qmat_status qmat_scan_fail(const qmat_scanner *scanner, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* The number of bytes that remain: the bound for any count in a header. */

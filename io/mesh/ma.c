@@ -6,22 +6,11 @@
 #include "core/geometry/medial_build.h"
 #include "io/scanner.h"
 
-static qmat_status read_count(qmat_scanner *scanner, const char *what, uint64_t bytes_each, size_t *count) {
-  int64_t number = 0;
-  qmat_status status = qmat_scan_integer(scanner, what, 0, UINT32_MAX - 1, &number);
-  if (status != QMAT_OK) return status;
-  if ((uint64_t)number > (qmat_scan_left(scanner) + 1) / bytes_each) {
-    return qmat_scan_fail(scanner, "%s is %lld, more than the file can hold", what, (long long)number);
-  }
-  *count = (size_t)number;
-  return QMAT_OK;
-}
-
 static qmat_status read_sphere(qmat_scanner *scanner, double sphere[4]) {
   static const char *const names[4] = {"the x coordinate of a sphere", "the y coordinate of a sphere",
                                        "the z coordinate of a sphere", "the radius of a sphere"};
   for (int k = 0; k < 4; k++) {
-    if (!qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "expected %s, found the end of the file", names[k]);
+    qmat_scan_find(scanner);
     const qmat_scanner here = *scanner;
     qmat_status status = qmat_scan_number(scanner, names[k], &sphere[k]);
     if (status != QMAT_OK) return status;
@@ -35,11 +24,11 @@ static qmat_status read_simplex(qmat_scanner *scanner, const char *name, size_t 
                                 uint32_t *ids) {
   for (size_t k = 0; k < width; k++) {
     int64_t id = 0;
-    qmat_status status = qmat_scan_integer(scanner, "the number of a sphere", 0, (int64_t)sphere_count - 1, &id);
+    qmat_status status = qmat_scan_integer(scanner, "a sphere index", 0, (int64_t)sphere_count - 1, &id);
     if (status != QMAT_OK) return status;
     ids[k] = (uint32_t)id;
     for (size_t j = 0; j < k; j++) {
-      if (ids[j] == ids[k]) return qmat_scan_fail(scanner, "the %s names sphere %u twice", name, ids[k]);
+      if (ids[j] == ids[k]) return qmat_scan_fail(scanner, "the %s has sphere %u twice", name, ids[k]);
     }
   }
   return QMAT_OK;
@@ -56,13 +45,13 @@ static qmat_status read_rows(qmat_scanner *scanner, const size_t counts[3], doub
     } else if (qmat_scan_word(scanner, "f")) {
       kind = 2;
     } else if (!qmat_scan_word(scanner, "v")) {
-      if (qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "a line should start with v, e or f");
+      if (qmat_scan_find(scanner)) return qmat_scan_expected(scanner, "v, e or f");
       return qmat_scan_fail(scanner,
                             "the file ends after %zu of %zu spheres, %zu of %zu edges and %zu of %zu triangles",
                             read[0], counts[0], read[1], counts[1], read[2], counts[2]);
     }
     if (read[kind] == counts[kind]) {
-      return qmat_scan_fail(scanner, "there are more %ss than the %zu of the header", names[kind], counts[kind]);
+      return qmat_scan_fail(scanner, "there are more than the %zu %ss of the header", counts[kind], names[kind]);
     }
     size_t row = read[kind]++;
     qmat_status status = kind == 0   ? read_sphere(scanner, spheres + 4 * row)
@@ -70,8 +59,7 @@ static qmat_status read_rows(qmat_scanner *scanner, const size_t counts[3], doub
                                      : read_simplex(scanner, names[2], 3, counts[0], triangles + 3 * row);
     if (status != QMAT_OK) return qmat_fail_element(scanner->context, names[kind], (int64_t)row);
   }
-  if (qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "the file goes on after its last row");
-  return QMAT_OK;
+  return qmat_scan_find(scanner) ? qmat_scan_expected(scanner, "the end of the file") : QMAT_OK;
 }
 
 qmat_status qmat_ma_read(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_medial **medial) {
@@ -80,10 +68,10 @@ qmat_status qmat_ma_read(qmat_context *context, const qmat_bytes *bytes, const c
   size_t counts[3] = {0, 0, 0};
   qmat_scanner scanner;
   qmat_scanner_init(&scanner, context, path, (const char *)bytes->data, bytes->size, '#');
-  /* The least rows: "v 0 0 0 0", "e 0 1", "f 0 1 2", each with a line end that the last one may lack. */
-  qmat_status status = read_count(&scanner, "the number of spheres", 10, &counts[0]);
-  if (status == QMAT_OK) status = read_count(&scanner, "the number of edges", 6, &counts[1]);
-  if (status == QMAT_OK) status = read_count(&scanner, "the number of triangles", 8, &counts[2]);
+  /* The shortest rows are "v 0 0 0 0", "e 0 1" and "f 0 1 2", each with a line end. */
+  qmat_status status = qmat_scan_count(&scanner, "the number of spheres", 10, &counts[0]);
+  if (status == QMAT_OK) status = qmat_scan_count(&scanner, "the number of edges", 6, &counts[1]);
+  if (status == QMAT_OK) status = qmat_scan_count(&scanner, "the number of triangles", 8, &counts[2]);
   if (status != QMAT_OK) return status;
   if (counts[0] == 0) return qmat_scan_fail(&scanner, "the medial mesh has no spheres");
 

@@ -4,17 +4,17 @@
 
 #include "io/bytes.h"
 
-/* The text format of medial meshes: "spheres edges triangles", then lines v x y z radius, e i j and f i j k, with
- * numbers from 0. */
+/* The text format of medial meshes: the counts "spheres edges triangles", then lines "v x y z radius", "e i j" and
+ * "f i j k" with sphere indices from 0. */
 
-/* Reads a whole .ma file; `path` is for errors. The lines may come in any order and '#' starts a comment; counts,
- * finite numbers, radii of at least 0 and numbers in range are checked; edges of triangles are added where they are
- * missing. `*medial` is sealed, the caller releases it; NULL on failure. QMAT_ERROR_FORMAT with line and column, or
+/* Reads a whole .ma file; `path` is for errors. The lines may come in any order and '#' starts a comment. Coordinates
+ * must be finite, radii at least 0, indices in range and the counts right. Missing edges of triangles are added. The
+ * caller releases `*medial`, which is sealed; NULL on failure. QMAT_ERROR_FORMAT with line and column, or
  * QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_ma_read(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_medial **medial);
 
-/* Writes a .ma file whose numbers read back as the same. `*file` is sealed; the caller releases it; NULL on failure.
- * QMAT_ERROR_MEMORY. */
+/* Writes a .ma file whose numbers read back unchanged. The caller releases `*file`, which is sealed; NULL on failure.
+ * QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_ma_write(qmat_context *context, const qmat_medial *medial, qmat_file **file);
 
 #endif

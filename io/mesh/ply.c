@@ -11,19 +11,20 @@ typedef enum scalar { I8, U8, I16, U16, I32, U32, F32, F64, NO_SCALAR } scalar;
 
 static const size_t scalar_sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
 
-/* What a property is to us. */
+/* The properties that are read. */
 typedef enum role { OTHER, X, Y, Z, CORNERS } role;
 
 typedef struct property {
-  scalar type;    /* of the number, or of a list's items */
-  scalar counter; /* of a list's length; NO_SCALAR: no list */
+  scalar type;    /* of the number, or of each item of a list */
+  scalar counter; /* of the length of a list; NO_SCALAR: not a list */
   role role;
 } property;
 
 typedef enum element_kind { ELSE, VERTEX, FACE, STRIPS } element_kind;
 
 typedef struct element {
-  char name[32];
+  char name[32]; /* for errors */
+  int line;      /* of the header */
   element_kind kind;
   uint64_t count;
   size_t first_property, property_count;
@@ -48,6 +49,12 @@ typedef struct ply {
 
 /* ---- header ---- */
 
+/* QMAT_ERROR_FORMAT "expected WHAT, found TOKEN" for a token of the line that is being scanned. */
+static qmat_status expected(ply *p, const char *token, const char *what) {
+  p->scanner.at = token;
+  return qmat_scan_expected(&p->scanner, what);
+}
+
 static scalar scalar_named(const char *token, size_t length) {
   static const struct {
     const char *name;
@@ -67,33 +74,33 @@ static qmat_status read_format(ply *p) {
   p->ascii = qmat_is_word(token, length, "ascii");
   p->reader.big_endian = qmat_is_word(token, length, "binary_big_endian");
   if (!p->ascii && !p->reader.big_endian && !qmat_is_word(token, length, "binary_little_endian")) {
-    return qmat_scan_fail(&p->scanner, "the format must be ascii, binary_little_endian or binary_big_endian");
+    return expected(p, token, "ascii, binary_little_endian or binary_big_endian");
   }
   token = qmat_scan_token_on_line(&p->scanner, &length);
-  if (!qmat_is_word(token, length, "1.0")) return qmat_scan_fail(&p->scanner, "only version 1.0 of PLY is read");
+  if (!qmat_is_word(token, length, "1.0")) return expected(p, token, "version 1.0");
   return QMAT_OK;
 }
 
 static qmat_status read_element(ply *p) {
   size_t length;
   const char *token = qmat_scan_token_on_line(&p->scanner, &length);
-  if (length == 0) return qmat_scan_fail(&p->scanner, "the element has no name");
+  if (length == 0) return expected(p, token, "the name of an element");
   if (qmat_grow((void **)&p->elements, &p->element_capacity, p->element_count + 1, sizeof *p->elements) != 0) {
     return qmat_fail_memory(p->context, "the header");
   }
   element *e = &p->elements[p->element_count];
-  *e = (element){.first_property = p->property_count};
-  snprintf(e->name, sizeof e->name, "%.*s", length < 31 ? (int)length : 31, token);
+  *e = (element){.first_property = p->property_count, .line = p->scanner.line};
+  for (size_t i = 0; i < length && i < sizeof e->name - 1; i++) {
+    e->name[i] = token[i] >= ' ' && token[i] <= '~' ? token[i] : '?';
+  }
   if (qmat_is_word(token, length, "vertex")) e->kind = VERTEX;
   if (qmat_is_word(token, length, "face")) e->kind = FACE;
   if (qmat_is_word(token, length, "tristrips")) e->kind = STRIPS;
   for (size_t i = 0; e->kind != ELSE && i < p->element_count; i++) {
-    if (p->elements[i].kind == e->kind) {
-      return qmat_scan_fail(&p->scanner, "the element '%s' is there twice", e->name);
-    }
+    if (p->elements[i].kind == e->kind) return qmat_scan_fail(&p->scanner, "duplicate element '%s'", e->name);
   }
   int64_t count = 0;
-  if (!qmat_scan_find_on_line(&p->scanner)) return qmat_scan_fail(&p->scanner, "the element has no count");
+  if (!qmat_scan_find_on_line(&p->scanner)) return qmat_scan_expected(&p->scanner, "the count of an element");
   qmat_status status = qmat_scan_integer(&p->scanner, "the count of an element", 0, UINT32_MAX, &count);
   if (status != QMAT_OK) return status;
   e->count = (uint64_t)count;
@@ -102,7 +109,7 @@ static qmat_status read_element(ply *p) {
 }
 
 static qmat_status read_property(ply *p) {
-  if (p->element_count == 0) return qmat_scan_fail(&p->scanner, "the property belongs to no element");
+  if (p->element_count == 0) return qmat_scan_fail(&p->scanner, "a property must follow an element");
   element *e = &p->elements[p->element_count - 1];
   property property = {.counter = NO_SCALAR};
   size_t length;
@@ -111,18 +118,13 @@ static qmat_status read_property(ply *p) {
   if (list) {
     token = qmat_scan_token_on_line(&p->scanner, &length);
     property.counter = scalar_named(token, length);
-    if (property.counter >= F32) {
-      return qmat_scan_fail(&p->scanner, "'%.*s' is no type for the length of a list", length < 24 ? (int)length : 24,
-                            token);
-    }
+    if (property.counter >= F32) return expected(p, token, "an integer type");
     token = qmat_scan_token_on_line(&p->scanner, &length);
   }
   property.type = scalar_named(token, length);
-  if (property.type == NO_SCALAR) {
-    return qmat_scan_fail(&p->scanner, "'%.*s' is no type of a property", length < 24 ? (int)length : 24, token);
-  }
+  if (property.type == NO_SCALAR) return expected(p, token, "a type");
   token = qmat_scan_token_on_line(&p->scanner, &length);
-  if (length == 0) return qmat_scan_fail(&p->scanner, "the property has no name");
+  if (length == 0) return expected(p, token, "the name of a property");
   if (e->kind == VERTEX && !list && length == 1 && token[0] >= 'x' && token[0] <= 'z') {
     property.role = (role)(X + (token[0] - 'x'));
   }
@@ -132,7 +134,7 @@ static qmat_status read_property(ply *p) {
   }
   for (size_t i = e->first_property; property.role != OTHER && i < p->property_count; i++) {
     if (p->properties[i].role == property.role) {
-      return qmat_scan_fail(&p->scanner, "the property '%.*s' is there twice", (int)length, token);
+      return qmat_scan_fail(&p->scanner, "duplicate property '%.*s'", (int)length, token);
     }
   }
   if (qmat_grow((void **)&p->properties, &p->property_capacity, p->property_count + 1, sizeof *p->properties) != 0) {
@@ -151,7 +153,7 @@ static bool has_role(const ply *p, const element *e, role role) {
   return false;
 }
 
-/* The least bytes that one element takes in the body. */
+/* The fewest bytes that one element takes in the body. */
 static uint64_t least_size(const ply *p, const element *e) {
   uint64_t size = 0;
   for (size_t i = 0; i < e->property_count; i++) {
@@ -161,40 +163,31 @@ static uint64_t least_size(const ply *p, const element *e) {
   return size;
 }
 
-static qmat_status fail_header(ply *p, const char *message) {
-  qmat_fail(p->context, QMAT_ERROR_FORMAT, "%s", message);
-  return qmat_fail_at(p->context, p->path, 0, 0);
+static qmat_status fail_element(ply *p, const element *e, const char *complaint) {
+  qmat_fail(p->context, QMAT_ERROR_FORMAT, "element '%s' %s", e->name, complaint);
+  return qmat_fail_at(p->context, p->path, e->line, 0);
 }
 
-/* Counts must fit what is left of the file, all elements together. The last number of an ASCII file may lack a blank.
- */
+/* Checks that the elements that the header counts fit into the `left` bytes of the body, and that they can be read. */
 static qmat_status check_header(ply *p, uint64_t left) {
   bool vertices = false, facets = false;
-  left += p->ascii ? 1 : 0;
+  left += p->ascii ? 1 : 0; /* the last number may lack its blank */
   for (size_t i = 0; i < p->element_count; i++) {
     const element *e = &p->elements[i];
     const uint64_t size = least_size(p, e);
-    if (size > 0 && e->count > left / size) {
-      qmat_fail(p->context, QMAT_ERROR_FORMAT, "the header counts %llu elements '%s', more than the file can hold",
-                (unsigned long long)e->count, e->name);
-      return qmat_fail_at(p->context, p->path, 0, 0);
-    }
+    if (size > 0 && e->count > left / size) return fail_element(p, e, "has a count that the file cannot hold");
     left -= size * e->count;
-    if (e->kind == VERTEX) {
-      vertices = true;
-      for (int k = X; k <= Z; k++) {
-        if (!has_role(p, e, (role)k)) return fail_header(p, "the vertices lack one of the properties x, y and z");
-      }
+    for (int k = X; e->kind == VERTEX && k <= Z; k++) {
+      if (!has_role(p, e, (role)k)) return fail_element(p, e, "lacks one of the properties x, y and z");
     }
-    if (e->kind == FACE || e->kind == STRIPS) {
-      facets = true;
-      if (!has_role(p, e, CORNERS)) {
-        return fail_header(p, "the faces lack a list property vertex_indices");
-      }
+    if ((e->kind == FACE || e->kind == STRIPS) && !has_role(p, e, CORNERS)) {
+      return fail_element(p, e, "lacks the list property vertex_indices");
     }
+    vertices = vertices || e->kind == VERTEX;
+    facets = facets || e->kind == FACE || e->kind == STRIPS;
   }
-  if (!vertices) return fail_header(p, "the file has no element 'vertex'");
-  if (!facets) return fail_header(p, "the file holds vertices but no faces");
+  if (!vertices) return qmat_fail_file(p->context, QMAT_ERROR_FORMAT, p->path, "the file has no element 'vertex'");
+  if (!facets) return qmat_fail_file(p->context, QMAT_ERROR_FORMAT, p->path, "the file has no element 'face'");
   return QMAT_OK;
 }
 
@@ -205,12 +198,13 @@ static qmat_status read_header(ply *p, const qmat_bytes *bytes) {
   const char *token = qmat_scan_token_on_line(scanner, &length);
   if (!qmat_is_word(token, length, "ply")) {
     scanner->at = token;
-    return qmat_scan_fail(scanner, "this is no PLY file: it does not start with 'ply'");
+    return qmat_scan_expected(scanner, "'ply'");
   }
-  /* Where lines end in a carriage return alone, a line feed after the header is data. */
+  qmat_scan_find_on_line(scanner);
+  /* If lines end in a lone carriage return, a line feed after the header is data. */
   const bool lone_returns = scanner->at < scanner->end && *scanner->at == '\r' && scanner->at[1] != '\n';
   for (;;) {
-    if (!qmat_scan_next_line(scanner)) return qmat_scan_fail(scanner, "the file ends within its header");
+    if (!qmat_scan_next_line(scanner)) return qmat_scan_expected(scanner, "'end_header'");
     if (!qmat_scan_find_on_line(scanner)) continue;
     const qmat_scanner line = *scanner;
     qmat_status status = QMAT_OK;
@@ -225,11 +219,12 @@ static qmat_status read_header(ply *p, const qmat_bytes *bytes) {
     } else if (qmat_is_word(token, length, "end_header")) {
       break;
     } else if (!qmat_is_word(token, length, "comment") && !qmat_is_word(token, length, "obj_info")) {
-      return qmat_scan_fail(&line, "'%.*s' is no keyword of a PLY header", length < 24 ? (int)length : 24, token);
+      return qmat_scan_expected(&line, "a keyword of a PLY header");
     }
     if (status != QMAT_OK) return status;
   }
-  if (!format) return qmat_scan_fail(scanner, "the header names no format");
+  if (!format) return qmat_scan_fail(scanner, "the header has no line 'format'");
+  if (qmat_scan_find_on_line(scanner)) return qmat_scan_expected(scanner, "the end of the line");
   const char *at = scanner->at;
   if (at < scanner->end && *at == '\r') at++;
   if (at < scanner->end && *at == '\n' && !(lone_returns && at > scanner->at)) at++;
@@ -266,8 +261,7 @@ static qmat_status fail_body(ply *p, const element *e, uint64_t index, const cha
   if (p->ascii) {
     qmat_scan_fail(&p->scanner, "%s", message);
   } else {
-    qmat_fail(p->context, QMAT_ERROR_FORMAT, "%s", message);
-    qmat_fail_at(p->context, p->path, 0, 0);
+    qmat_fail_file(p->context, QMAT_ERROR_FORMAT, p->path, "%s", message);
   }
   return qmat_fail_element(p->context, e->name, (int64_t)index);
 }
@@ -282,8 +276,8 @@ static qmat_status add_facet(ply *p, const uint32_t *corners, size_t count, int 
   return qmat_soup_add_facet(p->context, p->soup, corners, count, p->facets_read++, line);
 }
 
-/* Every three corners in a row make a triangle, every second one turned over; -1 starts a new strip. Triangles that
- * name a vertex twice only join pieces. */
+/* Adds a triangle for every three consecutive corners, every second one reversed. -1 starts a new strip. Triangles with
+ * a repeated vertex only connect parts of a strip and are skipped. */
 static qmat_status add_strips(ply *p, size_t count, int line) {
   size_t start = 0;
   qmat_status status = QMAT_OK;
@@ -308,7 +302,7 @@ static qmat_status read_list(ply *p, const element *e, uint64_t index, const pro
   const size_t size = p->ascii ? 2 : scalar_sizes[q->type];
   const size_t left = p->ascii ? qmat_scan_left(&p->scanner) : qmat_bytes_left(&p->reader);
   if (p->reader.failed) return fail_body(p, e, index, "the file ends within the element");
-  if (!(number >= 0) || number != floor(number)) return fail_body(p, e, index, "a list has a length that is no count");
+  if (!(number >= 0) || number != floor(number)) return fail_body(p, e, index, "the length of a list is not a count");
   if (number > (double)(left / size)) return fail_body(p, e, index, "a list is longer than the rest of the file");
   const size_t count = (size_t)number;
   if (q->role != CORNERS) {
@@ -323,13 +317,13 @@ static qmat_status read_list(ply *p, const element *e, uint64_t index, const pro
     return qmat_fail_memory(p->context, "the corners of a facet");
   }
   for (size_t i = 0; i < count; i++) {
-    status = next_scalar(p, q->type, "the number of a vertex", &number);
+    status = next_scalar(p, q->type, "a vertex index", &number);
     if (status != QMAT_OK) return qmat_fail_element(p->context, e->name, (int64_t)index);
     const bool restart = e->kind == STRIPS && number == -1;
     if (!restart && (!(number >= 0 && number < (double)UINT32_MAX) || number != floor(number))) {
       char message[80], text[32];
       qmat_format_number(number, text, sizeof text);
-      snprintf(message, sizeof message, "the %s names vertex %s", e->kind == STRIPS ? "strip" : "facet", text);
+      snprintf(message, sizeof message, "a vertex index is %s", text);
       return fail_body(p, e, index, message);
     }
     p->corners[i] = restart ? UINT32_MAX : (uint32_t)number;
@@ -361,11 +355,11 @@ static qmat_status read_body(ply *p) {
     const uint64_t size = least_size(p, e);
     if (e->kind == ELSE && (size == 0 || (!p->ascii && !e->has_list))) {
       if (!qmat_take_bytes(&p->reader, (size_t)(size * e->count))) {
-        return fail_body(p, e, 0, "the file ends within these elements");
+        return fail_body(p, e, 0, "the file ends within the elements");
       }
       continue;
     }
-    /* Facets of no corners would fit in a byte, but they are refused later: no memory for those. */
+    /* Reserves for facets of 4 bytes or more: shorter ones have no valid corners. */
     const size_t left = p->ascii ? qmat_scan_left(&p->scanner) : qmat_bytes_left(&p->reader);
     const size_t facets = e->kind == FACE ? (e->count < left / 4 ? (size_t)e->count : left / 4) : 0;
     const size_t vertices = e->kind == VERTEX ? (size_t)e->count : 0;
@@ -374,13 +368,14 @@ static qmat_status read_body(ply *p) {
     if (status != QMAT_OK) return status;
   }
   if (p->ascii) {
-    return qmat_scan_find(&p->scanner) ? qmat_scan_fail(&p->scanner, "the file goes on after its last element")
-                                       : QMAT_OK;
+    return qmat_scan_find(&p->scanner) ? qmat_scan_expected(&p->scanner, "the end of the file") : QMAT_OK;
   }
-  /* A line end or zeros may follow; anything else means that the header says too little. */
+  /* A line end or zero bytes may follow. Anything else means that the header is wrong. */
   while (qmat_bytes_left(&p->reader) > 0) {
     const uint8_t byte = qmat_take_u8(&p->reader);
-    if (byte != 0 && byte != '\n' && byte != '\r') return fail_header(p, "the file goes on after its last element");
+    if (byte != 0 && byte != '\n' && byte != '\r') {
+      return qmat_fail_file(p->context, QMAT_ERROR_FORMAT, p->path, "the file continues after its last element");
+    }
   }
   return QMAT_OK;
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
 #include <string.h>
 
 #include "io/mesh/mesh_formats.h"
@@ -9,7 +10,7 @@ enum { HEADER = 84, FACET = 50 };
 bool qmat_stl_is_binary(const qmat_bytes *bytes) {
   if (bytes->size < HEADER) return false;
   qmat_byte_reader reader = {.bytes = bytes->data, .size = bytes->size, .at = HEADER - 4};
-  /* The count of an ASCII file, four characters, asks for more than 4 GiB: it is never mistaken. */
+  /* Four characters of ASCII text, read as a count, stand for more than 4 GiB: text is never taken for binary. */
   return bytes->size == HEADER + FACET * (uint64_t)qmat_take_u32(&reader);
 }
 
@@ -27,7 +28,7 @@ static qmat_status read_binary(qmat_context *context, const qmat_bytes *bytes, q
   qmat_status status = qmat_soup_reserve(context, soup, 3 * facets, facets, 3 * facets);
   for (size_t f = 0; f < facets && status == QMAT_OK; f++) {
     double points[9];
-    qmat_take_bytes(&reader, 12); /* the normal, which the corners' order gives */
+    qmat_take_bytes(&reader, 12); /* the normal: the order of the corners implies it */
     for (int k = 0; k < 9; k++) points[k] = (double)qmat_take_f32(&reader);
     qmat_take_bytes(&reader, 2);
     status = add_triangle(context, soup, points, 0);
@@ -35,7 +36,7 @@ static qmat_status read_binary(qmat_context *context, const qmat_bytes *bytes, q
   return status;
 }
 
-/* Takes the next token if it is `word` in any case. */
+/* Takes the next token if it is `word` in upper or lower case. */
 static bool take_word(qmat_scanner *scanner, const char *word) {
   if (!qmat_scan_find(scanner)) return false;
   const qmat_scanner start = *scanner;
@@ -49,11 +50,12 @@ static bool take_word(qmat_scanner *scanner, const char *word) {
 
 static qmat_status expect(qmat_scanner *scanner, const char *word) {
   if (take_word(scanner, word)) return QMAT_OK;
-  if (!qmat_scan_find(scanner)) return qmat_scan_fail(scanner, "the file ends where '%s' should stand", word);
-  return qmat_scan_fail(scanner, "'%s' should stand here", word);
+  char quoted[16];
+  snprintf(quoted, sizeof quoted, "'%s'", word);
+  return qmat_scan_expected(scanner, quoted);
 }
 
-/* facet normal x y z, outer loop, three vertices, endloop, endfacet; "facet" is taken. */
+/* Reads "normal x y z", "outer loop", three vertices, "endloop" and "endfacet"; "facet" is taken. */
 static qmat_status read_facet(qmat_scanner *scanner, qmat_soup *soup) {
   const int line = scanner->line;
   double points[9], normal;
@@ -63,9 +65,9 @@ static qmat_status read_facet(qmat_scanner *scanner, qmat_soup *soup) {
   }
   if (status == QMAT_OK) status = expect(scanner, "outer");
   if (status == QMAT_OK) status = expect(scanner, "loop");
-  for (int k = 0; k < 9 && status == QMAT_OK; k++) {
-    if (k % 3 == 0) status = expect(scanner, "vertex");
-    if (status == QMAT_OK) status = qmat_scan_number(scanner, "a coordinate of a vertex", &points[k]);
+  for (int k = 0; k < 3 && status == QMAT_OK; k++) {
+    status = expect(scanner, "vertex");
+    if (status == QMAT_OK) status = qmat_scan_vertex(scanner, false, points + 3 * k);
   }
   if (status == QMAT_OK) status = expect(scanner, "endloop");
   if (status == QMAT_OK) status = expect(scanner, "endfacet");
@@ -73,7 +75,7 @@ static qmat_status read_facet(qmat_scanner *scanner, qmat_soup *soup) {
   return add_triangle(scanner->context, soup, points, line);
 }
 
-/* Solids one after the other, each "solid NAME", facets, "endsolid NAME". */
+/* Reads solids, each "solid NAME", facets, "endsolid NAME". */
 static qmat_status read_ascii(qmat_scanner *scanner, qmat_soup *soup) {
   qmat_status status = QMAT_OK;
   do {
@@ -90,24 +92,20 @@ static qmat_status read_ascii(qmat_scanner *scanner, qmat_soup *soup) {
 qmat_status qmat_stl_read(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_soup *soup) {
   if (qmat_stl_is_binary(bytes)) return read_binary(context, bytes, soup);
 
-  /* Binary files may say "solid" too, but only they hold zero bytes. */
+  /* Binary files may start with "solid" too, but text has no zero bytes. */
   qmat_scanner scanner;
   qmat_scanner_init(&scanner, context, path, (const char *)bytes->data, bytes->size, 0);
   qmat_scanner first = scanner;
   bool text = take_word(&first, "solid") && !memchr(bytes->data, 0, bytes->size);
   if (text) return read_ascii(&scanner, soup);
   if (bytes->size < HEADER) {
-    qmat_fail(context, QMAT_ERROR_FORMAT,
-              "this is no STL file: it does not start with 'solid', and binary STL has at "
-              "least %d bytes, not %zu",
-              HEADER, bytes->size);
-  } else {
-    qmat_byte_reader reader = {.bytes = bytes->data, .size = bytes->size, .at = HEADER - 4};
-    uint64_t facets = qmat_take_u32(&reader);
-    qmat_fail(context, QMAT_ERROR_FORMAT,
-              "as binary STL the file counts %llu facets, which take %llu bytes, but it "
-              "has %zu",
-              (unsigned long long)facets, (unsigned long long)(HEADER + FACET * facets), bytes->size);
+    return qmat_fail_file(context, QMAT_ERROR_FORMAT, path,
+                          "not an STL file: text starts with 'solid', and binary STL has at least %d bytes, not %zu",
+                          HEADER, bytes->size);
   }
-  return qmat_fail_at(context, path, 0, 0);
+  qmat_byte_reader reader = {.bytes = bytes->data, .size = bytes->size, .at = HEADER - 4};
+  const uint64_t facets = qmat_take_u32(&reader);
+  return qmat_fail_file(context, QMAT_ERROR_FORMAT, path,
+                        "the binary STL header counts %llu facets, which take %llu bytes, but the file has %zu",
+                        (unsigned long long)facets, (unsigned long long)(HEADER + FACET * facets), bytes->size);
 }

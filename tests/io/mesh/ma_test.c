@@ -52,14 +52,14 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
       {"1 0 0\nv 0 nan 0 1\n", "file:2:5: sphere 0: the y coordinate of a sphere is not finite"},
       {"1 0 0\nv 0 0 1e999 1\n", "file:2:7: sphere 0: the z coordinate of a sphere is not finite"},
       {"1 0 0\nv 0 0 0\n", "file:3:1: sphere 0: expected the radius of a sphere, found the end of the file"},
-      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 0 2\n", "file:4:5: edge 0: the number of a sphere is '2', outside 0 to 1"},
-      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 1 1\n", "file:4:6: edge 0: the edge names sphere 1 twice"},
-      {"2 0 1\nv 0 0 0 1\nv 1 0 0 1\nf 1 0 1\n", "file:4:8: triangle 0: the triangle names sphere 1 twice"},
-      {"1 0 0\nw 0 0 0 1\n", "file:2:1: a line should start with v, e or f"},
+      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 0 2\n", "file:4:5: edge 0: a sphere index is '2', outside 0 to 1"},
+      {"2 1 0\nv 0 0 0 1\nv 1 0 0 1\ne 1 1\n", "file:4:6: edge 0: the edge has sphere 1 twice"},
+      {"2 0 1\nv 0 0 0 1\nv 1 0 0 1\nf 1 0 1\n", "file:4:8: triangle 0: the triangle has sphere 1 twice"},
+      {"1 0 0\nw 0 0 0 1\n", "file:2:1: expected v, e or f, found 'w'"},
       {"2 0 0\nv 0 0 0 1          \n",
        "file:3:1: the file ends after 1 of 2 spheres, 0 of 0 edges and 0 of 0 triangles"},
-      {"2 0 0\nv 0 0 0 1\ne 0 1\nv 0 0 0 1\n", "file:3:2: there are more edges than the 0 of the header"},
-      {"1 0 0\nv 0 0 0 1\nv 0 0 0 1\n", "file:3:1: the file goes on after its last row"},
+      {"2 0 0\nv 0 0 0 1\ne 0 1\nv 0 0 0 1\n", "file:3:2: there are more than the 0 edges of the header"},
+      {"1 0 0\nv 0 0 0 1\nv 0 0 0 1\n", "file:3:1: expected the end of the file, found 'v'"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     qmat_context context = {0};

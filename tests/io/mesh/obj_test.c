@@ -15,7 +15,7 @@ static const char sample[] =
     "v 0 1 -2e-1\n"
     "s off\n"
     "f 1/1/1 2//1 3/1 4\n"
-    "f -4 -3 \\\n"
+    "fo -4 -3 \\\n"
     "  -2\n"
     "l 1 2\n"
     "p 1\n"
@@ -56,18 +56,19 @@ static void test_line_ends_of_every_system_are_read(void **state) {
 static void test_bad_files_are_refused_with_the_place(void **state) {
   (void)state;
   static const char *const cases[][2] = {
-      {"v 0 0\nv 1 1 1\n", "file:1:6: vertex 0: the line ends before the z coordinate of a vertex"},
+      {"v 0 0\nv 1 1 1\n", "file:1:6: vertex 0: expected the z coordinate of a vertex, found the end of the line"},
       {"v 0 0,5 0\n", "file:1:5: vertex 0: the y coordinate of a vertex is '0,5', not a number"},
-      {"v 0 0 0\nf 1 2 3\n", "file:2:5: facet 0: vertex 2 is named, but 1 are defined so far"},
-      {"v 0 0 0\nf 1 1 -2\n", "file:2:7: facet 0: vertex -2 is named, but 1 are defined so far"},
-      {"v 0 0 0\nf 0 1 1\n", "file:2:3: facet 0: vertex 0 is named, but OBJ counts vertices from 1"},
-      {"v 0 0 0\nf 1 1x 1\n", "file:2:5: facet 0: '1x' is no corner of a facet: v, v/vt, v//vn or v/vt/vn"},
-      {"v 0 0 0\nf 1 /1 1\n", "file:2:5: facet 0: '/1' is no corner of a facet: v, v/vt, v//vn or v/vt/vn"},
-      {"v 0 0 0\nf 1/1/1/1\n", "file:2:3: facet 0: '1/1/1/1' is no corner of a facet: v, v/vt, v//vn or v/vt/vn"},
+      {"v 0 0 0\nf 1 2 3\n", "file:2:5: facet 0: a vertex index is 2, but 1 vertices precede it"},
+      {"v 0 0 0\nf 1 1 -2\n", "file:2:7: facet 0: a vertex index is -2, but 1 vertices precede it"},
+      {"v 0 0 0\nf 0 1 1\n", "file:2:3: facet 0: a vertex index is 0, but OBJ counts vertices from 1"},
+      {"v 0 0 0\nf 1 1x 1\n", "file:2:5: facet 0: expected a corner v, v/vt, v//vn or v/vt/vn, found '1x'"},
+      {"v 0 0 0\nf 1 /1 1\n", "file:2:5: facet 0: expected a corner v, v/vt, v//vn or v/vt/vn, found '/1'"},
+      {"v 0 0 0\nf 1/1/1/1\n", "file:2:3: facet 0: expected a corner v, v/vt, v//vn or v/vt/vn, found '1/1/1/1'"},
       {"v 0 0 0\nf 99999999999999999999 1 1\n",
-       "file:2:3: facet 0: '99999999999999999999' is no corner of a facet: v, v/vt, v//vn or v/vt/vn"},
-      {"surf 0 1 0 1 1\n", "file:1:1: free-form surfaces are not read (export the model as polygons)"},
-      {"call other.obj\n", "file:1:1: calls of other files are not read"},
+       "file:2:3: facet 0: expected a corner v, v/vt, v//vn or v/vt/vn, found '99999999999999999999'"},
+      {"surf 0 1 0 1 1\n", "file:1:1: free-form surfaces are not supported (export the model as polygons)"},
+      {"bzp 1 2 3 4\n", "file:1:1: free-form surfaces are not supported (export the model as polygons)"},
+      {"call other.obj\n", "file:1:1: calls of other files are not supported"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     assert_text_refused(qmat_obj_read, cases[i][0], cases[i][1]);

@@ -108,11 +108,12 @@ static void test_all_three_encodings_give_the_same(void **state) {
   }
 }
 
-static void test_headers_with_other_line_ends_are_read(void **state) {
+static void test_headers_with_other_line_ends_and_trailing_blanks_are_read(void **state) {
   (void)state;
   static const char body[] = "\x0A\0\0\0\0\0\0\0\0\0\0\0\3\0\0\0"; /* data that starts with a line feed */
   static const char *const ends[] = {"\n", "\r\n", "\r"};
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 6; i++) {
+    const bool blanks = i >= 3;
     qmat_writer writer = {0};
     static const char *const lines[] = {"ply",
                                         "format binary_little_endian 1.0",
@@ -125,7 +126,8 @@ static void test_headers_with_other_line_ends_are_read(void **state) {
                                         "end_header"};
     for (int k = 0; k < 9; k++) {
       qmat_put_text(&writer, lines[k]);
-      qmat_put_text(&writer, ends[i]);
+      if (blanks) qmat_put_text(&writer, " \t");
+      qmat_put_text(&writer, ends[i % 3]);
     }
     qmat_put_bytes(&writer, body, 16);
     qmat_soup soup = read_good(qmat_ply_read, writer.bytes, writer.size);
@@ -144,45 +146,49 @@ static void test_headers_with_other_line_ends_are_read(void **state) {
 static void test_bad_files_are_refused_with_the_place(void **state) {
   (void)state;
   static const char *const cases[][2] = {
-      {"plyx", "file:1:1: this is no PLY file: it does not start with 'ply'"},
-      {"ply\n", "file:2:1: the file ends within its header"},
-      {"ply\nformat text 1.0\n", "file:2:12: the format must be ascii, binary_little_endian or binary_big_endian"},
-      {"ply\nformat ascii 2.0\n", "file:2:17: only version 1.0 of PLY is read"},
-      {"ply\nend_header\n", "file:2:11: the header names no format"},
+      {"plyx", "file:1:1: expected 'ply', found 'plyx'"},
+      {"ply\n", "file:2:1: expected 'end_header', found the end of the file"},
+      {"ply\nformat text 1.0\n", "file:2:8: expected ascii, binary_little_endian or binary_big_endian, found 'text'"},
+      {"ply\nformat ascii 2.0\n", "file:2:14: expected version 1.0, found '2.0'"},
+      {"ply\nend_header\n", "file:2:11: the header has no line 'format'"},
+      {ASCII "element x\001\377 1\n"
+             "element vertex 1 \nend_header",
+       "file:4: element 'vertex' lacks one of the properties x, y and z"},
+      {ASCII "end_header x\n", "file:3:12: expected the end of the line, found 'x'"},
       {ASCII "end_header\n", "file: the file has no element 'vertex'"},
-      {ASCII VERTICES "end_header\n0 0 0\n", "file: the file holds vertices but no faces"},
+      {ASCII VERTICES "end_header\n0 0 0\n", "file: the file has no element 'face'"},
       {ASCII "element vertex 1\nproperty float x\nproperty float y\n" FACES "end_header\n0 0 0\n3 0 0 0",
-       "file: the vertices lack one of the properties x, y and z"},
+       "file:3: element 'vertex' lacks one of the properties x, y and z"},
       {ASCII VERTICES "element face 1\nproperty list uchar int corners\nend_header\n0 0 0\n3 0 0 0",
-       "file: the faces lack a list property vertex_indices"},
-      {ASCII "property float x\n", "file:3:9: the property belongs to no element"},
-      {ASCII "property", "file:3:9: the property belongs to no element"},
-      {ASCII "element vertex\n", "file:3:15: the element has no count"},
-      {ASCII "element\n", "file:3:8: the element has no name"},
+       "file:7: element 'face' lacks the list property vertex_indices"},
+      {ASCII "property float x\n", "file:3:9: a property must follow an element"},
+      {ASCII "property", "file:3:9: a property must follow an element"},
+      {ASCII "element vertex\n", "file:3:15: expected the count of an element, found the end of the line"},
+      {ASCII "element\n", "file:3:8: expected the name of an element, found the end of the line"},
       {ASCII "element vertex -1\n", "file:3:16: the count of an element is '-1', outside 0 to 4294967295"},
-      {ASCII VERTICES VERTICES, "file:7:15: the element 'vertex' is there twice"},
-      {ASCII VERTICES "property float x\n", "file:7:17: the property 'x' is there twice"},
-      {ASCII VERTICES "property long w\n", "file:7:14: 'long' is no type of a property"},
-      {ASCII VERTICES "property list float int w\n", "file:7:20: 'float' is no type for the length of a list"},
-      {ASCII "vertices 3\n", "file:3:1: 'vertices' is no keyword of a PLY header"},
+      {ASCII VERTICES VERTICES, "file:7:15: duplicate element 'vertex'"},
+      {ASCII VERTICES "property float x\n", "file:7:17: duplicate property 'x'"},
+      {ASCII VERTICES "property long w\n", "file:7:10: expected a type, found 'long'"},
+      {ASCII VERTICES "property list float int w\n", "file:7:15: expected an integer type, found 'float'"},
+      {ASCII "vertices 3\n", "file:3:1: expected a keyword of a PLY header, found 'vertices'"},
       {BINARY "element vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\n" FACES "end_header\n",
-       "file: the header counts 4000000000 elements 'vertex', more than the file can hold"},
+       "file:3: element 'vertex' has a count that the file cannot hold"},
       {ASCII VERTICES "element face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n",
-       "file: the header counts 4000000000 elements 'face', more than the file can hold"},
+       "file:7: element 'face' has a count that the file cannot hold"},
       {ASCII VERTICES FACES "end_header\n0 x 0\n3 0 0 0",
        "file:10:3: vertex 0: a coordinate of a vertex is 'x', not a number"},
       {ASCII VERTICES FACES "end_header\n0 0 0\n4000000000 0 0",
        "file:11:11: face 0: a list is longer than the rest of the file"},
-      {ASCII VERTICES FACES "end_header\n0 0 0\n-1 0 0", "file:11:3: face 0: a list has a length that is no count"},
-      {ASCII VERTICES FACES "end_header\n0 0 0\n3 0 0 -1", "file:11:9: face 0: the facet names vertex -1"},
-      {ASCII VERTICES FACES "end_header\n0 0 0\n3 0 0 0.5", "file:11:10: face 0: the facet names vertex 0.5"},
+      {ASCII VERTICES FACES "end_header\n0 0 0\n-1 0 0", "file:11:3: face 0: the length of a list is not a count"},
+      {ASCII VERTICES FACES "end_header\n0 0 0\n3 0 0 -1", "file:11:9: face 0: a vertex index is -1"},
+      {ASCII VERTICES FACES "end_header\n0 0 0\n3 0 0 0.5", "file:11:10: face 0: a vertex index is 0.5"},
       {ASCII VERTICES FACES "end_header\n0 0 0\n3 0 0 0\n3 0 0 0",
-       "file:12:1: the file goes on after its last element"},
+       "file:12:1: expected the end of the file, found '3'"},
       {BINARY VERTICES FACES "end_header\n123456789abc\xFF",
        "file: face 0: a list is longer than the rest of the file"},
       {BINARY VERTICES FACES "end_header\n123456789abc\1"
                              "1111x",
-       "file: the file goes on after its last element"},
+       "file: the file continues after its last element"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     assert_text_refused(qmat_ply_read, cases[i][0], cases[i][1]);
@@ -239,7 +245,7 @@ static void test_a_medial_mesh_is_written_with_radii_and_edges(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_all_three_encodings_give_the_same),
-      cmocka_unit_test(test_headers_with_other_line_ends_are_read),
+      cmocka_unit_test(test_headers_with_other_line_ends_and_trailing_blanks_are_read),
       cmocka_unit_test(test_bad_files_are_refused_with_the_place),
       cmocka_unit_test(test_damaged_files_never_crash),
       cmocka_unit_test(test_a_medial_mesh_is_written_with_radii_and_edges),

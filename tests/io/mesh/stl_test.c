@@ -75,21 +75,19 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
   uint8_t bytes[256];
   size_t size = make_binary("solid", bytes);
   assert_refused(qmat_stl_read, bytes, size - 1,
-                 "file: as binary STL the file counts 2 facets, which take 184 bytes, but it has 183");
+                 "file: the binary STL header counts 2 facets, which take 184 bytes, but the file has 183");
   memcpy(bytes + 80, "\0\x28\x6B\xEE", 4); /* 4000000000 */
   assert_refused(
       qmat_stl_read, bytes, size,
-      "file: as binary STL the file counts 4000000000 facets, which take 200000000084 bytes, but it has 184");
+      "file: the binary STL header counts 4000000000 facets, which take 200000000084 bytes, but the file has 184");
   static const char *const cases[][2] = {
-      {"hello",
-       "file: this is no STL file: it does not start with 'solid', and binary STL has at least 84 bytes, not 5"},
-      {"solid x\nfacet normal 0 0\n outer",
-       "file:3:2: facet 0: a coordinate of a normal is 'outer', not a number"},
+      {"hello", "file: not an STL file: text starts with 'solid', and binary STL has at least 84 bytes, not 5"},
+      {"solid x\nfacet normal 0 0\n outer", "file:3:2: facet 0: a coordinate of a normal is 'outer', not a number"},
       {"solid x\nfacet normal 0 0 1 outer loop vertex 0 0 0 vertex 0 0 0 endloop",
-       "file:2:57: facet 0: 'vertex' should stand here"},
-      {"solid x\nfacet normal 0 0 1 outer loop", "file:2:30: facet 0: the file ends where 'vertex' should stand"},
-      {"solid x\n", "file:2:1: the file ends where 'endsolid' should stand"},
-      {"solid x\nendsolid\nmore", "file:3:1: 'solid' should stand here"},
+       "file:2:57: facet 0: expected 'vertex', found 'endloop'"},
+      {"solid x\nfacet normal 0 0 1 outer loop", "file:2:30: facet 0: expected 'vertex', found the end of the file"},
+      {"solid x\n", "file:2:1: expected 'endsolid', found the end of the file"},
+      {"solid x\nendsolid\nmore", "file:3:1: expected 'solid', found 'more'"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     assert_text_refused(qmat_stl_read, cases[i][0], cases[i][1]);
