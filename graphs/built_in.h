@@ -2,7 +2,7 @@
 #ifndef QMAT_GRAPHS_BUILT_IN_H
 #define QMAT_GRAPHS_BUILT_IN_H
 
-#include "graphs/graph_file.h"
+#include "graphs/graph.h"
 
 /* The text of graphs/qmat_plus.yaml, written into the program by CMake. */
 extern const char qmat_plus_graph[];

@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "graphs/graph_file.h"
+#include "graphs/graph.h"
 
 /* Descriptors and parameters as JSON. NULL when memory is short; the caller calls json_decref. */
 

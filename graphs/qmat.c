@@ -7,8 +7,13 @@
 
 #include "core/json_text.h"
 #include "graphs/built_in.h"
+#include "graphs/graph_file.h"
+#include "graphs/graph_names.h"
+#include "graphs/graph_params.h"
 #include "graphs/node_json.h"
 #include "graphs/run/graph_run.h"
+#include "graphs/run/run_outputs.h"
+#include "graphs/run/run_plan.h"
 #include "graphs/run/run_report.h"
 #include "io/soup.h"
 #include "nodes/nodes.h"

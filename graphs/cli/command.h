@@ -2,7 +2,7 @@
 #ifndef QMAT_GRAPHS_CLI_COMMAND_H
 #define QMAT_GRAPHS_CLI_COMMAND_H
 
-#include "graphs/run/graph_run.h"
+#include "graphs/run/run_plan.h"
 
 /* The commands of the command line. Each is one constant descriptor at the foot of its file; parsing, mistakes and help
  * come from its table of options. */

@@ -10,6 +10,7 @@
 #include "graphs/cli/batch.h"
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
+#include "graphs/graph_params.h"
 #include "graphs/run/run_report.h"
 
 /* One call of `qmat batch`. */

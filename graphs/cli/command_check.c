@@ -2,11 +2,11 @@
 #include <stdio.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/graph_params.h"
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_graph *graph = &invocation->graph;
-  qmat_status status =
-      qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
+  qmat_status status = qmat_read_graph_argument(context, invocation);
   if (status == QMAT_OK) status = qmat_graph_check_params(context, graph);
   if (status != QMAT_OK || qmat_invocation_value(invocation, "quiet")) return status;
   printf("%s: %zu node%s, %zu input%s, %zu output%s, no mistakes\n", graph->file, graph->node_count,

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/run/graph_run.h"
 
 /* One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip. */
 static const char *type_colour(qmat_value_type type) {

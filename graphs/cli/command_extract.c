@@ -2,7 +2,7 @@
 #include <stdio.h>
 
 #include "graphs/cli/command.h"
-#include "graphs/run/graph_run.h"
+#include "graphs/run/run_paths.h"
 #include "io/extract.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"

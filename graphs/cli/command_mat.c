@@ -4,6 +4,7 @@
 
 #include "graphs/built_in.h"
 #include "graphs/cli/command.h"
+#include "graphs/graph_params.h"
 #include "graphs/node_json.h"
 #include "io/model.h"
 

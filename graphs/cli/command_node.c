@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/graph_names.h"
 #include "graphs/node_json.h"
 
 static void print_row(const char *name, int width, const char *text) {

@@ -8,7 +8,6 @@
 
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
-#include "graphs/run/run_cache.h"
 
 /* A file that the run depends on, as it was when it was read. */
 typedef struct watched_file {

@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/graph_names.h"
+#include "graphs/run/graph_run.h"
 #include "graphs/run/why.h"
 
 static void print_why(const json_t *why) {

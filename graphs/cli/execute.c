@@ -4,6 +4,12 @@
 
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
+#include "graphs/graph_file.h"
+#include "graphs/graph_names.h"
+#include "graphs/graph_params.h"
+#include "graphs/run/graph_run.h"
+#include "graphs/run/run_outputs.h"
+#include "graphs/run/run_paths.h"
 #include "graphs/run/run_report.h"
 
 const qmat_option qmat_common_options[] = {

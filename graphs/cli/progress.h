@@ -2,7 +2,7 @@
 #ifndef QMAT_GRAPHS_CLI_PROGRESS_H
 #define QMAT_GRAPHS_CLI_PROGRESS_H
 
-#include "graphs/run/graph_run.h"
+#include "graphs/run/run_step.h"
 
 /* How a run is watched from the command line. */
 typedef enum qmat_progress_mode {

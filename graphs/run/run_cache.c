@@ -7,24 +7,24 @@
 #include <time.h>
 
 #include "graphs/cache/cache_key.h"
+#include "graphs/run/run_paths.h"
 
 /* ---- files ---- */
 
-static bool add_file(struct qmat_run_file_digest **files, size_t *count, size_t *capacity, const char *path,
+static bool add_file(qmat_run_file_digest **files, size_t *count, size_t *capacity, const char *path,
                      const qmat_digest *digest) {
   char *copy = qmat_strdup(path);
   if (!copy || qmat_grow((void **)files, capacity, *count + 1, sizeof **files) != 0) {
     qmat_free(copy);
     return false;
   }
-  struct qmat_run_file_digest *file = &(*files)[(*count)++];
-  *file = (struct qmat_run_file_digest){.path = copy, .readable = digest != NULL};
+  qmat_run_file_digest *file = &(*files)[(*count)++];
+  *file = (qmat_run_file_digest){.path = copy, .readable = digest != NULL};
   if (digest) file->digest = *digest;
   return true;
 }
 
-static const struct qmat_run_file_digest *find_file(const struct qmat_run_file_digest *files, size_t count,
-                                                    const char *path) {
+static const qmat_run_file_digest *find_file(const qmat_run_file_digest *files, size_t count, const char *path) {
   for (size_t i = 0; i < count; i++)
     if (strcmp(files[i].path, path) == 0) return &files[i];
   return NULL;
@@ -37,7 +37,7 @@ void qmat_step_note_read(void *user, const char *path, const uint8_t *bytes, siz
     reads->incomplete = true;
     return;
   }
-  const struct qmat_run_file_digest *known = find_file(reads->files, reads->count, path);
+  const qmat_run_file_digest *known = find_file(reads->files, reads->count, path);
   if (!known) {
     if (!add_file(&reads->files, &reads->count, &reads->capacity, path, bytes ? &digest : NULL))
       reads->incomplete = true;
@@ -54,7 +54,7 @@ void qmat_step_reads_uninit(qmat_step_reads *reads) {
 
 void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads) {
   for (size_t i = 0; i < reads->count; i++) {
-    const struct qmat_run_file_digest *file = &reads->files[i];
+    const qmat_run_file_digest *file = &reads->files[i];
     if (!find_file(run->hashed, run->hashed_count, file->path))
       add_file(&run->hashed, &run->hashed_count, &run->hashed_capacity, file->path,
                file->readable ? &file->digest : NULL);
@@ -62,8 +62,8 @@ void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads) {
 }
 
 /* What is known of a file; it is hashed when it is asked for first. NULL when memory is short. */
-static const struct qmat_run_file_digest *digest_file(qmat_run *run, const char *path) {
-  const struct qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, path);
+static const qmat_run_file_digest *digest_file(qmat_run *run, const char *path) {
+  const qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, path);
   if (known) return known;
   qmat_digest digest;
   bool readable = qmat_digest_of_file(path, &digest) == QMAT_OK;
@@ -88,7 +88,7 @@ static json_t *make_items(qmat_run *run, const qmat_run_step *step) {
   for (size_t row = 0; row < params && known; row++) {
     const char *path = qmat_param_input_file(type, row, step->params);
     if (!path) continue;
-    const struct qmat_run_file_digest *file = digest_file(run, path);
+    const qmat_run_file_digest *file = digest_file(run, path);
     known = file && file->readable;
     if (!known) continue;
     digests[row] = file->digest;
@@ -124,7 +124,7 @@ static bool add_sides(qmat_run *run, const qmat_run_step *step, const json_t *si
     const json_t *side = json_array_get(sides, i);
     const char *param = json_string_value(json_array_get(side, 0)), *name = json_string_value(json_array_get(side, 1));
     char *path = param && name ? side_path(type_of(run, step), step, param, name) : NULL;
-    const struct qmat_run_file_digest *file = path ? digest_file(run, path) : NULL;
+    const qmat_run_file_digest *file = path ? digest_file(run, path) : NULL;
     bool added = file && qmat_key_add_side_file(items, param, name, file->readable ? &file->digest : NULL);
     qmat_free(path);
     if (!added) return false;
@@ -227,7 +227,7 @@ qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
  */
 typedef struct side_file {
   const char *param, *path;
-  const struct qmat_run_file_digest *file;
+  const qmat_run_file_digest *file;
 } side_file;
 
 static int by_name(const void *a, const void *b) {
@@ -244,7 +244,7 @@ static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qma
   const qmat_node *type = type_of(run, step);
   *count = 0;
   for (size_t i = 0; i < reads->count; i++) {
-    const struct qmat_run_file_digest *file = &reads->files[i];
+    const qmat_run_file_digest *file = &reads->files[i];
     side_file side = {.file = file};
     bool is_main = false;
     for (size_t row = 0; row < qmat_param_count(type) && !is_main; row++) {
@@ -260,7 +260,7 @@ static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qma
       }
     }
     if (is_main) {
-      const struct qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, file->path);
+      const qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, file->path);
       if (!file->readable || !known || !qmat_digest_equal(&known->digest, &file->digest)) return false;
     } else if (!side.param || !qmat_is_utf8(side.path)) {
       return false;

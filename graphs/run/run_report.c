@@ -7,7 +7,6 @@
 
 #include "core/json_text.h"
 #include "graphs/node_json.h"
-#include "graphs/run/run_cache.h"
 #include "io/bytes.h"
 #include "io/save.h"
 

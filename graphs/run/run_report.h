@@ -4,7 +4,8 @@
 
 #include <stdio.h>
 
-#include "graphs/run/graph_run.h"
+#include "graphs/run/run.h"
+#include "graphs/run/run_summary.h"
 
 /* What a run came to: as JSON for programs, as a table for people. */
 

@@ -2,7 +2,7 @@
 #ifndef QMAT_GRAPHS_RUN_WHY_H
 #define QMAT_GRAPHS_RUN_WHY_H
 
-#include "graphs/run/graph_run.h"
+#include "graphs/run/run.h"
 
 /* Why a step of a run is found in the cache or has to run: its key against that of the nearest earlier record. */
 

@@ -9,7 +9,14 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "graphs/graph_file.h"
+#include "graphs/graph_names.h"
+#include "graphs/graph_params.h"
 #include "graphs/run/graph_run.h"
+#include "graphs/run/run_outputs.h"
+#include "graphs/run/run_paths.h"
+#include "graphs/run/run_plan.h"
+#include "graphs/run/run_summary.h"
 
 typedef struct number_params {
   double value;

@@ -607,7 +607,7 @@ static void test_lists_of_different_lengths_do_not_go_together(void **state) {
            "  add:   { type: test.add, in: { first: all.number, second: sum.number } }\n",
            other);
   assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_USAGE);
-  assert_string_equal(context.error.message, "a list of 3 is given beside one of 4");
+  assert_string_equal(context.error.message, "this list has 3 items, another input's has 4");
   assert_string_equal(context.error.node_id, "both");
   assert_string_equal(context.error.field, "second");
   qmat_context_uninit(&context);

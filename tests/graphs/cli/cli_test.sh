@@ -95,7 +95,7 @@ expect 2 "did you mean 'medial.simplify'?" "$qmat" node medial.simplfy
 expect 0 "no mistakes" "$qmat" check "$source/graphs/qmat_plus.yaml"
 expect 0 "digraph" "$qmat" dot "$source/graphs/qmat_plus.yaml"
 expect 0 "no mistakes" "$qmat" check "$source/graphs/lod.yaml"
-expect 2 "cannot be opened" "$qmat" check missing.yaml
+expect 2 "cannot open the graph file" "$qmat" check missing.yaml
 printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' >bad.yaml
 expect 2 "bad.yaml:3:14: there is no node type 'mesh.sfd' (did you mean 'mesh.sdf'?)" "$qmat" check bad.yaml
 expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report failed.json
@@ -112,7 +112,7 @@ expect 2 "known endings" "$qmat" mat box.off -o box.xyz
 expect 2 "between 0 and 1" "$qmat" mat box.off -o box.glb --epsilon 200%
 expect 2 "two outputs" "$qmat" mat box.off -o box.glb -o ./box.glb
 expect 2 "did you mean 'asset'?" "$qmat" mat box.off -o aset=box.glb
-expect 1 "folder of the output" "$qmat" mat box.off -o missing/box.glb
+expect 1 "output folder" "$qmat" mat box.off -o missing/box.glb
 expect 1 "nothere.off" "$qmat" mat nothere.off -o box.glb --report failed.json
 holds "the failure in the report" grep -q '"node": "model"' failed.json
 holds "no file after a failure" test ! -e box.glb

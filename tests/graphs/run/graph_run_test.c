@@ -145,7 +145,7 @@ static void test_a_run_stops_at_the_named_node(void **state) {
   qmat_run_uninit(&f->run);
   const qmat_run_save save = {0, in_folder(f, 0, "a.txt")};
   assert_int_equal(plan(f, (qmat_run_options){.to_node = "total", .saves = &save, .save_count = 1}), QMAT_ERROR_USAGE);
-  assert_non_null(strstr(f->context.error.message, "after node 'total'"));
+  assert_non_null(strstr(f->context.error.message, "needs nodes after 'total'"));
 }
 
 static void test_the_last_node_runs_once_a_format_and_the_others_once(void **state) {
@@ -206,11 +206,11 @@ static void test_bad_output_paths_are_refused_before_anything_runs(void **state)
   const qmat_run_save twice[] = {{0, in_folder(f, 0, "a.txt")}, {0, roundabout}};
   check_refused(f, twice, 2, QMAT_ERROR_USAGE, "two outputs have the path");
   const qmat_run_save lost = {0, in_folder(f, 0, "missing/a.txt")}, folder = {0, in_folder(f, 1, "d.txt")};
-  check_refused(f, &lost, 1, QMAT_ERROR_IO, "folder of the output cannot be used");
+  check_refused(f, &lost, 1, QMAT_ERROR_IO, "cannot use the output folder");
   char command[100];
   snprintf(command, sizeof command, "mkdir %s", f->paths[1]);
   assert_int_equal(system(command), 0);
-  check_refused(f, &folder, 1, QMAT_ERROR_IO, "the output is a folder");
+  check_refused(f, &folder, 1, QMAT_ERROR_IO, "the output path is a folder");
 }
 
 static void test_inputs_are_never_overwritten(void **state) {

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/graph.h"
+
+#include <string.h>
+
+const qmat_node *qmat_registry_find(const qmat_registry *registry, const char *name) {
+  for (size_t i = 0; i < registry->count; i++)
+    if (strcmp(registry->nodes[i]->name, name) == 0) return registry->nodes[i];
+  return NULL;
+}
+
+const qmat_param *qmat_output_format_param(const qmat_node *type) {
+  for (size_t i = 0; i < qmat_param_count(type); i++)
+    if (type->params[i].type == QMAT_PARAM_ENUM && (type->params[i].flags & QMAT_PARAM_OUTPUT_FORMAT))
+      return &type->params[i];
+  return NULL;
+}
+
+const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node) {
+  for (size_t row = 0; row < qmat_param_count(node->type); row++)
+    if ((node->type->params[row].flags & QMAT_PARAM_REQUIRED) && !node->texts[row]) return &node->type->params[row];
+  return NULL;
+}
+
+const char *qmat_graph_input_name(const qmat_graph *graph, size_t node, const qmat_param *param) {
+  for (size_t i = 0; i < graph->input_count; i++)
+    for (size_t k = 0; k < graph->inputs[i].param_count; k++) {
+      const qmat_graph_param *at = &graph->inputs[i].params[k];
+      if (at->node == node && &graph->nodes[node].type->params[at->param] == param) return graph->inputs[i].name;
+    }
+  return NULL;
+}
+
+void qmat_graph_uninit(qmat_graph *graph) {
+  for (size_t i = 0; i < graph->node_count; i++) {
+    qmat_graph_node *node = &graph->nodes[i];
+    for (size_t row = 0; node->texts && row < qmat_param_count(node->type); row++) qmat_free(node->texts[row]);
+    qmat_free(node->texts);
+    qmat_free(node->marks);
+    qmat_free(node->links);
+    qmat_free(node->params);
+  }
+  for (size_t i = 0; i < graph->output_count; i++) qmat_free(graph->outputs[i].path);
+  for (size_t i = 0; i < graph->input_count; i++) qmat_free(graph->inputs[i].params);
+  qmat_free(graph->nodes);
+  qmat_free(graph->inputs);
+  qmat_free(graph->outputs);
+  qmat_free(graph->order);
+  qmat_free(graph->file);
+  qmat_free(graph->folder);
+  *graph = (qmat_graph){0};
+}

@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/graph_params.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "graphs/graph_names.h"
+
+/* The ending of a file's name, without the dot; "": it has none. */
+static const char *path_ending(const char *path) {
+  const char *name = strrchr(path, '/');
+  name = name ? name + 1 : path;
+  const char *dot = strrchr(name, '.');
+  return dot && dot != name ? dot + 1 : "";
+}
+
+qmat_status qmat_graph_output_format(qmat_context *context, const qmat_graph *graph, size_t index, const char *path,
+                                     int *choice) {
+  static const char *const report_endings[] = {"json", NULL};
+  const qmat_graph_output *output = &graph->outputs[index];
+  const qmat_node *type = graph->nodes[output->node].type;
+  const qmat_value_type made = type->outputs[output->port].type;
+  *choice = -1;
+  const char *const *endings = NULL;
+  const qmat_param *format = NULL;
+  if (made == QMAT_REPORT) {
+    endings = report_endings;
+  } else if (made == QMAT_FILE) {
+    format = qmat_output_format_param(type);
+    if (!format) return QMAT_OK;
+    endings = format->choices;
+  } else {
+    qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' is a %s, but only files and reports can be saved", output->name,
+              qmat_value_type_name(made));
+    return qmat_fail_hint(context, "scene.write makes files");
+  }
+  const char *ending = path_ending(path);
+  char known[200];
+  size_t used = 0;
+  for (int i = 0; endings[i]; i++) {
+    if (strcasecmp(endings[i], ending) == 0) {
+      if (format) *choice = i;
+      return QMAT_OK;
+    }
+    if (used < sizeof known)
+      used += (size_t)snprintf(known + used, sizeof known - used, "%s.%s", i ? ", " : "", endings[i]);
+  }
+  if (*ending)
+    qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' cannot be written as '.%s'", output->name,
+              qmat_show(ending).text);
+  else
+    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has no ending that says how to write output '%s'", qmat_show(path).text,
+              output->name);
+  return qmat_fail_hint(context, "known endings: %s", known);
+}
+
+char *qmat_resolve_path(const char *folder, const char *path) {
+  if (path[0] == '/' || path[0] == 0) folder = "";
+  size_t length = strlen(folder), rest = strlen(path);
+  char *resolved = qmat_alloc(length + rest + 1, 1);
+  if (!resolved) return NULL;
+  memcpy(resolved, folder, length);
+  memcpy(resolved + length, path, rest + 1);
+  return resolved;
+}
+
+qmat_status qmat_graph_set(qmat_context *context, qmat_graph *graph, size_t index, size_t row, const char *text,
+                           const char *folder) {
+  qmat_graph_node *node = &graph->nodes[index];
+  const qmat_param *param = &node->type->params[row];
+  const char *outer_id = context->node_id, *outer_type = context->node_type;
+  context->node_id = node->id;
+  context->node_type = node->type->name;
+  char *copy = NULL;
+  qmat_status status = QMAT_OK;
+  if (strlen(text) > QMAT_GRAPH_MAX_TEXT) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s has more than %d bytes", param->name, QMAT_GRAPH_MAX_TEXT);
+    status = qmat_fail_field(context, param->name);
+  } else {
+    copy = param->type == QMAT_PARAM_PATH ? qmat_resolve_path(folder, text) : qmat_strdup(text);
+    if (!copy) status = qmat_fail_memory(context, "graph");
+  }
+  if (status == QMAT_OK) status = qmat_param_parse(context, node->type, param, copy, node->params);
+  if (status == QMAT_OK) {
+    qmat_free(node->texts[row]);
+    node->texts[row] = copy;
+    node->marks[row] = (qmat_mark){0, 0};
+  } else {
+    qmat_free(copy);
+  }
+  context->node_id = outer_id;
+  context->node_type = outer_type;
+  return status;
+}
+
+/* Checks that a parameter may be set to `text`, without setting it. */
+static qmat_status try_param(qmat_context *context, const qmat_graph *graph, qmat_graph_param at, const char *text) {
+  const qmat_graph_node *node = &graph->nodes[at.node];
+  const char *outer_id = context->node_id, *outer_type = context->node_type;
+  void *params = qmat_calloc(1, node->type->params_size);
+  if (!params) return qmat_fail_memory(context, "graph");
+  context->node_id = node->id;
+  context->node_type = node->type->name;
+  const qmat_status status = qmat_param_parse(context, node->type, &node->type->params[at.param], text, params);
+  context->node_id = outer_id;
+  context->node_type = outer_type;
+  qmat_free(params);
+  return status;
+}
+
+qmat_status qmat_graph_set_named(qmat_context *context, qmat_graph *graph, const char *name, const char *text) {
+  qmat_graph_param single;
+  const qmat_graph_param *params = NULL;
+  size_t count = 0;
+  qmat_status status = qmat_graph_find_params(context, graph, name, &single, &params, &count);
+  for (size_t i = 1; i < count && status == QMAT_OK; i++) status = try_param(context, graph, params[i], text);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = qmat_graph_set(context, graph, params[i].node, params[i].param, text, "");
+  return status;
+}
+
+qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const char *assignment) {
+  const char *equals = strchr(assignment, '=');
+  if (!equals) {
+    return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is not of the form node.parameter=value",
+                     qmat_show(assignment).text);
+  }
+  size_t length = (size_t)(equals - assignment);
+  char name[2 * QMAT_GRAPH_NAME_SIZE];
+  if (length >= sizeof name) length = sizeof name - 1;
+  memcpy(name, assignment, length);
+  name[length] = 0;
+  return qmat_graph_set_named(context, graph, name, equals + 1);
+}
+
+/* Gives the newest error the place where the file sets the parameter that it names. */
+static qmat_status place_at_param(qmat_context *context, const qmat_graph *graph, const qmat_graph_node *node) {
+  const qmat_param *param = qmat_param_find(node->type, context->error.field);
+  qmat_mark mark = node->mark;
+  if (param) {
+    size_t row = (size_t)(param - node->type->params);
+    if (node->marks[row].line > 0) mark = node->marks[row];
+    /* Set on the command line: the file is not at fault. */
+    else if (node->texts[row])
+      return context->error.status;
+  }
+  return qmat_fail_at(context, graph->file, mark.line, mark.column);
+}
+
+qmat_status qmat_graph_check_node(qmat_context *context, const qmat_graph *graph, size_t index, const void *params) {
+  const qmat_graph_node *node = &graph->nodes[index];
+  const char *outer_id = context->node_id, *outer_type = context->node_type;
+  context->node_id = node->id;
+  context->node_type = node->type->name;
+  qmat_status status = qmat_params_check(context, node->type, params);
+  if (status == QMAT_ERROR_USAGE && !context->error.file[0]) {
+    const qmat_param *missing = qmat_graph_missing_param(node);
+    const char *input = missing ? qmat_graph_input_name(graph, index, missing) : NULL;
+    if (missing && strcmp(missing->name, context->error.field) == 0 && !context->error.hint[0]) {
+      const char *value = missing->type == QMAT_PARAM_PATH ? "FILE" : "VALUE";
+      if (input)
+        qmat_fail_hint(context, "--set %s=%s", input, value);
+      else
+        qmat_fail_hint(context, "--set %s.%s=%s", node->id, missing->name, value);
+    }
+    status = place_at_param(context, graph, node);
+  }
+  context->node_id = outer_id;
+  context->node_type = outer_type;
+  return status;
+}
+
+qmat_status qmat_graph_check_params(qmat_context *context, const qmat_graph *graph) {
+  for (size_t i = 0; i < graph->node_count; i++) {
+    const qmat_param *missing = qmat_graph_missing_param(&graph->nodes[i]);
+    if (missing && qmat_graph_input_name(graph, i, missing)) continue;
+    qmat_status status = qmat_graph_check_node(context, graph, i, graph->nodes[i].params);
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}

@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/run/run_lists.h"
+
+#include <string.h>
+
+#include "graphs/run/parallel_items.h"
+
+qmat_status qmat_count_lifted(qmat_context *context, const qmat_node *type, const qmat_value *const *inputs,
+                              size_t *count, const qmat_list **first) {
+  *count = 0;
+  *first = NULL;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (!inputs[port] || inputs[port]->type != QMAT_LIST || type->inputs[port].list) continue;
+    const size_t here = qmat_value_count(inputs[port]);
+    if (*count > 0 && here != *count) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "this list has %zu items, another input's has %zu", here, *count);
+      return qmat_fail_field(context, type->inputs[port].name);
+    }
+    if (*count == 0) *first = (const qmat_list *)inputs[port];
+    *count = here;
+  }
+  return QMAT_OK;
+}
+
+/* Plans the run of `step` alone, with item `item` of each of its lists. Its outputs' slots come first. */
+static qmat_status plan_item(qmat_context *context, const qmat_run *run, const qmat_run_step *step,
+                             const qmat_value *const *inputs, size_t item, qmat_run *one) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  const size_t output_count = qmat_output_count(type), input_count = qmat_input_count(type);
+  *one = (qmat_run){.graph = run->graph, .cache = run->cache, .bypass = run->bypass};
+  one->steps = qmat_calloc(1, sizeof *one->steps);
+  one->slots = qmat_calloc(output_count + input_count, sizeof *one->slots);
+  if (!one->steps || !one->slots) return qmat_fail_memory(context, "plan");
+  qmat_run_step *own = &one->steps[0];
+  *own = (qmat_run_step){.node = step->node, .format = step->format, .forced = step->forced};
+  one->step_count = 1;
+  one->slot_count = output_count + input_count;
+  own->inputs = qmat_calloc(input_count, sizeof *own->inputs);
+  own->made = qmat_calloc(output_count, sizeof *own->made);
+  own->params = qmat_alloc(type->params_size, 1);
+  if (!own->inputs || !own->made || !own->params) return qmat_fail_memory(context, "plan");
+  if (type->params_size > 0) memcpy(own->params, step->params, type->params_size);
+  for (size_t port = 0; port < output_count; port++) one->slots[port].kept = true;
+  for (size_t port = 0; port < input_count; port++) {
+    own->inputs[port] = SIZE_MAX;
+    if (!inputs[port]) continue;
+    const qmat_value *value = type->inputs[port].list ? inputs[port] : qmat_value_at(inputs[port], item);
+    own->inputs[port] = output_count + port;
+    one->slots[output_count + port] = (qmat_run_slot){
+        .value = qmat_value_retain(value), .digest = value->digest, .known = true, .step = SIZE_MAX, .kept = true};
+  }
+  return QMAT_OK;
+}
+
+/* A step that runs over lists. */
+typedef struct lifted_step {
+  const qmat_run *run;
+  qmat_run_step *step;
+  const qmat_value *const *inputs;
+  qmat_list **outputs;
+  qmat_make_item_fn *make;
+  void *user;
+  pthread_mutex_t lock;   /* of the cache, the step's counters and the next two */
+  size_t first_unusable;  /* the first item that the node cannot process; SIZE_MAX: none */
+  qmat_error first_error; /* why */
+} lifted_step;
+
+/* Puts a failure into the output lists for one item; the other items continue. */
+static qmat_status leave_out(lifted_step *lifted, qmat_context *context, size_t item, const qmat_value *failure) {
+  qmat_run_step *step = lifted->step;
+  qmat_value *made = failure ? qmat_value_retain(failure) : qmat_failure_of_error(context);
+  if (!made) return context->error.status;
+  for (size_t port = 0; port < qmat_output_count(lifted->run->graph->nodes[step->node].type); port++)
+    lifted->outputs[port]->items[item] = qmat_value_retain(made);
+  qmat_value_release(made);
+  pthread_mutex_lock(&lifted->lock);
+  if (failure) step->lifted_left_out++;
+  if (!failure && item < lifted->first_unusable) {
+    lifted->first_unusable = item;
+    lifted->first_error = context->error;
+  }
+  pthread_mutex_unlock(&lifted->lock);
+  return QMAT_OK;
+}
+
+/* Makes the step's outputs for one item. Runs in one of the threads of qmat_run_items. */
+static qmat_status run_item(void *user, qmat_context *context, size_t item) {
+  lifted_step *lifted = user;
+  qmat_run_step *step = lifted->step;
+  const qmat_node *type = lifted->run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (!lifted->inputs[port] || type->inputs[port].list) continue;
+    const qmat_value *given = qmat_value_at(lifted->inputs[port], item);
+    if (qmat_value_failure(given)) return leave_out(lifted, context, item, given);
+  }
+  qmat_run one;
+  bool hit = false;
+  qmat_status status = plan_item(context, lifted->run, step, lifted->inputs, item, &one);
+  if (status == QMAT_OK) status = lifted->make(lifted->user, context, &one, &lifted->lock, &hit);
+  for (size_t port = 0; port < qmat_output_count(type) && status == QMAT_OK; port++)
+    lifted->outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
+  pthread_mutex_lock(&lifted->lock);
+  if (hit) step->lifted_hits++;
+  pthread_mutex_unlock(&lifted->lock);
+  qmat_run_uninit(&one);
+  return status == QMAT_ERROR_GEOMETRY ? leave_out(lifted, context, item, NULL) : status;
+}
+
+/* The bytes of one item's inputs. */
+static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, size_t item) {
+  size_t size = 0;
+  for (size_t port = 0; port < qmat_input_count(type); port++)
+    if (inputs[port] && inputs[port]->type == QMAT_LIST && !type->inputs[port].list)
+      size += qmat_value_bytes(qmat_value_at(inputs[port], item));
+  return size;
+}
+
+/* Fails when every item failed, with the first item's error. */
+static qmat_status check_any_made(const lifted_step *lifted, qmat_context *context, const qmat_list *first) {
+  const qmat_list *made = lifted->outputs[0];
+  for (size_t i = 0; i < made->count; i++)
+    if (!qmat_value_failure(made->items[i])) return QMAT_OK;
+  if (lifted->first_unusable == SIZE_MAX) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s", qmat_value_failure(made->items[0]));
+    return qmat_fail_within(context, first->names[0]);
+  }
+  context->error = lifted->first_error;
+  return qmat_fail_within(context, first->names[lifted->first_unusable]);
+}
+
+static qmat_status run_items(qmat_context *context, lifted_step *lifted, const qmat_list *first) {
+  const qmat_node *type = lifted->run->graph->nodes[lifted->step->node].type;
+  size_t *sizes = qmat_alloc(first->count, sizeof *sizes), failed;
+  if (!sizes) return qmat_fail_memory(context, "values");
+  for (size_t i = 0; i < first->count; i++) sizes[i] = item_size(type, lifted->inputs, i);
+  pthread_mutex_init(&lifted->lock, NULL);
+  qmat_status status = qmat_run_items(context, first->count, sizes, "meshes", run_item, lifted, &failed);
+  pthread_mutex_destroy(&lifted->lock);
+  qmat_free(sizes);
+  if (failed != SIZE_MAX) qmat_fail_within(context, first->names[failed]);
+  if (status == QMAT_OK && qmat_output_count(type) > 0) status = check_any_made(lifted, context, first);
+  return status;
+}
+
+qmat_status qmat_run_lifted(qmat_context *context, qmat_run *run, size_t index, const qmat_value *const *inputs,
+                            const qmat_list *first, qmat_make_item_fn *make, void *user, qmat_value **outputs) {
+  qmat_run_step *step = &run->steps[index];
+  const size_t output_count = qmat_output_count(run->graph->nodes[step->node].type);
+  qmat_list **lists = qmat_calloc(output_count, sizeof *lists);
+  qmat_status status = lists ? QMAT_OK : qmat_fail_memory(context, "values");
+  step->lifted = first->count;
+  step->lifted_hits = step->lifted_left_out = 0;
+  for (size_t port = 0; port < output_count && status == QMAT_OK; port++) {
+    lists[port] = qmat_list_new(first->count);
+    for (size_t i = 0; lists[port] && i < first->count; i++) {
+      lists[port]->names[i] = qmat_strdup(first->names[i]);
+      if (!lists[port]->names[i]) status = qmat_fail_memory(context, "values");
+    }
+    if (!lists[port]) status = qmat_fail_memory(context, "values");
+  }
+  lifted_step lifted = {.run = run,
+                        .step = step,
+                        .inputs = inputs,
+                        .outputs = lists,
+                        .make = make,
+                        .user = user,
+                        .first_unusable = SIZE_MAX};
+  if (status == QMAT_OK) status = run_items(context, &lifted, first);
+  for (size_t port = 0; port < output_count && status == QMAT_OK; port++)
+    status = qmat_value_seal(context, &lists[port]->base);
+  for (size_t port = 0; lists && port < output_count; port++) {
+    if (status == QMAT_OK)
+      outputs[port] = &lists[port]->base;
+    else if (lists[port])
+      qmat_value_release(&lists[port]->base);
+  }
+  qmat_free(lists);
+  return status;
+}
