@@ -6,9 +6,10 @@
 #include <string.h>
 
 #include "core/geometry/medial_distance.h"
-#include "core/hash.h"
+#include "core/geometry/triangle.h"
 #include "core/json_text.h"
 #include "core/node.h"
+#include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
 #include "nodes/measure/topology_report.h"
@@ -73,88 +74,44 @@ static qmat_status prepare(evaluation *e, const qmat_mesh *mesh, const qmat_medi
 
 /* ---- surface to envelope ---- */
 
-enum { SAMPLES_AT_ONCE = 512 };
-
-typedef struct sample_sum {
-  double gap, offset, largest, deepest;
-} sample_sum;
-
-static double facet_area(const double *a, const double *b, const double *c) {
-  double square = 0;
-  for (int k = 0; k < 3; k++) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    const double n = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
-    square += n * n;
-  }
-  return 0.5 * sqrt(square);
-}
-
-/* Sample i lies where the running sum of areas passes (i + 1/2) / samples of the whole, anywhere in that facet. */
-static void surface_point(const evaluation *e, const double *areas, size_t i, double point[3]) {
-  const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
+/* Sum 0 is max(0, F) and sum 1 |F|; maximum 0 is F and maximum 1 the depth -F. */
+static void add_sample(const void *data, size_t facet, double x, double y, qmat_area_sums *sums) {
+  const evaluation *e = data;
   const double *positions = qmat_surface_positions(e->surface);
-  const double wanted = areas[mesh->triangle_count - 1] * (((double)i + 0.5) / (double)e->params->samples);
-  size_t low = 0, high = mesh->triangle_count - 1;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    if (areas[middle] > wanted)
-      high = middle;
-    else
-      low = middle + 1;
-  }
-  const uint32_t *row = &mesh->triangles[3 * low];
-  const double root = sqrt(qmat_hash_unit(qmat_hash3(0, i, 0))), y = qmat_hash_unit(qmat_hash3(0, i, 1));
-  for (size_t k = 0; k < 3; k++)
-    point[k] = (1 - root) * positions[3 * (size_t)row[0] + k] + root * (1 - y) * positions[3 * (size_t)row[1] + k] +
-               root * y * positions[3 * (size_t)row[2] + k];
+  const uint32_t *row = &qmat_surface_mesh(e->surface)->triangles[3 * facet];
+  double point[3];
+  qmat_triangle_point(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]], &positions[3 * (size_t)row[2]], x,
+                      y, point);
+  const double f = qmat_envelope_distance(e->envelope, point, NULL);
+  sums->sum[0] += fmax(f, 0);
+  sums->sum[1] += fabs(f);
+  sums->largest[0] = fmax(sums->largest[0], f);
+  sums->largest[1] = fmax(sums->largest[1], -f);
 }
 
 static qmat_status sample_surface(evaluation *e) {
-  qmat_context *context = e->context;
   const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
   const double *positions = qmat_surface_positions(e->surface);
-  const size_t samples = (size_t)e->params->samples, rows = (samples + SAMPLES_AT_ONCE - 1) / SAMPLES_AT_ONCE;
-  const size_t slice = 256;
-  double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas), area = 0;
-  sample_sum *sums = qmat_arena_alloc(&context->arena, slice, sizeof *sums), all = {0, 0, 0, 0};
-  if (!areas || !sums) return qmat_fail_memory(context, "samples of the surface");
+  double *areas = qmat_arena_alloc(&e->context->arena, mesh->triangle_count, sizeof *areas), area = 0, normal[3];
+  if (!areas) return qmat_fail_memory(e->context, "samples of the surface");
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const uint32_t *row = &mesh->triangles[3 * t];
-    areas[t] = area +=
-        facet_area(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]], &positions[3 * (size_t)row[2]]);
+    areas[t] = area += qmat_triangle_area(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]],
+                                          &positions[3 * (size_t)row[2]], normal);
   }
-  const int threads = qmat_threads(context);
-  for (size_t first = 0; first < rows; first += slice) {
-    const qmat_status status = qmat_progress(context, first, rows, "samples of the surface");
-    if (status != QMAT_OK) return status;
-    const size_t last = first + slice < rows ? first + slice : rows;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
-    for (size_t row = first; row < last; row++) {
-      sample_sum sum = {0, 0, 0, 0};
-      for (size_t i = row * SAMPLES_AT_ONCE; i < samples && i < (row + 1) * SAMPLES_AT_ONCE; i++) {
-        double point[3];
-        surface_point(e, areas, i, point);
-        const double f = qmat_envelope_distance(e->envelope, point, NULL);
-        sum.gap += fmax(f, 0);
-        sum.offset += fabs(f);
-        sum.largest = fmax(sum.largest, f);
-        sum.deepest = fmax(sum.deepest, -f);
-      }
-      sums[row - first] = sum;
-    }
-    for (size_t row = first; row < last; row++) {
-      const sample_sum *sum = &sums[row - first];
-      all.gap += sum->gap;
-      all.offset += sum->offset;
-      all.largest = fmax(all.largest, sum->largest);
-      all.deepest = fmax(all.deepest, sum->deepest);
-    }
-  }
-  e->largest_gap = all.largest;
-  e->mean_gap = all.gap / (double)samples;
-  e->deepest = all.deepest;
-  e->mean_offset = all.offset / (double)samples;
-  return QMAT_OK;
+  const qmat_area_samples samples = {.areas = areas,
+                                     .element_count = mesh->triangle_count,
+                                     .sample_count = (size_t)e->params->samples,
+                                     .progress = "samples of the surface",
+                                     .add = add_sample,
+                                     .data = e};
+  qmat_area_sums sums;
+  const qmat_status status = qmat_area_samples_sum(e->context, &samples, &sums);
+  e->largest_gap = sums.largest[0];
+  e->mean_gap = sums.sum[0] / (double)e->params->samples;
+  e->deepest = sums.largest[1];
+  e->mean_offset = sums.sum[1] / (double)e->params->samples;
+  return status;
 }
 
 /* Bounds max(0, F) over the surface; again from a larger F where that asks for less tolerance. */
@@ -254,7 +211,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
       {"triangles", e->unit.triangle_count},       {"spheres_outside", e->spheres_outside},
       {"degenerate_cones", e->degenerate_cones},   {"degenerate_slabs", e->degenerate_slabs},
       {"duplicate_spheres", e->duplicate_spheres}, {"samples_of_surface", (size_t)e->params->samples},
-      {"samples_of_envelope", b->sample_count},    {"pieces_of_envelope", b->looks},
+      {"samples_of_envelope", b->sample_count},    {"pieces_of_envelope", b->query_count},
   };
   const bool solid = mesh->closed && mesh->oriented;
   const bool within = surface_to_envelope <= e->params->epsilon && envelope_to_surface <= e->params->epsilon;

@@ -22,6 +22,11 @@ static inline void qmat_cross(const double a[3], const double b[3], double out[3
   out[1] = a[2] * b[0] - a[0] * b[2];
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
+/* Scales a vector to length 1; its length is not 0. */
+static inline void qmat_normalize(double v[3]) {
+  const double length = sqrt(qmat_dot(v, v));
+  for (int k = 0; k < 3; k++) v[k] /= length;
+}
 
 /* A maximum and minimum that compile to one instruction; the second operand where the first is not a number. */
 static inline double qmat_larger(double a, double b) {

@@ -94,8 +94,8 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->cavities = boundary.far_points;
   errors->cavity_count = keep_inside(surface, errors->cavities, boundary.far_count);
-  errors->doubts = boundary.doubts;
-  errors->doubt_count = keep_inside(surface, errors->doubts, boundary.doubt_count);
+  errors->doubts = boundary.undecided_points;
+  errors->doubt_count = keep_inside(surface, errors->doubts, boundary.undecided_count);
   return status;
 }
 
