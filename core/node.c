@@ -2,8 +2,6 @@
 #include "core/node.h"
 
 #include <errno.h>
-#include <float.h>
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -86,119 +84,6 @@ void qmat_params_default(const qmat_node *node, void *params) {
   }
 }
 
-static bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-/* Skips a run of digits. */
-static const char *skip_digits(const char *text) {
-  while (is_digit(*text)) text++;
-  return text;
-}
-
-bool qmat_parse_number(const char *text, double *number) {
-  /* The grammar is checked here, so that strtod's blanks, hexadecimal digits, infinities and NaN stay out. */
-  const char *digits = text + (*text == '-' || *text == '+');
-  const char *end = skip_digits(digits);
-  size_t digit_count = (size_t)(end - digits);
-  if (*end == '.') {
-    const char *fraction = end + 1;
-    end = skip_digits(fraction);
-    digit_count += (size_t)(end - fraction);
-  }
-  if (digit_count == 0) return false;
-  const char *mantissa_end = end;
-  long exponent = 0;
-  if (*end == 'e' || *end == 'E') {
-    const char *exponent_digits = end + 1 + (end[1] == '-' || end[1] == '+');
-    end = skip_digits(exponent_digits);
-    if (end == exponent_digits) return false;
-    exponent = strtol(mantissa_end + 1, NULL, 10); /* saturates */
-  }
-
-  char shifted[160];
-  if (*end == '%') {
-    /* The exponent is lowered by two instead of dividing by 100, which would round twice. */
-    const size_t length = (size_t)(mantissa_end - text);
-    if (end[1] != '\0' || length + 32 > sizeof shifted) return false;
-    if (exponent < -100000) exponent = -100000;
-    if (exponent > 100000) exponent = 100000;
-    memcpy(shifted, text, length);
-    snprintf(shifted + length, sizeof shifted - length, "e%ld", exponent - 2);
-    text = shifted;
-  } else if (*end != '\0') {
-    return false;
-  }
-
-  const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-  if (plain == (locale_t)0) return false;
-  const double value = strtod_l(text, NULL, plain);
-  freelocale(plain);
-  if (!isfinite(value)) return false;
-  *number = value;
-  return true;
-}
-
-void qmat_format_number(double number, char *text, size_t size) {
-  if (size == 0) return;
-  text[0] = '\0';
-  const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-  if (plain == (locale_t)0) return;
-  const locale_t before = uselocale(plain);
-  char shortest[40];
-  /* "%.15g" drops trailing zeros and so is the shortest where 15 digits do, but for numbers of reduced precision. */
-  const int first = number != 0 && fabs(number) < DBL_MIN ? 1 : 15;
-  for (int precision = first; precision <= 17; precision++) {
-    snprintf(shortest, sizeof shortest, "%.*g", precision, number);
-    if (strtod(shortest, NULL) == number) break;
-  }
-  uselocale(before);
-  freelocale(plain);
-  snprintf(text, size, "%s", shortest);
-}
-
-static size_t smaller(size_t a, size_t b) {
-  return a < b ? a : b;
-}
-
-enum { LONGEST_NAME = 63 };
-
-/* The optimal string alignment distance: insertions, deletions, substitutions and swaps of neighbours. */
-static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length) {
-  size_t rows[3][LONGEST_NAME + 1];
-  size_t *before = rows[0], *last = rows[1], *row = rows[2];
-  for (size_t j = 0; j <= b_length; j++) last[j] = j;
-  for (size_t i = 1; i <= a_length; i++) {
-    row[0] = i;
-    for (size_t j = 1; j <= b_length; j++) {
-      row[j] = smaller(smaller(last[j], row[j - 1]) + 1, last[j - 1] + (a[i - 1] != b[j - 1]));
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = smaller(row[j], before[j - 2] + 1);
-    }
-    size_t *oldest = before;
-    before = last;
-    last = row;
-    row = oldest;
-  }
-  return last[b_length];
-}
-
-const char *qmat_nearest_name(const char *text, const char *const *names, size_t count) {
-  const size_t length = strnlen(text, LONGEST_NAME + 1);
-  if (length > LONGEST_NAME) return NULL;
-  const char *nearest = NULL;
-  size_t nearest_distance = smaller(1 + length / 3 + 1, length); /* a wholly different letter is not near */
-  for (size_t i = 0; i < count; i++) {
-    const size_t name_length = strnlen(names[i], LONGEST_NAME + 1);
-    if (name_length > LONGEST_NAME) continue;
-    const size_t distance = edit_distance(text, length, names[i], name_length);
-    if (distance < nearest_distance) {
-      nearest = names[i];
-      nearest_distance = distance;
-    }
-  }
-  return nearest;
-}
-
 /* The unit in parentheses after a range, or nothing for plain numbers. */
 static void format_unit(const qmat_param *param, char *text, size_t size) {
   text[0] = '\0';
@@ -250,8 +135,7 @@ static qmat_status parse_bool(qmat_context *context, const qmat_param *param, co
 
 static qmat_status parse_int(qmat_context *context, const qmat_param *param, const char *text, int64_t *value) {
   const char *digits = text + (*text == '-' || *text == '+');
-  const char *end = skip_digits(digits);
-  if (end == digits || *end != '\0') {
+  if (*digits == '\0' || digits[strspn(digits, "0123456789")] != '\0') {
     qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a whole number, not '%s'", param->name, text);
     return qmat_fail_field(context, param->name);
   }

@@ -115,15 +115,4 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
 /* Writes the parameter's value as canonical text that qmat_param_parse reads back to the same value. */
 void qmat_param_format(const qmat_param *param, const void *params, char *text, size_t size);
 
-/* Of `count` names the one nearest to `text` by edit distance, or NULL when none is near. */
-const char *qmat_nearest_name(const char *text, const char *const *names, size_t count);
-
-/* A finite number from `text`, in full, with an optional '%' that divides by 100 ("0.1%" is the double nearest to
- * 0.001); decimal digits only, no blanks; independent of the locale. False leaves `*number` alone. */
-bool qmat_parse_number(const char *text, double *number);
-
-/* Writes the shortest decimal text that reads back to the same double; independent of the locale. 32 bytes are enough;
- * always terminated when size > 0. */
-void qmat_format_number(double number, char *text, size_t size);
-
 #endif

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "core/value_form.h"
 #include "graphs/cache/cache_key.h"
 #include "io/bytes.h"
 

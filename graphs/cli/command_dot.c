@@ -5,13 +5,12 @@
 #include "graphs/cli/command.h"
 #include "graphs/run/graph_run.h"
 
-/* One colour per value type, told apart by people who see few colours too; edges carry the type's name as a tooltip. */
+/* Colours that people with colour blindness can distinguish, by the number of the value type. Each edge also carries the
+ * name of its type as a tooltip. */
 static const char *type_colour(qmat_value_type type) {
-  static const char *const colours[QMAT_VALUE_TYPE_COUNT] = {
-      [QMAT_SCENE] = "#7f7f7f",  [QMAT_MESH] = "#0072b2",  [QMAT_FIELD] = "#56b4e9",  [QMAT_SAMPLES] = "#009e73",
-      [QMAT_MEDIAL] = "#d55e00", [QMAT_CHAIN] = "#e69f00", [QMAT_REPORT] = "#cc79a7", [QMAT_FILE] = "#000000",
-  };
-  return colours[type];
+  static const char *const colours[] = {"#7f7f7f", "#0072b2", "#56b4e9", "#009e73", "#d55e00",
+                                        "#e69f00", "#cc79a7", "#000000", "#b2df8a", "#882255"};
+  return colours[type % (sizeof colours / sizeof *colours)];
 }
 
 /* Ids and descriptor names are ASCII words, but paths and texts of parameters are anything. */

@@ -29,9 +29,9 @@ const char *qmat_step_state_name(qmat_step_state state);
 typedef struct qmat_run_made {
   qmat_digest digest;
   size_t bytes;
-  size_t items;       /* the length of a list; 1 for any other value */
-  uint64_t blob_size; /* of its serialised form in the cache; 0: it is in no cache */
-  size_t counts[3];   /* see qmat_value_counts */
+  size_t items;                    /* the length of a list; 1 for any other value */
+  uint64_t blob_size;              /* of its serialised form in the cache; 0: it is in no cache */
+  size_t counts[QMAT_MOST_COUNTS]; /* see qmat_value_counts */
 } qmat_run_made;
 
 /* One run of one node. */

@@ -149,7 +149,7 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   made->items = items > 1 ? items : 1;
   made->blob_size = (uint64_t)size;
   made->bytes = (size_t)bytes;
-  for (size_t i = 0; i < 3; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
+  for (size_t i = 0; i < QMAT_MOST_COUNTS; i++) made->counts[i] = (size_t)json_integer_value(json_array_get(counts, i));
   return true;
 }
 
@@ -291,10 +291,13 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
     json_t *stored = qmat_cache_put_value(run->cache, value, &added);
     *any_added = *any_added || added;
     made->blob_size = (uint64_t)json_integer_value(json_object_get(stored, "blob"));
-    json_t *output = json_pack("{s:s, s:s, s:I, s:[I, I, I]}", "port", type->outputs[port].name, "type",
-                               qmat_value_type_name(value->type), "bytes", (json_int_t)made->bytes, "counts",
-                               (json_int_t)made->counts[0], (json_int_t)made->counts[1], (json_int_t)made->counts[2]);
-    done = stored && output && json_object_update(output, stored) == 0;
+    json_t *counts = json_array();
+    done = counts != NULL;
+    for (size_t i = 0; i < QMAT_MOST_COUNTS && done; i++)
+      done = json_array_append_new(counts, json_integer((json_int_t)made->counts[i])) == 0;
+    json_t *output = json_pack("{s:s, s:s, s:I, s:o}", "port", type->outputs[port].name, "type",
+                               qmat_value_type_name(value->type), "bytes", (json_int_t)made->bytes, "counts", counts);
+    done = done && stored && output && json_object_update(output, stored) == 0;
     json_decref(stored);
     done = json_array_append_new(outputs, output) == 0 && done;
   }

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_report.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/json_text.h"
@@ -37,8 +35,8 @@ static json_t *output_json(const qmat_port *port, const qmat_run_made *made) {
   if (made->items > 1) json_object_set_new(output, "items", json_integer((json_int_t)made->items));
   json_object_set_new(output, "digest", digest_json(&made->digest));
   json_object_set_new(output, "bytes", json_integer((json_int_t)made->bytes));
-  const char *const *names = qmat_value_count_names(port->type);
-  for (int i = 0; names[i]; i++) json_object_set_new(output, names[i], json_integer((json_int_t)made->counts[i]));
+  const qmat_value_count_row *rows = qmat_value_count_rows(port->type);
+  for (size_t i = 0; rows[i].name; i++) qmat_json_set_count(output, rows[i].name, made->counts[i]);
   return output;
 }
 
@@ -227,48 +225,6 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
 
 /* ---- text ---- */
 
-void qmat_format_count(uint64_t count, char *text) {
-  char digits[24];
-  int length = snprintf(digits, sizeof digits, "%llu", (unsigned long long)count);
-  char *out = text;
-  for (int i = 0; i < length; i++) {
-    if (i > 0 && (length - i) % 3 == 0) *out++ = ',';
-    *out++ = digits[i];
-  }
-  *out = 0;
-}
-
-void qmat_format_bytes(uint64_t bytes, char *text) {
-  static const char *const units[] = {"kB", "MB", "GB", "TB"};
-  if (bytes < 1000) {
-    snprintf(text, 32, "%u byte%s", (unsigned)bytes, bytes == 1 ? "" : "s");
-    return;
-  }
-  double size = (double)bytes / 1000;
-  int unit = 0;
-  while (size >= 999.5 && unit < 3) {
-    size /= 1000;
-    unit++;
-  }
-  char number[40];
-  qmat_format_number(size < 9.95 ? round(size * 10) / 10 : round(size), number, sizeof number);
-  snprintf(text, 32, "%.20s %s", number, units[unit]);
-}
-
-void qmat_format_bound(double fraction, char *text) {
-  double percent = fraction * 100;
-  if (!(percent > 0)) {
-    snprintf(text, 48, "0 %%");
-    return;
-  }
-  /* Rounding up must not make 0.98 % of what is 0.98 % but for the last bit. */
-  double digits = floor(1 - floor(log10(percent)));
-  double scale = pow(10, digits > 0 ? digits : 0);
-  char number[40];
-  qmat_format_number(ceil(percent * scale * (1 - 1e-12)) / scale, number, sizeof number);
-  snprintf(text, 48, "%s %%", number);
-}
-
 void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size) {
   char spheres[32], triangles[32], out[48], in[48], model[144];
   qmat_format_count(summary->spheres, spheres);
@@ -311,12 +267,13 @@ static void describe_made(const qmat_port *port, const qmat_run_made *made, char
     snprintf(text, size, "%s", number);
     return;
   }
-  const char *const *names = qmat_value_count_names(port->type);
+  const qmat_value_count_row *rows = qmat_value_count_rows(port->type);
   size_t used = 0;
-  for (int i = port->type == QMAT_MESH ? 1 : 0; names[i] && used < size; i++) {
+  for (size_t i = 0; rows[i].name && used < size; i++) {
+    if (rows[i].detail) continue;
     qmat_format_count(made->counts[i], number);
-    int letters = (int)strlen(names[i]) - (made->counts[i] == 1 ? 1 : 0);
-    used += (size_t)snprintf(text + used, size - used, "%s%s %.*s", used ? " " : "", number, letters, names[i]);
+    int letters = (int)strlen(rows[i].name) - (made->counts[i] == 1 ? 1 : 0);
+    used += (size_t)snprintf(text + used, size - used, "%s%s %.*s", used ? " " : "", number, letters, rows[i].name);
   }
 }
 

@@ -33,12 +33,4 @@ void qmat_run_print_plan(const qmat_run *run, FILE *out);
 /* One sentence: how many spheres describe the model, and how well. Terminated; cut when `size` is short. */
 void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size);
 
-/* 1234567 as "1,234,567"; `text` holds at least 32 bytes. */
-void qmat_format_count(uint64_t count, char *text);
-/* 1234567 as "1.2 MB"; `text` holds at least 32 bytes. */
-void qmat_format_bytes(uint64_t bytes, char *text);
-/* A fraction as a percentage of two digits, rounded up since it is a bound: 0.00977 as "0.98 %"; `text` holds at least
- * 48 bytes. */
-void qmat_format_bound(double fraction, char *text);
-
 #endif

@@ -3,7 +3,6 @@
 
 #include "graphs/run/run_cache.h"
 #include "graphs/run/run_lists.h"
-#include "graphs/run/run_summary.h"
 
 /* Takes the outputs of a step that has run. False when the cache has other bytes for them: a step that ran before may
  * have read those. */

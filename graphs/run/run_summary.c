@@ -1,64 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_summary.h"
 
-const char *const *qmat_value_count_names(qmat_value_type type) {
-  static const char *const none[] = {NULL}, *const mesh[] = {"vertices", "triangles", NULL},
-                           *const field[] = {"values", NULL}, *const samples[] = {"samples", NULL},
-                           *const medial[] = {"spheres", "cones", "slabs", NULL}, *const file[] = {"parts", NULL},
-                           *const chain[] = {"spheres", "collapses", NULL};
-  switch (type) {
-    case QMAT_MESH:
-      return mesh;
-    case QMAT_FIELD:
-      return field;
-    case QMAT_SAMPLES:
-      return samples;
-    case QMAT_MEDIAL:
-      return medial;
-    case QMAT_CHAIN:
-      return chain;
-    case QMAT_FILE:
-      return file;
-    default:
-      return none;
-  }
-}
-
-void qmat_value_counts(const qmat_value *value, size_t counts[3]) {
-  counts[0] = counts[1] = counts[2] = 0;
-  for (size_t i = 0; value->type == QMAT_LIST && i < qmat_value_count(value); i++) {
-    size_t of_item[3];
-    qmat_value_counts(qmat_value_at(value, i), of_item);
-    for (int k = 0; k < 3; k++) counts[k] += of_item[k];
-  }
-  switch (value->type) {
-    case QMAT_MESH:
-      counts[0] = ((const qmat_mesh *)value)->vertex_count;
-      counts[1] = ((const qmat_mesh *)value)->triangle_count;
-      break;
-    case QMAT_FIELD:
-      counts[0] = ((const qmat_field *)value)->count;
-      break;
-    case QMAT_SAMPLES:
-      counts[0] = ((const qmat_samples *)value)->count;
-      break;
-    case QMAT_MEDIAL:
-      counts[0] = ((const qmat_medial *)value)->sphere_count;
-      counts[1] = ((const qmat_medial *)value)->edge_count;
-      counts[2] = ((const qmat_medial *)value)->triangle_count;
-      break;
-    case QMAT_CHAIN:
-      counts[0] = ((const qmat_chain *)value)->sphere_count;
-      counts[1] = ((const qmat_chain *)value)->collapse_count;
-      break;
-    case QMAT_FILE:
-      counts[0] = ((const qmat_file *)value)->part_count;
-      break;
-    default:
-      break;
-  }
-}
-
 static bool take_number(const json_t *report, const char *key, double *number) {
   const json_t *value = json_object_get(report, key);
   if (!json_is_number(value)) return false;

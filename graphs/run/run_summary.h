@@ -4,11 +4,6 @@
 
 #include "graphs/run/run.h"
 
-/* The names of what a value of this type counts ("spheres", "cones", "slabs"), in the plural, ended by NULL. */
-const char *const *qmat_value_count_names(qmat_value_type type);
-/* The counts under those names; of a list their sums. */
-void qmat_value_counts(const qmat_value *value, size_t counts[3]);
-
 /* In how far the spheres that a step made describe its mesh. Fractions are of the bounding-box diagonal. */
 typedef struct qmat_run_summary {
   size_t step;

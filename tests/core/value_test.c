@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "core/hash.h"
+#include "core/value_form.h"
 
 static void *copy_of(const void *array, size_t bytes) {
   void *copy = qmat_alloc(bytes, 1);
@@ -538,7 +539,7 @@ static void test_bad_meshes_name_the_first_bad_element(void **state) {
   for (size_t i = 0; i < sizeof no_lengths / sizeof *no_lengths; i++) {
     mesh = mesh_example();
     mesh->deviation = no_lengths[i];
-    assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "deviation: it is no length");
+    assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "deviation: it is negative or not finite");
   }
 }
 
@@ -634,7 +635,7 @@ static void test_bad_samples_name_the_first_bad_element(void **state) {
   assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "sample 1: the barycentric coordinates sum to 0.75, not 1");
   samples = samples_example();
   samples->vertex_count = 3;
-  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "vertex_count: 3 of 2 samples are said to be vertices");
+  assert_not_sealed(&samples->base, QMAT_ERROR_GEOMETRY, "vertex_count: there are 3 vertices among 2 samples");
 }
 
 static void test_barycentrics_may_be_off_by_rounding(void **state) {
@@ -659,18 +660,18 @@ static void test_bad_medial_meshes_name_the_first_bad_element(void **state) {
   assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 3: it names sphere 4 of 4");
   medial = medial_example();
   medial->edges[0] = 1;
-  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 0: its spheres 1 and 1 do not rise");
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 0: its spheres 1 and 1 are not in ascending order");
   medial = medial_example();
   medial->edges[3] = 1;
-  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 1: it repeats the edge before it");
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 1: it repeats the previous edge");
   medial = medial_example();
   medial->edges[4] = 0;
   medial->edges[5] = 1;
-  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 2: it sorts before the last edge");
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "edge 2: it sorts before the previous edge");
   medial = medial_example();
   medial->triangles[1] = 2;
   medial->triangles[2] = 1;
-  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its spheres 2 and 1 do not rise");
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its spheres 2 and 1 are not in ascending order");
   medial = medial_example();
   medial->triangles[2] = 3;
   assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its side (0, 3) is not among the edges");
@@ -713,13 +714,13 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "sample 1: its owner is sphere 4 of 4");
   chain = chain_example();
   chain->ends[2] = 4;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that is not there");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that does not exist");
   chain = chain_example();
   chain->ends[1] = 1;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: it joins a sphere with itself");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: it joins a sphere to itself");
   chain = chain_example();
   chain->ends[3] = 3;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that went before");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that an earlier collapse removed");
   chain = chain_example();
   chain->merged[7] = -1;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the radius -1 is negative");
@@ -728,10 +729,10 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is not finite");
   chain = chain_example();
   chain->errors[0] = -0.5;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: the error falls");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: the error is below that of the previous collapse, or negative");
   chain = chain_example();
   chain->errors[1] = 0.125;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error falls");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is below that of the previous collapse, or negative");
 }
 
 static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
@@ -741,12 +742,12 @@ static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
     qmat_file *file = file_example();
     set_part_name(file, 2, bad[i]);
     char line[128];
-    snprintf(line, sizeof line, "part 2: its name '%s' is no path below the main part's folder", bad[i]);
+    snprintf(line, sizeof line, "part 2: its name '%s' is not a path below the main part's folder", bad[i]);
     assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, line);
   }
   qmat_file *file = file_example();
   set_part_name(file, 2, "medial.bin");
-  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 2: the name 'medial.bin' was given before");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 2: the name 'medial.bin' is used twice");
   file = file_example();
   set_part_name(file, 1, "");
   assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 1: it has no name");
@@ -881,7 +882,7 @@ static void test_a_huge_length_is_refused_before_it_is_allocated(void **state) {
   assert_int_equal(read_exactly(&context, mesh, sizeof mesh - 1, &value), QMAT_ERROR_FORMAT);
   assert_int_equal(read_exactly(&context, file, sizeof file - 1, &value), QMAT_ERROR_FORMAT);
   assert_string_equal(context.error.message,
-                      "this is not the binary form of a value: there are fewer parts than it says");
+                      "this is not a serialised value: there are fewer parts than it states");
   assert_string_equal(context.error.field, "parts");
 }
 
@@ -890,7 +891,7 @@ static void test_another_version_is_refused_by_number(void **state) {
   qmat_context context = {0};
   qmat_value *value;
   assert_int_equal(read_exactly(&context, (const uint8_t *)"QMAT\2\0\0\0", 8, &value), QMAT_ERROR_FORMAT);
-  assert_string_equal(context.error.message, "the binary form has version 2; this qmat reads version 1");
+  assert_string_equal(context.error.message, "the serialised form has version 2; this qmat reads version 1");
 }
 
 static void test_content_that_breaks_a_rule_is_a_format_error_when_read(void **state) {
@@ -947,10 +948,10 @@ static void test_counts_beyond_32_bits_are_refused_before_the_arrays_are_read(vo
   (void)state;
   qmat_mesh *mesh = mesh_example();
   mesh->vertex_count = (size_t)UINT32_MAX + 1;
-  assert_not_sealed(&mesh->base, QMAT_ERROR_MEMORY, "4294967296 vertices are more than 32-bit indices can name");
+  assert_not_sealed(&mesh->base, QMAT_ERROR_MEMORY, "4294967296 vertices are more than 32-bit indices can address");
   qmat_medial *medial = medial_example();
   medial->triangle_count = (size_t)1 << 33;
-  assert_not_sealed(&medial->base, QMAT_ERROR_MEMORY, "8589934592 triangles are more than 32-bit indices can name");
+  assert_not_sealed(&medial->base, QMAT_ERROR_MEMORY, "8589934592 triangles are more than 32-bit indices can address");
 }
 
 /* The linker sends every aligned_alloc of the program here (tests/core/CMakeLists.txt). */
@@ -1016,7 +1017,7 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   qmat_value *value;
   assert_int_equal(qmat_value_serialize(&context, &list->base, &bytes, &size), QMAT_OK);
   assert_int_equal(qmat_value_deserialize(&context, bytes, size, NULL, &value), QMAT_ERROR_FORMAT);
-  assert_non_null(strstr(context.error.message, "an item is not at hand"));
+  assert_non_null(strstr(context.error.message, "an item of the list is missing"));
   assert_null(value);
   for (size_t cut = 0; cut < size; cut++) {
     uint8_t *part = copy_of(bytes, cut); /* to the byte, so that reading beyond is noticed */
@@ -1031,7 +1032,7 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   lists->names[0] = qmat_strdup("a");
   lists->names[1] = qmat_strdup("b");
   assert_not_sealed(&lists->base, QMAT_ERROR_INTERNAL,
-                    "item 0: it is a list, not sealed, or not of the type of the others");
+                    "item 0: it is a list, is not sealed, or differs in type from the other items");
   qmat_list *mixed = qmat_list_new(2);
   mixed->items[0] = qmat_value_retain(list->items[0]);
   mixed->items[1] = &mesh_example()->base;
@@ -1039,11 +1040,11 @@ static void test_a_list_has_items_of_one_type_and_stands_for_them(void **state) 
   mixed->names[1] = qmat_strdup("b");
   assert_sealed(&context, mixed->items[1]);
   assert_not_sealed(&mixed->base, QMAT_ERROR_INTERNAL,
-                    "item 1: it is a list, not sealed, or not of the type of the others");
+                    "item 1: it is a list, is not sealed, or differs in type from the other items");
   qmat_list *one = qmat_list_new(1);
   one->items[0] = qmat_value_retain(list->items[0]);
   one->names[0] = qmat_strdup("a");
-  assert_not_sealed(&one->base, QMAT_ERROR_INTERNAL, "a list has 1 items, not two or more");
+  assert_not_sealed(&one->base, QMAT_ERROR_INTERNAL, "a list has 1 items; it needs at least two");
   qmat_list *holes = qmat_list_new(2);
   assert_not_sealed(&holes->base, QMAT_ERROR_INTERNAL, "item 0: an item of a list is missing or has no name");
   qmat_value_release(&list->base);
@@ -1065,7 +1066,7 @@ static void test_failures_stand_among_the_items_of_a_list_but_are_not_all_of_the
     failures->items[i] = qmat_value_retain(list->items[0]);
     failures->names[i] = qmat_strdup("a");
   }
-  assert_not_sealed(&failures->base, QMAT_ERROR_INTERNAL, "a list has nothing but failures");
+  assert_not_sealed(&failures->base, QMAT_ERROR_INTERNAL, "a list holds only failures");
   qmat_value_release(&list->base);
 }
 

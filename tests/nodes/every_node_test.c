@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/value_form.h"
 #include "examples/models.h"
 #include "nodes/nodes.h"
 #include "tests/shapes.h"
