@@ -8,8 +8,6 @@
 /* The cells of an octree that the surface of an envelope passes through, and only those. A cell is halved until it is
  * no larger than the base size, and further where the medial radii near it are small, down to the finest size. */
 
-#define QMAT_NO_ID UINT32_MAX
-
 /* The primitives of an envelope, with radii raised to a floor so that none slips between the corners of the finest
  * cells. Numbered slabs, cones, spheres; a sphere of radius 0 that belongs to nothing is left out. */
 typedef struct qmat_cell_primitives {
