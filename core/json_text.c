@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/arena.h"
+#include "core/text.h"
 
 typedef struct growing_text {
   char *bytes;
@@ -31,6 +32,18 @@ char *qmat_json_text(const json_t *json, size_t flags, size_t *size) {
   }
   if (size) *size = text.size;
   return text.bytes;
+}
+
+json_t *qmat_json_string(const char *text) {
+  json_t *json = json_string(text);
+  if (json) return json;
+  char *copy = qmat_strdup(text);
+  if (!copy) return NULL;
+  for (char *c = copy; *c; c++)
+    if ((unsigned char)*c >= 0x80) *c = '?';
+  json = json_string(copy);
+  qmat_free(copy);
+  return json;
 }
 
 int qmat_json_set_count(json_t *object, const char *key, size_t count) {

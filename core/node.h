@@ -50,6 +50,32 @@ typedef struct qmat_port {
   bool list;
 } qmat_port;
 
+/* How an entry of a report enters the summary of a run, and how the reports of several meshes are merged. */
+typedef enum qmat_summary_kind {
+  QMAT_SUMMARY_SUM,   /* a count: the sum */
+  QMAT_SUMMARY_BOUND, /* an upper bound, as a fraction: the largest */
+  QMAT_SUMMARY_ALL,   /* a flag: whether all are true; left out unless every report has it */
+  QMAT_SUMMARY_ANY,   /* a flag: left out unless it is true in one of them */
+  QMAT_SUMMARY_INPUT  /* not in the report: the count of that name (qmat_value_count_rows) of the node's first input
+                         that has one; 0 when there is none */
+} qmat_summary_kind;
+
+typedef struct qmat_summary_entry {
+  const char *key;   /* in the report and in the summary */
+  const char *title; /* the column in a table of several runs; NULL: no column */
+  qmat_summary_kind kind;
+} qmat_summary_entry;
+
+/* What a run that ends with this node comes to. The runner merges the entries and prints the sentence; it does not know
+ * what they mean. */
+typedef struct qmat_report_summary {
+  const qmat_summary_entry *entries; /* ended by an entry without a key. A report without all sums and bounds has no
+                                        summary. */
+  /* Writes one sentence about `name`. `summary` has the merged entries; of a list of meshes also the counts "meshes",
+   * those that have a report, and "failures". `text` holds `size` bytes; always terminated. */
+  void (*sentence)(const char *name, const json_t *summary, char *text, size_t size);
+} qmat_report_summary;
+
 /* A library beneath whose version may change the bytes that a node makes. */
 typedef struct qmat_library {
   const char *name; /* "Embree" */
@@ -65,10 +91,11 @@ typedef struct qmat_node {
   const char *doc;      /* a few sentences */
   const char *citation; /* paper section and equations, or "" */
   size_t params_size;
-  const qmat_param *params;             /* ended by a row without a name; NULL: none */
-  const qmat_port *inputs;              /* ended by a row without a name; NULL: none */
-  const qmat_port *outputs;             /* ended by a row without a name */
-  const qmat_library *const *libraries; /* those that may change its results, ended by NULL; NULL: none */
+  const qmat_param *params;                  /* ended by a row without a name; NULL: none */
+  const qmat_port *inputs;                   /* ended by a row without a name; NULL: none */
+  const qmat_port *outputs;                  /* ended by a row without a name */
+  const qmat_library *const *libraries;      /* those that may change its results, ended by NULL; NULL: none */
+  const qmat_report_summary *report_summary; /* of its first report output; NULL: not part of a run's summary */
   /* Rules between parameters; NULL: none. Fails with qmat_fail + qmat_fail_field. */
   qmat_status (*check)(qmat_context *context, const void *params);
   /* Rules for how many values the inputs that take lists whole are given; NULL: none. `counts` has a number for every

@@ -9,6 +9,7 @@
 #include "core/geometry/triangle.h"
 #include "core/json_text.h"
 #include "core/node.h"
+#include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
@@ -319,5 +320,6 @@ const qmat_node qmat_node_medial_evaluate = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .report_summary = &qmat_medial_summary,
     .run = run,
 };

@@ -6,6 +6,7 @@
 #include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/envelope_to_surface.h"
 #include "nodes/measure/medial_errors.h"
 #include "nodes/measure/topology.h"
@@ -667,6 +668,7 @@ const qmat_node qmat_node_medial_simplify = {
     .params = params,
     .inputs = inputs,
     .outputs = outputs,
+    .report_summary = &qmat_medial_summary,
     .libraries = libraries,
     .run = run,
 };

@@ -159,12 +159,42 @@ static int columns_of(const char *name) {
   return columns;
 }
 
-static void print_table(const qmat_batch *batch) {
+/* The entries that the assets' summaries are expected to have: those of the graph's last node with a summary. */
+static const qmat_summary_entry *summary_entries(const qmat_graph *graph) {
+  static const qmat_summary_entry none[] = {{0}};
+  for (size_t i = graph->node_count; i-- > 0;)
+    if (graph->nodes[i].type->report_summary) return graph->nodes[i].type->report_summary->entries;
+  return none;
+}
+
+/* The width of an entry's column. */
+static int column_width(const qmat_summary_entry *entry) {
+  return columns_of(entry->title) > 7 ? columns_of(entry->title) : 7;
+}
+
+static void print_summary(const qmat_summary_entry *entries, const json_t *summary) {
+  for (size_t i = 0; entries[i].key; i++) {
+    const json_t *value = json_object_get(summary, entries[i].key);
+    char text[48];
+    if (!entries[i].title) continue;
+    if (json_is_integer(value))
+      qmat_format_count((uint64_t)json_integer_value(value), text);
+    else
+      qmat_format_bound(json_real_value(value), text);
+    printf("  %*s", column_width(&entries[i]), text);
+  }
+}
+
+static void print_table(const qmat_batch *batch, const qmat_graph *graph) {
+  const qmat_summary_entry *entries = summary_entries(graph);
   int width = 5;
   size_t counts[4] = {0};
   for (size_t i = 0; i < batch->count; i++)
     if (columns_of(batch->assets[i].stem) > width) width = columns_of(batch->assets[i].stem);
-  printf("%-*s  result   seconds  hits   spheres  surface to envelope  envelope to surface\n", width, "asset");
+  printf("%-*s  result   seconds  hits ", width, "asset");
+  for (size_t i = 0; entries[i].key; i++)
+    if (entries[i].title) printf("  %*s", column_width(&entries[i]), entries[i].title);
+  putchar('\n');
   for (size_t i = 0; i < batch->count; i++) {
     const qmat_asset *asset = &batch->assets[i];
     const json_t *summary = json_object_get(asset->result, "summary"), *nodes = json_object_get(asset->result, "nodes");
@@ -175,13 +205,7 @@ static void print_table(const qmat_batch *batch) {
     if (asset->state == QMAT_ASSET_DONE)
       printf("  %2lld/%-2zu", json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits")),
              json_array_size(nodes));
-    if (json_is_object(summary)) {
-      char count[32], out[48], in[48];
-      qmat_format_count((uint64_t)json_integer_value(json_object_get(summary, "spheres")), count);
-      qmat_format_bound(json_real_value(json_object_get(summary, "surface_to_envelope")), out);
-      qmat_format_bound(json_real_value(json_object_get(summary, "envelope_to_surface")), in);
-      printf("  %7s  %19s  %19s", count, out, in);
-    }
+    if (json_is_object(summary)) print_summary(entries, summary);
     putchar('\n');
   }
   printf("%zu done, %zu failed, %zu not run\n", counts[QMAT_ASSET_DONE], counts[QMAT_ASSET_FAILED],
@@ -280,7 +304,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     failed += batch.assets[i].state == QMAT_ASSET_FAILED;
     if (batch.assets[i].report) unlink(batch.assets[i].report);
   }
-  if (started && !call.json && !call.quiet) print_table(&batch);
+  if (started && !call.json && !call.quiet) print_table(&batch, &call.invocation->graph);
   if (status == QMAT_OK && failed > 0)
     status = qmat_fail(context, QMAT_ERROR_IO, "%zu of %zu assets failed", failed, batch.count);
   if (*call.reports) rmdir(call.reports);

@@ -7,17 +7,6 @@
 #include "graphs/run/run_cache.h"
 #include "graphs/run/run_step.h"
 
-static void note_mesh(const qmat_run *run, qmat_run_step *step) {
-  const qmat_node *type = run->graph->nodes[step->node].type;
-  for (size_t port = 0; port < qmat_input_count(type) && step->mesh_triangles == 0; port++) {
-    if (type->inputs[port].type != QMAT_MESH || step->inputs[port] == SIZE_MAX) continue;
-    const qmat_run_slot *slot = &run->slots[step->inputs[port]];
-    const qmat_run_step *maker = slot->step == SIZE_MAX ? NULL : &run->steps[slot->step];
-    step->mesh_triangles = maker ? maker->made[step->inputs[port] - maker->first_slot].counts[1]
-                                 : ((const qmat_mesh *)slot->value)->triangle_count;
-  }
-}
-
 /* Names the run after its first scene. */
 static qmat_status take_name(qmat_executor *executor, const qmat_run_step *step, bool *named) {
   qmat_run *run = executor->run;
@@ -85,7 +74,6 @@ static qmat_status execute_step(qmat_executor *executor, size_t index, bool *nam
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   executor->context->node_id = node->id;
   executor->context->node_type = node->type->name;
-  note_mesh(run, step);
   double start = qmat_clock_seconds();
   qmat_status status = QMAT_OK;
   if (qmat_run_look_up(run, index)) {

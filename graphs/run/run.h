@@ -55,7 +55,6 @@ typedef struct qmat_run_step {
   size_t lifted;          /* items of the lists that it ran over; 0: it ran once, or not at all */
   size_t lifted_hits;     /* items whose result came from the cache */
   size_t lifted_left_out; /* items that an earlier node failed on */
-  size_t mesh_triangles;  /* of its first mesh input; 0: none */
 } qmat_run_step;
 
 /* A value between steps. */

@@ -10,19 +10,6 @@
 
 /* ---- JSON ---- */
 
-/* A text that may not be UTF-8, as a path may be: JSON has no way to say it, so foreign bytes become '?'. */
-static json_t *text_json(const char *text) {
-  json_t *json = json_string(text);
-  if (json) return json;
-  char *copy = qmat_strdup(text);
-  if (!copy) return NULL;
-  for (char *c = copy; *c; c++)
-    if ((unsigned char)*c >= 0x80) *c = '?';
-  json = json_string(copy);
-  qmat_free(copy);
-  return json;
-}
-
 static json_t *digest_json(const qmat_digest *digest) {
   char hex[65];
   qmat_digest_hex(digest, hex);
@@ -72,7 +59,7 @@ static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
   const qmat_file *made = value->type == QMAT_FILE ? (const qmat_file *)value : NULL;
   json_t *json = json_object();
   json_object_set_new(json, "name", json_string(run->graph->outputs[file->output].name));
-  json_object_set_new(json, "path", text_json(file->path));
+  json_object_set_new(json, "path", qmat_json_string(file->path));
   json_object_set_new(json, "format", json_string(made ? made->format : "json"));
   json_object_set_new(json, "bytes", json_integer((json_int_t)file->bytes));
   json_object_set_new(json, "sha256", digest_json(&file->sha256));
@@ -80,7 +67,7 @@ static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
     json_t *parts = json_array();
     for (size_t i = 1; i < made->part_count; i++) {
       json_t *part = json_object();
-      json_object_set_new(part, "name", text_json(made->parts[i].name));
+      json_object_set_new(part, "name", qmat_json_string(made->parts[i].name));
       json_object_set_new(part, "bytes", json_integer((json_int_t)made->parts[i].size));
       json_array_append_new(parts, part);
     }
@@ -97,7 +84,7 @@ static json_t *input_json(const qmat_run *run) {
       if (type->params[row].type == QMAT_PARAM_PATH && (type->params[row].flags & QMAT_PARAM_INPUT_FILE)) {
         const char *path;
         memcpy(&path, (const char *)run->steps[i].params + type->params[row].offset, sizeof path);
-        if (path) return text_json(path);
+        if (path) return qmat_json_string(path);
       }
   }
   return json_null();
@@ -110,40 +97,28 @@ static json_t *cache_json(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++)
     if (run->steps[i].state == QMAT_STEP_HIT) hits++;
   json_t *json = json_object();
-  json_object_set_new(json, "folder", text_json(run->cache->folder));
+  json_object_set_new(json, "folder", qmat_json_string(run->cache->folder));
   json_object_set_new(json, "read_only", json_boolean(run->cache->read_only));
   json_object_set_new(json, "hits", json_integer((json_int_t)hits));
   json_object_set_new(json, "warning",
-                      *qmat_cache_warning(run->cache) ? text_json(qmat_cache_warning(run->cache)) : json_null());
+                      *qmat_cache_warning(run->cache) ? qmat_json_string(qmat_cache_warning(run->cache)) : json_null());
   return json;
 }
 
 /* jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
-  json_t *nodes = json_array(), *outputs = json_array(), *report = json_object(), *brief = json_null();
+  json_t *nodes = json_array(), *outputs = json_array(), *report = json_object();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
   for (size_t i = 0; i < run->file_count; i++) json_array_append_new(outputs, file_json(run, &run->files[i]));
-  qmat_run_summary summary;
-  if (qmat_run_summarise(run, &summary)) {
-    char text[512];
-    qmat_summary_format(run, &summary, text, sizeof text);
-    brief = json_object();
-    json_object_set_new(brief, "name", text_json(run->name));
-    json_object_set_new(brief, "node", json_string(run->graph->nodes[run->steps[summary.step].node].id));
-    json_object_set_new(brief, "spheres", json_integer((json_int_t)summary.spheres));
-    json_object_set_new(brief, "triangles", json_integer((json_int_t)summary.triangles));
-    if (summary.meshes + summary.failures > 1)
-      json_object_set_new(brief, "meshes", json_integer((json_int_t)summary.meshes));
-    if (summary.failures > 0) json_object_set_new(brief, "failures", json_integer((json_int_t)summary.failures));
-    json_object_set_new(brief, "epsilon", json_real(summary.epsilon));
-    json_object_set_new(brief, "surface_to_envelope", json_real(summary.surface_to_envelope));
-    json_object_set_new(brief, "envelope_to_surface", json_real(summary.envelope_to_surface));
-    if (summary.evaluated) json_object_set_new(brief, "certified", json_boolean(summary.certified));
-    json_object_set_new(brief, "text", text_json(text));
-  }
+  char text[512];
+  json_t *brief = qmat_run_summarise(run, text, sizeof text);
+  if (brief)
+    json_object_set_new(brief, "text", qmat_json_string(text));
+  else
+    brief = json_null();
   bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
   if (json_object_set_new(report, "qmat", json_string(QMAT_VERSION)) != 0) whole = false;
-  if (json_object_set_new(report, "graph", text_json(run->graph->file)) != 0) whole = false;
+  if (json_object_set_new(report, "graph", qmat_json_string(run->graph->file)) != 0) whole = false;
   if (json_object_set_new(report, "input", input_json(run)) != 0) whole = false;
   if (json_object_set_new(report, "seconds", json_real(run->seconds)) != 0) whole = false;
   if (json_object_set_new(report, "threads", json_integer(qmat_threads(context))) != 0) whole = false;
@@ -162,17 +137,18 @@ json_t *qmat_error_report(const qmat_error *error) {
   json_t *fields = json_object(), *report = json_object();
   json_object_set_new(fields, "status", json_string(qmat_status_name(error->status)));
   json_object_set_new(fields, "exit_code", json_integer(qmat_status_exit_code(error->status)));
-  json_object_set_new(fields, "node", error->node_id[0] ? text_json(error->node_id) : json_null());
-  json_object_set_new(fields, "type", error->node_type[0] ? text_json(error->node_type) : json_null());
-  json_object_set_new(fields, "field", error->field[0] ? text_json(error->field) : json_null());
-  json_object_set_new(fields, "element_kind", error->element_kind[0] ? text_json(error->element_kind) : json_null());
+  json_object_set_new(fields, "node", error->node_id[0] ? qmat_json_string(error->node_id) : json_null());
+  json_object_set_new(fields, "type", error->node_type[0] ? qmat_json_string(error->node_type) : json_null());
+  json_object_set_new(fields, "field", error->field[0] ? qmat_json_string(error->field) : json_null());
+  json_object_set_new(fields, "element_kind",
+                      error->element_kind[0] ? qmat_json_string(error->element_kind) : json_null());
   json_object_set_new(fields, "element", error->element >= 0 ? json_integer(error->element) : json_null());
-  json_object_set_new(fields, "file", error->file[0] ? text_json(error->file) : json_null());
+  json_object_set_new(fields, "file", error->file[0] ? qmat_json_string(error->file) : json_null());
   json_object_set_new(fields, "line", error->line > 0 ? json_integer(error->line) : json_null());
   json_object_set_new(fields, "column", error->column > 0 ? json_integer(error->column) : json_null());
-  json_object_set_new(fields, "message", text_json(error->message));
-  json_object_set_new(fields, "hint", error->hint[0] ? text_json(error->hint) : json_null());
-  json_object_set_new(fields, "text", text_json(line));
+  json_object_set_new(fields, "message", qmat_json_string(error->message));
+  json_object_set_new(fields, "hint", error->hint[0] ? qmat_json_string(error->hint) : json_null());
+  json_object_set_new(fields, "text", qmat_json_string(line));
   if (json_object_set_new(report, "error", fields) == 0) return report;
   json_decref(report);
   return NULL;
@@ -224,39 +200,6 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
 }
 
 /* ---- text ---- */
-
-void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size) {
-  char spheres[32], triangles[32], out[48], in[48], model[144];
-  qmat_format_count(summary->spheres, spheres);
-  qmat_format_count(summary->triangles, triangles);
-  qmat_format_bound(summary->surface_to_envelope, out);
-  qmat_format_bound(summary->envelope_to_surface, in);
-  char what[48] = "the model";
-  if (summary->triangles > 0)
-    snprintf(what, sizeof what, "%s triangle%s", triangles, summary->triangles == 1 ? "" : "s");
-  if (summary->failures > 0)
-    snprintf(model, sizeof model, "%zu of the %zu meshes of %s", summary->meshes, summary->meshes + summary->failures,
-             what);
-  else if (summary->meshes > 1)
-    snprintf(model, sizeof model, "%s of %zu meshes", what, summary->meshes);
-  else
-    snprintf(model, sizeof model, "%s", what);
-  bool one = summary->spheres == 1;
-  const char *between =
-      summary->evaluated ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most";
-  const char *end = summary->evaluated ? " from the surface" : "", *proof = "";
-  if (summary->certified)
-    proof = " (certified)";
-  else if (summary->estimate)
-    proof = " (an estimate: the surface is not closed)";
-  else if (summary->evaluated && summary->epsilon > 0)
-    proof = " (not certified)";
-  snprintf(text, size,
-           "%s: %s sphere%s describe%s %s; no surface point is farther than %s of the %s from the envelope, and "
-           "%s %s%s%s.",
-           run->name, spheres, one ? "" : "s", one ? "s" : "", model, out,
-           summary->meshes > 1 ? "mesh's diagonal" : "diagonal", between, in, end, proof);
-}
 
 /* "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted. */
 static void describe_made(const qmat_port *port, const qmat_run_made *made, char *text, size_t size) {
@@ -345,9 +288,8 @@ void qmat_run_print(const qmat_run *run, FILE *out) {
     for (size_t k = 0; k < run->step_count; k++) made = made || run->steps[k].node == output->node;
     if (made && !saved) fprintf(out, "%s was not saved (-o %s=PATH)\n", output->name, output->name);
   }
-  qmat_run_summary summary;
-  if (!qmat_run_summarise(run, &summary)) return;
   char text[512];
-  qmat_summary_format(run, &summary, text, sizeof text);
-  fprintf(out, "%s\n", text);
+  json_t *summary = qmat_run_summarise(run, text, sizeof text);
+  if (summary) fprintf(out, "%s\n", text);
+  json_decref(summary);
 }

@@ -30,7 +30,4 @@ void qmat_run_print(const qmat_run *run, FILE *out);
 /* Prints a line per step of a run that was foreseen: node, type, state, and the start of its key where it is known. */
 void qmat_run_print_plan(const qmat_run *run, FILE *out);
 
-/* One sentence: how many spheres describe the model, and how well. Terminated; cut when `size` is short. */
-void qmat_summary_format(const qmat_run *run, const qmat_run_summary *summary, char *text, size_t size);
-
 #endif

@@ -1,53 +1,100 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_summary.h"
 
-static bool take_number(const json_t *report, const char *key, double *number) {
-  const json_t *value = json_object_get(report, key);
-  if (!json_is_number(value)) return false;
-  *number = json_number_value(value);
-  return true;
+#include <math.h>
+#include <string.h>
+
+#include "core/json_text.h"
+
+/* The count called `name` of the step's first connected input that has one. */
+static size_t input_count(const qmat_run *run, const qmat_run_step *step, const char *name) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    if (step->inputs[port] == SIZE_MAX) continue;
+    const size_t maker = run->slots[step->inputs[port]].step, first_given = run->slot_count - run->given_count;
+    const qmat_value_count_row *rows = qmat_value_count_rows(type->inputs[port].type);
+    size_t counts[QMAT_MOST_COUNTS];
+    if (maker == SIZE_MAX)
+      qmat_value_counts(run->given[step->inputs[port] - first_given].value, counts);
+    else
+      memcpy(counts, run->steps[maker].made[step->inputs[port] - run->steps[maker].first_slot].counts, sizeof counts);
+    for (size_t i = 0; rows[i].name; i++)
+      if (strcmp(rows[i].name, name) == 0 && counts[i] > 0) return counts[i];
+  }
+  return 0;
 }
 
-/* Takes one report into the summary; false when it lacks a number. */
-static bool summarise_report(const json_t *report, qmat_run_summary *summary) {
-  double spheres, epsilon, out, in;
-  if (!take_number(report, "spheres", &spheres) || !(spheres >= 0 && spheres < 0x1p53) ||
-      !take_number(report, "epsilon", &epsilon) || !take_number(report, "surface_to_envelope", &out) ||
-      !take_number(report, "envelope_to_surface", &in))
-    return false;
-  const json_t *certified = json_object_get(report, "certified");
-  const bool first = summary->meshes++ == 0;
-  summary->spheres += (uint64_t)spheres;
-  summary->epsilon = epsilon;
-  if (first || out > summary->surface_to_envelope) summary->surface_to_envelope = out;
-  if (first || in > summary->envelope_to_surface) summary->envelope_to_surface = in;
-  summary->evaluated = (first || summary->evaluated) && json_is_boolean(certified);
-  summary->certified = (first || summary->certified) && json_is_true(certified);
-  summary->estimate = summary->estimate || json_is_true(json_object_get(report, "estimate"));
-  return true;
-}
-
-bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary) {
-  for (size_t i = run->step_count; i-- > 0;) {
-    const qmat_run_step *step = &run->steps[i];
-    const qmat_node *type = run->graph->nodes[step->node].type;
-    bool medial = false;
-    for (size_t port = 0; port < qmat_output_count(type); port++)
-      if (type->outputs[port].type == QMAT_MEDIAL) medial = true;
-    for (size_t port = 0; port < qmat_input_count(type); port++)
-      if (type->inputs[port].type == QMAT_MEDIAL) medial = true;
-    if (!step->done || !medial || !step->report) continue;
-    *summary = (qmat_run_summary){.step = i, .triangles = step->mesh_triangles};
-    const json_t *meshes = json_object_get(step->report, "meshes");
-    bool whole = meshes || summarise_report(step->report, summary);
-    for (size_t k = 0; k < json_array_size(meshes) && whole; k++) {
-      const json_t *of_mesh = json_array_get(meshes, k);
-      if (json_object_get(of_mesh, "failure"))
-        summary->failures++;
+/* Merges one entry of a report into the summary. False when the report lacks a sum or a bound. */
+static bool merge_entry(const qmat_summary_entry *entry, const json_t *report, bool first, json_t *summary) {
+  const json_t *value = json_object_get(report, entry->key), *before = json_object_get(summary, entry->key);
+  const double number = json_number_value(value);
+  switch (entry->kind) {
+    case QMAT_SUMMARY_SUM:
+      if (!json_is_number(value) || !(number >= 0 && number < 0x1p53)) return false;
+      json_object_set_new(summary, entry->key, json_integer(json_integer_value(before) + (json_int_t)number));
+      return true;
+    case QMAT_SUMMARY_BOUND:
+      if (!json_is_number(value)) return false;
+      json_object_set_new(summary, entry->key, json_real(first ? number : fmax(number, json_real_value(before))));
+      return true;
+    case QMAT_SUMMARY_ALL:
+      if (json_is_boolean(value) && (first || before))
+        json_object_set_new(summary, entry->key, json_boolean(json_is_true(value) && (first || json_is_true(before))));
       else
-        whole = summarise_report(json_object_get(of_mesh, "report"), summary);
-    }
-    if (whole) return true;
+        json_object_del(summary, entry->key);
+      return true;
+    case QMAT_SUMMARY_ANY:
+      if (json_is_true(value)) json_object_set_new(summary, entry->key, json_true());
+      return true;
+    case QMAT_SUMMARY_INPUT:
+      return true;
   }
   return false;
+}
+
+static bool merge_report(const qmat_report_summary *type, const json_t *report, bool first, json_t *summary) {
+  bool whole = true;
+  for (size_t i = 0; type->entries[i].key && whole; i++) whole = merge_entry(&type->entries[i], report, first, summary);
+  return whole;
+}
+
+/* The summary of one step, or NULL. */
+static json_t *summarise_step(const qmat_run *run, const qmat_run_step *step) {
+  const qmat_graph_node *node = &run->graph->nodes[step->node];
+  const qmat_report_summary *type = node->type->report_summary;
+  const json_t *meshes = json_object_get(step->report, "meshes");
+  json_t *summary = json_object();
+  json_object_set_new(summary, "name", qmat_json_string(run->name));
+  json_object_set_new(summary, "node", json_string(node->id));
+  for (size_t i = 0; type->entries[i].key; i++) {
+    const char *key = type->entries[i].key;
+    if (type->entries[i].kind == QMAT_SUMMARY_INPUT) qmat_json_set_count(summary, key, input_count(run, step, key));
+  }
+  size_t merged = 0, failures = 0;
+  bool whole = meshes || merge_report(type, step->report, true, summary);
+  for (size_t k = 0; k < json_array_size(meshes) && whole; k++) {
+    const json_t *of_mesh = json_array_get(meshes, k);
+    if (json_object_get(of_mesh, "failure"))
+      failures++;
+    else
+      whole = merge_report(type, json_object_get(of_mesh, "report"), merged++ == 0, summary);
+  }
+  if (merged + failures > 1) qmat_json_set_count(summary, "meshes", merged);
+  if (failures > 0) qmat_json_set_count(summary, "failures", failures);
+  if (whole && summary) return summary;
+  json_decref(summary);
+  return NULL;
+}
+
+json_t *qmat_run_summarise(const qmat_run *run, char *text, size_t size) {
+  for (size_t i = run->step_count; i-- > 0;) {
+    const qmat_run_step *step = &run->steps[i];
+    const qmat_report_summary *type = run->graph->nodes[step->node].type->report_summary;
+    if (!step->done || !step->report || !type) continue;
+    json_t *summary = summarise_step(run, step);
+    if (!summary) continue;
+    type->sentence(run->name, summary, text, size);
+    return summary;
+  }
+  return NULL;
 }

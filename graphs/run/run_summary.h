@@ -4,21 +4,10 @@
 
 #include "graphs/run/run.h"
 
-/* In how far the spheres that a step made describe its mesh. Fractions are of the bounding-box diagonal. */
-typedef struct qmat_run_summary {
-  size_t step;
-  uint64_t spheres;
-  size_t triangles;                                         /* of the mesh that they describe; 0: not known */
-  size_t meshes;                                            /* that they describe, each within its own diagonal */
-  size_t failures;                                          /* meshes of the scene that could not be described */
-  double epsilon, surface_to_envelope, envelope_to_surface; /* of several meshes the largest */
-  bool evaluated; /* by a node that tells whether the errors are certified; the second is then of the boundary */
-  bool certified, estimate;
-} qmat_run_summary;
-
-/* The summary of the last step that made or read a medial mesh and made a report with the numbers "spheres", "epsilon",
- * "surface_to_envelope" and "envelope_to_surface"; false when there is none. A report with "certified" makes it
- * evaluated. */
-bool qmat_run_summarise(const qmat_run *run, qmat_run_summary *summary);
+/* The summary of a run: that of its last finished step whose node declares one (qmat_node.report_summary) and whose
+ * report has its entries. A JSON object: "name", "node", the entries in their order, and for several meshes the counts
+ * "meshes" and "failures". Writes the sentence to `text` of `size` bytes. NULL when there is no summary or memory is
+ * short; the caller calls json_decref. */
+json_t *qmat_run_summarise(const qmat_run *run, char *text, size_t size);
 
 #endif

@@ -17,6 +17,7 @@
 #include "graphs/run/run_paths.h"
 #include "graphs/run/run_plan.h"
 #include "graphs/run/run_summary.h"
+#include "nodes/descriptor/medial_summary.h"
 
 typedef struct number_params {
   double value;
@@ -291,6 +292,7 @@ static const qmat_node test_ball = {.name = "test.ball",
                                     .citation = "",
                                     .inputs = ball_inputs,
                                     .outputs = ball_outputs,
+                                    .report_summary = &qmat_medial_summary,
                                     .run = ball_run};
 
 static const qmat_node *const test_node_table[] = {&test_add,    &test_ball,  &test_fail, &test_mesh,

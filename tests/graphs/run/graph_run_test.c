@@ -8,6 +8,7 @@
 #include <dirent.h>
 
 #include "graphs/run/run_report.h"
+#include "graphs/run/run_summary.h"
 #include "tests/graphs/test_nodes.h"
 
 static const char sum_graph[] =
@@ -391,30 +392,59 @@ static void test_the_report_tells_every_node_file_and_the_summary(void **state) 
   json_decref(report);
 }
 
-static void test_the_summary_tells_what_is_certified(void **state) {
+static void fruit_sentence(const char *name, const json_t *summary, char *text, size_t size) {
+  char *json = json_dumps(summary, JSON_SORT_KEYS | JSON_COMPACT);
+  assert_non_null(json);
+  snprintf(text, size, "%s %s", name, json);
+  free(json);
+}
+
+/* The runner merges what a node declares, whatever it is called. */
+static void test_the_reports_of_several_meshes_become_one_summary(void **state) {
   (void)state;
+  static const qmat_summary_entry entries[] = {
+      {"apples", "apples", QMAT_SUMMARY_SUM},  {"bruise", "bruise", QMAT_SUMMARY_BOUND},
+      {"ripe", NULL, QMAT_SUMMARY_ALL},        {"wormy", NULL, QMAT_SUMMARY_ANY},
+      {"triangles", NULL, QMAT_SUMMARY_INPUT}, {0}};
+  static const qmat_report_summary type = {entries, fruit_sentence};
+  const qmat_node fruit = {.name = "test.fruit", .report_summary = &type};
+  qmat_graph_node node = {.id = "fruit", .type = &fruit};
+  const qmat_graph graph = {.nodes = &node, .node_count = 1};
   static const struct {
-    bool certified, estimate;
-    double epsilon;
-    const char *end;
-  } cases[] = {{true, false, 0.01, " from the surface (certified)."},
-               {false, false, 0.01, " from the surface (not certified)."},
-               {false, true, 0.01, " from the surface (an estimate: the surface is not closed)."},
-               {false, false, 0, "0.5 % from the surface."}};
-  const qmat_run run = {.name = "x"};
+    const char *report, *text; /* NULL: no summary */
+  } cases[] = {
+      {"{'apples': 3, 'bruise': 0.25, 'ripe': true, 'wormy': false, 'pears': 9}",
+       "x {'apples':3,'bruise':0.25,'name':'x','node':'fruit','ripe':true,'triangles':0}"},
+      {"{'meshes': [{'report': {'apples': 3, 'bruise': 0.25, 'ripe': true, 'wormy': true}}, {'failure': 'no tree'},"
+       " {'report': {'apples': 4, 'bruise': 0.5, 'ripe': false}}]}",
+       "x {'apples':7,'bruise':0.5,'failures':1,'meshes':2,'name':'x','node':'fruit','ripe':false,'triangles':0,"
+       "'wormy':true}"},
+      {"{'meshes': [{'report': {'apples': 3, 'bruise': 0.5, 'ripe': true}}, {'report': {'apples': 4, 'bruise': "
+       "0.25}}]}",
+       "x {'apples':7,'bruise':0.5,'meshes':2,'name':'x','node':'fruit','triangles':0}"},
+      {"{'meshes': [{'report': {'apples': 3, 'bruise': 0.5}},"
+       " {'report': {'apples': 4, 'bruise': 0.25, 'ripe': true}}]}",
+       "x {'apples':7,'bruise':0.5,'meshes':2,'name':'x','node':'fruit','triangles':0}"},
+      {"{'apples': 3}", NULL},
+      {"{'apples': -3, 'bruise': 0}", NULL},
+      {"{'apples': 3, 'bruise': 'none'}", NULL},
+  };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    char text[512];
-    const qmat_run_summary summary = {.spheres = 2,
-                                      .triangles = 4,
-                                      .epsilon = cases[i].epsilon,
-                                      .surface_to_envelope = 0.004,
-                                      .envelope_to_surface = 0.005,
-                                      .evaluated = true,
-                                      .certified = cases[i].certified,
-                                      .estimate = cases[i].estimate};
-    qmat_summary_format(&run, &summary, text, sizeof text);
-    assert_non_null(strstr(text, "farther than 0.4 % of the diagonal from the envelope, and no point of its boundary"));
-    assert_string_equal(text + strlen(text) - strlen(cases[i].end), cases[i].end);
+    char report[512], expected[512], text[512] = "";
+    snprintf(report, sizeof report, "%s", cases[i].report);
+    for (char *c = report; *c; c++)
+      if (*c == '\'') *c = '"';
+    qmat_run_step step = {.done = true, .report = json_loads(report, 0, NULL)};
+    assert_non_null(step.report);
+    const qmat_run run = {.name = "x", .graph = &graph, .steps = &step, .step_count = 1};
+    json_t *summary = qmat_run_summarise(&run, text, sizeof text);
+    assert_int_equal(summary != NULL, cases[i].text != NULL);
+    snprintf(expected, sizeof expected, "%s", cases[i].text ? cases[i].text : "");
+    for (char *c = expected; *c; c++)
+      if (*c == '\'') *c = '"';
+    assert_string_equal(text, expected);
+    json_decref(summary);
+    json_decref(step.report);
   }
 }
 
@@ -483,7 +513,7 @@ int main(void) {
       TEST(test_rules_between_parameters_are_checked_before_the_run),
       TEST(test_given_values_replace_a_node),
       TEST(test_the_report_tells_every_node_file_and_the_summary),
-      TEST(test_the_summary_tells_what_is_certified),
+      TEST(test_the_reports_of_several_meshes_become_one_summary),
       TEST(test_two_runs_give_the_same_digests),
       TEST(test_counts_sizes_and_bounds_are_written_for_people),
   };

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/descriptor/medial_summary.h"
+
+#include <stdio.h>
+
+#include "core/text.h"
+
+static const qmat_summary_entry entries[] = {
+    {"spheres", "spheres", QMAT_SUMMARY_SUM},
+    {"triangles", NULL, QMAT_SUMMARY_INPUT},
+    {"epsilon", NULL, QMAT_SUMMARY_BOUND},
+    {"surface_to_envelope", "surface to envelope", QMAT_SUMMARY_BOUND},
+    {"envelope_to_surface", "envelope to surface", QMAT_SUMMARY_BOUND},
+    {"certified", NULL, QMAT_SUMMARY_ALL},
+    {"estimate", NULL, QMAT_SUMMARY_ANY},
+    {0},
+};
+
+static uint64_t count_of(const json_t *summary, const char *key) {
+  return (uint64_t)json_integer_value(json_object_get(summary, key));
+}
+
+/* "4 triangles", "2 of the 3 meshes of 900 triangles", "the model". */
+static void describe_model(const json_t *summary, char *text, size_t size) {
+  const uint64_t triangles = count_of(summary, "triangles"), meshes = count_of(summary, "meshes"),
+                 failures = count_of(summary, "failures");
+  char number[32], what[48] = "the model";
+  qmat_format_count(triangles, number);
+  if (triangles > 0) snprintf(what, sizeof what, "%s triangle%s", number, triangles == 1 ? "" : "s");
+  if (failures > 0)
+    snprintf(text, size, "%llu of the %llu meshes of %s", (unsigned long long)meshes,
+             (unsigned long long)(meshes + failures), what);
+  else if (meshes > 1)
+    snprintf(text, size, "%s of %llu meshes", what, (unsigned long long)meshes);
+  else
+    snprintf(text, size, "%s", what);
+}
+
+static void write_sentence(const char *name, const json_t *summary, char *text, size_t size) {
+  const json_t *certified = json_object_get(summary, "certified");
+  const uint64_t sphere_count = count_of(summary, "spheres");
+  char spheres[32], out[48], in[48], model[144];
+  qmat_format_count(sphere_count, spheres);
+  qmat_format_bound(json_real_value(json_object_get(summary, "surface_to_envelope")), out);
+  qmat_format_bound(json_real_value(json_object_get(summary, "envelope_to_surface")), in);
+  describe_model(summary, model, sizeof model);
+  const char *proof = "";
+  if (json_is_true(certified))
+    proof = " (certified)";
+  else if (json_is_true(json_object_get(summary, "estimate")))
+    proof = " (an estimate: the surface is not closed)";
+  else if (certified && json_real_value(json_object_get(summary, "epsilon")) > 0)
+    proof = " (not certified)";
+  snprintf(text, size,
+           "%s: %s sphere%s %s; no surface point is farther than %s of the %s from the envelope, and %s %s%s%s.", name,
+           spheres, sphere_count == 1 ? " describes" : "s describe", model, out,
+           count_of(summary, "meshes") > 1 ? "mesh's diagonal" : "diagonal",
+           certified ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most", in,
+           certified ? " from the surface" : "", proof);
+}
+
+const qmat_report_summary qmat_medial_summary = {.entries = entries, .sentence = write_sentence};
