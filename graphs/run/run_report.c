@@ -201,7 +201,7 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
 
 /* ---- text ---- */
 
-/* "26,021 samples", "97 spheres 120 cones 31 slabs", "1.2 MB"; "" for what is not counted. */
+/* "26,021 samples", "3 vertices 2 edges", "1.2 MB"; "" for a type without counts. */
 static void describe_made(const qmat_port *port, const qmat_run_made *made, char *text, size_t size) {
   text[0] = 0;
   char number[32];
