@@ -63,10 +63,12 @@ judge() {
 
 # ---- Generated models ----
 
+mkdir -p reports/generated reports/surfaces
 holds "the models are made" "$build/qmat_models" all models
 for surface in models/*.off; do
   name=$(basename "$surface" .off)
-  holds "$name: mat" qmat mat "$surface" -o "$name.ma" -o "$name.glb" --epsilon 1% --report "$name.json"
+  holds "$name: mat" qmat mat "$surface" -o "$name.ma" -o "$name.glb" --epsilon 1% \
+    --report "reports/generated/$name@1%.json"
   if [ ! -s "$name.ma" ]; then continue; fi
   # Each solid is one piece; its medial mesh has no loop unless the solid has one.
   euler=1
@@ -74,7 +76,8 @@ for surface in models/*.off; do
   judge "$name: two-sided error, one part, Euler characteristic" "$surface" "$name.ma" --within 1% --components 1 \
     --euler $euler
   holds "$name: a binary glTF file" test "$(head -c 4 "$name.glb")" = glTF
-  holds "$name: the report has both errors" grep -q '"envelope_to_surface"' "$name.json"
+  holds "$name: the report has both errors" grep -q '"envelope_to_surface"' \
+    "reports/generated/$name@1%.json"
 done
 
 # Where the true medial axis is known, it is found: spheres have its places and its radii.
@@ -313,7 +316,8 @@ holds "a scene of flat meshes: no file" test ! -e scene/out/flat2.gltf
 if [ -d "$data/surfaces" ]; then
   for surface in "$data"/surfaces/*; do
     name=$(basename "$surface")
-    holds "$name: mat" qmat mat "$surface" -o real.ma -o real.glb --epsilon 1%
+    holds "$name: mat" qmat mat "$surface" -o real.ma -o real.glb --epsilon 1% \
+      --report "reports/surfaces/${name%.*}@1%.json"
     if [ -s real.ma ]; then judge "$name: two-sided error" "$surface" real.ma --within 1% --samples 3000; fi
     rm -f real.ma real.glb
   done
@@ -337,6 +341,17 @@ if [ -d "$data/surfaces" ]; then
 else
   skip "real models: there is no folder $data"
 fi
+
+# ---- Quality: no row of tests/quality/expected.txt gets worse ----
+
+sh "$source/tests/quality/gate.sh" --reports reports "$build" >quality.txt 2>&1
+code=$?
+cat quality.txt
+passed=$((passed + $(grep -c '^ok ' quality.txt)))
+bad=$(grep -c '^FAILED ' quality.txt)
+if [ "$code" -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
+failed=$((failed + bad))
+skipped=$((skipped + $(grep -c '^skipped ' quality.txt)))
 
 echo "$passed $failed $skipped" >"$counts"
 printf 'end to end: %d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"

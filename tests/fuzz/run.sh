@@ -1,0 +1,56 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Looks for inputs that break a reader, with libFuzzer: run.sh [--minutes M] [TARGET...]
+# M minutes (default: 1) are divided among the targets (default: all). Builds the preset fuzz (build/fuzz) first. What is
+# found stays in build/fuzz/found and is named; exit code 1 then. Exit code 77: clang or one of its libraries is missing.
+set -u
+top=$(cd "$(dirname "$0")/../.." && pwd) || exit 2
+build=$top/build/fuzz
+minutes=1
+if [ "${1:-}" = --minutes ]; then
+  minutes=$2
+  shift 2
+fi
+
+work=$(mktemp -d) || exit 2
+trap 'rm -rf "$work"' EXIT
+echo 'int LLVMFuzzerTestOneInput(const char *bytes, long size) { return size > 0 && *bytes > 9; }' >"$work/try.c"
+if ! command -v clang++ >"$work/which"; then
+  echo "skipped: clang is missing (Debian: clang)"
+  exit 77
+elif ! clang -fopenmp -fsanitize=fuzzer,address,undefined "$work/try.c" -o "$work/try" >"$work/said" 2>&1; then
+  echo "skipped: clang cannot link libFuzzer, its sanitizers or OpenMP (Debian: clang, libclang-rt-14-dev, libomp-dev)"
+  exit 77
+fi
+if ! (cd "$top" && cmake --preset fuzz && cmake --build --preset fuzz) >"$work/build.log" 2>&1; then
+  tail -n 40 "$work/build.log"
+  exit 1
+fi
+
+if [ $# -eq 0 ]; then
+  for folder in "$top"/tests/fuzz/corpus/*; do set -- "$@" "$(basename "$folder")"; done
+fi
+seconds=$(awk -v minutes="$minutes" -v targets=$# 'BEGIN { s = int(60 * minutes / targets); print s < 1 ? 1 : s }')
+LSAN_OPTIONS=suppressions=$top/tests/known_leaks.txt:print_suppressions=0
+CMOCKA_TEST_ABORT=1 # the checks of shared test code
+export LSAN_OPTIONS CMOCKA_TEST_ABORT
+failed=0
+mkdir -p "$build/found"
+for target in "$@"; do
+  corpus=$top/tests/fuzz/corpus/$target
+  dictionary=$top/tests/fuzz/dictionaries/$target.dict
+  mkdir -p "$build/grown/$target"
+  if [ -e "$dictionary" ]; then dictionary=-dict=$dictionary; else dictionary=-use_value_profile=1; fi
+  # New inputs of interest stay in build/fuzz/grown, where the next run continues.
+  if "$build/qmat_fuzz" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=16384 \
+    -print_final_stats=1 -artifact_prefix="$build/found/$target-" "$dictionary" "$build/grown/$target" "$corpus" \
+    >"$work/said" 2>&1; then
+    echo "ok      fuzz: $target: $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/said") inputs in $seconds s"
+  else
+    failed=1
+    echo "FAILED  fuzz: $target: $(grep -o "$build/found/.*" "$work/said" | head -n 1)"
+    grep -E 'ERROR|SUMMARY|violated|runtime error|allocated at once|^ *#[0-9]+ .* in (qmat|[a-z_]+ /)' "$work/said" |
+      head -n 20 | sed 's/^/        /'
+  fi
+done
+exit $failed
