@@ -20,7 +20,7 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *chain->spheres);
   chain->edges = copy_of(medial->edges, medial->edge_count, 2 * sizeof *chain->edges);
   chain->triangles = copy_of(medial->triangles, medial->triangle_count, 3 * sizeof *chain->triangles);
-  chain->owners = copy_of(log->owners, o->control.sample_count, sizeof *chain->owners);
+  chain->owners = copy_of(log->owners, o->constraints.sample_count, sizeof *chain->owners);
   chain->ends = copy_of(log->ends, log->count, 2 * sizeof *chain->ends);
   chain->merged = qmat_alloc(log->count, 4 * sizeof *chain->merged);
   chain->errors = copy_of(log->errors, log->count, sizeof *chain->errors);
@@ -30,10 +30,10 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->sphere_count = medial->sphere_count;
   chain->edge_count = medial->edge_count;
   chain->triangle_count = medial->triangle_count;
-  chain->sample_count = o->control.sample_count;
+  chain->sample_count = o->constraints.sample_count;
   chain->collapse_count = log->count;
   /* What takes part of an epsilon here, leaves that part there. */
-  for (size_t i = 0; i < log->count; i++) chain->errors[i] += qmat_control_share * deviation;
+  for (size_t i = 0; i < log->count; i++) chain->errors[i] += qmat_constraint_share * deviation;
   /* From the unit frame, as medial.simplify does it: to the same bytes. */
   qmat_frame_spheres_to_model(frame, o->initial.spheres, medial->sphere_count, chain->spheres);
   qmat_frame_spheres_to_model(frame, log->merged, log->count, chain->merged);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.simplify: edge collapses by slab quadratic error and stability ratio, with the error held on both sides. */
+/* medial.simplify: edge collapses by slab quadratic error and stability ratio, with the error own on both sides. */
 #include <math.h>
 #include <string.h>
 
@@ -28,11 +28,11 @@ typedef struct {
   const medial_simplify_params *params; /* with what the mesh's deviation leaves of epsilon */
   double epsilon, deviation;            /* what is asked for, and the deviation, in diagonals */
   qmat_surface *surface;
-  qmat_constraint_points control; /* of `dense` */
-  qmat_decimation dense;          /* where each round starts */
-  size_t initial_count;           /* spheres before the first collapse */
+  qmat_constraint_points constraints; /* of `dense` */
+  qmat_decimation dense;              /* where each round starts */
+  size_t initial_count;               /* spheres before the first collapse */
   /* Of the newest round, and of the one that it went on from. */
-  qmat_constraint_points round_controls[2];
+  qmat_constraint_points round_constraints[2];
   qmat_decimation rounds[2];
   int newest;
 } simplifier;
@@ -47,15 +47,15 @@ static const double default_epsilon = 0.01;
 static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
   const double tolerance = error_tolerance * epsilon;
-  const qmat_constraint_points *control = &s->round_controls[s->newest];
+  const qmat_constraint_points *constraints = &s->round_constraints[s->newest];
   qmat_status status =
-      qmat_medial_surface_bound_measure(s->context, s->surface, unit, control->points, control->surface_count,
+      qmat_medial_surface_bound_measure(s->context, s->surface, unit, constraints->points, constraints->surface_count,
                                         tolerance, least_reported * epsilon, epsilon - tolerance, errors);
   if (status != QMAT_OK) return status;
   const bool two_sided = s->params->epsilon > 0 && s->params->error == QMAT_ERROR_TWO_SIDED;
   const qmat_decimation *round = &s->rounds[s->newest];
   if (two_sided)
-    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->to_surface, &round->complex);
+    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->envelope_tracker, &round->complex);
   if (!two_sided || errors->envelope_to_surface > epsilon)
     status =
         qmat_medial_envelope_bound_measure(s->context, s->surface, unit, tolerance, least_reported * epsilon, errors);
@@ -71,29 +71,29 @@ static qmat_status fill_cavities(const simplifier *s, const qmat_medial_errors *
   qmat_status status = QMAT_OK;
   *left = *found;
   *filled = 0;
-  for (int i = 0; i < MOST_FILLINGS && left->cavity_count > 0 && status == QMAT_OK; i++) {
+  for (int i = 0; i < MOST_FILLINGS && left->uncovered_count > 0 && status == QMAT_OK; i++) {
     size_t added;
-    status = qmat_cavities_fill(s->context, s->surface, left->cavities, left->cavity_count, epsilon, unit, &added);
+    status = qmat_cavities_fill(s->context, s->surface, left->uncovered, left->uncovered_count, epsilon, unit, &added);
     if (status != QMAT_OK || added == 0) break;
     *filled += added;
     left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
-    left->cavities = left->doubts = NULL; /* those of `found` stay its own */
-    left->cavity_count = left->doubt_count = 0;
+    left->uncovered = left->undecided = NULL; /* those of `found` stay its own */
+    left->uncovered_count = left->undecided_count = 0;
     status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
   return status;
 }
 
 static void swap_lattices(qmat_decimation *a, qmat_decimation *b) {
-  const qmat_depth_lattice lattice = a->to_surface.lattice;
-  a->to_surface.lattice = b->to_surface.lattice;
-  b->to_surface.lattice = lattice;
+  const qmat_depth_lattice lattice = a->envelope_tracker.lattice;
+  a->envelope_tracker.lattice = b->envelope_tracker.lattice;
+  b->envelope_tracker.lattice = lattice;
 }
 
 /* Collapses that keep to this share of the error are done once for all rounds, so that places found later are still
  * within it, and so deep do those inside have to be in the envelope, as a share of epsilon. */
-static const double dense_share = 0.9, held_depth_share = 0.05;
+static const double dense_share = 0.9, required_depth_share = 0.05;
 
 static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                                   const qmat_medial *medial, const qmat_extra_points *extra) {
@@ -106,22 +106,22 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   const bool inside = s->params->error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
-                                         MOST_CONSTRAINT_POINTS, inside, &s->control);
+                                         MOST_CONSTRAINT_POINTS, inside, &s->constraints);
   if (extra->surface_count + extra->inner_count > 0) {
-    const qmat_constraint_points base = s->control;
+    const qmat_constraint_points base = s->constraints;
     qmat_constraint_points further;
     if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &dense->complex, extra, &further);
     if (status == QMAT_OK)
       status =
-          qmat_constraint_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->control);
+          qmat_constraint_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->constraints);
   }
   dense->rules.share = dense_share;
   dense->rules.refits = 0;
   s->initial_count = dense->complex.vertex_count;
   if (status == QMAT_OK)
-    status = qmat_can_collapse_in_parts(&dense->rules, &dense->complex)
-                 ? qmat_collapse_in_parts(dense, &s->control, state->depths)
-                 : qmat_decimation_init(dense, &s->control, state->depths);
+    status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex)
+                 ? qmat_collapse_partitioned(dense, &s->constraints, state->depths)
+                 : qmat_decimation_init(dense, &s->constraints, state->depths);
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;
 }
 
@@ -136,7 +136,7 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
   qmat_status status = qmat_simplify_rules(s->context, s->params, qmat_surface_mesh(s->surface), state, &round->rules);
   round->rules.neighbourhoods = neighbourhoods;
   round->rules.final_refit = final_refit;
-  if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_controls[s->newest], round);
+  if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
   if (status != QMAT_OK) return status;
   /* What is known of depths is true in every round. */
   swap_lattices(&s->dense, round);
@@ -168,7 +168,7 @@ static int report_run(json_t *root, const qmat_decimation *run, size_t initial_s
   bad |= qmat_json_set_count(root, "edges", unit->edge_count);
   bad |= qmat_json_set_count(root, "triangles", unit->triangle_count);
   bad |= qmat_json_set_count(root, "collapses", run->counts.collapses);
-  bad |= qmat_json_set_count(root, "constraint_points", run->control->count);
+  bad |= qmat_json_set_count(root, "constraint_points", run->constraints->count);
   bad |= qmat_json_set_count(root, "refused_by_inside_test", run->counts.refused_by_inside_test);
   bad |= qmat_json_set_count(root, "refused_by_surface_to_envelope", run->counts.refused_by_surface_to_envelope);
   bad |= qmat_json_set_count(root, "refused_by_envelope_to_surface", run->counts.refused_by_envelope_to_surface);
@@ -185,7 +185,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
   bad |= qmat_json_set_count(root, "cavity_filling_spheres", filled);
   bad |= qmat_json_set_count(root, "sphere_moves", run->moves);
-  bad |= qmat_json_set_count(root, "surface_distance_queries", s->dense.to_surface.lattice.questions);
+  bad |= qmat_json_set_count(root, "surface_distance_queries", s->dense.envelope_tracker.lattice.questions);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
@@ -205,14 +205,14 @@ static qmat_status append(simplifier *s, const double **points, size_t *count, c
 /* Whether the initial medial mesh itself keeps within epsilon at all constraint points: what it leaves too far away, no
  * round brings closer. */
 static bool starts_within(const simplifier *s, double epsilon) {
-  for (size_t i = 0; i < s->control.surface_count; i++)
-    if (!(s->control.distances[i] <= epsilon)) return false;
+  for (size_t i = 0; i < s->constraints.surface_count; i++)
+    if (!(s->constraints.distances[i] <= epsilon)) return false;
   return true;
 }
 
 /* Whether the dense part keeps to the places of a round as well as is wanted of the result. */
-static bool dense_keeps(const simplifier *s, const qmat_extra_points *extra) {
-  const qmat_constraint_points *base = &s->control, *all = &s->round_controls[s->newest];
+static bool dense_satisfies(const simplifier *s, const qmat_extra_points *extra) {
+  const qmat_constraint_points *base = &s->constraints, *all = &s->round_constraints[s->newest];
   for (size_t i = base->surface_count; i < all->surface_count; i++)
     if (!(all->distances[i] <= s->dense.rules.limit)) return false;
   return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
@@ -224,8 +224,8 @@ typedef struct {
   qmat_medial *medial;
   qmat_report *report;
   double fault;
-  bool holds;    /* whether surface and envelope keep within epsilon of each other, as far as it was found */
-  size_t filled; /* how many spheres were added to fill notches and voids */
+  bool within_epsilon; /* whether surface and envelope keep within epsilon of each other, as far as it was found */
+  size_t filled;       /* how many spheres were added to fill notches and voids */
 } attempt;
 
 static const double topology_fault = 0.05;
@@ -253,12 +253,12 @@ static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_med
   if (status == QMAT_OK) status = make_report(s, a->medial, &after, round, a->filled, a->report);
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
-  a->holds = status == QMAT_OK && a->fault == epsilon;
-  if (filled > 0) { /* what is in doubt by now is to be held, too */
-    double *const doubts = found->doubts;
-    found->doubts = after.doubts;
-    found->doubt_count = after.doubt_count;
-    after.doubts = doubts;
+  a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
+  if (filled > 0) { /* what is in doubt by now is to be own, too */
+    double *const undecided = found->undecided;
+    found->undecided = after.undecided;
+    found->undecided_count = after.undecided_count;
+    after.undecided = undecided;
     qmat_medial_errors_uninit(&after);
   }
   if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
@@ -283,26 +283,28 @@ static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, 
   return status == QMAT_OK ? finish_attempt(s, round, a, found) : status;
 }
 
-/* Places that were found between the constraint points are held in the next try. */
-static qmat_status hold_found(simplifier *s, const qmat_medial_errors *found, qmat_extra_points *extra) {
+/* Places that were found between the constraint points are own in the next try. */
+static qmat_status constrain_found_points(simplifier *s, const qmat_medial_errors *found, qmat_extra_points *extra) {
   qmat_status status = QMAT_OK;
   if (found->surface_to_envelope > s->params->epsilon)
     status = append(s, &extra->surface, &extra->surface_count, found->bound.points, found->bound.count);
-  if (status == QMAT_OK) status = append(s, &extra->inner, &extra->inner_count, found->cavities, found->cavity_count);
-  return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->doubts, found->doubt_count) : status;
+  if (status == QMAT_OK)
+    status = append(s, &extra->inner, &extra->inner_count, found->uncovered, found->uncovered_count);
+  return status == QMAT_OK ? append(s, &extra->inner, &extra->inner_count, found->undecided, found->undecided_count)
+                           : status;
 }
 
 /* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where cavities were
- * filled, of those in `found`, their places are held: what fills them may be a part of what was there before. What
- * does not keep within epsilon is tried again with the places held that were found. The result changes only where that
+ * filled, of those in `found`, their places are own: what fills them may be a part of what was there before. What
+ * does not keep within epsilon is tried again with the places own that were found. The result changes only where that
  * makes it no worse. */
 static qmat_status refit_jointly(simplifier *s, const qmat_initial_medial *state, int round,
                                  const qmat_medial_errors *found, attempt *best) {
   if (s->params->refits == 0 || best->medial->sphere_count <= (size_t)s->params->vertices) return QMAT_OK;
-  qmat_extra_points extra = {.held_depth = held_depth_share * s->params->epsilon};
+  qmat_extra_points extra = {.required_depth = required_depth_share * s->params->epsilon};
   const int base = s->newest;
   qmat_status status = QMAT_OK;
-  if (best->filled > 0) status = append(s, &extra.inner, &extra.inner_count, found->cavities, found->cavity_count);
+  if (best->filled > 0) status = append(s, &extra.inner, &extra.inner_count, found->uncovered, found->uncovered_count);
   bool ended = false;
   for (int i = 0; i < MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
     attempt a;
@@ -311,8 +313,8 @@ static qmat_status refit_jointly(simplifier *s, const qmat_initial_medial *state
     status = start_attempt(s, best->filled, &a, &errors);
     if (status == QMAT_OK) status = run_round(s, state, &s->rounds[base], best->medial, &extra, true, true);
     if (status == QMAT_OK) status = finish_attempt(s, round, &a, &errors);
-    ended = a.holds;
-    if (status == QMAT_OK && !ended) status = hold_found(s, &errors, &extra);
+    ended = a.within_epsilon;
+    if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status == QMAT_OK && !is_better(best, &a)) {
       release(best);
@@ -365,7 +367,7 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qma
  * solid by no more, but the surface may be farther away. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
   const qmat_decimation_rules *rules = &s->dense.rules;
-  if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  if (!a->within_epsilon || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
   json_t *root = a->report->root;
   for (bool opened = true; opened;) {
     qmat_topology topology;
@@ -401,7 +403,7 @@ static qmat_status insert_triangle(qmat_context *context, qmat_medial *medial, c
 /* Closes a loop of the medial mesh that the solid has not: fills the first three edges without a slab that are such a
  * loop, where the slab leaves the solid by no more than epsilon. `*closed`: whether there were any; `*protrusion` is
  * then what the slab leaves it by. One that closes no loop would make a void. */
-static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *to_surface) {
+static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *slab_error) {
   const double epsilon = s->params->epsilon;
   uint32_t *triangles;
   size_t count;
@@ -411,9 +413,9 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
     const uint32_t *corners = &triangles[3 * i];
     const double *spheres[3];
     for (size_t k = 0; k < 3; k++) spheres[k] = &unit->spheres[4 * (size_t)corners[k]];
-    *to_surface =
+    *slab_error =
         qmat_envelope_to_surface_bound(s->surface, spheres, 3, least_reported * epsilon, error_tolerance * epsilon);
-    if (*to_surface > epsilon) continue;
+    if (*slab_error > epsilon) continue;
     size_t place = 0;
     qmat_topology topology;
     qmat_medial_errors errors = {.surface_to_envelope = 0};
@@ -434,20 +436,20 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
  * no farther away, but may leave the solid. */
 static qmat_status close_loops(simplifier *s, attempt *a) {
   const qmat_decimation_rules *rules = &s->dense.rules;
-  if (!a->holds || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  if (!a->within_epsilon || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
   json_t *root = a->report->root;
   for (;;) {
     qmat_topology topology;
     bool closed;
-    double to_surface;
+    double slab_error;
     qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
     if (status != QMAT_OK || !topology.known || topology.loops == 0 || topology.euler >= rules->target_euler)
       return status;
-    status = close_loop(s, a->medial, topology.loops, &closed, &to_surface);
+    status = close_loop(s, a->medial, topology.loops, &closed, &slab_error);
     if (status != QMAT_OK || !closed) return status;
     const double before = json_real_value(json_object_get(root, "envelope_to_surface"));
     int bad = qmat_json_set_count(root, "triangles", a->medial->triangle_count);
-    bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, to_surface + s->deviation)));
+    bad |= json_object_set_new(root, "envelope_to_surface", json_real(fmax(before, slab_error + s->deviation)));
     if (bad) return qmat_fail_memory(s->context, "the report");
   }
 }
@@ -458,16 +460,17 @@ static qmat_status close_loops(simplifier *s, attempt *a) {
 static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                             const qmat_medial *initial, attempt *best) {
   const double epsilon = s->params->epsilon;
-  qmat_extra_points in_dense = {.held_depth = held_depth_share * epsilon}, extra = in_dense;
+  qmat_extra_points in_dense = {.required_depth = required_depth_share * epsilon}, extra = in_dense;
   qmat_status status = collapse_dense(s, state, samples, initial, &in_dense);
   for (int round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors;
     attempt a;
     const bool is_within = epsilon > 0 && starts_within(s, epsilon), is_last = round == MOST_ROUNDS || !is_within;
     status = run_attempt(s, state, &extra, round, is_last, &a, &errors);
-    const bool is_done = is_last || a.holds || (errors.surface_to_envelope <= epsilon && errors.cavity_count == 0);
-    const bool again = status == QMAT_OK && !is_done && !dense_keeps(s, &extra);
-    if (status == QMAT_OK && is_done && (a.holds || a.filled > 0 || is_within))
+    const bool is_done =
+        is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
+    const bool again = status == QMAT_OK && !is_done && !dense_satisfies(s, &extra);
+    if (status == QMAT_OK && is_done && (a.within_epsilon || a.filled > 0 || is_within))
       status = refit_jointly(s, state, round, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) {
       release(best);
@@ -475,13 +478,13 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     } else {
       release(&a);
     }
-    if (status == QMAT_OK && !is_done) status = hold_found(s, &errors, &extra);
+    if (status == QMAT_OK && !is_done) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status != QMAT_OK || is_done) return status;
     if (!again) continue;
     status = append(s, &in_dense.surface, &in_dense.surface_count, extra.surface, extra.surface_count);
     if (status == QMAT_OK) status = append(s, &in_dense.inner, &in_dense.inner_count, extra.inner, extra.inner_count);
-    extra = (qmat_extra_points){.held_depth = extra.held_depth};
+    extra = (qmat_extra_points){.required_depth = extra.required_depth};
     qmat_decimation_uninit(&s->dense);
     if (status == QMAT_OK) status = collapse_dense(s, state, samples, initial, &in_dense);
   }
@@ -512,8 +515,9 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double bound = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
   if (status == QMAT_OK)
-    status = qmat_medial_surface_bound_measure(context, o.surface, medial, o.control.points, o.control.surface_count,
-                                               error_tolerance * bound, least_reported * bound, INFINITY, &errors);
+    status =
+        qmat_medial_surface_bound_measure(context, o.surface, medial, o.constraints.points, o.constraints.surface_count,
+                                          error_tolerance * bound, least_reported * bound, INFINITY, &errors);
   if (status == QMAT_OK)
     status = qmat_medial_envelope_bound_measure(context, o.surface, medial, error_tolerance * bound,
                                                 least_reported * bound, &errors);
@@ -538,18 +542,18 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
 
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
-  medial_simplify_params held = *(const medial_simplify_params *)params;
-  const double epsilon = held.epsilon;
+  medial_simplify_params own = *(const medial_simplify_params *)params;
+  const double epsilon = own.epsilon;
   double deviation;
-  qmat_status status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &held, &deviation);
+  qmat_status status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &own, &deviation);
   if (status != QMAT_OK) return status;
-  if (qmat_simplify_in_order(&held)) return run_in_order(context, &held, epsilon, deviation, inputs, outputs);
+  if (qmat_simplify_in_order(&own)) return run_in_order(context, &own, epsilon, deviation, inputs, outputs);
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *initial = (const qmat_medial *)inputs[3];
-  simplifier s = {.context = context, .params = &held, .epsilon = epsilon, .deviation = deviation};
+  simplifier s = {.context = context, .params = &own, .epsilon = epsilon, .deviation = deviation};
   qmat_initial_medial state = {NULL, NULL, NULL};
   attempt best = {.fault = INFINITY};
-  status = qmat_simplify_prepare(context, &held, inputs, &s.surface, &state);
+  status = qmat_simplify_prepare(context, &own, inputs, &s.surface, &state);
   if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
   if (status == QMAT_OK) status = open_voids(&s, &best);
   if (status == QMAT_OK) status = close_loops(&s, &best);
@@ -596,7 +600,7 @@ static const qmat_param params[] = {
     QMAT_ERROR_PARAM,
     {.name = "on_exceed",
      .unit = "",
-     .doc = "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise what is held to it",
+     .doc = "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise what is own to it",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_EXCEED_SKIP,
      .choices = exceed_rules,
@@ -651,10 +655,10 @@ const qmat_node qmat_node_medial_simplify = {
         "deviation is taken from epsilon and added "
         "to "
         "the errors of the report. "
-        "With on_exceed=raise both errors are held to finest first, "
+        "With on_exceed=raise both errors are own to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
-        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is held rises "
+        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is own rises "
         "as soon as the cheapest collapse asks for it, as in the paper. Both have constraint points of their own, "
         "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
         "leaves the surface around it nearest to the envelope, and that distance for the cost; pmat keeps the "

@@ -18,10 +18,10 @@ enum { FINEST_GRID = 256 };
  */
 static const double spacing_share = 0.4;
 
-/* Into how many parts a length is divided. */
-static uint32_t parts_of(double length, double spacing) {
-  const double parts = ceil(length / spacing);
-  return parts < 1 ? 1 : parts > FINEST_GRID ? FINEST_GRID : (uint32_t)parts;
+/* Into how many divisions a length is divided. */
+static uint32_t divisions_of(double length, double spacing) {
+  const double divisions = ceil(length / spacing);
+  return divisions < 1 ? 1 : divisions > FINEST_GRID ? FINEST_GRID : (uint32_t)divisions;
 }
 
 /* A facet's grid: points on those of its sides that run from a smaller to a larger vertex, so that the facet across has
@@ -29,8 +29,8 @@ static uint32_t parts_of(double length, double spacing) {
 typedef struct {
   const double *corners[3]; /* the longest side first, from corner 0 to corner 1 */
   double longest;
-  bool own[3];       /* whether side k, from corner k on, is this facet's to divide */
-  uint32_t parts[3]; /* of the sides */
+  bool own[3];           /* whether side k, from corner k on, is this facet's to divide */
+  uint32_t divisions[3]; /* of the sides */
   uint32_t rows;
 } grid;
 
@@ -46,7 +46,7 @@ static grid grid_of(const double *positions, const uint32_t *corners, double spa
     const size_t side = (first + k) % 3;
     g.corners[k] = &positions[3 * (size_t)corners[side]];
     g.own[k] = corners[side] < corners[(side + 1) % 3];
-    g.parts[k] = parts_of(lengths[side], spacing);
+    g.divisions[k] = divisions_of(lengths[side], spacing);
   }
   double along = 0, square = 0;
   for (int k = 0; k < 3; k++) {
@@ -55,18 +55,18 @@ static grid grid_of(const double *positions, const uint32_t *corners, double spa
     square += across * across;
   }
   const double foot = g.longest > 0 ? along / g.longest : 0;
-  g.rows = parts_of(sqrt(fmax(square - foot * foot, 0)), spacing);
+  g.rows = divisions_of(sqrt(fmax(square - foot * foot, 0)), spacing);
   return g;
 }
 
-static uint32_t parts_of_row(const grid *g, uint32_t row, double spacing) {
-  return parts_of(g->longest * (1 - (double)row / g->rows), spacing);
+static uint32_t divisions_of_row(const grid *g, uint32_t row, double spacing) {
+  return divisions_of(g->longest * (1 - (double)row / g->rows), spacing);
 }
 
 static size_t grid_points(const grid *g, double spacing) {
   size_t count = 0;
-  for (int k = 0; k < 3; k++) count += g->own[k] ? g->parts[k] - 1 : 0;
-  for (uint32_t row = 1; row < g->rows; row++) count += parts_of_row(g, row, spacing) - 1;
+  for (int k = 0; k < 3; k++) count += g->own[k] ? g->divisions[k] - 1 : 0;
+  for (uint32_t row = 1; row < g->rows; row++) count += divisions_of_row(g, row, spacing) - 1;
   return count;
 }
 
@@ -77,17 +77,17 @@ static double *put_point(const double *const corners[3], double a, double b, dou
 
 static void fill_grid(const grid *g, double spacing, double *points) {
   for (int k = 0; k < 3; k++)
-    for (uint32_t i = 1; g->own[k] && i < g->parts[k]; i++) {
+    for (uint32_t i = 1; g->own[k] && i < g->divisions[k]; i++) {
       double weights[3] = {0, 0, 0};
-      weights[(k + 1) % 3] = (double)i / g->parts[k];
+      weights[(k + 1) % 3] = (double)i / g->divisions[k];
       weights[k] = 1 - weights[(k + 1) % 3];
       points = put_point(g->corners, weights[0], weights[1], weights[2], points);
     }
   for (uint32_t row = 1; row < g->rows; row++) {
     const double height = (double)row / g->rows;
-    const uint32_t parts = parts_of_row(g, row, spacing);
-    for (uint32_t i = 1; i < parts; i++) {
-      const double along = (1 - height) * i / parts;
+    const uint32_t divisions = divisions_of_row(g, row, spacing);
+    for (uint32_t i = 1; i < divisions; i++) {
+      const double along = (1 - height) * i / divisions;
       points = put_point(g->corners, 1 - height - along, along, height, points);
     }
   }
@@ -101,7 +101,7 @@ typedef struct {
   uint32_t *spheres;
   const double *reaches; /* per sphere, of find_reaches */
   qmat_point_grid samples;
-} answering;
+} regions;
 
 /* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it.
  */
@@ -117,7 +117,7 @@ static double *find_reaches(qmat_context *context, const qmat_complex *complex) 
 }
 
 static qmat_status find_answering(qmat_context *context, const qmat_samples *samples, const qmat_medial *medial,
-                                  answering *a) {
+                                  regions *a) {
   a->sphere_starts = qmat_arena_calloc(&context->arena, samples->count + 2, sizeof *a->sphere_starts);
   a->spheres = qmat_arena_alloc(&context->arena, medial->region_sample_count, sizeof *a->spheres);
   if (!a->sphere_starts || !a->spheres) return qmat_fail_memory(context, "responsible regions");
@@ -144,7 +144,7 @@ typedef struct {
   double weights[3];
 } witness;
 
-static void take_sphere(const answering *a, const double *point, uint32_t sample, witness *best) {
+static void take_sphere(const regions *a, const double *point, uint32_t sample, witness *best) {
   for (size_t i = a->sphere_starts[sample]; i < a->sphere_starts[sample + 1]; i++) {
     const uint32_t v = a->spheres[i];
     const double f = qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point);
@@ -177,26 +177,26 @@ static void take_star(const qmat_complex *complex, const double *point, uint32_t
   }
 }
 
-/* A point is content with a sphere that comes this close, as a part of epsilon; else it looks at the primitives around,
- * and when those are farther than the second part it asks the whole medial mesh. */
-static const double content_with_sphere = 0.5, content_with_star = 0.9;
+/* A point is accepted with a sphere that comes this close, as a part of epsilon; else it looks at the primitives
+ * around, and when those are farther than the second part it asks the whole medial mesh. */
+static const double accepted_with_sphere = 0.5, accepted_with_star = 0.9;
 
 /* About a tenth of a second of looks at single spheres: more far points than that are worth a search structure. */
-static const size_t most_sphere_looks = 100000000;
+static const size_t most_sphere_queries = 100000000;
 
-static void store(qmat_constraint_points *control, size_t i, const witness *w) {
-  memcpy(&control->witnesses[3 * i], w->vertices, sizeof w->vertices);
-  memcpy(&control->weights[3 * i], w->weights, sizeof w->weights);
-  control->distances[i] = w->distance;
+static void store(qmat_constraint_points *constraints, size_t i, const witness *w) {
+  memcpy(&constraints->witnesses[3 * i], w->vertices, sizeof w->vertices);
+  memcpy(&constraints->weights[3 * i], w->weights, sizeof w->weights);
+  constraints->distances[i] = w->distance;
 }
 
 /* The best witness among what answers for `count` samples; the primitives around are only looked at where no sphere
- * comes as close as is `content`. */
-static void look_around(const answering *a, const double *point, const uint32_t *samples, size_t count, double content,
-                        witness *best) {
+ * comes as close as is `accepted`. */
+static void search_regions(const regions *a, const double *point, const uint32_t *samples, size_t count,
+                           double accepted, witness *best) {
   *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
   for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
-  if (!(best->distance > content)) return;
+  if (!(best->distance > accepted)) return;
   for (size_t k = 0; k < count; k++)
     for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
       const uint32_t v = a->spheres[i];
@@ -207,19 +207,19 @@ static void look_around(const answering *a, const double *point, const uint32_t 
 
 /* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where
  * they leave the point farther than `enough` the sample nearest to it is asked. */
-static void look_around_in_facet(const answering *a, const double *point, size_t facet, double content, double enough,
-                                 witness *best) {
-  look_around(a, point, &a->mesh->triangles[3 * facet], 3, content, best);
+static void search_near_facet(const regions *a, const double *point, size_t facet, double accepted, double enough,
+                              witness *best) {
+  search_regions(a, point, &a->mesh->triangles[3 * facet], 3, accepted, best);
   if (best->distance <= enough) return;
   const uint32_t nearest = qmat_point_grid_nearest(&a->samples, point);
   witness other;
-  look_around(a, point, &nearest, 1, content, &other);
+  search_regions(a, point, &nearest, 1, accepted, &other);
   if (other.distance < best->distance) *best = other;
 }
 
 /* Also without a bound every point needs some witness. */
-static bool is_far(const qmat_constraint_points *control, size_t i, double enough) {
-  return control->witnesses[3 * i] == QMAT_NONE || !(control->distances[i] <= enough);
+static bool is_far(const qmat_constraint_points *constraints, size_t i, double enough) {
+  return constraints->witnesses[3 * i] == QMAT_NONE || !(constraints->distances[i] <= enough);
 }
 
 /* So many points or facets are done between two calls of the progress function. */
@@ -231,28 +231,28 @@ static qmat_status next_slice(qmat_context *context, size_t first, size_t count,
   return qmat_progress(context, first, count, "constraint points");
 }
 
-static size_t count_far(const qmat_constraint_points *control, double enough) {
+static size_t count_far(const qmat_constraint_points *constraints, double enough) {
   size_t far = 0;
-  for (size_t i = 0; i < control->count; i++) far += is_far(control, i, enough);
+  for (size_t i = 0; i < constraints->count; i++) far += is_far(constraints, i, enough);
   return far;
 }
 
 /* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
  * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
-static qmat_status ask_all_spheres(qmat_context *context, const answering *a, double enough,
-                                   qmat_constraint_points *control) {
+static qmat_status search_all_spheres(qmat_context *context, const regions *a, double enough,
+                                      qmat_constraint_points *constraints) {
   const qmat_complex *complex = a->complex;
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < control->count; first = last) {
-    const qmat_status status = next_slice(context, first, control->count, &last);
+  for (size_t first = 0, last; first < constraints->count; first = last) {
+    const qmat_status status = next_slice(context, first, constraints->count, &last);
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t i = first; i < last; i++) {
-      if (!is_far(control, i, enough)) continue;
-      const double *p = &control->points[3 * i];
-      witness best = {.distance = control->distances[i]};
-      memcpy(best.vertices, &control->witnesses[3 * i], sizeof best.vertices);
-      memcpy(best.weights, &control->weights[3 * i], sizeof best.weights);
+      if (!is_far(constraints, i, enough)) continue;
+      const double *p = &constraints->points[3 * i];
+      witness best = {.distance = constraints->distances[i]};
+      memcpy(best.vertices, &constraints->witnesses[3 * i], sizeof best.vertices);
+      memcpy(best.weights, &constraints->weights[3 * i], sizeof best.weights);
       for (size_t v = 0; v < complex->vertex_count; v++) {
         const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
         if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
@@ -260,7 +260,7 @@ static qmat_status ask_all_spheres(qmat_context *context, const answering *a, do
       for (size_t v = 0; v < complex->vertex_count; v++)
         if (qmat_sphere_distance(&complex->spheres[4 * v], p) - a->reaches[v] < best.distance)
           take_star(complex, p, (uint32_t)v, &best);
-      store(control, i, &best);
+      store(constraints, i, &best);
     }
   }
   return QMAT_OK;
@@ -295,35 +295,36 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
 }
 
 /* The same for many points: the nearest primitive of all. */
-static qmat_status ask_envelope(qmat_context *context, const qmat_complex *complex, double enough,
-                                qmat_constraint_points *control) {
+static qmat_status search_envelope(qmat_context *context, const qmat_complex *complex, double enough,
+                                   qmat_constraint_points *constraints) {
   qmat_envelope *envelope;
   qmat_status status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < control->count; first = last) {
-    status = next_slice(context, first, control->count, &last);
+  for (size_t first = 0, last; first < constraints->count; first = last) {
+    status = next_slice(context, first, constraints->count, &last);
     if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
-      if (!is_far(control, i, enough)) continue;
-      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
-      store(control, i, &w);
+      if (!is_far(constraints, i, enough)) continue;
+      const witness w = nearest_primitive(envelope, complex, &constraints->points[3 * i]);
+      store(constraints, i, &w);
     }
   }
   qmat_envelope_free(envelope);
   return status;
 }
 
-static qmat_status allocate(qmat_context *context, qmat_constraint_points *control) {
+static qmat_status allocate(qmat_context *context, qmat_constraint_points *constraints) {
   qmat_arena *arena = &context->arena;
-  control->points = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
-  control->witnesses = qmat_arena_alloc(arena, control->count, 3 * sizeof(uint32_t));
-  control->weights = qmat_arena_alloc(arena, control->count, 3 * sizeof(double));
-  control->distances = qmat_arena_alloc(arena, control->count, sizeof(double));
-  control->inner_limits =
-      qmat_arena_calloc(arena, control->count - control->surface_count, sizeof *control->inner_limits);
-  if (!control->points || !control->witnesses || !control->weights || !control->distances || !control->inner_limits)
+  constraints->points = qmat_arena_alloc(arena, constraints->count, 3 * sizeof(double));
+  constraints->witnesses = qmat_arena_alloc(arena, constraints->count, 3 * sizeof(uint32_t));
+  constraints->weights = qmat_arena_alloc(arena, constraints->count, 3 * sizeof(double));
+  constraints->distances = qmat_arena_alloc(arena, constraints->count, sizeof(double));
+  constraints->inner_limits =
+      qmat_arena_calloc(arena, constraints->count - constraints->surface_count, sizeof *constraints->inner_limits);
+  if (!constraints->points || !constraints->witnesses || !constraints->weights || !constraints->distances ||
+      !constraints->inner_limits)
     return qmat_fail_memory(context, "constraint points");
   return QMAT_OK;
 }
@@ -365,7 +366,7 @@ static shell_place shell_place_below(const double *corners, const double *normal
 
 /* Places nearly epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than
  * epsilon. Only where the solid is so thick and the initial medial mesh holds them. */
-static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const answering *a, double epsilon,
+static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
                               shell_points *shell) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = a->mesh;
@@ -410,7 +411,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
       if (!qmat_surface_inside(surface, place->point) ||
           qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
         continue;
-      look_around_in_facet(a, place->point, place->facet, 0, 0, &place->witness);
+      search_near_facet(a, place->point, place->facet, 0, 0, &place->witness);
     }
   }
   for (size_t i = 0; i < kept; i++)
@@ -421,36 +422,36 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
 /* The samples and what answers for them; `unit_samples` are in the unit frame. */
 static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
                                   const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
-                                  answering *a) {
-  *a = (answering){.mesh = mesh, .complex = complex};
+                                  regions *a) {
+  *a = (regions){.mesh = mesh, .complex = complex};
   const qmat_status status = find_answering(context, samples, medial, a);
   return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
 }
 
 /* Where each facet's grid starts behind the samples. The spacing grows until no more than `most` points are added. */
 static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
-                               size_t *starts, qmat_constraint_points *control) {
-  for (;; control->spacing *= 1.25) {
+                               size_t *starts, qmat_constraint_points *constraints) {
+  for (;; constraints->spacing *= 1.25) {
     const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
     if (status != QMAT_OK) return status;
     size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-      const grid g = grid_of(positions, &mesh->triangles[3 * t], control->spacing);
-      starts[t] = control->sample_count + added;
-      added += grid_points(&g, control->spacing);
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], constraints->spacing);
+      starts[t] = constraints->sample_count + added;
+      added += grid_points(&g, constraints->spacing);
     }
-    control->surface_count = control->sample_count + added;
+    constraints->surface_count = constraints->sample_count + added;
     if (added <= most) return QMAT_OK;
   }
 }
 
 /* The places on the surface, with witnesses of what answers around them. */
-static qmat_status look_on_surface(qmat_context *context, const answering *a, const double *positions,
-                                   const double *unit_samples, const size_t *starts, double content, double enough,
-                                   qmat_constraint_points *control) {
+static qmat_status make_surface_points(qmat_context *context, const regions *a, const double *positions,
+                                       const double *unit_samples, const size_t *starts, double accepted, double enough,
+                                       qmat_constraint_points *constraints) {
   const qmat_mesh *mesh = a->mesh;
-  const size_t samples = control->sample_count;
-  memcpy(control->points, unit_samples, 3 * samples * sizeof *unit_samples);
+  const size_t samples = constraints->sample_count;
+  memcpy(constraints->points, unit_samples, 3 * samples * sizeof *unit_samples);
   const int threads = qmat_threads(context);
   for (size_t first = 0, last; first < samples; first = last) {
     const qmat_status status = next_slice(context, first, samples, &last);
@@ -459,8 +460,8 @@ static qmat_status look_on_surface(qmat_context *context, const answering *a, co
     for (size_t i = first; i < last; i++) {
       const uint32_t sample = (uint32_t)i;
       witness best;
-      look_around(a, &control->points[3 * i], &sample, 1, content, &best);
-      store(control, i, &best);
+      search_regions(a, &constraints->points[3 * i], &sample, 1, accepted, &best);
+      store(constraints, i, &best);
     }
   }
   for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
@@ -469,53 +470,54 @@ static qmat_status look_on_surface(qmat_context *context, const answering *a, co
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t t = first; t < last; t++) {
       const uint32_t *corners = &mesh->triangles[3 * t];
-      const grid g = grid_of(positions, corners, control->spacing);
-      const size_t count = grid_points(&g, control->spacing);
-      if (count) fill_grid(&g, control->spacing, &control->points[3 * starts[t]]);
+      const grid g = grid_of(positions, corners, constraints->spacing);
+      const size_t count = grid_points(&g, constraints->spacing);
+      if (count) fill_grid(&g, constraints->spacing, &constraints->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
         witness best;
-        look_around_in_facet(a, &control->points[3 * i], t, content, enough, &best);
-        store(control, i, &best);
+        search_near_facet(a, &constraints->points[3 * i], t, accepted, enough, &best);
+        store(constraints, i, &best);
       }
     }
   }
   return QMAT_OK;
 }
 
-static qmat_status ask_for_far_points(qmat_context *context, const answering *a, double enough,
-                                      qmat_constraint_points *control) {
-  const size_t far = count_far(control, enough);
+static qmat_status improve_far_points(qmat_context *context, const regions *a, double enough,
+                                      qmat_constraint_points *constraints) {
+  const size_t far = count_far(constraints, enough);
   if (far == 0) return QMAT_OK;
-  if (far * a->complex->vertex_count > most_sphere_looks) return ask_envelope(context, a->complex, enough, control);
-  return ask_all_spheres(context, a, enough, control);
+  if (far * a->complex->vertex_count > most_sphere_queries)
+    return search_envelope(context, a->complex, enough, constraints);
+  return search_all_spheres(context, a, enough, constraints);
 }
 
 qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
                                      const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
-                                     qmat_constraint_points *control) {
-  *control = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing};
+                                     qmat_constraint_points *constraints) {
+  *constraints = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing};
   size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
   if (!starts) return qmat_fail_memory(context, "constraint points");
-  answering a;
+  regions a;
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
-  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, control);
-  control->count = control->surface_count;
-  if (status == QMAT_OK) status = allocate(context, control);
+  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, constraints);
+  constraints->count = constraints->surface_count;
+  if (status == QMAT_OK) status = allocate(context, constraints);
   if (status == QMAT_OK)
-    status = look_on_surface(context, &a, positions, unit_samples, starts, enough, enough, control);
-  return status == QMAT_OK ? ask_for_far_points(context, &a, enough, control) : status;
+    status = make_surface_points(context, &a, positions, unit_samples, starts, enough, enough, constraints);
+  return status == QMAT_OK ? improve_far_points(context, &a, enough, constraints) : status;
 }
 
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                         const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                        size_t most, bool inside, qmat_constraint_points *control) {
+                                        size_t most, bool inside, qmat_constraint_points *constraints) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *control = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
+  *constraints = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
-  answering a;
+  regions a;
   qmat_interior_points inner = {.count = 0};
   double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
   if (!starts || !unit_samples) return qmat_fail_memory(context, "constraint points");
@@ -525,61 +527,64 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
   if (status != QMAT_OK) return status;
-  if ((status = place_grids(context, mesh, positions, most, starts, control)) != QMAT_OK) return status;
-  control->count = control->surface_count + inner.count + shell.count;
-  if ((status = allocate(context, control)) != QMAT_OK) return status;
-  const double enough = content_with_star * epsilon;
-  status =
-      look_on_surface(context, &a, positions, unit_samples, starts, content_with_sphere * epsilon, enough, control);
+  if ((status = place_grids(context, mesh, positions, most, starts, constraints)) != QMAT_OK) return status;
+  constraints->count = constraints->surface_count + inner.count + shell.count;
+  if ((status = allocate(context, constraints)) != QMAT_OK) return status;
+  const double enough = accepted_with_star * epsilon;
+  status = make_surface_points(context, &a, positions, unit_samples, starts, accepted_with_sphere * epsilon, enough,
+                               constraints);
   if (status != QMAT_OK) return status;
-  size_t next = control->surface_count;
+  size_t next = constraints->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {
     const witness own = {inner.distances[i], {inner.spheres[i], QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-    memcpy(&control->points[3 * next], &inner.points[3 * i], 3 * sizeof(double));
-    control->inner_limits[i] = inner.limits[i];
-    store(control, next, &own);
+    memcpy(&constraints->points[3 * next], &inner.points[3 * i], 3 * sizeof(double));
+    constraints->inner_limits[i] = inner.limits[i];
+    store(constraints, next, &own);
   }
   for (size_t i = 0; i < shell.count; i++, next++) {
-    memcpy(&control->points[3 * next], shell.places[i].point, 3 * sizeof(double));
-    store(control, next, &shell.places[i].witness);
+    memcpy(&constraints->points[3 * next], shell.places[i].point, 3 * sizeof(double));
+    store(constraints, next, &shell.places[i].witness);
   }
-  return ask_for_far_points(context, &a, enough, control);
+  return improve_far_points(context, &a, enough, constraints);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
-                                   qmat_constraint_points *control) {
-  *control = (qmat_constraint_points){.count = extra->surface_count + extra->inner_count,
-                                      .surface_count = extra->surface_count};
-  qmat_status status = allocate(context, control);
+                                   qmat_constraint_points *constraints) {
+  *constraints = (qmat_constraint_points){.count = extra->surface_count + extra->inner_count,
+                                          .surface_count = extra->surface_count};
+  qmat_status status = allocate(context, constraints);
   qmat_envelope *envelope;
   if (status == QMAT_OK) status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
-  if (extra->surface_count) memcpy(control->points, extra->surface, 3 * extra->surface_count * sizeof *control->points);
+  if (extra->surface_count)
+    memcpy(constraints->points, extra->surface, 3 * extra->surface_count * sizeof *constraints->points);
   if (extra->inner_count)
-    memcpy(&control->points[3 * extra->surface_count], extra->inner, 3 * extra->inner_count * sizeof *control->points);
+    memcpy(&constraints->points[3 * extra->surface_count], extra->inner,
+           3 * extra->inner_count * sizeof *constraints->points);
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < control->count; first = last) {
-    status = next_slice(context, first, control->count, &last);
+  for (size_t first = 0, last; first < constraints->count; first = last) {
+    status = next_slice(context, first, constraints->count, &last);
     if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
-      const witness w = nearest_primitive(envelope, complex, &control->points[3 * i]);
-      store(control, i, &w);
+      const witness w = nearest_primitive(envelope, complex, &constraints->points[3 * i]);
+      store(constraints, i, &w);
     }
   }
   qmat_envelope_free(envelope);
   if (status != QMAT_OK) return status;
   size_t kept = extra->surface_count;
-  for (size_t i = kept; i < control->count; i++) {
-    if (!(control->distances[i] < 0)) continue;
-    memmove(&control->points[3 * kept], &control->points[3 * i], 3 * sizeof *control->points);
-    memmove(&control->witnesses[3 * kept], &control->witnesses[3 * i], 3 * sizeof *control->witnesses);
-    memmove(&control->weights[3 * kept], &control->weights[3 * i], 3 * sizeof *control->weights);
-    control->distances[kept] = control->distances[i];
-    control->inner_limits[kept - extra->surface_count] = fmax(0.5 * control->distances[i], -extra->held_depth);
+  for (size_t i = kept; i < constraints->count; i++) {
+    if (!(constraints->distances[i] < 0)) continue;
+    memmove(&constraints->points[3 * kept], &constraints->points[3 * i], 3 * sizeof *constraints->points);
+    memmove(&constraints->witnesses[3 * kept], &constraints->witnesses[3 * i], 3 * sizeof *constraints->witnesses);
+    memmove(&constraints->weights[3 * kept], &constraints->weights[3 * i], 3 * sizeof *constraints->weights);
+    constraints->distances[kept] = constraints->distances[i];
+    constraints->inner_limits[kept - extra->surface_count] =
+        fmax(0.5 * constraints->distances[i], -extra->required_depth);
     kept++;
   }
-  control->count = kept;
+  constraints->count = kept;
   return QMAT_OK;
 }
 

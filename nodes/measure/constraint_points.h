@@ -27,7 +27,7 @@ typedef struct qmat_constraint_points {
  * QMAT_ERROR_GEOMETRY (the medial mesh belongs to other samples). Uses all threads. */
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                         const qmat_medial *medial, const qmat_complex *complex, double epsilon,
-                                        size_t most, bool inside, qmat_constraint_points *control);
+                                        size_t most, bool inside, qmat_constraint_points *constraints);
 
 /* The places on the surface alone: the samples and a grid that far apart on each facet, of `most` points at most as
  * above. Their distances are no less than F, and F itself where that is more than `enough`. `positions` (3 doubles a
@@ -36,13 +36,13 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
 qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
                                      const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
-                                     qmat_constraint_points *control);
+                                     qmat_constraint_points *constraints);
 
 /* Further places: on the surface, and inside the solid. */
 typedef struct qmat_extra_points {
   size_t surface_count, inner_count;
   const double *surface, *inner; /* 3 per point, unit frame */
-  double held_depth;             /* how deep in the envelope interior points have to be */
+  double required_depth;         /* how deep in the envelope interior points have to be */
 } qmat_extra_points;
 
 /* Further places at which a medial mesh `complex` is to be held from now on, with their nearest primitives as
@@ -50,7 +50,7 @@ typedef struct qmat_extra_points {
  * which it does is held. Fills the places in the order of qmat_constraint_points; there is no sample among them.
  * QMAT_ERROR_MEMORY. All threads. */
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
-                                   qmat_constraint_points *control);
+                                   qmat_constraint_points *constraints);
 
 /* The places of `base` with the witnesses and weights (3 per place) that they have by now, and those of `extra`; what
  * is on the surface comes first. `ids` gives new numbers to the vertices that `witnesses` name; NULL: they keep theirs.

@@ -4,18 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-static double distance(const double *a, const double *b) {
-  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-  return sqrt(x * x + y * y + z * z);
-}
-
-static double maximum(double a, double b) {
-  return a > b ? a : b;
-}
-
-static double minimum(double a, double b) {
-  return a < b ? a : b;
-}
+#include "core/geometry/vector.h"
 
 /* One piece of a primitive: its corners, each with a lower bound of its depth. */
 typedef struct piece {
@@ -27,22 +16,23 @@ typedef struct piece {
  * largest at a corner. For an edge the crossing of the bounds from both ends is tighter. */
 static double bound_from_corners(const piece *p) {
   if (p->count == 2) {
-    const double length = distance(p->spheres[0], p->spheres[1]), change = p->spheres[1][3] - p->spheres[0][3];
+    const double length = qmat_point_distance(p->spheres[0], p->spheres[1]),
+                 change = p->spheres[1][3] - p->spheres[0][3];
     const double a = p->spheres[0][3] - p->depths[0], b = p->spheres[1][3] - p->depths[1];
-    /* a + t (length + change) and b + (1 - t) (length - change): the largest of their minimum is at an end or where
-     * they meet. */
-    const double ends = maximum(minimum(a, b + length - change), minimum(b, a + length + change));
+    /* a + t (length + change) and b + (1 - t) (length - change): the largest of their qmat_smaller is at an end or
+     * where they meet. */
+    const double ends = qmat_larger(qmat_smaller(a, b + length - change), qmat_smaller(b, a + length + change));
     const double t = length > 0 ? (b - a + length - change) / (2 * length) : 0;
-    return t > 0 && t < 1 ? maximum(ends, a + t * (length + change)) : ends;
+    return t > 0 && t < 1 ? qmat_larger(ends, a + t * (length + change)) : ends;
   }
   double sides[3], bound = INFINITY; /* each opposite a corner */
-  for (int k = 0; k < 3; k++) sides[k] = distance(p->spheres[(k + 1) % 3], p->spheres[(k + 2) % 3]);
+  for (int k = 0; k < 3; k++) sides[k] = qmat_point_distance(p->spheres[(k + 1) % 3], p->spheres[(k + 2) % 3]);
   for (int i = 0; i < 3; i++) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
     const double own = p->spheres[i][3] - p->depths[i];
     const double one = p->spheres[j][3] - p->depths[i] + sides[k];
     const double other = p->spheres[k][3] - p->depths[i] + sides[j];
-    bound = minimum(bound, maximum(own, maximum(one, other)));
+    bound = qmat_smaller(bound, qmat_larger(own, qmat_larger(one, other)));
   }
   return bound;
 }
@@ -79,7 +69,7 @@ enum { DEEPEST = 40 };
 typedef struct search {
   const qmat_surface *surface;
   qmat_depth_lattice *lattice; /* NULL: every depth is asked of the surface */
-  double content;              /* a piece with a bound up to this is done */
+  double accepted;             /* a piece with a bound up to this is done */
   double limit;                /* an h above this ends the search */
   double smallest;             /* pieces no larger than this are not split for a better bound; larger ones are not worth
                                   a question to the surface where there is a lattice */
@@ -90,10 +80,10 @@ typedef struct search {
 } search;
 
 static bool is_done(search *s, double bound, double size, bool last) {
-  if (!(bound <= s->content || bound <= s->found + s->tolerance ||
+  if (!(bound <= s->accepted || bound <= s->found + s->tolerance ||
         (bound <= s->limit && (last || size <= s->smallest))))
     return false;
-  s->bound = maximum(s->bound, bound);
+  s->bound = qmat_larger(s->bound, bound);
   return true;
 }
 
@@ -103,9 +93,9 @@ static bool search_piece(search *s, const piece *p, int level) {
   for (int i = 0; i < p->count; i++)
     for (int k = 0; k < 4; k++) centre[k] += share * p->spheres[i][k];
   for (int i = 0; i < p->count; i++) {
-    const double d = distance(p->spheres[i], centre);
-    size = maximum(size, d);
-    farthest = maximum(farthest, p->spheres[i][3] + d);
+    const double d = qmat_point_distance(p->spheres[i], centre);
+    size = qmat_larger(size, d);
+    farthest = qmat_larger(farthest, p->spheres[i][3] + d);
   }
   /* h over the piece is at most `farthest` less the depth at the centre: convex, so largest at a corner. */
   const bool last = p->count == 1 || level == DEEPEST;
@@ -124,19 +114,19 @@ static bool search_piece(search *s, const piece *p, int level) {
   }
   if (ask) {
     const double depth = s->lattice
-                             ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->content)
+                             ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->accepted)
                              : -qmat_surface_signed_distance(s->surface, centre);
     if (depth == INFINITY) { /* deeper than that */
-      s->bound = maximum(s->bound, s->content);
+      s->bound = qmat_larger(s->bound, s->accepted);
       return true;
     }
     const double h = centre[3] - depth;
-    s->found = maximum(s->found, h);
+    s->found = qmat_larger(s->found, h);
     memcpy(s->place, centre, sizeof centre);
     if (h > s->limit) return false;
     if (is_done(s, farthest - depth, size, last)) return true;
     if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
-      s->bound = maximum(s->bound, farthest - depth);
+      s->bound = qmat_larger(s->bound, farthest - depth);
       return farthest - depth <= s->limit;
     }
   }
@@ -153,7 +143,7 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
                                       double enough, double tolerance) {
   piece p = {.count = count};
   search s = {.surface = surface,
-              .content = enough,
+              .accepted = enough,
               .limit = INFINITY,
               .smallest = 0.01 * tolerance,
               .found = -INFINITY,
@@ -162,30 +152,30 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
   for (int i = 0; i < count; i++) {
     memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
     p.depths[i] = -qmat_surface_signed_distance(surface, spheres[i]);
-    s.found = maximum(s.found, spheres[i][3] - p.depths[i]);
+    s.found = qmat_larger(s.found, spheres[i][3] - p.depths[i]);
   }
   if (count > 1) search_piece(&s, &p, 0);
-  return maximum(s.bound, s.found);
+  return qmat_larger(s.bound, s.found);
 }
 
 /* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away.
  */
 static const double lattice_share = 0.5, widest_spacing = 0.005;
 
-qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_to_surface *to_surface,
+qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_to_surface *tracker,
                                           const qmat_surface *surface, const qmat_complex *complex,
                                           const double *depths, double limit) {
-  *to_surface = (qmat_envelope_to_surface){.limit = limit};
+  *tracker = (qmat_envelope_to_surface){.limit = limit};
   const double spacing = limit < INFINITY ? lattice_share * limit : widest_spacing;
-  const qmat_status status = qmat_depth_lattice_init(context, &to_surface->lattice, surface,
-                                                     spacing < widest_spacing ? spacing : widest_spacing);
+  const qmat_status status =
+      qmat_depth_lattice_init(context, &tracker->lattice, surface, spacing < widest_spacing ? spacing : widest_spacing);
   if (status != QMAT_OK) return status;
-  to_surface->depths = qmat_alloc(complex->vertex_count, sizeof(double));
-  to_surface->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
-  to_surface->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
-  if (!to_surface->depths || !to_surface->edge_bounds || !to_surface->triangle_bounds)
+  tracker->depths = qmat_alloc(complex->vertex_count, sizeof(double));
+  tracker->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
+  tracker->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
+  if (!tracker->depths || !tracker->edge_bounds || !tracker->triangle_bounds)
     return qmat_fail_memory(context, "protrusion bounds");
-  memcpy(to_surface->depths, depths, complex->vertex_count * sizeof *depths);
+  memcpy(tracker->depths, depths, complex->vertex_count * sizeof *depths);
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads)
   for (size_t i = 0; i < complex->edge_count + complex->triangle_count; i++) {
@@ -197,163 +187,163 @@ qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_t
       memcpy(p.spheres[k], &complex->spheres[4 * v], sizeof p.spheres[k]);
       p.depths[k] = depths[v];
     }
-    *(is_edge ? &to_surface->edge_bounds[id] : &to_surface->triangle_bounds[id]) = bound_from_corners(&p);
+    *(is_edge ? &tracker->edge_bounds[id] : &tracker->triangle_bounds[id]) = bound_from_corners(&p);
   }
   return QMAT_OK;
 }
 
-void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *to_surface) {
-  qmat_depth_lattice_uninit(&to_surface->lattice);
-  qmat_free(to_surface->depths);
-  qmat_free(to_surface->edge_bounds);
-  qmat_free(to_surface->triangle_bounds);
-  qmat_free(to_surface->new_edge_bounds);
-  qmat_free(to_surface->new_triangle_bounds);
-  *to_surface = (qmat_envelope_to_surface){0};
+void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *tracker) {
+  qmat_depth_lattice_uninit(&tracker->lattice);
+  qmat_free(tracker->depths);
+  qmat_free(tracker->edge_bounds);
+  qmat_free(tracker->triangle_bounds);
+  qmat_free(tracker->new_edge_bounds);
+  qmat_free(tracker->new_triangle_bounds);
+  *tracker = (qmat_envelope_to_surface){0};
 }
 
 /* Asks for what the tests of a star read, all at once. */
-static void fetch_bounds(const qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
-                         const qmat_collapse *c) {
+static void fetch_bounds(const qmat_envelope_to_surface *tracker, const qmat_complex *complex, const qmat_collapse *c) {
   for (size_t t = 0; t < c->triangle_count; t++) {
-    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&to_surface->triangle_bounds[c->kept_triangles[t]]);
-    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&to_surface->triangle_bounds[c->removed_triangles[t]]);
+    if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&tracker->triangle_bounds[c->kept_triangles[t]]);
+    if (c->removed_triangles[t] != QMAT_NONE) __builtin_prefetch(&tracker->triangle_bounds[c->removed_triangles[t]]);
   }
   for (size_t n = 0; n < c->neighbour_count; n++) {
-    __builtin_prefetch(&to_surface->depths[c->neighbours[n]]);
+    __builtin_prefetch(&tracker->depths[c->neighbours[n]]);
     __builtin_prefetch(&complex->spheres[4 * (size_t)c->neighbours[n]]);
-    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&to_surface->edge_bounds[c->kept_edges[n]]);
-    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&to_surface->edge_bounds[c->removed_edges[n]]);
+    if (c->kept_edges[n] != QMAT_NONE) __builtin_prefetch(&tracker->edge_bounds[c->kept_edges[n]]);
+    if (c->removed_edges[n] != QMAT_NONE) __builtin_prefetch(&tracker->edge_bounds[c->removed_edges[n]]);
   }
 }
 
-bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   double depth = -INFINITY, gap;
-  fetch_bounds(to_surface, complex, collapse);
+  fetch_bounds(tracker, complex, collapse);
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    depth = maximum(depth, to_surface->depths[ends[e]] - distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
-  if (!(depth > 0 && sphere[3] - depth <= to_surface->limit)) {
-    const double near = qmat_depth_lattice_near(&to_surface->lattice, sphere, &gap);
-    depth = maximum(depth, near - gap);
-    if (!(depth > 0 && sphere[3] - depth <= to_surface->limit))
-      depth = qmat_depth_lattice_exact_near(&to_surface->lattice, sphere, near, gap);
+    depth = qmat_larger(depth,
+                        tracker->depths[ends[e]] - qmat_point_distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
+  if (!(depth > 0 && sphere[3] - depth <= tracker->limit)) {
+    const double near = qmat_depth_lattice_near(&tracker->lattice, sphere, &gap);
+    depth = qmat_larger(depth, near - gap);
+    if (!(depth > 0 && sphere[3] - depth <= tracker->limit))
+      depth = qmat_depth_lattice_exact_near(&tracker->lattice, sphere, near, gap);
   }
-  to_surface->sphere_depth = depth;
-  return depth > 0 && sphere[3] - depth <= to_surface->limit;
+  tracker->sphere_depth = depth;
+  return depth > 0 && sphere[3] - depth <= tracker->limit;
 }
 
-bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
+bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                              const qmat_collapse *collapse, const double sphere[4]) {
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
     if (sphere[3] == 0 && other[3] == 0) continue; /* a crease, which lies on the surface */
-    const double half = 0.5 * distance(sphere, other);
-    if (half < to_surface->sphere_depth || half < to_surface->depths[collapse->neighbours[n]]) continue;
+    const double half = 0.5 * qmat_point_distance(sphere, other);
+    if (half < tracker->sphere_depth || half < tracker->depths[collapse->neighbours[n]]) continue;
     double middle[3], gap;
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
-    const double near = qmat_depth_lattice_near(&to_surface->lattice, middle, &gap);
+    const double near = qmat_depth_lattice_near(&tracker->lattice, middle, &gap);
     if (near > gap) continue;
-    if (near < -gap || !qmat_surface_inside(to_surface->lattice.surface, middle)) return false;
+    if (near < -gap || !qmat_surface_inside(tracker->lattice.surface, middle)) return false;
   }
   return true;
 }
 
 /* By how much h grows at most over a primitive of which a corner moves to another sphere. */
 static double growth(const double *from, const double *to) {
-  return maximum(0, distance(from, to) + to[3] - from[3]);
+  return qmat_larger(0, qmat_point_distance(from, to) + to[3] - from[3]);
 }
 
 /* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
-static const double content_share = 0.8, smallest_share = 0.15;
+static const double accepted_share = 0.8, smallest_share = 0.15;
 
-qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_to_surface *to_surface,
+qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_to_surface *tracker,
                                           const qmat_complex *complex, const qmat_collapse *collapse,
                                           const double sphere[4], bool *kept) {
-  if (qmat_grow((void **)&to_surface->new_edge_bounds, &to_surface->new_edge_capacity, collapse->neighbour_count,
+  if (qmat_grow((void **)&tracker->new_edge_bounds, &tracker->new_edge_capacity, collapse->neighbour_count,
                 sizeof(double)) ||
-      qmat_grow((void **)&to_surface->new_triangle_bounds, &to_surface->new_triangle_capacity, collapse->triangle_count,
+      qmat_grow((void **)&tracker->new_triangle_bounds, &tracker->new_triangle_capacity, collapse->triangle_count,
                 sizeof(double)))
     return qmat_fail_memory(context, "protrusion bounds");
   const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
   const double removed_growth =
       collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
-  search s = {.lattice = &to_surface->lattice,
-              .content = content_share * to_surface->limit,
-              .limit = to_surface->limit,
-              .smallest = smallest_share * to_surface->limit,
+  search s = {.lattice = &tracker->lattice,
+              .accepted = accepted_share * tracker->limit,
+              .limit = tracker->limit,
+              .smallest = smallest_share * tracker->limit,
               .tolerance = 0};
   piece p;
   memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
-  p.depths[0] = to_surface->sphere_depth;
+  p.depths[0] = tracker->sphere_depth;
   *kept = true;
   for (size_t t = 0; t < collapse->triangle_count + collapse->neighbour_count && *kept; t++) {
     const bool is_edge = t >= collapse->triangle_count;
     const size_t id = is_edge ? t - collapse->triangle_count : t;
     const uint32_t mine = is_edge ? collapse->kept_edges[id] : collapse->kept_triangles[id];
     const uint32_t theirs = is_edge ? collapse->removed_edges[id] : collapse->removed_triangles[id];
-    const double *bounds = is_edge ? to_surface->edge_bounds : to_surface->triangle_bounds;
-    double *result = is_edge ? &to_surface->new_edge_bounds[id] : &to_surface->new_triangle_bounds[id];
+    const double *bounds = is_edge ? tracker->edge_bounds : tracker->triangle_bounds;
+    double *result = is_edge ? &tracker->new_edge_bounds[id] : &tracker->new_triangle_bounds[id];
     double bound = INFINITY;
     if (mine != QMAT_NONE) bound = bounds[mine] + kept_growth;
-    if (theirs != QMAT_NONE) bound = minimum(bound, bounds[theirs] + removed_growth);
+    if (theirs != QMAT_NONE) bound = qmat_smaller(bound, bounds[theirs] + removed_growth);
     p.count = is_edge ? 2 : 3;
     for (int k = 1; k < p.count; k++) {
       const uint32_t v = is_edge ? collapse->neighbours[id] : collapse->triangle_pairs[2 * id + (size_t)k - 1];
       memcpy(p.spheres[k], &complex->spheres[4 * (size_t)v], sizeof p.spheres[k]);
-      p.depths[k] = to_surface->depths[v];
+      p.depths[k] = tracker->depths[v];
     }
-    bound = minimum(bound, bound_from_corners(&p));
+    bound = qmat_smaller(bound, bound_from_corners(&p));
     if (is_edge) /* an edge of a triangle is as good as the triangle */
-      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > to_surface->limit; i++)
+      for (size_t i = 0; i < 2 * collapse->triangle_count && bound > tracker->limit; i++)
         if (collapse->triangle_pairs[i] == collapse->neighbours[id])
-          bound = minimum(bound, to_surface->new_triangle_bounds[i / 2]);
-    if (bound > to_surface->limit) {
+          bound = qmat_smaller(bound, tracker->new_triangle_bounds[i / 2]);
+    if (bound > tracker->limit) {
       s.found = s.bound = -INFINITY;
       memcpy(s.place, sphere, sizeof s.place);
       *kept = search_piece(&s, &p, 0);
       bound = s.bound;
-      to_surface->failed = maximum(s.found, to_surface->limit);
-      memcpy(to_surface->failed_place, s.place, sizeof s.place);
+      tracker->failed = qmat_larger(s.found, tracker->limit);
+      memcpy(tracker->failed_place, s.place, sizeof s.place);
     }
     *result = bound;
   }
   return QMAT_OK;
 }
 
-void qmat_envelope_to_surface_commit(qmat_envelope_to_surface *to_surface, const qmat_collapse *collapse) {
-  to_surface->depths[collapse->kept] = to_surface->sphere_depth;
+void qmat_envelope_to_surface_commit(qmat_envelope_to_surface *tracker, const qmat_collapse *collapse) {
+  tracker->depths[collapse->kept] = tracker->sphere_depth;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const uint32_t edge = collapse->kept_edges[n] != QMAT_NONE ? collapse->kept_edges[n] : collapse->removed_edges[n];
-    to_surface->edge_bounds[edge] = to_surface->new_edge_bounds[n];
+    tracker->edge_bounds[edge] = tracker->new_edge_bounds[n];
   }
   for (size_t t = 0; t < collapse->triangle_count; t++) {
     const uint32_t triangle =
         collapse->kept_triangles[t] != QMAT_NONE ? collapse->kept_triangles[t] : collapse->removed_triangles[t];
-    to_surface->triangle_bounds[triangle] = to_surface->new_triangle_bounds[t];
+    tracker->triangle_bounds[triangle] = tracker->new_triangle_bounds[t];
   }
 }
 
-void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *to_surface, const qmat_complex *complex, uint32_t a,
+void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
                                          uint32_t b, double bound) {
-  double *known = &to_surface->edge_bounds[qmat_complex_find_edge(complex, a, b)];
-  *known = minimum(*known, bound);
+  double *known = &tracker->edge_bounds[qmat_complex_find_edge(complex, a, b)];
+  *known = qmat_smaller(*known, bound);
 }
 
-void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *to_surface, const qmat_complex *complex,
-                                             uint32_t a, uint32_t b, uint32_t c, double bound) {
-  double *known = &to_surface->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
-  *known = minimum(*known, bound);
+void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
+                                             uint32_t b, uint32_t c, double bound) {
+  double *known = &tracker->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
+  *known = qmat_smaller(*known, bound);
 }
 
-double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *to_surface, const qmat_complex *complex) {
+double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *tracker, const qmat_complex *complex) {
   double largest = 0;
   for (size_t v = 0; v < complex->vertex_count; v++)
-    if (complex->vertex_alive[v]) largest = maximum(largest, complex->spheres[4 * v + 3] - to_surface->depths[v]);
+    if (complex->vertex_alive[v]) largest = qmat_larger(largest, complex->spheres[4 * v + 3] - tracker->depths[v]);
   for (size_t e = 0; e < complex->edge_count; e++)
-    if (complex->edge_alive[e]) largest = maximum(largest, to_surface->edge_bounds[e]);
+    if (complex->edge_alive[e]) largest = qmat_larger(largest, tracker->edge_bounds[e]);
   for (size_t t = 0; t < complex->triangle_count; t++)
-    if (complex->triangle_alive[t]) largest = maximum(largest, to_surface->triangle_bounds[t]);
+    if (complex->triangle_alive[t]) largest = qmat_larger(largest, tracker->triangle_bounds[t]);
   return largest;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_distance.h"
+#include "core/geometry/vector.h"
 
 /* Pieces are not split beyond what rounding leaves of F. */
 static const double least_tolerance = 1e-6;
@@ -16,11 +17,6 @@ typedef struct facet_search {
   double found, bound;          /* the largest F found, and the largest bound of a finished piece */
   double worst, worst_point[3]; /* the largest F found on this facet */
 } facet_search;
-
-static double distance(const double *a, const double *b) {
-  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-  return sqrt(x * x + y * y + z * z);
-}
 
 /* The signed distance to one primitive at the farthest of three corners: an upper bound of F over their triangle. */
 static double convex_bound(const facet_search *search, size_t primitive, double corners[3][3]) {
@@ -43,7 +39,7 @@ static double convex_bound(const facet_search *search, size_t primitive, double 
 static void search_piece(facet_search *search, double corners[3][3]) {
   double centre[3], reach = 0;
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
-  for (int i = 0; i < 3; i++) reach = fmax(reach, distance(corners[i], centre));
+  for (int i = 0; i < 3; i++) reach = fmax(reach, qmat_point_distance(corners[i], centre));
   size_t primitive;
   const double f = qmat_envelope_distance(search->envelope, centre, &primitive);
   if (f > search->worst) {
@@ -60,7 +56,7 @@ static void search_piece(facet_search *search, double corners[3][3]) {
   int a = 0, b = 1;
   double longest = -1;
   for (int i = 0; i < 3; i++) {
-    const double length = distance(corners[i], corners[(i + 1) % 3]);
+    const double length = qmat_point_distance(corners[i], corners[(i + 1) % 3]);
     if (length > longest) {
       longest = length;
       a = i;

@@ -12,7 +12,7 @@ static const double spacing_share = 2, cube_share = 0.5;
 
 /* The share of a sphere's depth beyond what is asked for that the envelope has to hold around its centre within one of
  * its spheres. All of it would refuse joints that the envelope fills by several. */
-static const double held_share = 0.5;
+static const double covered_share = 0.5;
 
 typedef struct {
   uint64_t cube;
@@ -106,7 +106,7 @@ qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex 
     const double *sphere = &complex->spheres[4 * (size_t)placed[i].vertex];
     memcpy(&inner->points[3 * next], sphere, 3 * sizeof *sphere);
     inner->spheres[next] = placed[i].vertex;
-    inner->limits[next] = -held_share * (sphere[3] - depth);
+    inner->limits[next] = -covered_share * (sphere[3] - depth);
     inner->distances[next++] = -sphere[3];
   }
   for (size_t i = 0; i < nodes; i++) {

@@ -9,8 +9,8 @@
 
 /* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
  * one look. */
-static double least_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
-                               int threads) {
+static double sampled_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
+                                 int threads) {
   const size_t primitives = qmat_envelope_primitive_count(envelope);
   double least = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
@@ -27,7 +27,7 @@ static double least_to_surface(const qmat_surface *surface, const qmat_medial *u
 
 static double largest_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
                                  double tolerance, double enough, int threads) {
-  enough = fmax(enough, least_to_surface(surface, unit, envelope, threads) + tolerance);
+  enough = fmax(enough, sampled_to_surface(surface, unit, envelope, threads) + tolerance);
   const size_t primitives = qmat_envelope_primitive_count(envelope);
   double largest = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
@@ -92,16 +92,16 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
                                           &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
-  errors->cavities = boundary.far_points;
-  errors->cavity_count = keep_inside(surface, errors->cavities, boundary.far_count);
-  errors->doubts = boundary.undecided_points;
-  errors->doubt_count = keep_inside(surface, errors->doubts, boundary.undecided_count);
+  errors->uncovered = boundary.far_points;
+  errors->uncovered_count = keep_inside(surface, errors->uncovered, boundary.far_count);
+  errors->undecided = boundary.undecided_points;
+  errors->undecided_count = keep_inside(surface, errors->undecided, boundary.undecided_count);
   return status;
 }
 
 void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
-  qmat_free(errors->cavities);
-  qmat_free(errors->doubts);
-  errors->cavities = errors->doubts = NULL;
-  errors->cavity_count = errors->doubt_count = 0;
+  qmat_free(errors->uncovered);
+  qmat_free(errors->undecided);
+  errors->uncovered = errors->undecided = NULL;
+  errors->uncovered_count = errors->undecided_count = 0;
 }

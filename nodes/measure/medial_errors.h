@@ -10,9 +10,9 @@ typedef struct qmat_medial_errors {
   double envelope_to_surface; /* of what spheres, cones and slabs leave the solid by */
   qmat_hausdorff_bound bound; /* where the surface is farther than the threshold */
   double boundary_to_surface; /* of the distance of the envelope's boundary, on either side; 0: not measured */
-  size_t cavity_count, doubt_count;
-  double *cavities; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
-  double *doubts;   /* 3 each: places in the solid that may be as deep, though none was found that is */
+  size_t uncovered_count, undecided_count;
+  double *uncovered; /* 3 each: places of the envelope's boundary, deep in the solid: notches and voids */
+  double *undecided; /* 3 each: places in the solid that may be as deep, though none was found that is */
 } qmat_medial_errors;
 
 /* `unit` is a medial mesh in the unit frame, sealed or not. Each measures by branch and bound on all threads, and its

@@ -53,7 +53,7 @@ typedef struct {
   uint32_t point;
 } nearest_point;
 
-static void look_into(const qmat_point_grid *grid, size_t cell, const double *place, nearest_point *best) {
+static void search_cell(const qmat_point_grid *grid, size_t cell, const double *place, nearest_point *best) {
   for (uint32_t i = grid->starts[cell]; i < grid->starts[cell + 1]; i++) {
     const uint32_t point = grid->items[i];
     double square = 0;
@@ -67,7 +67,7 @@ static void look_into(const qmat_point_grid *grid, size_t cell, const double *pl
 }
 
 /* Looks into the cells that are `ring` cells away from `middle` along the axis along which they are farthest. */
-static void look_around(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
+static void search_ring(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
                         nearest_point *best) {
   size_t first[3], last[3], cell[3];
   for (size_t k = 0; k < 3; k++) {
@@ -80,7 +80,7 @@ static void look_around(const qmat_point_grid *grid, const size_t middle[3], siz
                            cell[1] == middle[1] + ring;
       for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++)
         if (on_side || cell[2] + ring == middle[2] || cell[2] == middle[2] + ring)
-          look_into(grid, cell_index(grid, cell), place, best);
+          search_cell(grid, cell_index(grid, cell), place, best);
     }
 }
 
@@ -92,7 +92,7 @@ uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place
   }
   nearest_point best = {INFINITY, UINT32_MAX};
   for (size_t ring = 0; ring < rings; ring++) {
-    look_around(grid, middle, ring, place, &best);
+    search_ring(grid, middle, ring, place, &best);
     /* All that was not looked at is beyond so many whole cells. */
     const double beyond = (double)ring * grid->width;
     if (best.square < beyond * beyond) break;
@@ -110,7 +110,7 @@ bool qmat_point_grid_has_within(const qmat_point_grid *grid, const double place[
   for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++)
     for (cell[1] = first[1]; cell[1] <= last[1]; cell[1]++)
       for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++) {
-        look_into(grid, cell_index(grid, cell), place, &best);
+        search_cell(grid, cell_index(grid, cell), place, &best);
         if (best.square <= reach * reach) return true;
       }
   return false;

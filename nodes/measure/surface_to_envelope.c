@@ -11,96 +11,96 @@ typedef struct qmat_new_witness {
   double weights[3];
 } new_witness;
 
-static void link_slot(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
-  const uint32_t head = to_envelope->heads[vertex];
-  to_envelope->next[slot] = head;
-  to_envelope->previous[slot] = QMAT_NONE;
-  if (head != QMAT_NONE) to_envelope->previous[head] = slot;
-  to_envelope->heads[vertex] = slot;
-  to_envelope->slot_counts[vertex]++;
+static void link_slot(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t vertex) {
+  const uint32_t head = tracker->heads[vertex];
+  tracker->next[slot] = head;
+  tracker->previous[slot] = QMAT_NONE;
+  if (head != QMAT_NONE) tracker->previous[head] = slot;
+  tracker->heads[vertex] = slot;
+  tracker->slot_counts[vertex]++;
 }
 
-static void unlink_slot(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
-  const uint32_t next = to_envelope->next[slot], previous = to_envelope->previous[slot];
-  if (next != QMAT_NONE) to_envelope->previous[next] = previous;
+static void unlink_slot(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t vertex) {
+  const uint32_t next = tracker->next[slot], previous = tracker->previous[slot];
+  if (next != QMAT_NONE) tracker->previous[next] = previous;
   if (previous != QMAT_NONE)
-    to_envelope->next[previous] = next;
+    tracker->next[previous] = next;
   else
-    to_envelope->heads[vertex] = next;
-  to_envelope->slot_counts[vertex]--;
+    tracker->heads[vertex] = next;
+  tracker->slot_counts[vertex]--;
 }
 
-qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to_envelope *to_envelope,
-                                          size_t point_count, const double *points, double *limits,
-                                          const uint32_t *witnesses, const double *weights, size_t vertex_count) {
-  *to_envelope = (qmat_surface_to_envelope){.point_count = point_count, .points = points, .limits = limits};
+qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to_envelope *tracker, size_t point_count,
+                                          const double *points, double *limits, const uint32_t *witnesses,
+                                          const double *weights, size_t vertex_count) {
+  *tracker = (qmat_surface_to_envelope){.point_count = point_count, .points = points, .limits = limits};
   if (point_count >= QMAT_NONE / 3) return qmat_fail_memory(context, "constraint points");
-  to_envelope->witnesses = qmat_alloc(point_count, 3 * sizeof(uint32_t));
-  to_envelope->weights = qmat_alloc(point_count, 3 * sizeof(double));
-  to_envelope->next = qmat_alloc(point_count, 3 * sizeof(uint32_t));
-  to_envelope->previous = qmat_alloc(point_count, 3 * sizeof(uint32_t));
-  to_envelope->heads = qmat_alloc(vertex_count, sizeof(uint32_t));
-  to_envelope->slot_counts = qmat_calloc(vertex_count, sizeof(uint32_t));
-  to_envelope->marks = qmat_calloc(point_count, sizeof(uint32_t));
-  if (!to_envelope->witnesses || !to_envelope->weights || !to_envelope->next || !to_envelope->previous ||
-      !to_envelope->heads || !to_envelope->slot_counts || !to_envelope->marks)
+  tracker->witnesses = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  tracker->weights = qmat_alloc(point_count, 3 * sizeof(double));
+  tracker->next = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  tracker->previous = qmat_alloc(point_count, 3 * sizeof(uint32_t));
+  tracker->heads = qmat_alloc(vertex_count, sizeof(uint32_t));
+  tracker->slot_counts = qmat_calloc(vertex_count, sizeof(uint32_t));
+  tracker->marks = qmat_calloc(point_count, sizeof(uint32_t));
+  if (!tracker->witnesses || !tracker->weights || !tracker->next || !tracker->previous || !tracker->heads ||
+      !tracker->slot_counts || !tracker->marks)
     return qmat_fail_memory(context, "constraint points");
   if (point_count > 0) {
-    memcpy(to_envelope->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
-    memcpy(to_envelope->weights, weights, 3 * point_count * sizeof *weights);
+    memcpy(tracker->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
+    memcpy(tracker->weights, weights, 3 * point_count * sizeof *weights);
   }
-  for (size_t v = 0; v < vertex_count; v++) to_envelope->heads[v] = QMAT_NONE;
+  for (size_t v = 0; v < vertex_count; v++) tracker->heads[v] = QMAT_NONE;
   for (size_t slot = 0; slot < 3 * point_count; slot++)
-    if (witnesses[slot] != QMAT_NONE) link_slot(to_envelope, (uint32_t)slot, witnesses[slot]);
+    if (witnesses[slot] != QMAT_NONE) link_slot(tracker, (uint32_t)slot, witnesses[slot]);
   return QMAT_OK;
 }
 
-void qmat_surface_to_envelope_uninit(qmat_surface_to_envelope *to_envelope) {
-  qmat_free(to_envelope->witnesses);
-  qmat_free(to_envelope->weights);
-  qmat_free(to_envelope->next);
-  qmat_free(to_envelope->previous);
-  qmat_free(to_envelope->heads);
-  qmat_free(to_envelope->slot_counts);
-  qmat_free(to_envelope->marks);
-  qmat_free(to_envelope->found);
-  qmat_free(to_envelope->star.items);
-  qmat_free(to_envelope->star.balls);
-  qmat_free(to_envelope->link.items);
-  qmat_free(to_envelope->link.balls);
-  *to_envelope = (qmat_surface_to_envelope){0};
+void qmat_surface_to_envelope_uninit(qmat_surface_to_envelope *tracker) {
+  qmat_free(tracker->witnesses);
+  qmat_free(tracker->weights);
+  qmat_free(tracker->next);
+  qmat_free(tracker->previous);
+  qmat_free(tracker->heads);
+  qmat_free(tracker->slot_counts);
+  qmat_free(tracker->marks);
+  qmat_free(tracker->found);
+  qmat_free(tracker->star.items);
+  qmat_free(tracker->star.balls);
+  qmat_free(tracker->link.items);
+  qmat_free(tracker->link.balls);
+  *tracker = (qmat_surface_to_envelope){0};
 }
 
 /* F at the witness after the collapse: an upper bound of F there. */
-static double witness_distance(const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+static double witness_distance(const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double sphere[4], size_t point) {
   double s[4] = {0, 0, 0, 0};
   for (size_t k = 0; k < 3; k++) {
-    const uint32_t vertex = to_envelope->witnesses[3 * point + k];
+    const uint32_t vertex = tracker->witnesses[3 * point + k];
     if (vertex == QMAT_NONE) break;
-    const double weight = to_envelope->weights[3 * point + k];
+    const double weight = tracker->weights[3 * point + k];
     const double *corner =
         vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
     for (int i = 0; i < 4; i++) s[i] += weight * corner[i];
   }
-  return qmat_sphere_distance(s, &to_envelope->points[3 * point]);
+  return qmat_sphere_distance(s, &tracker->points[3 * point]);
 }
 
 /* A slab or loose cone of a star. */
-typedef struct qmat_star_part {
+typedef struct qmat_star_primitive {
   qmat_primitive primitive;
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
-} star_part;
+} star_primitive;
 
-static qmat_status add_part(qmat_context *context, qmat_star_parts *parts, const double *const spheres[3],
-                            const uint32_t vertices[3]) {
-  if (qmat_grow((void **)&parts->items, &parts->item_capacity, parts->count + 1, sizeof *parts->items) ||
-      qmat_grow((void **)&parts->balls, &parts->ball_capacity, parts->count + 1, sizeof *parts->balls))
+static qmat_status add_primitive(qmat_context *context, qmat_star_primitives *list, const double *const spheres[3],
+                                 const uint32_t vertices[3]) {
+  if (qmat_grow((void **)&list->items, &list->item_capacity, list->count + 1, sizeof *list->items) ||
+      qmat_grow((void **)&list->balls, &list->ball_capacity, list->count + 1, sizeof *list->balls))
     return qmat_fail_memory(context, "the star of a collapse");
-  star_part *part = &parts->items[parts->count];
-  memcpy(part->vertices, vertices, sizeof part->vertices);
-  qmat_primitive_prepare(spheres, vertices[2] == QMAT_NONE ? 2 : 3, &part->primitive, &parts->balls[parts->count]);
-  parts->count++;
+  star_primitive *item = &list->items[list->count];
+  memcpy(item->vertices, vertices, sizeof item->vertices);
+  qmat_primitive_prepare(spheres, vertices[2] == QMAT_NONE ? 2 : 3, &item->primitive, &list->balls[list->count]);
+  list->count++;
   return QMAT_OK;
 }
 
@@ -110,33 +110,33 @@ static const double *corner(const qmat_complex *complex, const qmat_collapse *co
   return vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
 }
 
-static qmat_status add_simplex(qmat_context *context, qmat_star_parts *parts, const qmat_complex *complex,
+static qmat_status add_simplex(qmat_context *context, qmat_star_primitives *list, const qmat_complex *complex,
                                const qmat_collapse *collapse, const double *sphere, uint32_t a, uint32_t b,
                                uint32_t c) {
   const uint32_t vertices[3] = {a, b, c};
   const double *spheres[3] = {corner(complex, collapse, sphere, a), corner(complex, collapse, sphere, b), NULL};
   if (c != QMAT_NONE) spheres[2] = corner(complex, collapse, sphere, c);
-  return add_part(context, parts, spheres, vertices);
+  return add_primitive(context, list, spheres, vertices);
 }
 
-qmat_status qmat_surface_to_envelope_prepare(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+qmat_status qmat_surface_to_envelope_prepare(qmat_context *context, qmat_surface_to_envelope *tracker,
                                              const qmat_complex *complex, const qmat_collapse *collapse,
                                              const double sphere[4]) {
   qmat_status status = QMAT_OK;
-  to_envelope->star.count = to_envelope->link.count = 0;
-  to_envelope->link_known = false;
+  tracker->star.count = tracker->link.count = 0;
+  tracker->link_known = false;
   for (size_t t = 0; t < collapse->triangle_count && status == QMAT_OK; t++)
-    status = add_simplex(context, &to_envelope->star, complex, collapse, sphere, collapse->kept,
+    status = add_simplex(context, &tracker->star, complex, collapse, sphere, collapse->kept,
                          collapse->triangle_pairs[2 * t], collapse->triangle_pairs[2 * t + 1]);
   for (size_t n = 0; n < collapse->neighbour_count && status == QMAT_OK; n++) {
     bool loose = true;
     for (size_t i = 0; i < 2 * collapse->triangle_count && loose; i++)
       loose = collapse->triangle_pairs[i] != collapse->neighbours[n];
     if (loose)
-      status = add_simplex(context, &to_envelope->star, complex, collapse, sphere, collapse->kept,
-                           collapse->neighbours[n], QMAT_NONE);
+      status = add_simplex(context, &tracker->star, complex, collapse, sphere, collapse->kept, collapse->neighbours[n],
+                           QMAT_NONE);
   }
-  to_envelope->prepared = status == QMAT_OK;
+  tracker->prepared = status == QMAT_OK;
   return status;
 }
 
@@ -147,8 +147,8 @@ static bool is_touched(const qmat_collapse *collapse, const uint32_t *vertices, 
 }
 
 /* Prepares the primitives of the link's vertices that the collapse does not touch. */
-static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope *to_envelope,
-                                const qmat_complex *complex, const qmat_collapse *collapse) {
+static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope *tracker, const qmat_complex *complex,
+                                const qmat_collapse *collapse) {
   qmat_status status = QMAT_OK;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const uint32_t vertex = collapse->neighbours[n];
@@ -157,96 +157,95 @@ static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope 
     for (size_t i = 0; i < count && status == QMAT_OK; i++) {
       const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
       if (!is_touched(collapse, t, 3))
-        status = add_simplex(context, &to_envelope->link, complex, collapse, NULL, t[0], t[1], t[2]);
+        status = add_simplex(context, &tracker->link, complex, collapse, NULL, t[0], t[1], t[2]);
     }
     at = qmat_complex_edges_at(complex, vertex, &count);
     for (size_t i = 0; i < count && status == QMAT_OK; i++) {
       const uint32_t *ends = &complex->edges[2 * (size_t)at[i]];
       if (!complex->edge_triangles[at[i]] && !is_touched(collapse, ends, 2))
-        status = add_simplex(context, &to_envelope->link, complex, collapse, NULL, ends[0], ends[1], QMAT_NONE);
+        status = add_simplex(context, &tracker->link, complex, collapse, NULL, ends[0], ends[1], QMAT_NONE);
     }
   }
-  to_envelope->link_known = status == QMAT_OK;
+  tracker->link_known = status == QMAT_OK;
   return status;
 }
 
 /* The nearest primitive of the merged vertex's star. */
-static double search_star(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse,
+static double search_star(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse,
                           const double sphere[4], const double *point, new_witness *witness) {
   double best = qmat_sphere_distance(sphere, point);
   *witness = (new_witness){witness->point, {collapse->kept, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-  for (size_t i = 0; i < to_envelope->star.count; i++) {
+  for (size_t i = 0; i < tracker->star.count; i++) {
     double weights[3];
-    if (qmat_primitive_is_farther(&to_envelope->star.balls[i], point, best)) continue;
-    const star_part *part = &to_envelope->star.items[i];
-    const double f = qmat_primitive_foot(&part->primitive, point, weights);
+    if (qmat_primitive_is_farther(&tracker->star.balls[i], point, best)) continue;
+    const star_primitive *item = &tracker->star.items[i];
+    const double f = qmat_primitive_foot(&item->primitive, point, weights);
     if (!(f < best)) continue;
     best = f;
-    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->vertices, item->vertices, sizeof witness->vertices);
     memcpy(witness->weights, weights, sizeof witness->weights);
   }
   return best;
 }
 
 /* The nearest primitive of the link, or the first that comes as close as `enough`. */
-static double search_link(const qmat_surface_to_envelope *to_envelope, const double *point, double enough,
+static double search_link(const qmat_surface_to_envelope *tracker, const double *point, double enough,
                           new_witness *witness) {
   double best = INFINITY;
-  for (size_t i = 0; i < to_envelope->link.count; i++) {
+  for (size_t i = 0; i < tracker->link.count; i++) {
     double weights[3];
-    if (qmat_primitive_is_farther(&to_envelope->link.balls[i], point, best)) continue;
-    const star_part *part = &to_envelope->link.items[i];
-    const double f = qmat_primitive_foot(&part->primitive, point, weights);
+    if (qmat_primitive_is_farther(&tracker->link.balls[i], point, best)) continue;
+    const star_primitive *item = &tracker->link.items[i];
+    const double f = qmat_primitive_foot(&item->primitive, point, weights);
     if (!(f < best)) continue;
     best = f;
-    memcpy(witness->vertices, part->vertices, sizeof witness->vertices);
+    memcpy(witness->vertices, item->vertices, sizeof witness->vertices);
     memcpy(witness->weights, weights, sizeof witness->weights);
     if (best <= enough) break;
   }
   return best;
 }
 
-static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                               const qmat_collapse *collapse, const double sphere[4], uint32_t point, bool *kept) {
-  if (to_envelope->marks[point] == to_envelope->stamp) return QMAT_OK;
-  to_envelope->marks[point] = to_envelope->stamp;
-  const double limit = to_envelope->limits[point];
-  if (witness_distance(to_envelope, complex, collapse, sphere, point) <= limit) return QMAT_OK;
-  if (!to_envelope->prepared) {
-    const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
+  if (tracker->marks[point] == tracker->stamp) return QMAT_OK;
+  tracker->marks[point] = tracker->stamp;
+  const double limit = tracker->limits[point];
+  if (witness_distance(tracker, complex, collapse, sphere, point) <= limit) return QMAT_OK;
+  if (!tracker->prepared) {
+    const qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, sphere);
     if (status != QMAT_OK) return status;
   }
-  if (qmat_grow((void **)&to_envelope->found, &to_envelope->found_capacity, to_envelope->found_count + 1,
-                sizeof *to_envelope->found))
+  if (qmat_grow((void **)&tracker->found, &tracker->found_capacity, tracker->found_count + 1, sizeof *tracker->found))
     return qmat_fail_memory(context, "witnesses");
-  new_witness *witness = &to_envelope->found[to_envelope->found_count];
+  new_witness *witness = &tracker->found[tracker->found_count];
   witness->point = point;
-  const double *p = &to_envelope->points[3 * (size_t)point];
-  const double star = search_star(to_envelope, collapse, sphere, p, witness);
+  const double *p = &tracker->points[3 * (size_t)point];
+  const double star = search_star(tracker, collapse, sphere, p, witness);
   if (star <= limit) {
-    to_envelope->found_count++;
+    tracker->found_count++;
     return QMAT_OK;
   }
-  if (!to_envelope->link_known) {
-    const qmat_status status = prepare_link(context, to_envelope, complex, collapse);
+  if (!tracker->link_known) {
+    const qmat_status status = prepare_link(context, tracker, complex, collapse);
     if (status != QMAT_OK) return status;
   }
-  const double link = search_link(to_envelope, p, limit, witness);
+  const double link = search_link(tracker, p, limit, witness);
   if (link <= limit) {
-    to_envelope->found_count++;
+    tracker->found_count++;
     return QMAT_OK;
   }
-  to_envelope->failed_distance = fmin(star, link);
-  to_envelope->failed_point = point;
+  tracker->failed_distance = fmin(star, link);
+  tracker->failed_point = point;
   *kept = false;
   return QMAT_OK;
 }
 
-double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4], const double point[3],
                                           double foot[4], double *share) {
   new_witness witness = {.point = QMAT_NONE};
-  const double distance = search_star(to_envelope, collapse, sphere, point, &witness);
+  const double distance = search_star(tracker, collapse, sphere, point, &witness);
   *share = witness.weights[0];
   for (int i = 0; i < 4; i++) foot[i] = witness.weights[0] * sphere[i];
   for (size_t k = 1; k < 3 && witness.vertices[k] != QMAT_NONE; k++)
@@ -256,31 +255,31 @@ double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *to_env
 }
 
 /* Every point is looked at once in a walk over several lists: a new stamp marks those that were. */
-static void start_marks(qmat_surface_to_envelope *to_envelope) {
-  if (++to_envelope->stamp > 0) return;
-  memset(to_envelope->marks, 0, to_envelope->point_count * sizeof *to_envelope->marks);
-  to_envelope->stamp = 1;
+static void start_marks(qmat_surface_to_envelope *tracker) {
+  if (++tracker->stamp > 0) return;
+  memset(tracker->marks, 0, tracker->point_count * sizeof *tracker->marks);
+  tracker->stamp = 1;
 }
 
-qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_surface_to_envelope *tracker,
                                                  const qmat_complex *complex, const qmat_collapse *collapse,
                                                  const double sphere[4], size_t point_count, double *error) {
-  qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
-  if (status == QMAT_OK) status = prepare_link(context, to_envelope, complex, collapse);
+  qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, sphere);
+  if (status == QMAT_OK) status = prepare_link(context, tracker, complex, collapse);
   if (status != QMAT_OK) return status;
   *error = -INFINITY;
-  start_marks(to_envelope);
+  start_marks(tracker);
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = to_envelope->heads[ends[e]]; slot != QMAT_NONE; slot = to_envelope->next[slot]) {
+    for (uint32_t slot = tracker->heads[ends[e]]; slot != QMAT_NONE; slot = tracker->next[slot]) {
       const uint32_t point = slot / 3;
-      if (point >= point_count || to_envelope->marks[point] == to_envelope->stamp) continue;
-      to_envelope->marks[point] = to_envelope->stamp;
-      const double *p = &to_envelope->points[3 * (size_t)point];
+      if (point >= point_count || tracker->marks[point] == tracker->stamp) continue;
+      tracker->marks[point] = tracker->stamp;
+      const double *p = &tracker->points[3 * (size_t)point];
       new_witness witness = {.point = point};
-      double f = witness_distance(to_envelope, complex, collapse, sphere, point);
-      if (f > *error) f = fmin(f, search_star(to_envelope, collapse, sphere, p, &witness));
-      if (f > *error) f = fmin(f, search_link(to_envelope, p, *error, &witness));
+      double f = witness_distance(tracker, complex, collapse, sphere, point);
+      if (f > *error) f = fmin(f, search_star(tracker, collapse, sphere, p, &witness));
+      if (f > *error) f = fmin(f, search_link(tracker, p, *error, &witness));
       *error = fmax(*error, f);
     }
   return QMAT_OK;
@@ -289,99 +288,98 @@ qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_sur
 /* What a look at the slot will read: the lists run through memory at random, and waiting for it takes longer than the
  * look.
  */
-static inline void fetch_ahead(const qmat_surface_to_envelope *to_envelope, uint32_t slot) {
+static inline void fetch_ahead(const qmat_surface_to_envelope *tracker, uint32_t slot) {
   if (slot == QMAT_NONE) return;
   const size_t point = slot / 3;
-  __builtin_prefetch(&to_envelope->next[slot]);
-  __builtin_prefetch(&to_envelope->marks[point]);
-  __builtin_prefetch(&to_envelope->limits[point]);
-  __builtin_prefetch(&to_envelope->witnesses[3 * point]);
-  __builtin_prefetch(&to_envelope->weights[3 * point]);
-  __builtin_prefetch(&to_envelope->points[3 * point]);
+  __builtin_prefetch(&tracker->next[slot]);
+  __builtin_prefetch(&tracker->marks[point]);
+  __builtin_prefetch(&tracker->limits[point]);
+  __builtin_prefetch(&tracker->witnesses[3 * point]);
+  __builtin_prefetch(&tracker->weights[3 * point]);
+  __builtin_prefetch(&tracker->points[3 * point]);
 }
 
-static bool touches(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse, uint32_t point) {
+static bool touches(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t point) {
   for (size_t k = 0; k < 3; k++) {
-    const uint32_t vertex = to_envelope->witnesses[3 * (size_t)point + k];
+    const uint32_t vertex = tracker->witnesses[3 * (size_t)point + k];
     if (vertex != QMAT_NONE && (vertex == collapse->kept || vertex == collapse->removed)) return true;
   }
   return false;
 }
 
-qmat_status qmat_surface_to_envelope_test(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+qmat_status qmat_surface_to_envelope_test(qmat_context *context, qmat_surface_to_envelope *tracker,
                                           const qmat_complex *complex, const qmat_collapse *collapse,
                                           const double sphere[4], uint32_t first, bool *kept) {
   *kept = true;
-  to_envelope->found_count = 0;
-  to_envelope->prepared = false;
-  start_marks(to_envelope);
+  tracker->found_count = 0;
+  tracker->prepared = false;
+  start_marks(tracker);
   qmat_status status = QMAT_OK;
-  if (first != QMAT_NONE && touches(to_envelope, collapse, first))
-    status = test_point(context, to_envelope, complex, collapse, sphere, first, kept);
+  if (first != QMAT_NONE && touches(tracker, collapse, first))
+    status = test_point(context, tracker, complex, collapse, sphere, first, kept);
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = to_envelope->heads[ends[e]], next; slot != QMAT_NONE && status == QMAT_OK && *kept;
-         slot = next) {
-      next = to_envelope->next[slot];
-      fetch_ahead(to_envelope, next);
-      status = test_point(context, to_envelope, complex, collapse, sphere, slot / 3, kept);
+    for (uint32_t slot = tracker->heads[ends[e]], next; slot != QMAT_NONE && status == QMAT_OK && *kept; slot = next) {
+      next = tracker->next[slot];
+      fetch_ahead(tracker, next);
+      status = test_point(context, tracker, complex, collapse, sphere, slot / 3, kept);
     }
   return status;
 }
 
 /* Drops a witness slot, which is linked at `vertex`; the last used slot of the point takes its place. */
-static void drop_corner(qmat_surface_to_envelope *to_envelope, uint32_t slot, uint32_t vertex) {
-  unlink_slot(to_envelope, slot, vertex);
+static void drop_corner(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t vertex) {
+  unlink_slot(tracker, slot, vertex);
   uint32_t last = slot;
-  while (last % 3 < 2 && to_envelope->witnesses[last + 1] != QMAT_NONE) last++;
+  while (last % 3 < 2 && tracker->witnesses[last + 1] != QMAT_NONE) last++;
   if (last != slot) {
-    const uint32_t moved = to_envelope->witnesses[last];
-    unlink_slot(to_envelope, last, moved);
-    to_envelope->witnesses[slot] = moved;
-    to_envelope->weights[slot] = to_envelope->weights[last];
-    link_slot(to_envelope, slot, moved);
+    const uint32_t moved = tracker->witnesses[last];
+    unlink_slot(tracker, last, moved);
+    tracker->witnesses[slot] = moved;
+    tracker->weights[slot] = tracker->weights[last];
+    link_slot(tracker, slot, moved);
   }
-  to_envelope->witnesses[last] = QMAT_NONE;
-  to_envelope->weights[last] = 0;
+  tracker->witnesses[last] = QMAT_NONE;
+  tracker->weights[last] = 0;
 }
 
 /* The witnesses of `removed` become those of `kept`. */
-static void merge_lists(qmat_surface_to_envelope *to_envelope, uint32_t kept, uint32_t removed) {
+static void merge_lists(qmat_surface_to_envelope *tracker, uint32_t kept, uint32_t removed) {
   uint32_t tail = QMAT_NONE;
-  for (uint32_t slot = to_envelope->heads[removed]; slot != QMAT_NONE;) {
-    const uint32_t next = to_envelope->next[slot], first = slot - slot % 3;
+  for (uint32_t slot = tracker->heads[removed]; slot != QMAT_NONE;) {
+    const uint32_t next = tracker->next[slot], first = slot - slot % 3;
     uint32_t twin = first;
-    while (twin < first + 3 && to_envelope->witnesses[twin] != kept) twin++;
+    while (twin < first + 3 && tracker->witnesses[twin] != kept) twin++;
     if (twin < first + 3) {
-      to_envelope->weights[twin] += to_envelope->weights[slot];
-      drop_corner(to_envelope, slot, removed);
+      tracker->weights[twin] += tracker->weights[slot];
+      drop_corner(tracker, slot, removed);
     } else {
-      to_envelope->witnesses[slot] = kept;
+      tracker->witnesses[slot] = kept;
       tail = slot;
     }
     slot = next;
   }
   if (tail != QMAT_NONE) {
-    to_envelope->next[tail] = to_envelope->heads[kept];
-    if (to_envelope->heads[kept] != QMAT_NONE) to_envelope->previous[to_envelope->heads[kept]] = tail;
-    to_envelope->heads[kept] = to_envelope->heads[removed];
+    tracker->next[tail] = tracker->heads[kept];
+    if (tracker->heads[kept] != QMAT_NONE) tracker->previous[tracker->heads[kept]] = tail;
+    tracker->heads[kept] = tracker->heads[removed];
   }
-  to_envelope->slot_counts[kept] += to_envelope->slot_counts[removed];
-  to_envelope->heads[removed] = QMAT_NONE;
-  to_envelope->slot_counts[removed] = 0;
+  tracker->slot_counts[kept] += tracker->slot_counts[removed];
+  tracker->heads[removed] = QMAT_NONE;
+  tracker->slot_counts[removed] = 0;
 }
 
-void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse) {
-  if (collapse->removed != QMAT_NONE) merge_lists(to_envelope, collapse->kept, collapse->removed);
-  for (size_t i = 0; i < to_envelope->found_count; i++) {
-    const new_witness *w = &to_envelope->found[i];
+void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *tracker, const qmat_collapse *collapse) {
+  if (collapse->removed != QMAT_NONE) merge_lists(tracker, collapse->kept, collapse->removed);
+  for (size_t i = 0; i < tracker->found_count; i++) {
+    const new_witness *w = &tracker->found[i];
     for (size_t k = 0; k < 3; k++) {
       const uint32_t slot = 3 * w->point + (uint32_t)k;
-      if (to_envelope->witnesses[slot] != QMAT_NONE) unlink_slot(to_envelope, slot, to_envelope->witnesses[slot]);
-      to_envelope->witnesses[slot] = w->vertices[k];
-      to_envelope->weights[slot] = w->weights[k];
-      if (w->vertices[k] != QMAT_NONE) link_slot(to_envelope, slot, w->vertices[k]);
+      if (tracker->witnesses[slot] != QMAT_NONE) unlink_slot(tracker, slot, tracker->witnesses[slot]);
+      tracker->witnesses[slot] = w->vertices[k];
+      tracker->weights[slot] = w->weights[k];
+      if (w->vertices[k] != QMAT_NONE) link_slot(tracker, slot, w->vertices[k]);
     }
   }
-  to_envelope->found_count = 0;
+  tracker->found_count = 0;
 }

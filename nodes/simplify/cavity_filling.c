@@ -10,8 +10,8 @@
 #include "nodes/measure/envelope_to_surface.h"
 
 /* How far a new sphere leaves the solid, as a share of epsilon: the first with which a cone keeps within epsilon. */
-static const double to_surface_errors[] = {0.9, 0.6, 0.3, 0};
-enum { PROTRUSIONS = sizeof to_surface_errors / sizeof *to_surface_errors };
+static const double protruding_shares[] = {0.9, 0.6, 0.3, 0};
+enum { SHARES = sizeof protruding_shares / sizeof *protruding_shares };
 
 /* Cones to so many of the nearest spheres are tried. */
 enum { MOST_NEIGHBOURS = 8 };
@@ -51,7 +51,7 @@ static size_t find_nearest(const double *spheres, size_t count, const double *pl
   return found;
 }
 
-static bool is_held(const double *spheres, size_t count, const double *place) {
+static bool is_covered(const double *spheres, size_t count, const double *place) {
   for (size_t i = 0; i < count; i++)
     if (qmat_sphere_distance(&spheres[4 * i], place) < 0) return true;
   return false;
@@ -63,8 +63,8 @@ static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_
   uint32_t nearest[MOST_NEIGHBOURS];
   const size_t found = find_nearest(spheres, count, place, nearest);
   memcpy(sphere, place, 3 * sizeof *place);
-  for (int p = 0; p < PROTRUSIONS; p++) {
-    sphere[3] = depth + to_surface_errors[p] * epsilon;
+  for (int p = 0; p < SHARES; p++) {
+    sphere[3] = depth + protruding_shares[p] * epsilon;
     for (size_t n = 0; n < found; n++) {
       const double *const ends[2] = {sphere, &spheres[4 * (size_t)nearest[n]]};
       *neighbour = nearest[n];
@@ -129,7 +129,7 @@ qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surfac
   for (size_t i = 0; i < count; i++) {
     const double *place = &places[3 * cavities[i].place];
     double *sphere = &spheres[4 * (before + *added)];
-    if (!(cavities[i].depth > 0) || is_held(&spheres[4 * before], *added, place)) continue;
+    if (!(cavities[i].depth > 0) || is_covered(&spheres[4 * before], *added, place)) continue;
     if (fit_sphere(surface, spheres, before + *added, place, cavities[i].depth, epsilon, sphere, &neighbours[*added]))
       ++*added;
   }

@@ -5,7 +5,7 @@
 
 #include "core/geometry/medial_build.h"
 
-const double qmat_control_share = 0.975;
+const double qmat_constraint_share = 0.975;
 
 void qmat_collapse_roots(const uint32_t *ends, size_t count, size_t sphere_count, uint32_t *roots) {
   for (size_t v = 0; v < sphere_count; v++) roots[v] = (uint32_t)v;
@@ -39,7 +39,7 @@ size_t qmat_chain_length(const qmat_chain *chain, size_t vertices, double epsilo
   if (!(epsilon > 0)) return high;
   while (low < high) { /* errors never fall */
     const size_t middle = low + (high - low) / 2;
-    if (chain->errors[middle] > qmat_control_share * epsilon)
+    if (chain->errors[middle] > qmat_constraint_share * epsilon)
       high = middle;
     else
       low = middle + 1;

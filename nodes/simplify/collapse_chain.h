@@ -15,7 +15,7 @@ typedef struct qmat_collapse_log {
 
 /* Of an error that is asked for, collapses may reach this share at the constraint points: the rest is left to the
  * surface between them. */
-extern const double qmat_control_share;
+extern const double qmat_constraint_share;
 
 /* The sphere that each of `sphere_count` initial spheres has become part of after `count` collapses (`ends`: 2 per
  * collapse, as in qmat_chain), itself where it went into none. `roots`: sphere_count. Cost: linear. */

@@ -16,7 +16,7 @@ double qmat_pmat_cost(const double a[4], const double b[4]) {
   return length > 0 ? length / fabs(a[3] - b[3]) : 0;
 }
 
-qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *tracker,
                                       const qmat_complex *complex, const qmat_collapse *collapse, size_t point_count,
                                       qmat_candidates *candidates) {
   const double *ends[2] = {&complex->spheres[4 * (size_t)collapse->kept],
@@ -27,7 +27,7 @@ qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_env
     const double *sphere = ends[i ? !larger : larger];
     double error;
     const qmat_status status =
-        qmat_surface_to_envelope_of_collapse(context, to_envelope, complex, collapse, sphere, point_count, &error);
+        qmat_surface_to_envelope_of_collapse(context, tracker, complex, collapse, sphere, point_count, &error);
     if (status != QMAT_OK) return status;
     qmat_candidates_insert(candidates, sphere, error);
   }

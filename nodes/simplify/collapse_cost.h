@@ -23,7 +23,7 @@ double qmat_pmat_cost(const double a[4], const double b[4]);
 /* The end of the edge of the newest preview to which a collapse leaves the least F at the points that both ends answer
  * for, of the first `point_count` constraint points, with that F: the largest. -INFINITY where there are none; of
  * equals the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
-qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *to_envelope,
+qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *tracker,
                                       const qmat_complex *complex, const qmat_collapse *collapse, size_t point_count,
                                       qmat_candidates *candidates);
 

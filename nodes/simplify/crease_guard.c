@@ -137,12 +137,12 @@ static double error_without(const qmat_crease_guard *g, uint32_t feature, uint32
 }
 
 bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_complex *complex,
-                                const qmat_quadric *quadrics, uint32_t edge, double held, qmat_candidates *candidates,
-                                double *asked) {
+                                const qmat_quadric *quadrics, uint32_t edge, double tolerance,
+                                qmat_candidates *candidates, double *needed) {
   const uint32_t *ends = &complex->edges[2 * (size_t)edge];
   const bool is_feature[2] = {qmat_crease_guard_is_feature(guard, ends[0]),
                               qmat_crease_guard_is_feature(guard, ends[1])};
-  *asked = INFINITY;
+  *needed = INFINITY;
   if (!is_feature[0] && !is_feature[1]) return false;
   const bool is_last_inner = complex->live_vertices <= guard->left + 1;
   const qmat_quadric quadric = qmat_merged_quadric(complex, quadrics, edge);
@@ -151,10 +151,10 @@ bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_compl
     if (!is_feature[k]) continue;
     double error = is_last_inner ? INFINITY : 0;
     if (is_feature[1 - k]) error = error_without(guard, guard->features[ends[1 - k]], guard->features[ends[k]]);
-    if (error <= held && error < INFINITY)
+    if (error <= tolerance && error < INFINITY)
       qmat_candidates_add(candidates, &quadric, &complex->spheres[4 * (size_t)ends[k]]);
     else
-      *asked = fmin(*asked, error);
+      *needed = fmin(*needed, error);
   }
   return true;
 }

@@ -38,11 +38,11 @@ static inline bool qmat_crease_guard_is_feature(const qmat_crease_guard *guard, 
 }
 
 /* Leaves of the candidates of an edge what keeps features, with their slab quadratic errors: none or some of its ends.
- * False, and nothing changed, where neither end is a feature. `held` is how far points of a crease may be from it;
- * `*asked` gets the least for which there would be a candidate more (INFINITY: none). Safe from any thread. */
+ * False, and nothing changed, where neither end is a feature. `tolerance` is how far points of a crease may be from it;
+ * `*needed` gets the least for which there would be a candidate more (INFINITY: none). Safe from any thread. */
 bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_complex *complex,
-                                const qmat_quadric *quadrics, uint32_t edge, double held, qmat_candidates *candidates,
-                                double *asked);
+                                const qmat_quadric *quadrics, uint32_t edge, double tolerance,
+                                qmat_candidates *candidates, double *needed);
 
 /* Follows a collapse to `sphere`, one of those that were left: call it before the complex changes. */
 void qmat_crease_guard_commit(qmat_crease_guard *guard, const qmat_complex *complex, const qmat_collapse *collapse,

@@ -27,31 +27,33 @@ static bool is_two_sided(const qmat_decimation *s) {
   return s->rules.error == QMAT_ERROR_TWO_SIDED;
 }
 
-/* Levels by which what is held rises: twelve to each doubling of the finest. Beyond the whole model nothing is held. */
+/* Levels by which what is threshold rises: twelve to each doubling of the finest. Beyond the whole model nothing is
+ * threshold. */
 enum { LEVELS_TO_A_DOUBLING = 12 };
 
-static double held_at(const qmat_decimation *s, int level) {
+static double threshold_at(const qmat_decimation *s, int level) {
   const double part = exp2((double)(level % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING);
   const double error = ldexp(part, level / LEVELS_TO_A_DOUBLING) * s->rules.finest;
-  return error <= 1 ? qmat_control_share * error : INFINITY;
+  return error <= 1 ? qmat_constraint_share * error : INFINITY;
 }
 
 /* Points that the initial medial mesh leaves farther away are kept from getting worse. An interior point that is deeper
- * than what is held has to stay inside the envelope, lest it be cavity. */
-static void hold(qmat_decimation *s, int level) {
-  const qmat_constraint_points *control = s->control;
+ * than what is threshold has to stay inside the envelope, lest it be cavity. */
+static void set_threshold(qmat_decimation *s, int level) {
+  const qmat_constraint_points *constraints = s->constraints;
   s->level = level;
-  s->held = held_at(s, level);
-  for (size_t i = 0; i < control->surface_count; i++) s->to_envelope.limits[i] = fmax(s->held, control->distances[i]);
-  for (size_t i = control->surface_count; i < control->count; i++)
-    s->to_envelope.limits[i] = -control->distances[i] > s->held ? 0 : INFINITY;
-  s->to_surface.limit = is_two_sided(s) ? s->held : INFINITY;
+  s->threshold = threshold_at(s, level);
+  for (size_t i = 0; i < constraints->surface_count; i++)
+    s->surface_tracker.limits[i] = fmax(s->threshold, constraints->distances[i]);
+  for (size_t i = constraints->surface_count; i < constraints->count; i++)
+    s->surface_tracker.limits[i] = -constraints->distances[i] > s->threshold ? 0 : INFINITY;
+  s->envelope_tracker.limit = is_two_sided(s) ? s->threshold : INFINITY;
 }
 
 /* False where the next level is above the limit, or there is none. */
-static bool hold_next(qmat_decimation *s) {
-  if (!(s->held < INFINITY) || held_at(s, s->level + 1) > s->rules.limit) return false;
-  hold(s, s->level + 1);
+static bool raise_threshold(qmat_decimation *s) {
+  if (!(s->threshold < INFINITY) || threshold_at(s, s->level + 1) > s->rules.limit) return false;
+  set_threshold(s, s->level + 1);
   return true;
 }
 
@@ -61,8 +63,8 @@ static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candi
   } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
     const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
     if (status != QMAT_OK) return status;
-    return qmat_hausdorff_candidates(s->context, &s->to_envelope, &s->complex, &s->collapse, s->control->surface_count,
-                                     c);
+    return qmat_hausdorff_candidates(s->context, &s->surface_tracker, &s->complex, &s->collapse,
+                                     s->constraints->surface_count, c);
   } else if (s->rules.published) {
     qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
   } else {
@@ -71,12 +73,12 @@ static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candi
   return QMAT_OK;
 }
 
-/* What an edge at sharp features may collapse to, whatever is held; where there is nothing the candidates stay. */
+/* What an edge at sharp features may collapse to, whatever is threshold; where there is nothing the candidates stay. */
 static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
-  double asked;
+  double needed;
   if (s->rules.cost == QMAT_COST_SLAB &&
-      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &asked) &&
+      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &needed) &&
       allowed.count > 0)
     *c = allowed;
 }
@@ -102,16 +104,16 @@ static qmat_status fill_heap(qmat_decimation *s) {
   const size_t count = s->complex.edge_count;
   s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
   s->stale = qmat_arena_alloc(&s->context->arena, count, sizeof *s->stale);
-  s->asked = qmat_arena_alloc(&s->context->arena, count, sizeof *s->asked);
+  s->needed = qmat_arena_alloc(&s->context->arena, count, sizeof *s->needed);
   s->fitted_errors = qmat_arena_calloc(&s->context->arena, count, sizeof *s->fitted_errors);
   s->converged = qmat_arena_calloc(&s->context->arena, s->complex.vertex_count, sizeof *s->converged);
-  if (!s->failed_points || !s->stale || !s->asked || !s->fitted_errors || !s->converged)
+  if (!s->failed_points || !s->stale || !s->needed || !s->fitted_errors || !s->converged)
     return qmat_fail_memory(s->context, "the heap of edges");
   qmat_status status = qmat_edge_heap_init(s->context, &s->heap, &s->complex);
   if (status != QMAT_OK) return status;
   for (size_t e = 0; e < count; e++) {
     s->failed_points[e] = QMAT_NONE;
-    s->asked[e] = 0;
+    s->needed[e] = 0;
   }
   if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* looks at stars, one at a time */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
@@ -128,18 +130,18 @@ static qmat_status fill_heap(qmat_decimation *s) {
 }
 
 /* The sample's owner: the corner of its witness with the largest weight. */
-static uint32_t owner_of(const qmat_surface_to_envelope *to_envelope, size_t point) {
+static uint32_t owner_of(const qmat_surface_to_envelope *surface_tracker, size_t point) {
   uint32_t best = 0;
   for (uint32_t k = 1; k < 3; k++)
-    if (to_envelope->witnesses[3 * point + k] != QMAT_NONE &&
-        to_envelope->weights[3 * point + k] > to_envelope->weights[3 * point + best])
+    if (surface_tracker->witnesses[3 * point + k] != QMAT_NONE &&
+        surface_tracker->weights[3 * point + k] > surface_tracker->weights[3 * point + best])
       best = k;
-  return to_envelope->witnesses[3 * point + best];
+  return surface_tracker->witnesses[3 * point + best];
 }
 
 /* Room for every collapse, and who answers for the samples before the first. */
 static qmat_status start_log(qmat_decimation *s) {
-  const size_t most = s->complex.vertex_count, samples = s->control->sample_count;
+  const size_t most = s->complex.vertex_count, samples = s->constraints->sample_count;
   qmat_arena *arena = &s->context->arena;
   s->log.ends = qmat_arena_alloc(arena, most, 2 * sizeof(uint32_t));
   s->log.merged = qmat_arena_alloc(arena, most, 4 * sizeof(double));
@@ -147,16 +149,16 @@ static qmat_status start_log(qmat_decimation *s) {
   s->log.owners = qmat_arena_alloc(arena, samples, sizeof(uint32_t));
   if (!s->log.ends || !s->log.merged || !s->log.errors || !s->log.owners)
     return qmat_fail_memory(s->context, "the collapses");
-  for (size_t i = 0; i < samples; i++) s->log.owners[i] = owner_of(&s->to_envelope, i);
+  for (size_t i = 0; i < samples; i++) s->log.owners[i] = owner_of(&s->surface_tracker, i);
   return QMAT_OK;
 }
 
-qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_points *control, const double *depths) {
+qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_points *constraints, const double *depths) {
   qmat_context *context = s->context;
   const qmat_complex *c = &s->complex;
-  s->control = control;
+  s->constraints = constraints;
   s->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
-  double *limits = qmat_arena_alloc(&context->arena, control->count, sizeof *limits);
+  double *limits = qmat_arena_alloc(&context->arena, constraints->count, sizeof *limits);
   if (!limits) return qmat_fail_memory(context, "the simplification");
   if (!s->quadrics) {
     s->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *s->quadrics);
@@ -172,21 +174,22 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
   }
   /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
   const double limit = s->rules.share * s->rules.limit;
-  for (size_t i = 0; i < control->count; i++)
-    limits[i] = i < control->surface_count ? fmax(limit, control->distances[i])
-                                           : control->inner_limits[i - control->surface_count];
-  qmat_status status = qmat_surface_to_envelope_init(context, &s->to_envelope, control->count, control->points, limits,
-                                                     control->witnesses, control->weights, c->vertex_count);
+  for (size_t i = 0; i < constraints->count; i++)
+    limits[i] = i < constraints->surface_count ? fmax(limit, constraints->distances[i])
+                                               : constraints->inner_limits[i - constraints->surface_count];
+  qmat_status status =
+      qmat_surface_to_envelope_init(context, &s->surface_tracker, constraints->count, constraints->points, limits,
+                                    constraints->witnesses, constraints->weights, c->vertex_count);
   if (status == QMAT_OK) status = fill_heap(s);
   if (status != QMAT_OK) return status;
-  s->held = limit;
-  status = qmat_envelope_to_surface_init(context, &s->to_surface, s->surface, c, depths,
+  s->threshold = limit;
+  status = qmat_envelope_to_surface_init(context, &s->envelope_tracker, s->surface, c, depths,
                                          !is_two_sided(s) ? INFINITY
                                          : in_order(s)    ? s->rules.finest
                                                           : s->rules.limit);
-  if (is_two_sided(s)) s->to_surface.limit = limit;
+  if (is_two_sided(s)) s->envelope_tracker.limit = limit;
   if (status != QMAT_OK || !in_order(s)) return status;
-  hold(s, 0);
+  set_threshold(s, 0);
   return start_log(s);
 }
 
@@ -195,8 +198,8 @@ void qmat_decimation_uninit(qmat_decimation *s) {
   qmat_sphere_fit_uninit(&s->fit);
   qmat_neighbourhood_fit_uninit(&s->neighbourhood);
   qmat_free(s->saved);
-  qmat_surface_to_envelope_uninit(&s->to_envelope);
-  qmat_envelope_to_surface_uninit(&s->to_surface);
+  qmat_surface_to_envelope_uninit(&s->surface_tracker);
+  qmat_envelope_to_surface_uninit(&s->envelope_tracker);
   qmat_complex_uninit(&s->complex);
 }
 
@@ -206,9 +209,9 @@ static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   bool any = false;
   for (int k = 0; k < 2; k++)
-    for (uint32_t slot = qmat_surface_to_envelope_first(&s->to_envelope, ends[k]); slot != QMAT_NONE;
-         slot = s->to_envelope.next[slot]) {
-      if (slot / 3 >= s->control->sample_count) continue;
+    for (uint32_t slot = qmat_surface_to_envelope_first(&s->surface_tracker, ends[k]); slot != QMAT_NONE;
+         slot = s->surface_tracker.next[slot]) {
+      if (slot / 3 >= s->constraints->sample_count) continue;
       if (!s->rules.thin[slot / 3]) return false;
       any = true;
     }
@@ -271,12 +274,12 @@ typedef enum { DONE, REFUSED, EXCEEDED } outcome;
 /* Why the newest test of a sphere failed. */
 typedef enum { BY_NOTHING, BY_SPHERE, BY_MIDPOINT, BY_SURFACE_TO_ENVELOPE, BY_ENVELOPE_TO_SURFACE } refusal;
 
-static bool holds_to_surface(const qmat_decimation *s) {
-  return s->held < INFINITY && is_two_sided(s);
+static bool bounds_envelope(const qmat_decimation *s) {
+  return s->threshold < INFINITY && is_two_sided(s);
 }
 
 static bool is_inner(const qmat_decimation *s, size_t point) {
-  return point >= s->control->surface_count;
+  return point >= s->constraints->surface_count;
 }
 
 /* Whether the newest preview merges into a sharp feature. */
@@ -291,51 +294,51 @@ static bool merges_feature(const qmat_decimation *s) {
 static outcome test_inside(qmat_decimation *s, const double *sphere) {
   const bool on_surface = merges_feature(s);
   const bool kept =
-      qmat_envelope_to_surface_test_sphere(&s->to_surface, &s->complex, &s->collapse, sphere) || on_surface;
+      qmat_envelope_to_surface_test_sphere(&s->envelope_tracker, &s->complex, &s->collapse, sphere) || on_surface;
   s->refusal = BY_SPHERE;
-  const bool inside = s->rules.published || on_surface || s->to_surface.sphere_depth > 0;
+  const bool inside = s->rules.published || on_surface || s->envelope_tracker.sphere_depth > 0;
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return REFUSED;
   s->refusal = BY_MIDPOINT;
   if (!s->rules.published &&
-      !qmat_envelope_to_surface_test_midpoints(&s->to_surface, &s->complex, &s->collapse, sphere))
+      !qmat_envelope_to_surface_test_midpoints(&s->envelope_tracker, &s->complex, &s->collapse, sphere))
     return REFUSED;
-  return kept || !(sphere[3] - s->to_surface.sphere_depth > s->to_surface.limit) ? DONE : EXCEEDED;
+  return kept || !(sphere[3] - s->envelope_tracker.sphere_depth > s->envelope_tracker.limit) ? DONE : EXCEEDED;
 }
 
 /* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
- * they exceed it, `*asked` is no more than what would have to be held. */
+ * they exceed it, `*needed` is no more than what would have to be threshold. */
 static qmat_status test_sphere(qmat_decimation *s, const double *sphere, uint32_t first, outcome *result,
-                               double *asked) {
+                               double *needed) {
   bool kept;
-  s->to_envelope.found_count = 0;
+  s->surface_tracker.found_count = 0;
   *result = test_inside(s, sphere);
-  *asked = sphere[3] - s->to_surface.sphere_depth;
+  *needed = sphere[3] - s->envelope_tracker.sphere_depth;
   if (*result != DONE) {
     s->counts.refused_by_inside_test++;
     return QMAT_OK;
   }
   *result = EXCEEDED;
-  if (s->held < INFINITY) {
+  if (s->threshold < INFINITY) {
     const qmat_status status =
-        qmat_surface_to_envelope_test(s->context, &s->to_envelope, &s->complex, &s->collapse, sphere, first, &kept);
+        qmat_surface_to_envelope_test(s->context, &s->surface_tracker, &s->complex, &s->collapse, sphere, first, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->counts.refused_by_surface_to_envelope++;
       s->refusal = BY_SURFACE_TO_ENVELOPE;
-      *asked =
-          fmax(s->held, is_inner(s, s->to_envelope.failed_point) ? -s->control->distances[s->to_envelope.failed_point]
-                                                                 : s->to_envelope.failed_distance);
+      *needed = fmax(s->threshold, is_inner(s, s->surface_tracker.failed_point)
+                                       ? -s->constraints->distances[s->surface_tracker.failed_point]
+                                       : s->surface_tracker.failed_distance);
       return QMAT_OK;
     }
   }
-  if (holds_to_surface(s)) {
+  if (bounds_envelope(s)) {
     const qmat_status status =
-        qmat_envelope_to_surface_test(s->context, &s->to_surface, &s->complex, &s->collapse, sphere, &kept);
+        qmat_envelope_to_surface_test(s->context, &s->envelope_tracker, &s->complex, &s->collapse, sphere, &kept);
     if (status != QMAT_OK) return status;
     if (!kept) {
       s->counts.refused_by_envelope_to_surface++;
       s->refusal = BY_ENVELOPE_TO_SURFACE;
-      *asked = s->to_surface.failed;
+      *needed = s->envelope_tracker.failed;
       return QMAT_OK;
     }
   }
@@ -351,17 +354,17 @@ static void record(qmat_decimation *s, const double *sphere) {
   s->log.ends[2 * i] = s->collapse.kept;
   s->log.ends[2 * i + 1] = s->collapse.removed;
   memcpy(&s->log.merged[4 * i], sphere, 4 * sizeof *sphere);
-  s->log.errors[i] = fmin(s->held, most_error);
+  s->log.errors[i] = fmin(s->threshold, most_error);
 }
 
 /* Does what the newest preview and the newest test allow. */
 static qmat_status commit(qmat_decimation *s, const double *sphere) {
   if (in_order(s)) record(s, sphere);
-  if (holds_to_surface(s))
-    qmat_envelope_to_surface_commit(&s->to_surface, &s->collapse);
+  if (bounds_envelope(s))
+    qmat_envelope_to_surface_commit(&s->envelope_tracker, &s->collapse);
   else
-    s->to_surface.depths[s->collapse.kept] = s->to_surface.sphere_depth;
-  qmat_surface_to_envelope_commit(&s->to_envelope, &s->collapse);
+    s->envelope_tracker.depths[s->collapse.kept] = s->envelope_tracker.sphere_depth;
+  qmat_surface_to_envelope_commit(&s->surface_tracker, &s->collapse);
   qmat_crease_guard_commit(&s->creases, &s->complex, &s->collapse, sphere);
   return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
 }
@@ -369,37 +372,39 @@ static qmat_status commit(qmat_decimation *s, const double *sphere) {
 /* A fit looks at so many constraint points at most, and at so many when it polishes what is left. */
 enum { FITTED_POINTS = 256, FINAL_REFIT_POINTS = 1024 };
 
-/* A sphere whose sampled error is this many times what is held is not worth a test. */
-static const double worth_testing = 1.1;
+/* A sphere whose sampled error is this many times what is threshold is not worth a test. */
+static const double test_ratio = 1.1;
 
-/* Where the spheres were fitted before, a fit that starts badly is left sooner, at this share of what is held. */
-static const double less_hope = 0.6;
+/* Where the spheres were fitted before, a fit that starts badly is left sooner, at this share of what is threshold. */
+static const double early_exit_share = 0.6;
 
 /* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
  * look good as they are. */
 static qmat_status try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
                               outcome *result) {
-  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, asked;
+  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
   int least = 0;
-  qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->to_envelope, &s->collapse,
-                                              s->control->surface_count, FITTED_POINTS);
+  qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
+                                              s->constraints->surface_count, FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
-    status = qmat_sphere_fit_error(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, c->spheres[i],
+    status = qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, c->spheres[i],
                                    &errors[i]);
     if (errors[i] < errors[least]) least = i;
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   s->refusal = BY_NOTHING;
   if (status == QMAT_OK)
-    status = qmat_sphere_fit_run(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse,
-                                 s->rules.neighbourhoods ? less_hope * s->held : s->held, sphere, &error);
+    status =
+        qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse,
+                            s->rules.neighbourhoods ? early_exit_share * s->threshold : s->threshold, sphere, &error);
   s->fitted_errors[edge] = error;
   memcpy(s->fitted, sphere, sizeof s->fitted);
-  if (status == QMAT_OK && error <= worth_testing * s->held) status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+  if (status == QMAT_OK && error <= test_ratio * s->threshold)
+    status = test_sphere(s, sphere, QMAT_NONE, result, &needed);
   for (int i = 0; i < c->count && status == QMAT_OK && *result != DONE; i++) {
-    if (!(errors[i] <= worth_testing * s->held)) continue;
+    if (!(errors[i] <= test_ratio * s->threshold)) continue;
     memcpy(sphere, c->spheres[i], sizeof c->spheres[i]);
-    status = test_sphere(s, sphere, QMAT_NONE, result, &asked);
+    status = test_sphere(s, sphere, QMAT_NONE, result, &needed);
   }
   return status;
 }
@@ -418,12 +423,13 @@ static qmat_status save(qmat_decimation *s, double *values, size_t count) {
 /* Remembers a sphere and the bounds of what hangs on it. */
 static qmat_status save_star(qmat_decimation *s, uint32_t vertex) {
   qmat_status status = save(s, &s->complex.spheres[4 * (size_t)vertex], 4);
-  if (status == QMAT_OK) status = save(s, &s->to_surface.depths[vertex], 1);
+  if (status == QMAT_OK) status = save(s, &s->envelope_tracker.depths[vertex], 1);
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->to_surface.edge_bounds[at[i]], 1);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->envelope_tracker.edge_bounds[at[i]], 1);
   at = qmat_complex_triangles_at(&s->complex, vertex, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->to_surface.triangle_bounds[at[i]], 1);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = save(s, &s->envelope_tracker.triangle_bounds[at[i]], 1);
   return status;
 }
 
@@ -431,57 +437,58 @@ static void restore(qmat_decimation *s) {
   for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
 }
 
-/* Moves a sphere whatever is held; what is known of its protrusion stays true. */
+/* Moves a sphere whatever is threshold; what is known of its protrusion stays true. */
 static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphere, bool *inside) {
-  qmat_envelope_to_surface *to_surface = &s->to_surface;
-  const double limit = to_surface->limit;
+  qmat_envelope_to_surface *envelope_tracker = &s->envelope_tracker;
+  const double limit = envelope_tracker->limit;
   bool kept;
   qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
   if (status != QMAT_OK) return status;
-  to_surface->limit = INFINITY;
-  *inside = qmat_envelope_to_surface_test_sphere(to_surface, &s->complex, &s->collapse, sphere);
+  envelope_tracker->limit = INFINITY;
+  *inside = qmat_envelope_to_surface_test_sphere(envelope_tracker, &s->complex, &s->collapse, sphere);
   if (*inside) {
-    status = qmat_envelope_to_surface_test(s->context, to_surface, &s->complex, &s->collapse, sphere, &kept);
-    if (status == QMAT_OK) qmat_envelope_to_surface_commit(to_surface, &s->collapse);
+    status = qmat_envelope_to_surface_test(s->context, envelope_tracker, &s->complex, &s->collapse, sphere, &kept);
+    if (status == QMAT_OK) qmat_envelope_to_surface_commit(envelope_tracker, &s->collapse);
   }
-  to_surface->limit = limit;
+  envelope_tracker->limit = limit;
   if (status == QMAT_OK && *inside) status = qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
   return status;
 }
 
-/* What has been refused is asked for with this share of what is held to spare. */
+/* What has been refused is needed for with this share of what is threshold to spare. */
 static const double margin = 0.02;
 
 /* Asks for what the newest test has refused. */
-static qmat_status ask_for_refused(qmat_decimation *s, const double *sphere, bool *asked) {
-  const double *centre = s->refusal == BY_SPHERE ? sphere : s->to_surface.failed_place;
-  *asked = true;
+static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
+  const double *centre = s->refusal == BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
+  *needed = true;
   if (s->refusal == BY_SURFACE_TO_ENVELOPE) {
-    const size_t point = s->to_envelope.failed_point;
-    return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->to_envelope.points[3 * point],
-                                      is_inner(s, point) ? QMAT_PLACE_INSIDE : QMAT_PLACE_SURFACE,
-                                      s->to_envelope.limits[point] - margin * s->held);
+    const size_t point = s->surface_tracker.failed_point;
+    return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->surface_tracker.points[3 * point],
+                                      is_inner(s, point) ? QMAT_TARGET_INSIDE : QMAT_TARGET_SURFACE,
+                                      s->surface_tracker.limits[point] - margin * s->threshold);
   }
   double closest[3];
   uint32_t triangle;
-  *asked = s->refusal != BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
-  if (!*asked) return QMAT_OK;
+  *needed = s->refusal != BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
+  if (!*needed) return QMAT_OK;
   qmat_surface_distance(s->surface, centre, INFINITY, closest, &triangle);
-  return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, closest, QMAT_PLACE_BORDER, (1 - margin) * s->held);
+  return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, closest, QMAT_TARGET_BORDER,
+                                    (1 - margin) * s->threshold);
 }
 
 /* Tests a sphere of the patch, which is placed; number 0 is the collapse's. */
 static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int number, outcome *result) {
-  double asked;
+  double needed;
   const qmat_status status =
       number == 0 ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
                   : qmat_complex_preview_move(s->context, &s->complex, s->neighbourhood.vertices[number], &s->collapse);
-  return status == QMAT_OK ? test_sphere(s, s->neighbourhood.spheres[number], QMAT_NONE, result, &asked) : status;
+  return status == QMAT_OK ? test_sphere(s, s->neighbourhood.spheres[number], QMAT_NONE, result, &needed) : status;
 }
 
-/* Tests the spheres of the patch: `*suspect` first, which becomes the one that is refused, and the collapse last, which
- * is then the newest preview. */
-static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *suspect,
+/* Tests the spheres of the patch: `*last_refused` first, which becomes the one that is refused, and the collapse last,
+ * which is then the newest preview. */
+static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *last_refused,
                                       outcome *result, bool *again) {
   qmat_neighbourhood_fit *neighbourhood = &s->neighbourhood;
   bool inside = true;
@@ -492,24 +499,24 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
     status = place(s, i < 0 ? removed : neighbourhood->vertices[i], neighbourhood->spheres[i < 0 ? 0 : i], &inside);
     if (!inside) return status;
   }
-  const int first = *suspect;
+  const int first = *last_refused;
   for (int i = 0; i <= neighbourhood->count && status == QMAT_OK; i++) {
     const int number = i == 0 ? first : i % neighbourhood->count;
     if (i > 0 && number == first && (number > 0 || neighbourhood->count == 1)) continue;
     status = test_in_neighbourhood(s, edge, number, result);
     if (status != QMAT_OK || *result == DONE) continue;
-    *suspect = number;
-    return ask_for_refused(s, neighbourhood->spheres[number], again);
+    *last_refused = number;
+    return add_refused_target(s, neighbourhood->spheres[number], again);
   }
   return status;
 }
 
-/* At most so often what a test refuses is asked for and the patch fitted again. */
+/* At most so often what a test refuses is needed for and the patch fitted again. */
 enum { MOST_FITS = 6 };
 
 /* Up to this error (of its own fit) a sphere is worth a fit of the patch, and up to that error a fit of the patch is
- * worth a test, as shares of what is held. */
-static const double worth_a_neighbourhood = 1.3, worth_placing = 1.02;
+ * worth a test, as shares of what is threshold. */
+static const double neighbourhood_ratio = 1.3, placement_ratio = 1.02;
 
 /* The collapse of the newest preview with the sphere around which its own fit ended, and with its neighbours fitted too
  * unless it is left `alone`. Where it can be done they are placed, and it is the newest preview and test; else nothing
@@ -523,19 +530,20 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
         !(s->protecting && is_protected(s, c->neighbours[n])))
       others[count++] = c->neighbours[n];
-  qmat_status status = qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->to_envelope, &s->complex, c,
-                                                    s->fitted, others, count, s->control->surface_count, s->held);
+  qmat_status status =
+      qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, s->fitted,
+                                   others, count, s->constraints->surface_count, s->threshold);
   bool again = true;
-  int suspect = 0;
+  int last_refused = 0;
   for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != DONE; i++) {
     double error;
     qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, i % 2 == 1, &error);
-    if (!(error <= worth_placing * s->held)) return status;
+    if (!(error <= placement_ratio * s->threshold)) return status;
     s->saved_count = 0;
     status = save_star(s, removed);
     for (int k = 0; k < s->neighbourhood.count && status == QMAT_OK; k++)
       status = save_star(s, s->neighbourhood.vertices[k]);
-    if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &suspect, result, &again);
+    if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &last_refused, result, &again);
     if (status == QMAT_OK && *result == DONE) return status;
     restore(s);
     if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
@@ -547,8 +555,8 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
 static qmat_status try_neighbourhoods(qmat_decimation *s, uint32_t edge, outcome *result) {
   qmat_status status = QMAT_OK;
   if (s->refusal == BY_MIDPOINT) return status;
-  if (s->fitted_errors[edge] <= worth_testing * s->held) status = try_neighbourhood(s, edge, true, result);
-  if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= worth_a_neighbourhood * s->held)
+  if (s->fitted_errors[edge] <= test_ratio * s->threshold) status = try_neighbourhood(s, edge, true, result);
+  if (status == QMAT_OK && *result != DONE && s->fitted_errors[edge] <= neighbourhood_ratio * s->threshold)
     status = try_neighbourhood(s, edge, false, result);
   return status;
 }
@@ -560,14 +568,15 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, outcome *resu
   s->neighbourhood.count = 0; /* that of an edge tried before is none of this one's */
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
-  double asked;
+  double needed;
   const double share = s->rules.crease_share;
-  bool bound = qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->held, &c, &asked);
-  asked /= share;
+  bool bound =
+      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->threshold, &c, &needed);
+  needed /= share;
   if (bound && c.count == 0) {
     s->counts.refused_by_protection++;
-    s->asked[edge] = asked;
-    if (asked < INFINITY) *result = EXCEEDED;
+    s->needed[edge] = needed;
+    if (needed < INFINITY) *result = EXCEEDED;
     return QMAT_OK;
   }
   if (!bound && s->protecting && !apply_protection(s, edge, &c, &bound)) {
@@ -582,15 +591,15 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, outcome *resu
     return QMAT_OK;
   }
   bool exceeded = false;
-  s->asked[edge] = bound ? asked : INFINITY;
+  s->needed[edge] = bound ? needed : INFINITY;
   const double *sphere = NULL;
   const bool fits = s->fitting && !bound;
   for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != DONE; i++) {
     sphere = c.spheres[i];
     const size_t refused = s->counts.refused_by_surface_to_envelope;
-    status = test_sphere(s, sphere, s->failed_points[edge], result, &asked);
-    if (s->counts.refused_by_surface_to_envelope > refused) s->failed_points[edge] = s->to_envelope.failed_point;
-    if (*result == EXCEEDED) s->asked[edge] = fmin(s->asked[edge], asked);
+    status = test_sphere(s, sphere, s->failed_points[edge], result, &needed);
+    if (s->counts.refused_by_surface_to_envelope > refused) s->failed_points[edge] = s->surface_tracker.failed_point;
+    if (*result == EXCEEDED) s->needed[edge] = fmin(s->needed[edge], needed);
     exceeded |= *result == EXCEEDED;
   }
   double fitted[4];
@@ -610,9 +619,9 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, outcome *resu
   return status;
 }
 
-/* An edge whose fitted sphere had this many times the error that is held is not tried again for a sphere nearby that
- * moves, only for one that goes. */
-static const double worth_another_fit = 2;
+/* An edge whose fitted sphere had this many times the error that is threshold is not tried again for a sphere nearby
+ * that moves, only for one that goes. */
+static const double retry_ratio = 2;
 
 static bool is_locked(const qmat_decimation *s, uint32_t edge) {
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
@@ -621,7 +630,7 @@ static bool is_locked(const qmat_decimation *s, uint32_t edge) {
 
 static void queue_again(qmat_decimation *s, uint32_t edge) {
   if (s->heap.places[edge] != QMAT_NONE || is_locked(s, edge)) return;
-  if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > worth_another_fit * s->held) return;
+  if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > retry_ratio * s->threshold) return;
   qmat_edge_heap_update(&s->heap, edge);
 }
 
@@ -650,7 +659,7 @@ static void update_neighbourhood(qmat_decimation *s) {
   }
 }
 
-static bool may_go_on(const qmat_decimation *s) {
+static bool may_continue(const qmat_decimation *s) {
   const size_t live = s->complex.live_vertices;
   return live > 1 && !(s->rules.vertices > 0 && live <= s->rules.vertices);
 }
@@ -661,12 +670,12 @@ static qmat_status report_progress(const qmat_decimation *s) {
 }
 
 /* Takes over what a test finds of a sphere of the patch that has been placed. */
-static qmat_status settle(qmat_decimation *s, uint32_t vertex) {
-  double sphere[4], asked;
+static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
+  double sphere[4], needed;
   outcome result;
   memcpy(sphere, &s->complex.spheres[4 * (size_t)vertex], sizeof sphere);
   qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
-  if (status == QMAT_OK) status = test_sphere(s, sphere, QMAT_NONE, &result, &asked);
+  if (status == QMAT_OK) status = test_sphere(s, sphere, QMAT_NONE, &result, &needed);
   if (status != QMAT_OK || result != DONE) return status;
   status = commit(s, sphere);
   update_neighbourhood(s);
@@ -685,7 +694,7 @@ static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
       qmat_edge_heap_update(&s->heap, edge);
       continue;
     }
-    *ended = !may_go_on(s) || (s->rules.most_cost > 0 && s->heap.costs[edge] > s->rules.most_cost);
+    *ended = !may_continue(s) || (s->rules.most_cost > 0 && s->heap.costs[edge] > s->rules.most_cost);
     if (*ended) return QMAT_OK;
     s->protecting = s->rules.protect == QMAT_PROTECT_ALWAYS ||
                     (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= late_stage(initial));
@@ -697,10 +706,10 @@ static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
       s->counts.collapses++;
       update_neighbourhood(s);
       for (int i = 1; i < s->neighbourhood.count && status == QMAT_OK; i++)
-        status = settle(s, s->neighbourhood.vertices[i]);
+        status = commit_placed(s, s->neighbourhood.vertices[i]);
       if (status != QMAT_OK) return status;
     } else if (result == EXCEEDED && s->rules.on_exceed == QMAT_EXCEED_STOP) {
-      *ended = !hold_next(s);
+      *ended = !raise_threshold(s);
       qmat_edge_heap_update(&s->heap, edge);
     }
   }
@@ -722,20 +731,21 @@ static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
     qmat_status status = report_progress(s);
     if (status == QMAT_OK) status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)
-      status =
-          qmat_sphere_fit_gather(s->context, &s->fit, &s->to_envelope, &s->collapse, s->control->surface_count, most);
+      status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
+                                      s->constraints->surface_count, most);
     double sphere[4], before, after;
     memcpy(sphere, &s->complex.spheres[4 * (size_t)v], sizeof sphere);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_error(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, sphere, &before);
+      status =
+          qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, sphere, &before);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_run(s->context, &s->fit, &s->to_envelope, &s->complex, &s->collapse, INFINITY, sphere,
-                                   &after);
+      status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, INFINITY,
+                                   sphere, &after);
     if (status != QMAT_OK) return status;
     if (!(after <= (1 - least_gain) * before)) continue;
     outcome result;
-    double asked;
-    status = test_sphere(s, sphere, QMAT_NONE, &result, &asked);
+    double needed;
+    status = test_sphere(s, sphere, QMAT_NONE, &result, &needed);
     if (status == QMAT_OK && result == DONE) {
       status = commit(s, sphere);
       update_neighbourhood(s);
@@ -752,18 +762,18 @@ static void queue_all(qmat_decimation *s) {
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
 }
 
-/* The edges that may collapse with what is held now. */
+/* The edges that may collapse with what is threshold now. */
 static void queue_raised(qmat_decimation *s) {
   for (uint32_t e = 0; e < s->complex.edge_count; e++)
-    if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->asked[e] <= s->held)
+    if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->needed[e] <= s->threshold)
       qmat_edge_heap_update(&s->heap, e);
 }
 
 qmat_status qmat_decimation_run(qmat_decimation *s) {
-  bool ended = s->held > s->rules.limit; /* where even the lowest level is above it */
+  bool ended = s->threshold > s->rules.limit; /* where even the lowest level is above it */
   qmat_status status = s->rules.neighbourhoods ? QMAT_OK : collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
-         hold_next(s)) {
+         raise_threshold(s)) {
     queue_raised(s);
     status = collapse_edges(s, &ended);
   }
@@ -788,13 +798,13 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
 /* Where collapses come in order the merged sphere inherits the regions of both ends (section 3.3): who answers does not
  * depend on the limits that were tested. */
 static qmat_status set_regions(const qmat_decimation *s, const uint32_t *ids, qmat_medial *medial) {
-  const size_t samples = s->control->sample_count;
+  const size_t samples = s->constraints->sample_count;
   uint32_t *owners = qmat_arena_alloc(&s->context->arena, samples, sizeof *owners);
   uint32_t *roots = qmat_arena_alloc(&s->context->arena, s->complex.vertex_count, sizeof *roots);
   if (!owners || !roots) return qmat_fail_memory(s->context, "responsible regions");
   if (in_order(s)) qmat_collapse_roots(s->log.ends, s->log.count, s->complex.vertex_count, roots);
   for (size_t i = 0; i < samples; i++) {
-    uint32_t owner = in_order(s) ? s->log.owners[i] : owner_of(&s->to_envelope, i);
+    uint32_t owner = in_order(s) ? s->log.owners[i] : owner_of(&s->surface_tracker, i);
     if (in_order(s) && owner != QMAT_NONE) owner = roots[owner];
     owners[i] = owner == QMAT_NONE ? QMAT_NONE : ids[owner];
   }
@@ -838,19 +848,19 @@ static void carry_bounds(const qmat_decimation *from, const uint32_t *ids, qmat_
   for (size_t e = 0; e < from->complex.edge_count; e++) {
     if (!from->complex.edge_alive[e]) continue;
     const uint32_t *ends = &from->complex.edges[2 * e];
-    qmat_envelope_to_surface_bound_edge(&to->to_surface, &to->complex, ids[ends[0]], ids[ends[1]],
-                                        from->to_surface.edge_bounds[e]);
+    qmat_envelope_to_surface_bound_edge(&to->envelope_tracker, &to->complex, ids[ends[0]], ids[ends[1]],
+                                        from->envelope_tracker.edge_bounds[e]);
   }
   for (size_t t = 0; t < from->complex.triangle_count; t++) {
     if (!from->complex.triangle_alive[t]) continue;
     const uint32_t *corners = &from->complex.triangles[3 * t];
-    qmat_envelope_to_surface_bound_triangle(&to->to_surface, &to->complex, ids[corners[0]], ids[corners[1]],
-                                            ids[corners[2]], from->to_surface.triangle_bounds[t]);
+    qmat_envelope_to_surface_bound_triangle(&to->envelope_tracker, &to->complex, ids[corners[0]], ids[corners[1]],
+                                            ids[corners[2]], from->envelope_tracker.triangle_bounds[t]);
   }
 }
 
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
-                                   qmat_constraint_points *control, qmat_decimation *to) {
+                                   qmat_constraint_points *constraints, qmat_decimation *to) {
   qmat_context *context = from->context;
   qmat_arena *arena = &context->arena;
   const qmat_complex *c = &from->complex;
@@ -866,16 +876,16 @@ qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_media
   for (size_t v = 0; v < c->vertex_count; v++) {
     if (!c->vertex_alive[v]) continue;
     ids[v] = next;
-    depths[next] = from->to_surface.depths[v];
+    depths[next] = from->envelope_tracker.depths[v];
     to->quadrics[next++] = from->quadrics[v];
   }
   for (size_t v = next; v < left->sphere_count; v++)
     depths[v] = -qmat_surface_signed_distance(from->surface, &left->spheres[4 * v]);
   status = qmat_crease_guard_renumber(context, &from->creases, ids, left->sphere_count, &to->creases);
   if (status != QMAT_OK) return status;
-  status = qmat_constraint_points_join(context, from->control, from->to_envelope.witnesses, from->to_envelope.weights,
-                                       ids, &further, control);
-  if (status == QMAT_OK) status = qmat_decimation_init(to, control, depths);
+  status = qmat_constraint_points_join(context, from->constraints, from->surface_tracker.witnesses,
+                                       from->surface_tracker.weights, ids, &further, constraints);
+  if (status == QMAT_OK) status = qmat_decimation_init(to, constraints, depths);
   if (status != QMAT_OK) return status;
   carry_bounds(from, ids, to);
   to->counts = from->counts;

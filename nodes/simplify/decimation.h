@@ -28,9 +28,10 @@ typedef struct qmat_collapse_counts {
 
 /* What collapses are allowed, and when they end. */
 typedef struct qmat_decimation_rules {
-  double limit;     /* what both errors are held to at the constraint points, unit frame; INFINITY: nothing is held */
+  double limit;     /* what both errors are threshold to at the constraint points, unit frame; INFINITY: nothing is
+                       threshold */
   double share;     /* of the limit, how much of it collapses may use up: above 0, at most 1 */
-  double finest;    /* what is held first where that rises, unit frame */
+  double finest;    /* what is threshold first where that rises, unit frame */
   size_t vertices;  /* collapses end when so few are left; 0: never */
   double most_cost; /* or when the cheapest costs more; 0: never */
   double k;         /* of eq. 6 */
@@ -41,7 +42,7 @@ typedef struct qmat_decimation_rules {
   qmat_topology_policy topology;
   qmat_protection protect;
   qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
-  double crease_share;        /* of what is held, how far points of a crease may be from what is left of it: above 0 */
+  double crease_share; /* of what is threshold, how far points of a crease may be from what is left of it: above 0 */
   int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
   bool neighbourhoods; /* edges are tried with the spheres around them fitted at once, where an earlier run was left
                           without */
@@ -54,9 +55,9 @@ typedef struct qmat_decimation_rules {
 /* A medial mesh while its edges collapse, the cheapest first, each to the best candidate that lies inside the model and
  * keeps both errors (sections 3.1.2, 3.3 and 3.4).
  *
- * With QMAT_EXCEED_SKIP the limit is what is held from the first collapse on. With the others the collapses are the
- * same for any limit and number of vertices, which only say where they end: what is held starts at the finest and
- * rises, by twelve levels to each doubling, when the next collapse in the order of costs would exceed it (STOP), or
+ * With QMAT_EXCEED_SKIP the limit is what is threshold from the first collapse on. With the others the collapses are
+ * the same for any limit and number of vertices, which only say where they end: what is threshold starts at the finest
+ * and rises, by twelve levels to each doubling, when the next collapse in the order of costs would exceed it (STOP), or
  * when every one would (RAISE). */
 typedef struct qmat_decimation {
   qmat_context *context;
@@ -65,9 +66,9 @@ typedef struct qmat_decimation {
   qmat_complex complex;
   qmat_quadric *quadrics; /* per vertex */
   qmat_edge_heap heap;
-  const qmat_constraint_points *control;
-  qmat_surface_to_envelope to_envelope;
-  qmat_envelope_to_surface to_surface;
+  const qmat_constraint_points *constraints;
+  qmat_surface_to_envelope surface_tracker;
+  qmat_envelope_to_surface envelope_tracker;
   qmat_collapse collapse;
   qmat_sphere_fit fit;
   double fitted[4]; /* what the newest fit of it has made of a collapse's sphere */
@@ -75,11 +76,11 @@ typedef struct qmat_decimation {
   struct qmat_neighbourhood_state *saved; /* what a patch was before it was tried */
   size_t saved_count, saved_capacity;
   qmat_crease_guard creases;
-  double held;             /* what both errors are held to now; INFINITY: nothing is held */
+  double threshold;        /* what both errors are threshold to now; INFINITY: nothing is threshold */
   int level;               /* of it, where it rises */
-  qmat_collapse_log log;   /* every collapse, where what is held rises */
+  qmat_collapse_log log;   /* every collapse, where what is threshold rises */
   uint32_t *failed_points; /* per edge: the constraint point that refused it, or QMAT_NONE */
-  double *asked;           /* per edge: no less has to be held for it to collapse, as far as is known */
+  double *needed;          /* per edge: no less has to be threshold for it to collapse, as far as is known */
   uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
   double *fitted_errors;   /* per edge: of the sphere that was fitted last */
   uint8_t *converged;      /* per vertex: whether a fit did not move it, and nothing has moved around it since */
@@ -92,10 +93,10 @@ typedef struct qmat_decimation {
 } qmat_decimation;
 
 /* Sets the quadrics, the heap, the coverage and the protrusion of a complex up. The caller has made `complex` (unit
- * frame) and given context, rules and surface; `control` stays the caller's, its distances may be lowered limits of
+ * frame) and given context, rules and surface; `constraints` stays the caller's, its distances may be lowered limits of
  * points that the initial medial mesh leaves farther away. `depths`: per vertex. All in the context's arena but what
  * qmat_decimation_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
-qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constraint_points *control,
+qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                  const double *depths);
 void qmat_decimation_uninit(qmat_decimation *decimation);
 
@@ -108,9 +109,9 @@ qmat_status qmat_decimation_extract(const qmat_decimation *decimation, qmat_medi
 
 /* Goes on in `to` where `from` stopped: with `left`, what qmat_decimation_extract gives of it, with the quadrics,
  * bounds and witnesses that it has. Spheres may have been added behind it, joined by edges, and there may be `extra`
- * places. `to` has context, surface and rules; `control` gets its constraint points and has to live as long. `from`
+ * places. `to` has context, surface and rules; `constraints` gets its constraint points and has to live as long. `from`
  * stays as it is. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
-                                   qmat_constraint_points *control, qmat_decimation *to);
+                                   qmat_constraint_points *constraints, qmat_decimation *to);
 
 #endif

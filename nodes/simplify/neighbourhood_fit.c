@@ -6,26 +6,26 @@
 
 #include "core/geometry/vector.h"
 
-enum { MOST_PLACES = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
+enum { MOST_TARGETS = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 
 /* A slab or loose cone of the patch, prepared with the spheres of the newest step, and the ball that holds it. */
-typedef struct qmat_neighbourhood_part {
+typedef struct qmat_fit_primitive {
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
   int moving[3];        /* which sphere of the fit each corner is, or -1 */
   qmat_primitive primitive;
   qmat_primitive_ball ball;
-} neighbourhood_part;
+} fit_primitive;
 
-typedef struct qmat_neighbourhood_place {
+typedef struct qmat_fit_target {
   double point[3];
-  double slack; /* how much more than `held` F may be; of a border, how much less it may be below 0 */
-  qmat_place_kind kind;
-  uint32_t part; /* the nearest one, of the newest step */
-} neighbourhood_place;
+  double slack; /* how much more than `threshold` F may be; of a border, how much less it may be below 0 */
+  qmat_target_kind kind;
+  uint32_t nearest; /* the nearest one, of the newest step */
+} fit_target;
 
 void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit) {
-  qmat_free(fit->parts);
-  qmat_free(fit->places);
+  qmat_free(fit->primitives);
+  qmat_free(fit->targets);
   *fit = (qmat_neighbourhood_fit){.count = 0};
 }
 
@@ -35,30 +35,30 @@ static int moving_index(const qmat_neighbourhood_fit *fit, uint32_t vertex) {
   return -1;
 }
 
-static bool has_corner(const neighbourhood_part *part, uint32_t vertex) {
-  return part->vertices[0] == vertex || part->vertices[1] == vertex || part->vertices[2] == vertex;
+static bool has_corner(const fit_primitive *item, uint32_t vertex) {
+  return item->vertices[0] == vertex || item->vertices[1] == vertex || item->vertices[2] == vertex;
 }
 
 /* Adds a simplex of the complex as the collapse leaves it, unless it vanishes or is there already. */
-static qmat_status add_part(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_collapse *collapse,
-                            const uint32_t *vertices, int count) {
+static qmat_status add_primitive(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_collapse *collapse,
+                                 const uint32_t *vertices, int count) {
   uint32_t corners[3] = {QMAT_NONE, QMAT_NONE, QMAT_NONE};
   for (int k = 0; k < count; k++) {
     corners[k] = vertices[k] == collapse->removed ? collapse->kept : vertices[k];
     for (int j = 0; j < k; j++)
       if (corners[j] == corners[k]) return QMAT_OK;
   }
-  for (size_t i = 0; i < fit->part_count; i++) {
+  for (size_t i = 0; i < fit->primitive_count; i++) {
     int shared = 0;
-    for (int k = 0; k < count; k++) shared += has_corner(&fit->parts[i], corners[k]);
+    for (int k = 0; k < count; k++) shared += has_corner(&fit->primitives[i], corners[k]);
     if (shared == count) return QMAT_OK; /* the same, or an edge of a slab */
   }
-  if (qmat_grow((void **)&fit->parts, &fit->part_capacity, fit->part_count + 1, sizeof *fit->parts))
+  if (qmat_grow((void **)&fit->primitives, &fit->primitive_capacity, fit->primitive_count + 1, sizeof *fit->primitives))
     return qmat_fail_memory(context, "the fit of a patch");
-  neighbourhood_part *part = &fit->parts[fit->part_count++];
+  fit_primitive *item = &fit->primitives[fit->primitive_count++];
   for (int k = 0; k < 3; k++) {
-    part->vertices[k] = corners[k];
-    part->moving[k] = corners[k] == QMAT_NONE ? -1 : moving_index(fit, corners[k]);
+    item->vertices[k] = corners[k];
+    item->moving[k] = corners[k] == QMAT_NONE ? -1 : moving_index(fit, corners[k]);
   }
   return QMAT_OK;
 }
@@ -71,35 +71,36 @@ static qmat_status add_star(qmat_context *context, qmat_neighbourhood_fit *fit, 
   const uint32_t *rows = corners == 3 ? complex->triangles : complex->edges;
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
-    status = add_part(context, fit, collapse, &rows[(size_t)corners * at[i]], corners);
+    status = add_primitive(context, fit, collapse, &rows[(size_t)corners * at[i]], corners);
   return status;
 }
 
 qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood_fit *fit, const double *point,
-                                       qmat_place_kind kind, double limit) {
-  if (qmat_grow((void **)&fit->places, &fit->place_capacity, fit->place_count + 1, sizeof *fit->places))
+                                       qmat_target_kind kind, double limit) {
+  if (qmat_grow((void **)&fit->targets, &fit->target_capacity, fit->target_count + 1, sizeof *fit->targets))
     return qmat_fail_memory(context, "the fit of a patch");
-  neighbourhood_place *place = &fit->places[fit->place_count++];
-  *place =
-      (neighbourhood_place){.kind = kind, .slack = kind == QMAT_PLACE_BORDER ? fit->held - limit : limit - fit->held};
-  memcpy(place->point, point, sizeof place->point);
+  fit_target *target = &fit->targets[fit->target_count++];
+  *target =
+      (fit_target){.kind = kind, .slack = kind == QMAT_TARGET_BORDER ? fit->threshold - limit : limit - fit->threshold};
+  memcpy(target->point, point, sizeof target->point);
   return QMAT_OK;
 }
 
 /* Whether this slot is the first by which its point hangs on the patch. */
-static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *to_envelope,
-                          uint32_t removed, uint32_t slot) {
+static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
+                          uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (to_envelope->witnesses[s] == removed || moving_index(fit, to_envelope->witnesses[s]) >= 0) return false;
+    if (tracker->witnesses[s] == removed || moving_index(fit, tracker->witnesses[s]) >= 0) return false;
   return true;
 }
 
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
-                                         const qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
+                                         const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                          const qmat_collapse *collapse, const double sphere[4],
-                                         const uint32_t *vertices, size_t count, size_t surface_count, double held) {
-  fit->held = held;
-  fit->part_count = fit->place_count = 0;
+                                         const uint32_t *vertices, size_t count, size_t surface_count,
+                                         double threshold) {
+  fit->threshold = threshold;
+  fit->primitive_count = fit->target_count = 0;
   fit->worst = 0;
   fit->count = 1;
   fit->vertices[0] = collapse->kept;
@@ -112,59 +113,59 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
   for (int corners = 3; corners >= 2; corners--)
     for (int i = -1; i < fit->count && status == QMAT_OK; i++)
       status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
-  size_t slots = to_envelope->slot_counts[collapse->removed], at = 0;
-  for (int i = 0; i < fit->count; i++) slots += to_envelope->slot_counts[fit->vertices[i]];
-  const size_t stride = (slots + MOST_PLACES - 1) / MOST_PLACES;
+  size_t slots = tracker->slot_counts[collapse->removed], at = 0;
+  for (int i = 0; i < fit->count; i++) slots += tracker->slot_counts[fit->vertices[i]];
+  const size_t stride = (slots + MOST_TARGETS - 1) / MOST_TARGETS;
   for (int i = -1; i < fit->count && status == QMAT_OK; i++)
-    for (uint32_t slot = qmat_surface_to_envelope_first(to_envelope, i < 0 ? collapse->removed : fit->vertices[i]);
-         slot != QMAT_NONE && status == QMAT_OK; slot = to_envelope->next[slot], at++) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(tracker, i < 0 ? collapse->removed : fit->vertices[i]);
+         slot != QMAT_NONE && status == QMAT_OK; slot = tracker->next[slot], at++) {
       const size_t point = slot / 3;
-      if (at % stride == 0 && point < surface_count && is_first_slot(fit, to_envelope, collapse->removed, slot))
-        status = qmat_neighbourhood_fit_add(context, fit, &to_envelope->points[3 * point], QMAT_PLACE_SURFACE,
-                                            to_envelope->limits[point]);
+      if (at % stride == 0 && point < surface_count && is_first_slot(fit, tracker, collapse->removed, slot))
+        status = qmat_neighbourhood_fit_add(context, fit, &tracker->points[3 * point], QMAT_TARGET_SURFACE,
+                                            tracker->limits[point]);
     }
   return status;
 }
 
 static void prepare(qmat_neighbourhood_fit *fit, const qmat_complex *complex, double spheres[][4]) {
-  for (size_t i = 0; i < fit->part_count; i++) {
-    neighbourhood_part *part = &fit->parts[i];
-    const int corners = part->vertices[2] == QMAT_NONE ? 2 : 3;
+  for (size_t i = 0; i < fit->primitive_count; i++) {
+    fit_primitive *item = &fit->primitives[i];
+    const int corners = item->vertices[2] == QMAT_NONE ? 2 : 3;
     const double *at[3];
     for (int k = 0; k < corners; k++)
-      at[k] = part->moving[k] >= 0 ? spheres[part->moving[k]] : &complex->spheres[4 * (size_t)part->vertices[k]];
-    qmat_primitive_prepare(at, corners, &part->primitive, &part->ball);
+      at[k] = item->moving[k] >= 0 ? spheres[item->moving[k]] : &complex->spheres[4 * (size_t)item->vertices[k]];
+    qmat_primitive_prepare(at, corners, &item->primitive, &item->ball);
   }
 }
 
-/* F at a place, and the weights of the corners of its nearest part, which is looked for from the last one on. */
-static double find_foot(const qmat_neighbourhood_fit *fit, neighbourhood_place *place, double weights[3]) {
-  uint32_t nearest = place->part;
-  double best = qmat_primitive_foot(&fit->parts[nearest].primitive, place->point, weights);
-  for (uint32_t i = 0; i < fit->part_count; i++) {
-    if (i == place->part) continue;
-    const neighbourhood_part *part = &fit->parts[i];
+/* F at a target, and the weights of the corners of its nearest item, which is looked for from the last one on. */
+static double find_foot(const qmat_neighbourhood_fit *fit, fit_target *target, double weights[3]) {
+  uint32_t nearest = target->nearest;
+  double best = qmat_primitive_foot(&fit->primitives[nearest].primitive, target->point, weights);
+  for (uint32_t i = 0; i < fit->primitive_count; i++) {
+    if (i == target->nearest) continue;
+    const fit_primitive *item = &fit->primitives[i];
     double w[3];
-    if (qmat_primitive_is_farther(&part->ball, place->point, best)) continue;
-    const double f = qmat_primitive_foot(&part->primitive, place->point, w);
+    if (qmat_primitive_is_farther(&item->ball, target->point, best)) continue;
+    const double f = qmat_primitive_foot(&item->primitive, target->point, w);
     if (!(f < best)) continue;
     best = f;
     nearest = i;
     memcpy(weights, w, sizeof w);
   }
-  place->part = nearest;
+  target->nearest = nearest;
   return best;
 }
 
-/* By how much F is wrong; above `held` in size where it is not what is asked. */
-static double error_at(const neighbourhood_place *place, double f) {
-  switch (place->kind) {
-    case QMAT_PLACE_INSIDE:
-      return qmat_larger(0, f - place->slack);
-    case QMAT_PLACE_BORDER:
-      return qmat_smaller(0, f - place->slack);
+/* By how much F is wrong; above `threshold` in size where it is not what is asked. */
+static double error_at(const fit_target *target, double f) {
+  switch (target->kind) {
+    case QMAT_TARGET_INSIDE:
+      return qmat_larger(0, f - target->slack);
+    case QMAT_TARGET_BORDER:
+      return qmat_smaller(0, f - target->slack);
     default:
-      return f > 0 ? qmat_larger(0, f - place->slack) : f;
+      return f > 0 ? qmat_larger(0, f - target->slack) : f;
   }
 }
 
@@ -174,25 +175,24 @@ typedef struct {
   int count;
 } equations;
 
-/* Adds weight times the square of the linearised error of a place. */
-static void add_place(const qmat_neighbourhood_fit *fit, const qmat_complex *complex, double spheres[][4],
-                      const neighbourhood_place *place, const double weights[3], double error, double weight,
-                      equations *e) {
-  const neighbourhood_part *part = &fit->parts[place->part];
+/* Adds weight times the square of the linearised error of a target. */
+static void add_target(const qmat_neighbourhood_fit *fit, const qmat_complex *complex, double spheres[][4],
+                       const fit_target *target, const double weights[3], double error, double weight, equations *e) {
+  const fit_primitive *item = &fit->primitives[target->nearest];
   double foot[3] = {0, 0, 0}, row[12];
   int columns[12], count = 0;
-  for (int k = 0; k < 3 && part->vertices[k] != QMAT_NONE; k++) {
+  for (int k = 0; k < 3 && item->vertices[k] != QMAT_NONE; k++) {
     const double *at =
-        part->moving[k] >= 0 ? spheres[part->moving[k]] : &complex->spheres[4 * (size_t)part->vertices[k]];
+        item->moving[k] >= 0 ? spheres[item->moving[k]] : &complex->spheres[4 * (size_t)item->vertices[k]];
     for (int i = 0; i < 3; i++) foot[i] += weights[k] * at[i];
   }
-  const double length = qmat_point_distance(place->point, foot);
+  const double length = qmat_point_distance(target->point, foot);
   if (!(length > 0)) return;
   for (int k = 0; k < 3; k++) {
-    if (part->moving[k] < 0 || !(weights[k] > 0)) continue;
+    if (item->moving[k] < 0 || !(weights[k] > 0)) continue;
     for (int i = 0; i < 4; i++) {
-      columns[count] = 4 * part->moving[k] + i;
-      row[count++] = i < 3 ? -weights[k] * (place->point[i] - foot[i]) / length : -weights[k];
+      columns[count] = 4 * item->moving[k] + i;
+      row[count++] = i < 3 ? -weights[k] * (target->point[i] - foot[i]) / length : -weights[k];
     }
   }
   for (int i = 0; i < count; i++) {
@@ -202,7 +202,7 @@ static void add_place(const qmat_neighbourhood_fit *fit, const qmat_complex *com
   }
 }
 
-/* Keeps the spheres near where they are, with this share of the places' weight. */
+/* Keeps the spheres near where they are, with this share of the targets' weight. */
 static const double damping = 1e-3;
 
 /* Solves by LDL'; b becomes the solution. */
@@ -235,9 +235,9 @@ static bool solve(equations *e) {
 static const int powers[] = {0, 2, 2, 4, 4, 6, 6, 6};
 enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
 
-/* A fit whose error is still this many times what is held after this many steps is left. */
-enum { STEPS_OF_HOPE = 3 };
-static const double hope = 2;
+/* A fit whose error is still this many times what is threshold after this many steps is left. */
+enum { EARLY_EXIT_STEP = 3 };
+static const double early_exit_ratio = 2;
 
 void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex *complex, bool again, double *error) {
   double current[QMAT_NEIGHBOURHOOD_SPHERES][4];
@@ -245,7 +245,7 @@ void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex 
   const size_t bytes = (size_t)fit->count * sizeof *current;
   memcpy(current, fit->spheres, bytes);
   *error = INFINITY;
-  for (int step = again ? FIRST_STEP_AGAIN : 0; fit->part_count > 0; step++) {
+  for (int step = again ? FIRST_STEP_AGAIN : 0; fit->primitive_count > 0; step++) {
     prepare(fit, complex, current);
     e.count = 4 * fit->count;
     for (int i = 0; i < e.count; i++) {
@@ -254,22 +254,22 @@ void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex 
     }
     const double last_worst = fit->worst;
     double worst = 0;
-    for (size_t i = 0; i < fit->place_count; i++) {
-      neighbourhood_place *place = &fit->places[i];
+    for (size_t i = 0; i < fit->target_count; i++) {
+      fit_target *target = &fit->targets[i];
       double weights[3], weight = 1;
-      const double wrong = error_at(place, find_foot(fit, place, weights));
+      const double wrong = error_at(target, find_foot(fit, target, weights));
       worst = qmat_larger(worst, fabs(wrong));
       if (step == STEPS || wrong == 0) continue;
       const double relative = last_worst > 0 ? wrong / last_worst : 1;
       for (int p = 0; p < powers[step]; p += 2) weight *= relative * relative;
-      add_place(fit, complex, current, place, weights, wrong, weight, &e);
+      add_target(fit, complex, current, target, weights, wrong, weight, &e);
     }
     fit->worst = worst;
     if (worst < *error) {
       *error = worst;
       memcpy(fit->spheres, current, bytes);
     }
-    if (step == STEPS || (step >= STEPS_OF_HOPE && *error > hope * fit->held) || !solve(&e)) return;
+    if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * fit->threshold) || !solve(&e)) return;
     for (int i = 0; i < fit->count; i++) {
       for (int k = 0; k < 4; k++) current[i][k] += e.b[4 * i + k] / (1 + 0.5 * powers[step]);
       if (!(current[i][3] > 0)) return;

@@ -7,11 +7,11 @@
 
 #include "core/geometry/medial_build.h"
 
-/* A part has no more vertices than this where they do not all lie in one place. */
-enum { MOST_IN_A_PART = 1 << 14 };
+/* A piece has no more vertices than this where they do not all lie in one place. */
+enum { MOST_PIECE_VERTICES = 1 << 14 };
 
-/* Of the vertices of a part this share is left. */
-static const double left_share = 0.25;
+/* Of the vertices of a piece this share is left. */
+static const double kept_share = 0.25;
 
 static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex) {
   for (size_t v = 0; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
@@ -19,44 +19,44 @@ static bool has_features(const qmat_decimation_rules *rules, const qmat_complex 
   return false;
 }
 
-bool qmat_can_collapse_in_parts(const qmat_decimation_rules *rules, const qmat_complex *complex) {
-  return complex->vertex_count > MOST_IN_A_PART && rules->on_exceed == QMAT_EXCEED_SKIP &&
+bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex) {
+  return complex->vertex_count > MOST_PIECE_VERTICES && rules->on_exceed == QMAT_EXCEED_SKIP &&
          rules->cost == QMAT_COST_SLAB && !rules->published && rules->protect == QMAT_PROTECT_OFF &&
-         (double)rules->vertices <= left_share * (double)complex->vertex_count && !has_features(rules, complex);
+         (double)rules->vertices <= kept_share * (double)complex->vertex_count && !has_features(rules, complex);
 }
 
-/* Rows by the part that they belong to: those of part p are items[starts[p]] to items[starts[p + 1]]. Behind the last
- * part come those between parts. */
-typedef struct part_rows {
+/* Rows by the piece that they belong to: those of piece p are items[starts[p]] to items[starts[p + 1]]. Behind the last
+ * piece come those between pieces. */
+typedef struct piece_rows {
   size_t *starts;
   uint32_t *items;
-} part_rows;
+} piece_rows;
 
-/* What is left of a part: its edges and triangles by the numbers of the whole, and their bounds. */
-typedef struct part_rest {
+/* What is left of a piece: its edges and triangles by the numbers of the whole, and their bounds. */
+typedef struct piece_result {
   size_t edge_count, triangle_count;
   uint32_t *edges, *triangles;
   double *edge_bounds, *triangle_bounds;
   qmat_collapse_counts counts;
   size_t questions;
-} part_rest;
+} piece_result;
 
-typedef struct divided {
+typedef struct partition {
   qmat_context *context;
   qmat_decimation *whole;
-  qmat_constraint_points *control;
+  qmat_constraint_points *constraints;
   double *depths; /* per vertex, and so on */
-  size_t part_count;
-  uint32_t *parts;        /* per vertex */
-  uint32_t *numbers;      /* per vertex: its number within its part */
-  uint8_t *locked, *gone; /* per vertex: whether it has an edge to another part, and whether it is no more */
-  part_rows vertices, edges, triangles, points;
-  part_rest *rests;
-  _Atomic size_t done; /* vertices of parts that are done */
-  _Atomic bool ended;  /* the run was cancelled, or a part has failed */
-} divided;
+  size_t piece_count;
+  uint32_t *pieces;       /* per vertex */
+  uint32_t *numbers;      /* per vertex: its number within its piece */
+  uint8_t *locked, *gone; /* per vertex: whether it has an edge to another piece, and whether it is no more */
+  piece_rows vertices, edges, triangles, points;
+  piece_result *results;
+  _Atomic size_t done; /* vertices of pieces that are done */
+  _Atomic bool ended;  /* the run was cancelled, or a piece has failed */
+} partition;
 
-/* ---- the parts ---- */
+/* ---- the pieces ---- */
 
 enum { BINS = 1024 };
 
@@ -89,74 +89,74 @@ static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uin
   return kept;
 }
 
-/* Numbers the parts of `count` vertices. */
-static void divide_vertices(divided *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
-  const size_t lower = count > MOST_IN_A_PART ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
+/* Numbers the pieces of `count` vertices. */
+static void divide_vertices(partition *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
+  const size_t lower = count > MOST_PIECE_VERTICES ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
   if (lower > 0 && lower < count) {
     divide_vertices(d, vertices, lower, scratch);
     divide_vertices(d, &vertices[lower], count - lower, scratch);
     return;
   }
-  for (size_t i = 0; i < count; i++) d->parts[vertices[i]] = (uint32_t)d->part_count;
-  d->part_count++;
+  for (size_t i = 0; i < count; i++) d->pieces[vertices[i]] = (uint32_t)d->piece_count;
+  d->piece_count++;
 }
 
-/* The part of all of a row's vertices, or the number of parts. */
-static size_t part_of(const divided *d, const uint32_t *row, size_t size) {
-  const uint32_t part = d->parts[row[0]];
+/* The piece of all of a row's vertices, or the number of pieces. */
+static size_t piece_of(const partition *d, const uint32_t *row, size_t size) {
+  const uint32_t piece = d->pieces[row[0]];
   for (size_t k = 1; k < size && row[k] != QMAT_NONE; k++)
-    if (d->parts[row[k]] != part) return d->part_count;
-  return part;
+    if (d->pieces[row[k]] != piece) return d->piece_count;
+  return piece;
 }
 
-/* Sorts rows of `size` vertices each by their parts; NULL: each vertex is a row. */
-static qmat_status sort_rows(divided *d, const uint32_t *rows, size_t count, size_t size, part_rows *sorted) {
+/* Sorts rows of `size` vertices each by their pieces; NULL: each vertex is a row. */
+static qmat_status sort_rows(partition *d, const uint32_t *rows, size_t count, size_t size, piece_rows *sorted) {
   qmat_arena *arena = &d->context->arena;
-  sorted->starts = qmat_arena_calloc(arena, d->part_count + 3, sizeof *sorted->starts);
+  sorted->starts = qmat_arena_calloc(arena, d->piece_count + 3, sizeof *sorted->starts);
   sorted->items = qmat_arena_alloc(arena, count, sizeof *sorted->items);
-  if (!sorted->starts || !sorted->items) return qmat_fail_memory(d->context, "parts of the medial mesh");
-  for (size_t i = 0; i < count; i++) sorted->starts[(rows ? part_of(d, &rows[size * i], size) : d->parts[i]) + 2]++;
-  for (size_t p = 0; p <= d->part_count; p++) sorted->starts[p + 2] += sorted->starts[p + 1];
+  if (!sorted->starts || !sorted->items) return qmat_fail_memory(d->context, "pieces of the medial mesh");
+  for (size_t i = 0; i < count; i++) sorted->starts[(rows ? piece_of(d, &rows[size * i], size) : d->pieces[i]) + 2]++;
+  for (size_t p = 0; p <= d->piece_count; p++) sorted->starts[p + 2] += sorted->starts[p + 1];
   for (size_t i = 0; i < count; i++)
-    sorted->items[sorted->starts[(rows ? part_of(d, &rows[size * i], size) : d->parts[i]) + 1]++] = (uint32_t)i;
+    sorted->items[sorted->starts[(rows ? piece_of(d, &rows[size * i], size) : d->pieces[i]) + 1]++] = (uint32_t)i;
   return QMAT_OK;
 }
 
-static qmat_status divide(divided *d) {
+static qmat_status divide(partition *d) {
   const qmat_complex *c = &d->whole->complex;
   qmat_arena *arena = &d->context->arena;
   const size_t vertices = c->vertex_count;
-  d->parts = qmat_arena_alloc(arena, vertices, sizeof *d->parts);
+  d->pieces = qmat_arena_alloc(arena, vertices, sizeof *d->pieces);
   d->numbers = qmat_arena_alloc(arena, vertices, sizeof *d->numbers);
   d->locked = qmat_arena_calloc(arena, vertices, 1);
   d->gone = qmat_arena_calloc(arena, vertices, 1);
   uint32_t *order = qmat_arena_alloc(arena, vertices, sizeof *order);
   uint32_t *scratch = qmat_arena_alloc(arena, vertices, sizeof *scratch);
-  if (!d->parts || !d->numbers || !d->locked || !d->gone || !order || !scratch)
-    return qmat_fail_memory(d->context, "parts of the medial mesh");
+  if (!d->pieces || !d->numbers || !d->locked || !d->gone || !order || !scratch)
+    return qmat_fail_memory(d->context, "pieces of the medial mesh");
   for (size_t v = 0; v < vertices; v++) order[v] = (uint32_t)v;
   divide_vertices(d, order, vertices, scratch);
   qmat_status status = sort_rows(d, NULL, vertices, 1, &d->vertices);
   if (status == QMAT_OK) status = sort_rows(d, c->edges, c->edge_count, 2, &d->edges);
   if (status == QMAT_OK) status = sort_rows(d, c->triangles, c->triangle_count, 3, &d->triangles);
-  if (status == QMAT_OK) status = sort_rows(d, d->control->witnesses, d->control->count, 3, &d->points);
-  d->rests = qmat_arena_calloc(arena, d->part_count, sizeof *d->rests);
-  if (status == QMAT_OK && !d->rests) status = qmat_fail_memory(d->context, "parts of the medial mesh");
+  if (status == QMAT_OK) status = sort_rows(d, d->constraints->witnesses, d->constraints->count, 3, &d->points);
+  d->results = qmat_arena_calloc(arena, d->piece_count, sizeof *d->results);
+  if (status == QMAT_OK && !d->results) status = qmat_fail_memory(d->context, "pieces of the medial mesh");
   if (status != QMAT_OK) return status;
-  for (size_t p = 0; p < d->part_count; p++)
+  for (size_t p = 0; p < d->piece_count; p++)
     for (size_t i = d->vertices.starts[p]; i < d->vertices.starts[p + 1]; i++)
       d->numbers[d->vertices.items[i]] = (uint32_t)(i - d->vertices.starts[p]);
-  for (size_t i = d->edges.starts[d->part_count]; i < d->edges.starts[d->part_count + 1]; i++)
+  for (size_t i = d->edges.starts[d->piece_count]; i < d->edges.starts[d->piece_count + 1]; i++)
     for (size_t k = 0; k < 2; k++) d->locked[c->edges[2 * (size_t)d->edges.items[i] + k]] = 1;
   return QMAT_OK;
 }
 
-/* ---- the collapses of one part ---- */
+/* ---- the collapses of one piece ---- */
 
-/* Rows of a part by the part's own numbers. NULL when memory is short. */
-static uint32_t *renumber(qmat_arena *arena, const divided *d, const part_rows *sorted, size_t part,
+/* Rows of a piece by the piece's own numbers. NULL when memory is short. */
+static uint32_t *renumber(qmat_arena *arena, const partition *d, const piece_rows *sorted, size_t piece,
                           const uint32_t *rows, size_t size) {
-  const size_t first = sorted->starts[part], count = sorted->starts[part + 1] - first;
+  const size_t first = sorted->starts[piece], count = sorted->starts[piece + 1] - first;
   uint32_t *own = qmat_arena_alloc(arena, count, size * sizeof *own);
   for (size_t i = 0; own && i < count; i++)
     for (size_t k = 0; k < size; k++) {
@@ -166,18 +166,18 @@ static uint32_t *renumber(qmat_arena *arena, const divided *d, const part_rows *
   return own;
 }
 
-/* The constraint points that hang on the part alone. */
-static qmat_status take_points(qmat_context *context, const divided *d, size_t part, qmat_constraint_points *own) {
-  const qmat_constraint_points *all = d->control;
-  const size_t first = d->points.starts[part];
+/* The constraint points that hang on the piece alone. */
+static qmat_status take_points(qmat_context *context, const partition *d, size_t piece, qmat_constraint_points *own) {
+  const qmat_constraint_points *all = d->constraints;
+  const size_t first = d->points.starts[piece];
   qmat_arena *arena = &context->arena;
-  *own = (qmat_constraint_points){.count = d->points.starts[part + 1] - first, .spacing = all->spacing};
+  *own = (qmat_constraint_points){.count = d->points.starts[piece + 1] - first, .spacing = all->spacing};
   const uint32_t *items = &d->points.items[first];
   own->points = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
   own->weights = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
   own->distances = qmat_arena_alloc(arena, own->count, sizeof(double));
   own->inner_limits = qmat_arena_alloc(arena, own->count, sizeof(double));
-  own->witnesses = renumber(arena, d, &d->points, part, all->witnesses, 3);
+  own->witnesses = renumber(arena, d, &d->points, piece, all->witnesses, 3);
   if (!own->points || !own->weights || !own->distances || !own->inner_limits || !own->witnesses)
     return qmat_fail_memory(context, "constraint points");
   for (size_t i = 0; i < own->count; i++) {
@@ -192,20 +192,20 @@ static qmat_status take_points(qmat_context *context, const divided *d, size_t p
   return QMAT_OK;
 }
 
-/* What of a whole number falls to a part by its share of the vertices; all parts together get all of it. */
-static int64_t share_of(const divided *d, size_t part, int64_t number) {
+/* What of a whole number falls to a piece by its share of the vertices; all pieces together get all of it. */
+static int64_t share_of(const partition *d, size_t piece, int64_t number) {
   const double all = (double)d->whole->complex.vertex_count;
-  const double before = (double)d->vertices.starts[part] / all, after = (double)d->vertices.starts[part + 1] / all;
+  const double before = (double)d->vertices.starts[piece] / all, after = (double)d->vertices.starts[piece + 1] / all;
   return (int64_t)floor((double)number * after) - (int64_t)floor((double)number * before);
 }
 
-/* Sets the part up as a medial mesh of its own. */
-static qmat_status start_part(qmat_context *context, const divided *d, size_t part, qmat_constraint_points *control,
-                              qmat_decimation *own) {
+/* Sets the piece up as a medial mesh of its own. */
+static qmat_status start_piece(qmat_context *context, const partition *d, size_t piece,
+                               qmat_constraint_points *constraints, qmat_decimation *own) {
   const qmat_decimation *whole = d->whole;
   const qmat_complex *c = &whole->complex;
   qmat_arena *arena = &context->arena;
-  const size_t first = d->vertices.starts[part], count = d->vertices.starts[part + 1] - first;
+  const size_t first = d->vertices.starts[piece], count = d->vertices.starts[piece + 1] - first;
   const uint32_t *vertices = &d->vertices.items[first];
   *own = (qmat_decimation){.context = context, .surface = whole->surface, .rules = whole->rules};
   double *spheres = qmat_arena_alloc(arena, count, 4 * sizeof *spheres);
@@ -213,12 +213,12 @@ static qmat_status start_part(qmat_context *context, const divided *d, size_t pa
   uint8_t *locked = qmat_arena_alloc(arena, count, 1);
   own->quadrics = qmat_arena_alloc(arena, count, sizeof *own->quadrics);
   qmat_medial medial = {.sphere_count = count,
-                        .edge_count = d->edges.starts[part + 1] - d->edges.starts[part],
-                        .triangle_count = d->triangles.starts[part + 1] - d->triangles.starts[part],
-                        .edges = renumber(arena, d, &d->edges, part, c->edges, 2),
-                        .triangles = renumber(arena, d, &d->triangles, part, c->triangles, 3)};
+                        .edge_count = d->edges.starts[piece + 1] - d->edges.starts[piece],
+                        .triangle_count = d->triangles.starts[piece + 1] - d->triangles.starts[piece],
+                        .edges = renumber(arena, d, &d->edges, piece, c->edges, 2),
+                        .triangles = renumber(arena, d, &d->triangles, piece, c->triangles, 3)};
   if (!spheres || !depths || !locked || !own->quadrics || !medial.edges || !medial.triangles)
-    return qmat_fail_memory(context, "a part of the medial mesh");
+    return qmat_fail_memory(context, "a piece of the medial mesh");
   for (size_t i = 0; i < count; i++) {
     memcpy(&spheres[4 * i], &c->spheres[4 * (size_t)vertices[i]], 4 * sizeof *spheres);
     depths[i] = d->depths[vertices[i]];
@@ -227,15 +227,15 @@ static qmat_status start_part(qmat_context *context, const divided *d, size_t pa
   }
   own->locked = locked;
   own->rules.refits = 0;
-  own->rules.vertices = (size_t)ceil(left_share * (double)count);
+  own->rules.vertices = (size_t)ceil(kept_share * (double)count);
   qmat_status status = qmat_complex_init(context, &own->complex, &medial, spheres);
-  if (status == QMAT_OK) status = take_points(context, d, part, control);
-  if (status == QMAT_OK) status = qmat_decimation_init(own, control, depths);
-  own->rules.target_euler = own->euler + share_of(d, part, whole->rules.target_euler - whole->euler);
+  if (status == QMAT_OK) status = take_points(context, d, piece, constraints);
+  if (status == QMAT_OK) status = qmat_decimation_init(own, constraints, depths);
+  own->rules.target_euler = own->euler + share_of(d, piece, whole->rules.target_euler - whole->euler);
   return status;
 }
 
-/* The live rows of a part by the numbers of the whole, and their bounds. Both are to be freed. */
+/* The live rows of a piece by the numbers of the whole, and their bounds. Both are to be freed. */
 static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint32_t *rows, const double *bounds,
                      size_t count, size_t size, size_t *left, uint32_t **rows_left, double **bounds_left) {
   *left = 0;
@@ -252,68 +252,68 @@ static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint3
   return 0;
 }
 
-/* Gives back to the whole what is left of a part: what belongs to one part is written by it alone. */
-static qmat_status end_part(divided *d, size_t part, const qmat_decimation *own) {
+/* Gives back to the whole what is left of a piece: what belongs to one piece is written by it alone. */
+static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *own) {
   qmat_complex *all = &d->whole->complex;
   const qmat_complex *c = &own->complex;
-  const uint32_t *vertices = &d->vertices.items[d->vertices.starts[part]];
-  const uint32_t *points = &d->points.items[d->points.starts[part]];
-  part_rest *rest = &d->rests[part];
+  const uint32_t *vertices = &d->vertices.items[d->vertices.starts[piece]];
+  const uint32_t *points = &d->points.items[d->points.starts[piece]];
+  piece_result *result = &d->results[piece];
   for (size_t i = 0; i < c->vertex_count; i++) {
     const uint32_t v = vertices[i];
     d->gone[v] = !c->vertex_alive[i];
     memcpy(&all->spheres[4 * (size_t)v], &c->spheres[4 * i], 4 * sizeof(double));
-    d->depths[v] = own->to_surface.depths[i];
+    d->depths[v] = own->envelope_tracker.depths[i];
     d->whole->quadrics[v] = own->quadrics[i];
   }
-  for (size_t i = 0; i < own->control->count; i++)
+  for (size_t i = 0; i < own->constraints->count; i++)
     for (size_t k = 0; k < 3; k++) {
-      const uint32_t vertex = own->to_envelope.witnesses[3 * i + k];
-      d->control->witnesses[3 * (size_t)points[i] + k] = vertex == QMAT_NONE ? QMAT_NONE : vertices[vertex];
-      d->control->weights[3 * (size_t)points[i] + k] = own->to_envelope.weights[3 * i + k];
+      const uint32_t vertex = own->surface_tracker.witnesses[3 * i + k];
+      d->constraints->witnesses[3 * (size_t)points[i] + k] = vertex == QMAT_NONE ? QMAT_NONE : vertices[vertex];
+      d->constraints->weights[3 * (size_t)points[i] + k] = own->surface_tracker.weights[3 * i + k];
     }
-  rest->counts = own->counts;
-  rest->questions = own->to_surface.lattice.questions;
-  if (take_rows(vertices, c->edge_alive, c->edges, own->to_surface.edge_bounds, c->edge_count, 2, &rest->edge_count,
-                &rest->edges, &rest->edge_bounds) ||
-      take_rows(vertices, c->triangle_alive, c->triangles, own->to_surface.triangle_bounds, c->triangle_count, 3,
-                &rest->triangle_count, &rest->triangles, &rest->triangle_bounds))
-    return qmat_fail_memory(own->context, "a part of the medial mesh");
+  result->counts = own->counts;
+  result->questions = own->envelope_tracker.lattice.questions;
+  if (take_rows(vertices, c->edge_alive, c->edges, own->envelope_tracker.edge_bounds, c->edge_count, 2,
+                &result->edge_count, &result->edges, &result->edge_bounds) ||
+      take_rows(vertices, c->triangle_alive, c->triangles, own->envelope_tracker.triangle_bounds, c->triangle_count, 3,
+                &result->triangle_count, &result->triangles, &result->triangle_bounds))
+    return qmat_fail_memory(own->context, "a piece of the medial mesh");
   atomic_fetch_add(&d->done, c->vertex_count);
   return QMAT_OK;
 }
 
-static qmat_status collapse_part(qmat_context *context, divided *d, size_t part) {
+static qmat_status collapse_piece(qmat_context *context, partition *d, size_t piece) {
   qmat_decimation own;
-  qmat_constraint_points control;
-  qmat_status status = start_part(context, d, part, &control, &own);
+  qmat_constraint_points constraints;
+  qmat_status status = start_piece(context, d, piece, &constraints, &own);
   if (status == QMAT_OK) status = qmat_decimation_run(&own);
-  if (status == QMAT_OK) status = end_part(d, part, &own);
+  if (status == QMAT_OK) status = end_piece(d, piece, &own);
   qmat_decimation_uninit(&own);
   qmat_arena_uninit(&context->arena);
   return status;
 }
 
 /* Who asks: only the thread that runs the node may call the progress function of the run. */
-typedef struct asker {
-  divided *divided;
+typedef struct progress_caller {
+  partition *partition;
   bool is_outside;
-} asker;
+} progress_caller;
 
-static bool may_go_on(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                      const char *unit) {
+static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                             const char *unit) {
   (void)node_id;
   (void)node_type;
   (void)total;
-  const asker *here = user;
-  divided *d = here->divided;
+  const progress_caller *here = user;
+  partition *d = here->partition;
   if (here->is_outside &&
       qmat_progress(d->context, atomic_load(&d->done) + done, d->whole->complex.vertex_count, unit) != QMAT_OK)
     atomic_store(&d->ended, true);
   return !atomic_load(&d->ended);
 }
 
-static qmat_status collapse_parts(divided *d) {
+static qmat_status collapse_pieces(partition *d) {
   qmat_context *context = d->context;
   const int threads = qmat_threads(context);
   qmat_status status = qmat_progress(context, 0, 0, "collapses");
@@ -322,8 +322,8 @@ static qmat_status collapse_parts(divided *d) {
   qmat_error error = {.status = QMAT_OK};
 #pragma omp parallel num_threads(threads)
   {
-    asker here = {.divided = d, .is_outside = false};
-    qmat_context own = {.progress = may_go_on,
+    progress_caller here = {.partition = d, .is_outside = false};
+    qmat_context own = {.progress = forward_progress,
                         .progress_user = &here,
                         .threads = 1,
                         .node_id = context->node_id,
@@ -331,14 +331,14 @@ static qmat_status collapse_parts(divided *d) {
 #pragma omp master
     here.is_outside = true;
 #pragma omp for schedule(dynamic, 1)
-    for (size_t part = 0; part < d->part_count; part++) {
+    for (size_t piece = 0; piece < d->piece_count; piece++) {
       if (atomic_load(&d->ended)) continue;
-      const qmat_status result = collapse_part(&own, d, part);
+      const qmat_status result = collapse_piece(&own, d, piece);
       if (result == QMAT_OK || result == QMAT_CANCELLED) continue;
       atomic_store(&d->ended, true);
-#pragma omp critical(qmat_collapse_in_parts)
-      if (part < failed) {
-        failed = part;
+#pragma omp critical(qmat_collapse_partitioned)
+      if (piece < failed) {
+        failed = piece;
         error = own.error;
       }
     }
@@ -358,62 +358,62 @@ static size_t put_rows(const uint32_t *rows, size_t count, size_t size, const ui
   return count;
 }
 
-static size_t put_rows_between(const divided *d, const part_rows *sorted, const uint32_t *rows, size_t size,
+static size_t put_rows_between(const partition *d, const piece_rows *sorted, const uint32_t *rows, size_t size,
                                const uint32_t *ids, uint32_t *out) {
-  const size_t first = sorted->starts[d->part_count], count = sorted->starts[d->part_count + 1] - first;
+  const size_t first = sorted->starts[d->piece_count], count = sorted->starts[d->piece_count + 1] - first;
   for (size_t i = 0; i < count; i++) put_rows(&rows[size * sorted->items[first + i]], 1, size, ids, &out[size * i]);
   return count;
 }
 
-/* The medial mesh of all parts, with the numbers that `ids` gives to the vertices. */
-static qmat_status join(const divided *d, const uint32_t *ids, qmat_medial *medial) {
+/* The medial mesh of all pieces, with the numbers that `ids` gives to the vertices. */
+static qmat_status join(const partition *d, const uint32_t *ids, qmat_medial *medial) {
   const qmat_complex *c = &d->whole->complex;
   uint32_t *edges = qmat_arena_alloc(&d->context->arena, c->edge_count, 2 * sizeof *edges);
   uint32_t *triangles = qmat_arena_alloc(&d->context->arena, c->triangle_count, 3 * sizeof *triangles);
   if (!edges || !triangles) return qmat_fail_memory(d->context, "the medial mesh");
   size_t edge_count = put_rows_between(d, &d->edges, c->edges, 2, ids, edges);
   size_t triangle_count = put_rows_between(d, &d->triangles, c->triangles, 3, ids, triangles);
-  for (size_t p = 0; p < d->part_count; p++) {
-    const part_rest *rest = &d->rests[p];
-    edge_count += put_rows(rest->edges, rest->edge_count, 2, ids, &edges[2 * edge_count]);
-    triangle_count += put_rows(rest->triangles, rest->triangle_count, 3, ids, &triangles[3 * triangle_count]);
+  for (size_t p = 0; p < d->piece_count; p++) {
+    const piece_result *result = &d->results[p];
+    edge_count += put_rows(result->edges, result->edge_count, 2, ids, &edges[2 * edge_count]);
+    triangle_count += put_rows(result->triangles, result->triangle_count, 3, ids, &triangles[3 * triangle_count]);
   }
   return qmat_medial_set_simplices(d->context, medial, edges, edge_count, triangles, triangle_count);
 }
 
-/* What the parts know of the protrusion of their edges and triangles, where it is more than their corners say. */
-static void carry_bounds(const divided *d, const uint32_t *ids) {
+/* What the pieces know of the protrusion of their edges and triangles, where it is more than their corners say. */
+static void carry_bounds(const partition *d, const uint32_t *ids) {
   qmat_decimation *whole = d->whole;
-  for (size_t p = 0; p < d->part_count; p++) {
-    const part_rest *rest = &d->rests[p];
-    for (size_t i = 0; i < rest->edge_count; i++) {
-      const uint32_t *ends = &rest->edges[2 * i];
-      qmat_envelope_to_surface_bound_edge(&whole->to_surface, &whole->complex, ids[ends[0]], ids[ends[1]],
-                                          rest->edge_bounds[i]);
+  for (size_t p = 0; p < d->piece_count; p++) {
+    const piece_result *result = &d->results[p];
+    for (size_t i = 0; i < result->edge_count; i++) {
+      const uint32_t *ends = &result->edges[2 * i];
+      qmat_envelope_to_surface_bound_edge(&whole->envelope_tracker, &whole->complex, ids[ends[0]], ids[ends[1]],
+                                          result->edge_bounds[i]);
     }
-    for (size_t i = 0; i < rest->triangle_count; i++) {
-      const uint32_t *t = &rest->triangles[3 * i];
-      qmat_envelope_to_surface_bound_triangle(&whole->to_surface, &whole->complex, ids[t[0]], ids[t[1]], ids[t[2]],
-                                              rest->triangle_bounds[i]);
+    for (size_t i = 0; i < result->triangle_count; i++) {
+      const uint32_t *t = &result->triangles[3 * i];
+      qmat_envelope_to_surface_bound_triangle(&whole->envelope_tracker, &whole->complex, ids[t[0]], ids[t[1]],
+                                              ids[t[2]], result->triangle_bounds[i]);
     }
   }
 }
 
-static void add_counts(const divided *d) {
+static void add_counts(const partition *d) {
   qmat_decimation *whole = d->whole;
-  for (size_t p = 0; p < d->part_count; p++) {
-    const part_rest *rest = &d->rests[p];
-    whole->counts.collapses += rest->counts.collapses;
-    whole->counts.refused_by_inside_test += rest->counts.refused_by_inside_test;
-    whole->counts.refused_by_surface_to_envelope += rest->counts.refused_by_surface_to_envelope;
-    whole->counts.refused_by_envelope_to_surface += rest->counts.refused_by_envelope_to_surface;
-    whole->counts.refused_by_topology += rest->counts.refused_by_topology;
-    whole->to_surface.lattice.questions += rest->questions;
+  for (size_t p = 0; p < d->piece_count; p++) {
+    const piece_result *result = &d->results[p];
+    whole->counts.collapses += result->counts.collapses;
+    whole->counts.refused_by_inside_test += result->counts.refused_by_inside_test;
+    whole->counts.refused_by_surface_to_envelope += result->counts.refused_by_surface_to_envelope;
+    whole->counts.refused_by_envelope_to_surface += result->counts.refused_by_envelope_to_surface;
+    whole->counts.refused_by_topology += result->counts.refused_by_topology;
+    whole->envelope_tracker.lattice.questions += result->questions;
   }
 }
 
 /* Puts what is left together in place of the whole. */
-static qmat_status put_together(divided *d) {
+static qmat_status put_together(partition *d) {
   qmat_decimation *whole = d->whole;
   qmat_arena *arena = &d->context->arena;
   const size_t before = whole->complex.vertex_count;
@@ -433,43 +433,44 @@ static qmat_status put_together(divided *d) {
     whole->quadrics[count++] = whole->quadrics[v];
   }
   medial->sphere_count = count;
-  for (size_t i = 0; i < 3 * d->control->count; i++)
-    if (d->control->witnesses[i] != QMAT_NONE) d->control->witnesses[i] = ids[d->control->witnesses[i]];
+  for (size_t i = 0; i < 3 * d->constraints->count; i++)
+    if (d->constraints->witnesses[i] != QMAT_NONE) d->constraints->witnesses[i] = ids[d->constraints->witnesses[i]];
   qmat_status status = join(d, ids, medial);
   qmat_complex left = {.vertex_count = 0};
   if (status == QMAT_OK) status = qmat_complex_init(d->context, &left, medial, spheres);
   qmat_complex_uninit(&whole->complex);
   whole->complex = left;
   qmat_value_release(&medial->base);
-  if (status == QMAT_OK) status = qmat_decimation_init(whole, d->control, d->depths);
+  if (status == QMAT_OK) status = qmat_decimation_init(whole, d->constraints, d->depths);
   if (status != QMAT_OK) return status;
   carry_bounds(d, ids);
   add_counts(d);
   return QMAT_OK;
 }
 
-static void free_rests(const divided *d) {
-  for (size_t p = 0; d->rests && p < d->part_count; p++) {
-    qmat_free(d->rests[p].edges);
-    qmat_free(d->rests[p].triangles);
-    qmat_free(d->rests[p].edge_bounds);
-    qmat_free(d->rests[p].triangle_bounds);
+static void free_results(const partition *d) {
+  for (size_t p = 0; d->results && p < d->piece_count; p++) {
+    qmat_free(d->results[p].edges);
+    qmat_free(d->results[p].triangles);
+    qmat_free(d->results[p].edge_bounds);
+    qmat_free(d->results[p].triangle_bounds);
   }
 }
 
-qmat_status qmat_collapse_in_parts(qmat_decimation *decimation, qmat_constraint_points *control, const double *depths) {
+qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constraint_points *constraints,
+                                      const double *depths) {
   qmat_context *context = decimation->context;
   const qmat_complex *c = &decimation->complex;
-  divided d = {.context = context, .whole = decimation, .control = control};
+  partition d = {.context = context, .whole = decimation, .constraints = constraints};
   d.depths = qmat_arena_alloc(&context->arena, c->vertex_count, sizeof *d.depths);
   decimation->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *decimation->quadrics);
-  if (!d.depths || !decimation->quadrics) return qmat_fail_memory(context, "parts of the medial mesh");
+  if (!d.depths || !decimation->quadrics) return qmat_fail_memory(context, "pieces of the medial mesh");
   memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
   qmat_medial_quadrics_add(c, decimation->quadrics);
   decimation->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
   qmat_status status = divide(&d);
-  if (status == QMAT_OK) status = collapse_parts(&d);
+  if (status == QMAT_OK) status = collapse_pieces(&d);
   if (status == QMAT_OK) status = put_together(&d);
-  free_rests(&d);
+  free_results(&d);
   return status;
 }

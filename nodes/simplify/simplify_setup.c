@@ -15,7 +15,7 @@ const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
 /* The constraint points of collapses in order, which are there for any epsilon, are those of so many times the finest.
  */
-static const double control_error = 2;
+static const double constraint_error = 2;
 
 enum { MOST_CONSTRAINT_POINTS = 600000 };
 
@@ -123,7 +123,7 @@ static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mes
 
 qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *p, const qmat_mesh *mesh,
                                 const qmat_initial_medial *initial, qmat_decimation_rules *rules) {
-  *rules = (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_control_share * p->epsilon : INFINITY,
+  *rules = (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
                                    .share = 1,
                                    .finest = p->finest,
                                    .vertices = (size_t)p->vertices,
@@ -163,9 +163,9 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,
-                                         control_error * o->params.finest, MOST_CONSTRAINT_POINTS,
-                                         run->rules.error == QMAT_ERROR_TWO_SIDED, &o->control);
-  if (status == QMAT_OK) status = qmat_decimation_init(run, &o->control, o->initial.depths);
+                                         constraint_error * o->params.finest, MOST_CONSTRAINT_POINTS,
+                                         run->rules.error == QMAT_ERROR_TWO_SIDED, &o->constraints);
+  if (status == QMAT_OK) status = qmat_decimation_init(run, &o->constraints, o->initial.depths);
   return status == QMAT_OK ? qmat_decimation_run(run) : status;
 }
 

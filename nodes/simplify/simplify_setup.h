@@ -155,7 +155,7 @@ typedef struct qmat_ordered_collapses {
   qmat_simplify_params params; /* with what compat sets */
   qmat_surface *surface;
   qmat_initial_medial initial;
-  qmat_constraint_points control;
+  qmat_constraint_points constraints;
   qmat_decimation decimation;
 } qmat_ordered_collapses;
 

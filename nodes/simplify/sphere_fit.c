@@ -13,45 +13,44 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
 }
 
 /* Whether this slot is the first by which its point hangs on the collapse. */
-static bool is_first_slot(const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse, uint32_t slot) {
+static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (to_envelope->witnesses[s] == collapse->kept || to_envelope->witnesses[s] == collapse->removed) return false;
+    if (tracker->witnesses[s] == collapse->kept || tracker->witnesses[s] == collapse->removed) return false;
   return true;
 }
 
-qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit,
-                                   const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse,
-                                   size_t surface_count, size_t most) {
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
+                                   const qmat_collapse *collapse, size_t surface_count, size_t most) {
   if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   size_t slots = 0, skip = 0;
-  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += to_envelope->slot_counts[ends[e]];
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += tracker->slot_counts[ends[e]];
   const size_t stride = (slots + most - 1) / most;
   fit->count = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = qmat_surface_to_envelope_first(to_envelope, ends[e]); slot != QMAT_NONE;
-         slot = to_envelope->next[slot]) {
+    for (uint32_t slot = qmat_surface_to_envelope_first(tracker, ends[e]); slot != QMAT_NONE;
+         slot = tracker->next[slot]) {
       if (skip > 0) {
         skip--;
         continue;
       }
       skip = stride - 1;
-      if (slot / 3 < surface_count && is_first_slot(to_envelope, collapse, slot)) fit->points[fit->count++] = slot / 3;
+      if (slot / 3 < surface_count && is_first_slot(tracker, collapse, slot)) fit->points[fit->count++] = slot / 3;
     }
   return QMAT_OK;
 }
 
-qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit,
-                                  qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
-                                  const qmat_collapse *collapse, const double sphere[4], double *error) {
+qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+                                  const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
+                                  double *error) {
   *error = 0;
-  const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, sphere);
+  const qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, sphere);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < fit->count; i++) {
     double foot[4], share;
-    const double f = qmat_surface_to_envelope_star_foot(to_envelope, complex, collapse, sphere,
-                                                        &to_envelope->points[3 * (size_t)fit->points[i]], foot, &share);
+    const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, sphere,
+                                                        &tracker->points[3 * (size_t)fit->points[i]], foot, &share);
     *error = qmat_larger(*error, fabs(f));
   }
   return QMAT_OK;
@@ -61,9 +60,9 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *
 static const int powers[] = {0, 0, 2, 2, 4, 4, 6, 6};
 enum { STEPS = sizeof powers / sizeof *powers };
 
-/* A fit whose error is still this many times hopeless after this many steps is left. */
-enum { STEPS_OF_HOPE = 3 };
-static const double hope = 3;
+/* A fit whose error is still this many times give_up_error after this many steps is left. */
+enum { EARLY_EXIT_STEP = 3 };
+static const double early_exit_ratio = 3;
 
 /* Adds weight times the square of the linearised F of a point whose foot moves with `share` of the sphere: a tangent
  * plane in the coordinates of the sphere. */
@@ -92,22 +91,22 @@ static void add_damping(qmat_quadric *sum, const double *sphere) {
   }
 }
 
-qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit,
-                                qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
-                                const qmat_collapse *collapse, double hopeless, double sphere[4], double *error) {
+qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+                                const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
+                                double sphere[4], double *error) {
   double current[4], worst = 0, last_worst = INFINITY;
   memcpy(current, sphere, sizeof current);
   *error = INFINITY;
   for (int step = 0;; step++) {
-    const qmat_status status = qmat_surface_to_envelope_prepare(context, to_envelope, complex, collapse, current);
+    const qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, current);
     if (status != QMAT_OK) return status;
     qmat_quadric sum = {.c = 0};
     last_worst = worst;
     worst = 0;
     for (size_t i = 0; i < fit->count; i++) {
-      const double *point = &to_envelope->points[3 * (size_t)fit->points[i]];
+      const double *point = &tracker->points[3 * (size_t)fit->points[i]];
       double foot[4], share;
-      const double f = qmat_surface_to_envelope_star_foot(to_envelope, complex, collapse, current, point, foot, &share);
+      const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, current, point, foot, &share);
       worst = qmat_larger(worst, fabs(f));
       if (step == STEPS || !(share > 1e-3)) continue;
       double weight = 1;
@@ -119,7 +118,7 @@ qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fi
       *error = worst;
       memcpy(sphere, current, sizeof current);
     }
-    if (step == STEPS || (step >= STEPS_OF_HOPE && *error > hope * hopeless)) return QMAT_OK;
+    if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * give_up_error)) return QMAT_OK;
     add_damping(&sum, current);
     double next[4];
     if (!qmat_quadric_minimise(&sum, next) || !(next[3] > 0)) return QMAT_OK;

@@ -16,21 +16,20 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit);
 
 /* Chooses the constraint points of a collapse or move: those of its vertices among the first `surface_count`, at most
  * `most` (> 0), evenly spread over the lists. QMAT_ERROR_MEMORY. */
-qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit,
-                                   const qmat_surface_to_envelope *to_envelope, const qmat_collapse *collapse,
-                                   size_t surface_count, size_t most);
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
+                                   const qmat_collapse *collapse, size_t surface_count, size_t most);
 
 /* The largest |F| at the chosen points, F being the distance to the star of `collapse` with `sphere`. */
-qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit,
-                                  qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
-                                  const qmat_collapse *collapse, const double sphere[4], double *error);
+qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+                                  const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
+                                  double *error);
 
 /* Moves and resizes `sphere` so that the largest |F| at the chosen points becomes small: least squares with weights
  * that rise with the error from step to step (Gauss-Newton on norms of rising order). Gives up where the error stays
- * above `hopeless`. `*error` is the largest |F| of the sphere that is given back, which is no worse than what came in.
- * QMAT_ERROR_MEMORY. Cost: ten looks at each point. */
-qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit,
-                                qmat_surface_to_envelope *to_envelope, const qmat_complex *complex,
-                                const qmat_collapse *collapse, double hopeless, double sphere[4], double *error);
+ * above `give_up_error`. `*error` is the largest |F| of the sphere that is given back, which is no worse than what came
+ * in. QMAT_ERROR_MEMORY. Cost: ten looks at each point. */
+qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+                                const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
+                                double sphere[4], double *error);
 
 #endif

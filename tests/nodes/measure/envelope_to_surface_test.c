@@ -147,7 +147,7 @@ typedef struct {
   qmat_context context;
   qmat_surface *surface;
   qmat_complex complex;
-  qmat_envelope_to_surface to_surface;
+  qmat_envelope_to_surface envelope_tracker;
   qmat_collapse collapse;
 } model;
 
@@ -162,15 +162,16 @@ static void make_model(model *m, qmat_mesh *mesh, double limit) {
   assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
   for (size_t v = 0; v < medial->sphere_count; v++)
     depths[v] = -qmat_surface_signed_distance(m->surface, &spheres[4 * v]);
-  assert_int_equal(qmat_envelope_to_surface_init(&m->context, &m->to_surface, m->surface, &m->complex, depths, limit),
-                   QMAT_OK);
+  assert_int_equal(
+      qmat_envelope_to_surface_init(&m->context, &m->envelope_tracker, m->surface, &m->complex, depths, limit),
+      QMAT_OK);
   qmat_free(spheres);
   qmat_free(depths);
 }
 
 static void free_model(model *m) {
   qmat_collapse_uninit(&m->collapse);
-  qmat_envelope_to_surface_uninit(&m->to_surface);
+  qmat_envelope_to_surface_uninit(&m->envelope_tracker);
   qmat_complex_uninit(&m->complex);
   qmat_surface_free(m->surface);
   qmat_context_uninit(&m->context);
@@ -180,21 +181,21 @@ static void free_model(model *m) {
 /* What is known of a vertex, an edge or a triangle holds on a dense grid of it. */
 static void check_vertex(const model *m, uint32_t v) {
   const double depth = -qmat_surface_signed_distance(m->surface, &m->complex.spheres[4 * (size_t)v]);
-  assert_true(m->to_surface.depths[v] <= depth + ROUNDING);
+  assert_true(m->envelope_tracker.depths[v] <= depth + ROUNDING);
 }
 
 static void check_edge(const model *m, uint32_t e, int steps) {
   const double *spheres[2];
   double gap;
   for (size_t k = 0; k < 2; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.edges[2 * (size_t)e + k]];
-  assert_true(m->to_surface.edge_bounds[e] >= sampled(m->surface, spheres, 2, steps, &gap) - ROUNDING);
+  assert_true(m->envelope_tracker.edge_bounds[e] >= sampled(m->surface, spheres, 2, steps, &gap) - ROUNDING);
 }
 
 static void check_triangle(const model *m, uint32_t t, int steps) {
   const double *spheres[3];
   double gap;
   for (size_t k = 0; k < 3; k++) spheres[k] = &m->complex.spheres[4 * (size_t)m->complex.triangles[3 * (size_t)t + k]];
-  assert_true(m->to_surface.triangle_bounds[t] >= sampled(m->surface, spheres, 3, steps, &gap) - ROUNDING);
+  assert_true(m->envelope_tracker.triangle_bounds[t] >= sampled(m->surface, spheres, 3, steps, &gap) - ROUNDING);
 }
 
 static void check_all(const model *m, int steps) {
@@ -212,12 +213,12 @@ static void check_star(const model *m, uint32_t v, int steps) {
   check_vertex(m, v);
   const uint32_t *at = qmat_complex_edges_at(&m->complex, v, &count);
   for (size_t i = 0; i < count; i++) {
-    assert_true(m->to_surface.edge_bounds[at[i]] <= m->to_surface.limit);
+    assert_true(m->envelope_tracker.edge_bounds[at[i]] <= m->envelope_tracker.limit);
     check_edge(m, at[i], steps);
   }
   at = qmat_complex_triangles_at(&m->complex, v, &count);
   for (size_t i = 0; i < count; i++) {
-    assert_true(m->to_surface.triangle_bounds[at[i]] <= m->to_surface.limit);
+    assert_true(m->envelope_tracker.triangle_bounds[at[i]] <= m->envelope_tracker.limit);
     check_triangle(m, at[i], steps);
   }
 }
@@ -257,23 +258,25 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least) {
     sphere[3] = fmax(sphere[3], 0);
     bool kept = true;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
-    const bool good = qmat_envelope_to_surface_test_sphere(&m->to_surface, &m->complex, &m->collapse, sphere);
+    const bool good = qmat_envelope_to_surface_test_sphere(&m->envelope_tracker, &m->complex, &m->collapse, sphere);
     const double depth = -qmat_surface_signed_distance(m->surface, sphere);
-    assert_true(m->to_surface.sphere_depth <= depth + ROUNDING);
-    if (fabs(depth) > 1e-7 && fabs(sphere[3] - depth - m->to_surface.limit) > 1e-7)
-      assert_int_equal(good, depth > 0 && sphere[3] - depth <= m->to_surface.limit);
+    assert_true(m->envelope_tracker.sphere_depth <= depth + ROUNDING);
+    if (fabs(depth) > 1e-7 && fabs(sphere[3] - depth - m->envelope_tracker.limit) > 1e-7)
+      assert_int_equal(good, depth > 0 && sphere[3] - depth <= m->envelope_tracker.limit);
     idle++;
     by_sphere += !good;
     if (!good) continue;
-    const bool inside = qmat_envelope_to_surface_test_midpoints(&m->to_surface, &m->complex, &m->collapse, sphere);
+    const bool inside =
+        qmat_envelope_to_surface_test_midpoints(&m->envelope_tracker, &m->complex, &m->collapse, sphere);
     check_midpoints(m, sphere, inside);
     by_midpoints += !inside;
     if (!inside) continue;
     assert_int_equal(
-        qmat_envelope_to_surface_test(&m->context, &m->to_surface, &m->complex, &m->collapse, sphere, &kept), QMAT_OK);
+        qmat_envelope_to_surface_test(&m->context, &m->envelope_tracker, &m->complex, &m->collapse, sphere, &kept),
+        QMAT_OK);
     by_limit += !kept;
     if (!kept) continue;
-    qmat_envelope_to_surface_commit(&m->to_surface, &m->collapse);
+    qmat_envelope_to_surface_commit(&m->envelope_tracker, &m->collapse);
     assert_int_equal(qmat_complex_collapse(&m->context, &m->complex, &m->collapse, sphere), QMAT_OK);
     if (collapses++ % 8 == 0) check_star(m, m->collapse.kept, 6);
     idle = 0;
@@ -303,12 +306,12 @@ static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void *
   model m;
   make_model(&m, shape_box(1, 1, 1), INFINITY);
   assert_int_equal(qmat_complex_preview(&m.context, &m.complex, 0, &m.collapse), QMAT_OK);
-  assert_true(
-      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){0, 0, 0, 9}));
-  assert_false(
-      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){0.3, 0, 0, 0}));
-  assert_false(
-      qmat_envelope_to_surface_test_sphere(&m.to_surface, &m.complex, &m.collapse, (const double[4]){5, 0, 0, 9}));
+  assert_true(qmat_envelope_to_surface_test_sphere(&m.envelope_tracker, &m.complex, &m.collapse,
+                                                   (const double[4]){0, 0, 0, 9}));
+  assert_false(qmat_envelope_to_surface_test_sphere(&m.envelope_tracker, &m.complex, &m.collapse,
+                                                    (const double[4]){0.3, 0, 0, 0}));
+  assert_false(qmat_envelope_to_surface_test_sphere(&m.envelope_tracker, &m.complex, &m.collapse,
+                                                    (const double[4]){5, 0, 0, 9}));
   free_model(&m);
 }
 

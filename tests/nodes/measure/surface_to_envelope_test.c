@@ -23,7 +23,7 @@
 typedef struct {
   qmat_context context;
   qmat_complex complex;
-  qmat_surface_to_envelope to_envelope;
+  qmat_surface_to_envelope surface_tracker;
   qmat_collapse collapse;
 } chain;
 
@@ -42,7 +42,7 @@ static void make_chain(chain *c, double *limits) {
   for (uint32_t i = 0; i < LINKS; i++) edges[2 * i] = i, edges[2 * i + 1] = i + 1;
   assert_int_equal(qmat_medial_set_simplices(&c->context, medial, edges, LINKS, NULL, 0), QMAT_OK);
   assert_int_equal(qmat_complex_init(&c->context, &c->complex, medial, NULL), QMAT_OK);
-  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->to_envelope, POINTS, points, limits, witnesses,
+  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->surface_tracker, POINTS, points, limits, witnesses,
                                                  weights, LINKS + 1),
                    QMAT_OK);
   qmat_value_release(&medial->base);
@@ -50,7 +50,7 @@ static void make_chain(chain *c, double *limits) {
 
 static void free_chain(chain *c) {
   qmat_collapse_uninit(&c->collapse);
-  qmat_surface_to_envelope_uninit(&c->to_envelope);
+  qmat_surface_to_envelope_uninit(&c->surface_tracker);
   qmat_complex_uninit(&c->complex);
   qmat_context_uninit(&c->context);
 }
@@ -60,14 +60,14 @@ static bool try_merge(chain *c, uint32_t a, uint32_t b, const double sphere[4]) 
   assert_int_not_equal(edge, QMAT_NONE);
   assert_int_equal(qmat_complex_preview(&c->context, &c->complex, edge, &c->collapse), QMAT_OK);
   bool kept;
-  assert_int_equal(
-      qmat_surface_to_envelope_test(&c->context, &c->to_envelope, &c->complex, &c->collapse, sphere, QMAT_NONE, &kept),
-      QMAT_OK);
+  assert_int_equal(qmat_surface_to_envelope_test(&c->context, &c->surface_tracker, &c->complex, &c->collapse, sphere,
+                                                 QMAT_NONE, &kept),
+                   QMAT_OK);
   return kept;
 }
 
 static void merge(chain *c, const double sphere[4]) {
-  qmat_surface_to_envelope_commit(&c->to_envelope, &c->collapse);
+  qmat_surface_to_envelope_commit(&c->surface_tracker, &c->collapse);
   assert_int_equal(qmat_complex_collapse(&c->context, &c->complex, &c->collapse, sphere), QMAT_OK);
 }
 
@@ -81,11 +81,11 @@ static void test_witness_is_carried_along_while_it_holds(void **state) {
   assert_true(try_merge(&c, 3, 4, end));
   merge(&c, end);
   const uint32_t kept = c.collapse.kept;
-  assert_int_equal(c.to_envelope.witnesses[6], kept);
-  assert_int_equal(c.to_envelope.witnesses[7], QMAT_NONE);
-  assert_near(c.to_envelope.weights[6], 1, 0);
-  assert_int_equal(qmat_surface_to_envelope_first(&c.to_envelope, kept) / 3, 2);
-  assert_int_equal(qmat_surface_to_envelope_first(&c.to_envelope, c.collapse.removed), QMAT_NONE);
+  assert_int_equal(c.surface_tracker.witnesses[6], kept);
+  assert_int_equal(c.surface_tracker.witnesses[7], QMAT_NONE);
+  assert_near(c.surface_tracker.weights[6], 1, 0);
+  assert_int_equal(qmat_surface_to_envelope_first(&c.surface_tracker, kept) / 3, 2);
+  assert_int_equal(qmat_surface_to_envelope_first(&c.surface_tracker, c.collapse.removed), QMAT_NONE);
   free_chain(&c);
 }
 
@@ -98,11 +98,11 @@ static void test_another_witness_is_searched_for_when_it_moves_away(void **state
   const double end[4] = {3, 0, 0, 1};
   assert_true(try_merge(&c, 2, 3, end));
   merge(&c, end);
-  const uint32_t *w = &c.to_envelope.witnesses[3];
+  const uint32_t *w = &c.surface_tracker.witnesses[3];
   assert_true((w[0] == 1 || w[1] == 1) && (w[0] == c.collapse.kept || w[1] == c.collapse.kept));
   assert_int_equal(w[2], QMAT_NONE);
-  assert_near(c.to_envelope.weights[3], 0.5, 1e-12);
-  assert_near(c.to_envelope.weights[4], 0.5, 1e-12);
+  assert_near(c.surface_tracker.weights[3], 0.5, 1e-12);
+  assert_near(c.surface_tracker.weights[4], 0.5, 1e-12);
   free_chain(&c);
 }
 
@@ -113,9 +113,9 @@ static void test_point_that_nothing_reaches_refuses_and_is_named(void **state) {
   make_chain(&c, limits);
   const double shorter[4] = {3, 0, 0, 1}, thinner[4] = {2, 0, 0, 0.9}, thin_enough[4] = {2, 0, 0, 0.95};
   assert_false(try_merge(&c, 3, 4, shorter)); /* leaves the end of the chain: 0.45 from the point there */
-  assert_int_equal(c.to_envelope.failed_point, 2);
+  assert_int_equal(c.surface_tracker.failed_point, 2);
   assert_false(try_merge(&c, 1, 2, thinner));
-  assert_int_equal(c.to_envelope.failed_point, 1);
+  assert_int_equal(c.surface_tracker.failed_point, 1);
   limits[1] = 0.151;
   assert_true(try_merge(&c, 1, 2, thinner));
   limits[1] = 0.1001;
@@ -133,14 +133,15 @@ static void test_failed_point_is_tried_first(void **state) {
   bool kept;
   const double end[4] = {4, 0, 0, 1};
   assert_true(try_merge(&c, 3, 4, end));
-  assert_int_equal(qmat_surface_to_envelope_test(&c.context, &c.to_envelope, &c.complex, &c.collapse, end, 0, &kept),
-                   QMAT_OK);
+  assert_int_equal(
+      qmat_surface_to_envelope_test(&c.context, &c.surface_tracker, &c.complex, &c.collapse, end, 0, &kept), QMAT_OK);
   assert_true(kept); /* a point whose witness the collapse does not touch does not decide about it */
   const double shorter[4] = {3, 0, 0, 1};
   assert_int_equal(
-      qmat_surface_to_envelope_test(&c.context, &c.to_envelope, &c.complex, &c.collapse, shorter, 2, &kept), QMAT_OK);
+      qmat_surface_to_envelope_test(&c.context, &c.surface_tracker, &c.complex, &c.collapse, shorter, 2, &kept),
+      QMAT_OK);
   assert_false(kept);
-  assert_int_equal(c.to_envelope.failed_point, 2);
+  assert_int_equal(c.surface_tracker.failed_point, 2);
   free_chain(&c);
 }
 
@@ -151,8 +152,8 @@ typedef struct {
   qmat_context context;
   qmat_surface *surface;
   qmat_complex complex;
-  qmat_constraint_points control;
-  qmat_surface_to_envelope to_envelope;
+  qmat_constraint_points constraints;
+  qmat_surface_to_envelope surface_tracker;
   qmat_collapse collapse;
   double *limits;
 } model;
@@ -172,22 +173,22 @@ static void make_model(model *m, qmat_mesh *mesh, double epsilon, bool with_regi
   assert_int_equal(qmat_complex_init(&m->context, &m->complex, medial, spheres), QMAT_OK);
   qmat_free(spheres);
   assert_int_equal(qmat_constraint_points_make(&m->context, m->surface, m->p.samples, medial, &m->complex, epsilon,
-                                               3000, true, &m->control),
+                                               3000, true, &m->constraints),
                    QMAT_OK);
-  m->limits = qmat_alloc(m->control.count, sizeof *m->limits);
-  for (size_t i = 0; i < m->control.count; i++)
-    m->limits[i] = i < m->control.surface_count ? fmax(epsilon, m->control.distances[i])
-                                                : m->control.inner_limits[i - m->control.surface_count];
-  assert_int_equal(
-      qmat_surface_to_envelope_init(&m->context, &m->to_envelope, m->control.count, m->control.points, m->limits,
-                                    m->control.witnesses, m->control.weights, m->complex.vertex_count),
-      QMAT_OK);
+  m->limits = qmat_alloc(m->constraints.count, sizeof *m->limits);
+  for (size_t i = 0; i < m->constraints.count; i++)
+    m->limits[i] = i < m->constraints.surface_count ? fmax(epsilon, m->constraints.distances[i])
+                                                    : m->constraints.inner_limits[i - m->constraints.surface_count];
+  assert_int_equal(qmat_surface_to_envelope_init(&m->context, &m->surface_tracker, m->constraints.count,
+                                                 m->constraints.points, m->limits, m->constraints.witnesses,
+                                                 m->constraints.weights, m->complex.vertex_count),
+                   QMAT_OK);
 }
 
 static void free_model(model *m) {
   qmat_free(m->limits);
   qmat_collapse_uninit(&m->collapse);
-  qmat_surface_to_envelope_uninit(&m->to_envelope);
+  qmat_surface_to_envelope_uninit(&m->surface_tracker);
   qmat_complex_uninit(&m->complex);
   qmat_surface_free(m->surface);
   qmat_context_uninit(&m->context);
@@ -196,7 +197,7 @@ static void free_model(model *m) {
 
 /* Every used slot is in exactly the list of its vertex; nothing else is in a list. */
 static void check_lists(const model *m) {
-  const qmat_surface_to_envelope *c = &m->to_envelope;
+  const qmat_surface_to_envelope *c = &m->surface_tracker;
   size_t used = 0, listed = 0;
   for (size_t slot = 0; slot < 3 * c->point_count; slot++) used += c->witnesses[slot] != QMAT_NONE;
   for (uint32_t v = 0; v < m->complex.vertex_count; v++) {
@@ -227,8 +228,8 @@ static bool is_live_triangle(const qmat_complex *complex, const uint32_t *corner
 
 /* F at the point's witness, after a look at whether that is one. */
 static double checked_witness(const model *m, size_t point) {
-  const uint32_t *w = &m->to_envelope.witnesses[3 * point];
-  const double *share = &m->to_envelope.weights[3 * point];
+  const uint32_t *w = &m->surface_tracker.witnesses[3 * point];
+  const double *share = &m->surface_tracker.weights[3 * point];
   double sum = 0, sphere[4] = {0, 0, 0, 0};
   int corners = 0;
   while (corners < 3 && w[corners] != QMAT_NONE) corners++;
@@ -248,7 +249,7 @@ static double checked_witness(const model *m, size_t point) {
   assert_near(sum, 1, ROUNDING);
   if (corners == 2) assert_int_not_equal(qmat_complex_find_edge(&m->complex, w[0], w[1]), QMAT_NONE);
   if (corners == 3) assert_true(is_live_triangle(&m->complex, w));
-  return qmat_sphere_distance(sphere, &m->to_envelope.points[3 * point]);
+  return qmat_sphere_distance(sphere, &m->surface_tracker.points[3 * point]);
 }
 
 /* The envelope of what is alive. */
@@ -283,9 +284,9 @@ static qmat_envelope *live_envelope(model *m) {
 static void check(model *m) {
   check_lists(m);
   qmat_envelope *envelope = live_envelope(m);
-  for (size_t i = 0; i < m->control.count; i++) {
+  for (size_t i = 0; i < m->constraints.count; i++) {
     const double at_witness = checked_witness(m, i);
-    assert_true(at_witness >= qmat_envelope_distance(envelope, &m->control.points[3 * i], NULL) - ROUNDING);
+    assert_true(at_witness >= qmat_envelope_distance(envelope, &m->constraints.points[3 * i], NULL) - ROUNDING);
     assert_true(at_witness <= m->limits[i] + ROUNDING);
   }
   qmat_envelope_free(envelope);
@@ -301,8 +302,8 @@ static uint32_t random_live_edge(random_numbers *random, const qmat_complex *com
 /* Whether every point of the collapse's two regions is within its limit of the new complex, by asking all of it. */
 static void check_refusal(model *m, const double sphere[4]) {
   const uint32_t kept = m->collapse.kept, removed = m->collapse.removed;
-  const double *point = &m->control.points[3 * (size_t)m->to_envelope.failed_point];
-  const double limit = m->limits[m->to_envelope.failed_point];
+  const double *point = &m->constraints.points[3 * (size_t)m->surface_tracker.failed_point];
+  const double limit = m->limits[m->surface_tracker.failed_point];
   /* The failed point is out of reach of the merged sphere and of the link's untouched edges at least. */
   assert_true(qmat_sphere_distance(sphere, point) > limit);
   for (size_t n = 0; n < m->collapse.neighbour_count; n++) {
@@ -316,7 +317,7 @@ static void check_refusal(model *m, const double sphere[4]) {
   }
   bool served = false;
   for (size_t k = 0; k < 3; k++) {
-    const uint32_t v = m->to_envelope.witnesses[3 * (size_t)m->to_envelope.failed_point + k];
+    const uint32_t v = m->surface_tracker.witnesses[3 * (size_t)m->surface_tracker.failed_point + k];
     served |= v == kept || v == removed;
   }
   assert_true(served);
@@ -339,7 +340,7 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least, size_t che
     sphere[3] = fmax(sphere[3], 0);
     bool kept;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
-    assert_int_equal(qmat_surface_to_envelope_test(&m->context, &m->to_envelope, &m->complex, &m->collapse, sphere,
+    assert_int_equal(qmat_surface_to_envelope_test(&m->context, &m->surface_tracker, &m->complex, &m->collapse, sphere,
                                                    QMAT_NONE, &kept),
                      QMAT_OK);
     if (!kept) {
@@ -348,7 +349,7 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least, size_t che
       continue;
     }
     idle = 0;
-    qmat_surface_to_envelope_commit(&m->to_envelope, &m->collapse);
+    qmat_surface_to_envelope_commit(&m->surface_tracker, &m->collapse);
     assert_int_equal(qmat_complex_collapse(&m->context, &m->complex, &m->collapse, sphere), QMAT_OK);
     if (++collapses % every == 0 && checked < 2 * checks) {
       check(m);
@@ -393,11 +394,11 @@ static void test_without_limits_everything_may_collapse(void **state) {
     const double *a = &m.complex.spheres[4 * (size_t)m.complex.edges[2 * (size_t)edge]];
     const double sphere[4] = {a[0], a[1], a[2], a[3]};
     assert_int_equal(qmat_complex_preview(&m.context, &m.complex, edge, &m.collapse), QMAT_OK);
-    qmat_surface_to_envelope_commit(&m.to_envelope, &m.collapse); /* of no test at all */
+    qmat_surface_to_envelope_commit(&m.surface_tracker, &m.collapse); /* of no test at all */
     assert_int_equal(qmat_complex_collapse(&m.context, &m.complex, &m.collapse, sphere), QMAT_OK);
   }
   check_lists(&m);
-  for (size_t i = 0; i < m.control.count; i++) checked_witness(&m, i);
+  for (size_t i = 0; i < m.constraints.count; i++) checked_witness(&m, i);
   assert_int_equal(m.complex.live_vertices, pipeline_components(m.p.medial));
   free_model(&m);
 }

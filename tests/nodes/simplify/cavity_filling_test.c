@@ -119,18 +119,18 @@ static void test_cavities_are_found_and_filled(void **state) {
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double wide = 0.1; /* what the corners of the bar need */
   assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
-  assert_true(errors.cavity_count > 0);
+  assert_true(errors.uncovered_count > 0);
   assert_true(errors.boundary_to_surface > wide);
-  for (int i = 0; i < 8 && errors.cavity_count > 0; i++) {
+  for (int i = 0; i < 8 && errors.uncovered_count > 0; i++) {
     size_t added;
     assert_int_equal(
-        qmat_cavities_fill(&b.context, b.surface, errors.cavities, errors.cavity_count, wide, b.medial, &added),
+        qmat_cavities_fill(&b.context, b.surface, errors.uncovered, errors.uncovered_count, wide, b.medial, &added),
         QMAT_OK);
     assert_true(added > 0);
     qmat_medial_errors_uninit(&errors);
     assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
   }
-  assert_int_equal(errors.cavity_count, 0);
+  assert_int_equal(errors.uncovered_count, 0);
   assert_true(errors.boundary_to_surface <= wide);
   for (size_t e = 0; e < b.medial->edge_count; e++) {
     const double *const ends[2] = {&b.medial->spheres[4 * (size_t)b.medial->edges[2 * e]],

@@ -190,16 +190,17 @@ static void test_hausdorff_cost_is_the_largest_distance_of_all_points_that_the_e
       witnesses[3 * i + 1] = witnesses[3 * i + 2] = QMAT_NONE;
       weights[3 * i] = 1;
     }
-    qmat_surface_to_envelope to_envelope;
+    qmat_surface_to_envelope surface_tracker;
     qmat_collapse collapse = {0};
     qmat_candidates c;
-    assert_int_equal(
-        qmat_surface_to_envelope_init(&f.context, &to_envelope, POINTS, points, limits, witnesses, weights, SPHERES),
-        QMAT_OK);
+    assert_int_equal(qmat_surface_to_envelope_init(&f.context, &surface_tracker, POINTS, points, limits, witnesses,
+                                                   weights, SPHERES),
+                     QMAT_OK);
     const uint32_t edge = qmat_complex_find_edge(&f.complex, 0, 1);
     assert_int_equal(qmat_complex_preview(&f.context, &f.complex, edge, &collapse), QMAT_OK);
     const size_t counted = POINTS - 10;
-    assert_int_equal(qmat_hausdorff_candidates(&f.context, &to_envelope, &f.complex, &collapse, counted, &c), QMAT_OK);
+    assert_int_equal(qmat_hausdorff_candidates(&f.context, &surface_tracker, &f.complex, &collapse, counted, &c),
+                     QMAT_OK);
     assert_int_equal(c.count, 1);
     double best = INFINITY, of_candidate = -INFINITY;
     for (size_t e = 0; e < 2; e++) {
@@ -212,7 +213,7 @@ static void test_hausdorff_cost_is_the_largest_distance_of_all_points_that_the_e
     assert_near(c.errors[0], best, 1e-9);
     assert_near(of_candidate, best, 1e-9);
     qmat_collapse_uninit(&collapse);
-    qmat_surface_to_envelope_uninit(&to_envelope);
+    qmat_surface_to_envelope_uninit(&surface_tracker);
     tear_down(&f);
   }
 }
@@ -222,17 +223,17 @@ static void test_an_edge_without_points_keeps_its_larger_end_and_costs_least(voi
   static const double spheres[] = {0, 0, 0, 1, 3, 0, 0, 2};
   static const uint32_t edges[] = {0, 1};
   fixture f;
-  qmat_surface_to_envelope to_envelope;
+  qmat_surface_to_envelope surface_tracker;
   qmat_collapse collapse = {0};
   qmat_candidates c;
   make(&f, spheres, 2, edges, 1, NULL, 0);
-  assert_int_equal(qmat_surface_to_envelope_init(&f.context, &to_envelope, 0, NULL, NULL, NULL, NULL, 2), QMAT_OK);
+  assert_int_equal(qmat_surface_to_envelope_init(&f.context, &surface_tracker, 0, NULL, NULL, NULL, NULL, 2), QMAT_OK);
   assert_int_equal(qmat_complex_preview(&f.context, &f.complex, 0, &collapse), QMAT_OK);
-  assert_int_equal(qmat_hausdorff_candidates(&f.context, &to_envelope, &f.complex, &collapse, 0, &c), QMAT_OK);
+  assert_int_equal(qmat_hausdorff_candidates(&f.context, &surface_tracker, &f.complex, &collapse, 0, &c), QMAT_OK);
   assert_memory_equal(c.spheres[0], &spheres[4], 4 * sizeof(double));
   assert_true(c.errors[0] == -INFINITY);
   qmat_collapse_uninit(&collapse);
-  qmat_surface_to_envelope_uninit(&to_envelope);
+  qmat_surface_to_envelope_uninit(&surface_tracker);
   tear_down(&f);
 }
 

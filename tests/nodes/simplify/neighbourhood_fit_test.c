@@ -19,7 +19,7 @@ enum { SPHERES = 3, RINGS = 25, POINTS = 4 * RINGS };
 typedef struct {
   qmat_context context;
   qmat_complex complex;
-  qmat_surface_to_envelope to_envelope;
+  qmat_surface_to_envelope surface_tracker;
   qmat_collapse collapse;
   qmat_neighbourhood_fit fit;
   double points[3 * POINTS], limits[POINTS], weights[3 * POINTS];
@@ -59,7 +59,7 @@ static void make_chain(chain *c, int spheres) {
     c->witnesses[3 * i] = x < 0.5 ? 0 : x < 2 || spheres < 3 ? 1 : 2;
     c->witnesses[3 * i + 1] = c->witnesses[3 * i + 2] = QMAT_NONE;
   }
-  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->to_envelope, POINTS, c->points, c->limits,
+  assert_int_equal(qmat_surface_to_envelope_init(&c->context, &c->surface_tracker, POINTS, c->points, c->limits,
                                                  c->witnesses, c->weights, (size_t)spheres),
                    QMAT_OK);
   const uint32_t edge = qmat_complex_find_edge(&c->complex, 0, 1);
@@ -69,7 +69,7 @@ static void make_chain(chain *c, int spheres) {
 static void free_chain(chain *c) {
   qmat_neighbourhood_fit_uninit(&c->fit);
   qmat_collapse_uninit(&c->collapse);
-  qmat_surface_to_envelope_uninit(&c->to_envelope);
+  qmat_surface_to_envelope_uninit(&c->surface_tracker);
   qmat_complex_uninit(&c->complex);
   qmat_context_uninit(&c->context);
 }
@@ -77,7 +77,7 @@ static void free_chain(chain *c) {
 static double fit(chain *c, size_t others) {
   static const uint32_t neighbour = 2;
   double error;
-  assert_int_equal(qmat_neighbourhood_fit_start(&c->context, &c->fit, &c->to_envelope, &c->complex, &c->collapse,
+  assert_int_equal(qmat_neighbourhood_fit_start(&c->context, &c->fit, &c->surface_tracker, &c->complex, &c->collapse,
                                                 merged, &neighbour, others, POINTS, 0.05),
                    QMAT_OK);
   qmat_neighbourhood_fit_run(&c->fit, &c->complex, false, &error);
@@ -108,9 +108,9 @@ static void test_places_get_what_is_asked_of_them(void **state) {
   /* F is 0.02 here, beside the capsule; it has to be 0. */
   static const double beside[3] = {2, 1.02, 0};
   double error, before;
-  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, beside, QMAT_PLACE_INSIDE, 0), QMAT_OK);
+  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, beside, QMAT_TARGET_INSIDE, 0), QMAT_OK);
   qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
-  assert_true(error <= c.fit.held);
+  assert_true(error <= c.fit.threshold);
   assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], beside) <= 0);
   free_chain(&c);
 
@@ -120,9 +120,9 @@ static void test_places_get_what_is_asked_of_them(void **state) {
   static const double border[3] = {2, 0, 0.94};
   before = qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border);
   assert_true(before < -0.055);
-  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, border, QMAT_PLACE_BORDER, 0.05), QMAT_OK);
+  assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, border, QMAT_TARGET_BORDER, 0.05), QMAT_OK);
   qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
-  assert_true(error <= c.fit.held);
+  assert_true(error <= c.fit.threshold);
   assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border) >= -0.05);
   free_chain(&c);
 }

@@ -29,7 +29,7 @@ typedef struct sheet {
   qmat_surface *surface;
   qmat_medial *medial;
   double *spheres, *depths; /* unit frame */
-  qmat_constraint_points control;
+  qmat_constraint_points constraints;
   qmat_decimation run;
 } sheet;
 
@@ -70,20 +70,20 @@ static void make_sheet(sheet *s) {
   const qmat_frame *frame = qmat_surface_frame(s->surface);
   s->spheres = malloc(4 * SPHERES * sizeof(double));
   s->depths = malloc(SPHERES * sizeof(double));
-  s->control.points = malloc(3 * POINTS * sizeof(double));
-  assert_true(s->spheres && s->depths && s->control.points);
+  s->constraints.points = malloc(3 * POINTS * sizeof(double));
+  assert_true(s->spheres && s->depths && s->constraints.points);
   for (size_t i = 0; i < POINTS; i++) {
-    memcpy(&s->control.points[3 * i], &s->medial->spheres[4 * (i / 2)], 2 * sizeof(double));
-    s->control.points[3 * i + 2] = i % 2 ? half_height : -half_height;
+    memcpy(&s->constraints.points[3 * i], &s->medial->spheres[4 * (i / 2)], 2 * sizeof(double));
+    s->constraints.points[3 * i + 2] = i % 2 ? half_height : -half_height;
   }
-  qmat_frame_to_unit(frame, s->control.points, POINTS, s->control.points);
+  qmat_frame_to_unit(frame, s->constraints.points, POINTS, s->constraints.points);
   qmat_frame_spheres_to_unit(frame, s->medial->spheres, SPHERES, s->spheres);
   for (size_t i = 0; i < SPHERES; i++) s->depths[i] = -qmat_surface_signed_distance(s->surface, &s->spheres[4 * i]);
 }
 
 /* The run before its first collapse. */
 static void start(sheet *s) {
-  qmat_constraint_points *c = &s->control;
+  qmat_constraint_points *c = &s->constraints;
   const double *points = c->points;
   *c = (qmat_constraint_points){
       .count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = c->points, .spacing = INFINITY};
@@ -125,7 +125,7 @@ static void free_sheet(sheet *s) {
   qmat_value_release(&s->mesh->base);
   free(s->spheres);
   free(s->depths);
-  free(s->control.points);
+  free(s->constraints.points);
 }
 
 static int set_up(void **state) {
@@ -143,8 +143,8 @@ static int tear_down(void **state) {
 static void collapse(sheet *s, int threads) {
   start(s);
   s->context.threads = threads;
-  assert_true(qmat_can_collapse_in_parts(&s->run.rules, &s->run.complex));
-  assert_int_equal(qmat_collapse_in_parts(&s->run, &s->control, s->depths), QMAT_OK);
+  assert_true(qmat_can_collapse_partitioned(&s->run.rules, &s->run.complex));
+  assert_int_equal(qmat_collapse_partitioned(&s->run, &s->constraints, s->depths), QMAT_OK);
 }
 
 static void test_a_quarter_is_left_with_what_was_held(void **state) {
@@ -159,20 +159,20 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
   assert_int_equal((int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count, 1);
   for (size_t i = 0; i < POINTS; i++) {
     double sphere[4] = {0, 0, 0, 0}, sum = 0;
-    const uint32_t *w = &s->control.witnesses[3 * i];
+    const uint32_t *w = &s->constraints.witnesses[3 * i];
     for (size_t k = 0; k < 3 && w[k] != QMAT_NONE; k++) {
       assert_true(w[k] < c->vertex_count);
-      sum += s->control.weights[3 * i + k];
-      for (size_t j = 0; j < 4; j++) sphere[j] += s->control.weights[3 * i + k] * c->spheres[4 * (size_t)w[k] + j];
+      sum += s->constraints.weights[3 * i + k];
+      for (size_t j = 0; j < 4; j++) sphere[j] += s->constraints.weights[3 * i + k] * c->spheres[4 * (size_t)w[k] + j];
     }
     assert_near(sum, 1, 1e-9);
-    assert_true(qmat_sphere_distance(sphere, &s->control.points[3 * i]) <= limit * (1 + 1e-9));
+    assert_true(qmat_sphere_distance(sphere, &s->constraints.points[3 * i]) <= limit * (1 + 1e-9));
     if (w[1] != QMAT_NONE) assert_int_not_equal(qmat_complex_find_edge(c, w[0], w[1]), QMAT_NONE);
     if (w[2] != QMAT_NONE) assert_int_not_equal(qmat_complex_find_triangle(c, w[0], w[1], w[2]), QMAT_NONE);
   }
   for (size_t v = 0; v < c->vertex_count; v++) {
     const double depth = -qmat_surface_signed_distance(s->surface, &c->spheres[4 * v]);
-    assert_true(s->run.to_surface.depths[v] <= depth + 1e-9);
+    assert_true(s->run.envelope_tracker.depths[v] <= depth + 1e-9);
     assert_true(c->spheres[4 * v + 3] - depth <= limit);
   }
   /* What is known of an edge's protrusion is true all along it. */
@@ -182,9 +182,9 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
       for (size_t k = 0; k < 4; k++)
         sphere[k] = (1 - 0.25 * i) * c->spheres[4 * (size_t)c->edges[2 * e] + k] +
                     0.25 * i * c->spheres[4 * (size_t)c->edges[2 * e + 1] + k];
-      const double to_surface = sphere[3] + qmat_surface_signed_distance(s->surface, sphere);
-      assert_true(to_surface <= s->run.to_surface.edge_bounds[e] + 1e-9);
-      assert_true(to_surface <= limit);
+      const double envelope_tracker = sphere[3] + qmat_surface_signed_distance(s->surface, sphere);
+      assert_true(envelope_tracker <= s->run.envelope_tracker.edge_bounds[e] + 1e-9);
+      assert_true(envelope_tracker <= limit);
     }
   /* It goes on from there. */
   assert_int_equal(qmat_decimation_run(&s->run), QMAT_OK);
@@ -231,9 +231,9 @@ static void test_spheres_in_one_place_are_one_part(void **state) {
   const double depth = half_height / qmat_surface_frame(s->surface)->diagonal;
   for (size_t v = 0; v < SPHERES; v++) {
     depths[v] = depth;
-    for (size_t k = 0; k < 2; k++) s->control.distances[2 * v + k] = 10;
+    for (size_t k = 0; k < 2; k++) s->constraints.distances[2 * v + k] = 10;
   }
-  assert_int_equal(qmat_collapse_in_parts(&s->run, &s->control, depths), QMAT_OK);
+  assert_int_equal(qmat_collapse_partitioned(&s->run, &s->constraints, depths), QMAT_OK);
   assert_true(s->run.complex.vertex_count < SPHERES / 2);
   free(depths);
   end(s);
@@ -245,26 +245,26 @@ static void test_what_depends_on_the_order_is_not_done_in_parts(void **state) {
   qmat_decimation_rules *rules = &s->run.rules;
   const qmat_decimation_rules good = *rules;
   qmat_complex *c = &s->run.complex;
-  assert_true(qmat_can_collapse_in_parts(rules, c));
+  assert_true(qmat_can_collapse_partitioned(rules, c));
   rules->on_exceed = QMAT_EXCEED_RAISE;
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   *rules = good;
   rules->cost = QMAT_COST_PMAT;
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   *rules = good;
   rules->protect = QMAT_PROTECT_LATE;
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   *rules = good;
   rules->published = true;
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   *rules = good;
   rules->vertices = SPHERES / 2;
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   *rules = good;
   c->spheres[3] = 0; /* a sharp feature */
-  assert_false(qmat_can_collapse_in_parts(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c));
   rules->features = QMAT_FEATURES_NONE;
-  assert_true(qmat_can_collapse_in_parts(rules, c));
+  assert_true(qmat_can_collapse_partitioned(rules, c));
   end(s);
 }
 
@@ -285,7 +285,7 @@ static void test_it_ends_when_it_is_cancelled(void **state) {
     s->context.threads = 2;
     s->context.progress = ask_once;
     s->context.progress_user = &left;
-    const qmat_status status = qmat_collapse_in_parts(&s->run, &s->control, s->depths);
+    const qmat_status status = qmat_collapse_partitioned(&s->run, &s->constraints, s->depths);
     assert_true(status == QMAT_CANCELLED || (times == 1 && left == 0 && status == QMAT_OK));
     if (times == 0) assert_int_equal(status, QMAT_CANCELLED);
     end(s);
@@ -297,7 +297,7 @@ static void test_a_shortage_of_memory_anywhere_is_an_error(void **state) {
   start(s);
   shortage(SIZE_MAX, 0);
   s->context.threads = 2;
-  assert_int_equal(qmat_collapse_in_parts(&s->run, &s->control, s->depths), QMAT_OK);
+  assert_int_equal(qmat_collapse_partitioned(&s->run, &s->constraints, s->depths), QMAT_OK);
   const size_t needed = asked;
   end(s);
   assert_true(needed > 40);
@@ -305,7 +305,7 @@ static void test_a_shortage_of_memory_anywhere_is_an_error(void **state) {
     start(s);
     s->context.threads = 2;
     shortage(k * needed / 24, SIZE_MAX);
-    const qmat_status status = qmat_collapse_in_parts(&s->run, &s->control, s->depths);
+    const qmat_status status = qmat_collapse_partitioned(&s->run, &s->constraints, s->depths);
     shortage(SIZE_MAX, 0);
     assert_int_equal(status, QMAT_ERROR_MEMORY);
     assert_string_not_equal(s->context.error.message, "");
