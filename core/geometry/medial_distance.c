@@ -4,13 +4,11 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "core/geometry/vector.h"
+
 /* A triangle flatter than this (height over longest side) is the union of its cones: what lies between them is then
  * within twice the height of one of them, below what double precision resolves. */
 #define FLAT 1e-13
-
-static double dot3(const double a[3], const double b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static double clamp(double x, double high) {
   x = x > 0 ? x : 0;
@@ -24,12 +22,12 @@ static double cosine(double x) {
 
 double qmat_sphere_distance(const double sphere[4], const double point[3]) {
   double d[3] = {point[0] - sphere[0], point[1] - sphere[1], point[2] - sphere[2]};
-  return sqrt(dot3(d, d)) - sphere[3];
+  return sqrt(qmat_dot(d, d)) - sphere[3];
 }
 
 void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]) {
   double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-  double length = sqrt(dot3(d, d)), growth = b[3] - a[3];
+  double length = sqrt(qmat_dot(d, d)), growth = b[3] - a[3];
   if (!(length > fabs(growth)) || !(fabs(growth / length) < 1)) {
     const double *larger = growth > 0 ? b : a;
     *cone = (qmat_cone){.origin = {larger[0], larger[1], larger[2]}, .radius = larger[3], .only = growth > 0 ? 2 : 1};
@@ -48,10 +46,10 @@ void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]) {
 /* The distance, and where along the axis the nearest sphere sits. */
 static inline double cone_at(const qmat_cone *cone, const double point[3], double *along) {
   double w[3] = {point[0] - cone->origin[0], point[1] - cone->origin[1], point[2] - cone->origin[2]};
-  double axial = dot3(w, cone->axis);
+  double axial = qmat_dot(w, cone->axis);
   /* The radial part as a vector: |w|^2 - axial^2 would lose half the digits near the axis. */
   for (int k = 0; k < 3; k++) w[k] -= axial * cone->axis[k];
-  double radial2 = dot3(w, w);
+  double radial2 = qmat_dot(w, w);
   double t = clamp(axial + sqrt(radial2) * cone->lean, cone->length);
   *along = t;
   return sqrt((axial - t) * (axial - t) + radial2) - cone->radius - cone->slope * t;
@@ -99,7 +97,7 @@ static void edge_prepare(qmat_slab_edge *edge, const double a[2], double ra, con
 static void any_perpendicular(const double u[3], double v[3]) {
   int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2) : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
   for (int i = 0; i < 3; i++) v[i] = (i == k) - u[k] * u[i];
-  double length = sqrt(dot3(v, v));
+  double length = sqrt(qmat_dot(v, v));
   for (int i = 0; i < 3; i++) v[i] /= length;
 }
 
@@ -109,7 +107,7 @@ void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], co
   int first = 0;
   for (int i = 0; i < 3; i++) {
     const double *p = given[i], *q = given[(i + 1) % 3];
-    double d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, length2 = dot3(d, d);
+    double d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, length2 = qmat_dot(d, d);
     if (length2 > longest) {
       longest = length2;
       first = i;
@@ -123,15 +121,15 @@ void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], co
   double side = sqrt(longest), w[3], *u = slab->u, *v = slab->v, *n = slab->normal;
   for (int k = 0; k < 3; k++) u[k] = side > 0 ? (s[1][k] - s[0][k]) / side : k == 0;
   for (int k = 0; k < 3; k++) w[k] = s[2][k] - s[0][k];
-  slab->third = dot3(w, u);
+  slab->third = qmat_dot(w, u);
   for (int k = 0; k < 3; k++) v[k] = w[k] - slab->third * u[k];
-  double height = sqrt(dot3(v, v));
+  double height = sqrt(qmat_dot(v, v));
   if (height > FLAT * side) {
     /* Of a sliver, rounding leaves some u in v: take it out once more. */
     for (int k = 0; k < 3; k++) v[k] /= height;
-    double rest = dot3(v, u);
+    double rest = qmat_dot(v, u);
     for (int k = 0; k < 3; k++) v[k] -= rest * u[k];
-    double length = sqrt(dot3(v, v));
+    double length = sqrt(qmat_dot(v, v));
     for (int k = 0; k < 3; k++) v[k] /= length;
   } else {
     any_perpendicular(u, v);
@@ -175,7 +173,7 @@ static inline double edge_at(const qmat_slab_edge *edge, double u, double v, dou
  * an edge that faces it, so that at most two edges are looked at. */
 static inline double slab_at(const qmat_slab *slab, const double point[3], int *part, double at[2]) {
   double w[3] = {point[0] - slab->origin[0], point[1] - slab->origin[1], point[2] - slab->origin[2]};
-  double u = dot3(w, slab->u), v = dot3(w, slab->v), z = fabs(dot3(w, slab->normal));
+  double u = qmat_dot(w, slab->u), v = qmat_dot(w, slab->v), z = fabs(qmat_dot(w, slab->normal));
   unsigned faces = 7;
   if (slab->solid) {
     double b2 = (v + slab->lean[1] * z) * slab->inverse_height;

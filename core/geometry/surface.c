@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/geometry/triangle_blocks.h"
 #include "core/geometry/vector.h"
 
@@ -68,11 +69,8 @@ static const double *corner_position(const qmat_surface *surface, uint32_t trian
 
 /* Twice the area vector. */
 static void triangle_normal(const qmat_surface *surface, uint32_t triangle, double normal[3]) {
-  double e[3], f[3];
-  const double *a = corner_position(surface, triangle, 0);
-  qmat_subtract(corner_position(surface, triangle, 1), a, e);
-  qmat_subtract(corner_position(surface, triangle, 2), a, f);
-  qmat_cross(e, f, normal);
+  qmat_triangle_normal(corner_position(surface, triangle, 0), corner_position(surface, triangle, 1),
+                       corner_position(surface, triangle, 2), normal);
 }
 
 /* --- rays ------------------------------------------------------------------------------------------------------- */

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/json_text.h"
 #include "core/node.h"
 #include "io/base64.h"
@@ -140,17 +141,6 @@ static qmat_status single_positions(qmat_context *context, const qmat_mesh *skin
   return QMAT_OK;
 }
 
-static void cross(const double *a, const double *b, const double *c, double *normal) {
-  double u[3], v[3];
-  for (int k = 0; k < 3; k++) {
-    u[k] = b[k] - a[k];
-    v[k] = c[k] - a[k];
-  }
-  normal[0] = u[1] * v[2] - u[2] * v[1];
-  normal[1] = u[2] * v[0] - u[0] * v[2];
-  normal[2] = u[0] * v[1] - u[1] * v[0];
-}
-
 /* Unit normals, the sum of the facets' area vectors (cross products, whose length is twice the area). Vertices whose
  * sum vanishes get the z axis: glTF asks for unit length everywhere. `sums` is scratch of 3 doubles a vertex, zeroed.
  */
@@ -158,8 +148,8 @@ static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
   for (size_t t = 0; t < skin->triangle_count; t++) {
     const uint32_t *corner = skin->triangles + 3 * t;
     double normal[3];
-    cross(skin->positions + 3 * (size_t)corner[0], skin->positions + 3 * (size_t)corner[1],
-          skin->positions + 3 * (size_t)corner[2], normal);
+    qmat_triangle_normal(skin->positions + 3 * (size_t)corner[0], skin->positions + 3 * (size_t)corner[1],
+                         skin->positions + 3 * (size_t)corner[2], normal);
     for (int k = 0; k < 3; k++) {
       for (int axis = 0; axis < 3; axis++) sums[3 * (size_t)corner[k] + (size_t)axis] += normal[axis];
     }

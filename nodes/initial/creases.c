@@ -15,10 +15,6 @@ static double cosine_of(double degrees) {
   return cos(degrees * (3.14159265358979323846 / 180));
 }
 
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* A side of a triangle: its ends, and the side 3 * triangle + k that runs from corner k on. */
 typedef struct {
   uint32_t low, high;
@@ -41,12 +37,12 @@ static void normal_of(const qmat_mesh *mesh, const double *positions, size_t tri
 static bool is_crease(const qmat_mesh *mesh, const double *positions, const triangle_side *sides, double least_cosine) {
   double normals[2][3], across[3];
   for (int k = 0; k < 2; k++) normal_of(mesh, positions, sides[k].side / 3, normals[k]);
-  if (dot(normals[0], normals[0]) == 0 || dot(normals[1], normals[1]) == 0) return false;
-  if (!(dot(normals[0], normals[1]) < least_cosine)) return false;
+  if (qmat_dot(normals[0], normals[0]) == 0 || qmat_dot(normals[1], normals[1]) == 0) return false;
+  if (!(qmat_dot(normals[0], normals[1]) < least_cosine)) return false;
   const size_t second = sides[1].side / 3, opposite = (sides[1].side + 2) % 3;
   const double *apex = &positions[3 * (size_t)mesh->triangles[3 * second + opposite]];
   for (int k = 0; k < 3; k++) across[k] = apex[k] - positions[3 * (size_t)sides[0].low + (size_t)k];
-  return dot(normals[0], across) < 0;
+  return qmat_dot(normals[0], across) < 0;
 }
 
 /* Leaves out edges that hang together over less than `shortest`. */
@@ -118,9 +114,9 @@ static bool is_corner(const crease_graph *g, uint32_t vertex, double least_cosin
     const uint32_t next = other_end(g, g->at[first + i], vertex);
     for (size_t k = 0; k < 3; k++)
       along[i][k] = g->positions[g->stride * next + k] - g->positions[g->stride * vertex + k];
-    square[i] = dot(along[i], along[i]);
+    square[i] = qmat_dot(along[i], along[i]);
   }
-  return !(-dot(along[0], along[1]) >= least_cosine * sqrt(square[0] * square[1]));
+  return !(-qmat_dot(along[0], along[1]) >= least_cosine * sqrt(square[0] * square[1]));
 }
 
 /* Follows a crease from a vertex to the next corner, or around. */

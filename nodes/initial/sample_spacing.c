@@ -5,17 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 
 /* Rows of an even triangular pattern are this far apart, in spacings. */
 static const double row_height = 0.86602540378443864676;
 /* The displacement of a point, in steps of its row and in rows. */
 static const double displacement = 0.2;
-
-static double length_between(const double *a, const double *b) {
-  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-  return sqrt(x * x + y * y + z * z);
-}
 
 typedef struct side {
   uint32_t low, high;
@@ -35,7 +31,7 @@ qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh,
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
     const double length =
-        length_between(&positions[3 * (size_t)mesh->triangles[i]], &positions[3 * (size_t)mesh->triangles[next]]);
+        qmat_point_distance(&positions[3 * (size_t)mesh->triangles[i]], &positions[3 * (size_t)mesh->triangles[next]]);
     counts[i] = (uint32_t)fmax(ceil(length / spacing) - 1, 0);
     long_sides += counts[i] > 0;
   }
@@ -73,7 +69,7 @@ static rows find_rows(const double *a, const double *b, const double *c, double 
   const double *corners[3] = {a, b, c};
   rows r = {0, 0, 0};
   for (int k = 0; k < 3; k++) {
-    const double length = length_between(corners[k], corners[(k + 1) % 3]);
+    const double length = qmat_point_distance(corners[k], corners[(k + 1) % 3]);
     if (length > r.length) r = (rows){k, length, 0};
   }
   if (!(r.length > spacing)) return r;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 
 /* Each level's cells are half as wide as those of the one before; smaller radii search the finest level. */
@@ -23,10 +24,6 @@ typedef struct sample_grid {
   uint32_t *heads;    /* per bucket: its newest entry, or NONE */
   uint32_t *next;     /* per entry, LEVELS * sample + level */
 } sample_grid;
-
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static size_t bucket_of(const sample_grid *grid, int level, const int64_t cell[3]) {
   uint64_t h = (uint64_t)cell[0] * UINT64_C(0x9e3779b97f4a7c15) + (uint64_t)level;
@@ -66,8 +63,8 @@ static bool stands_for(const thinning *t, uint32_t kept, uint32_t sample) {
   double offset[3];
   for (size_t k = 0; k < 3; k++) offset[k] = t->points[3 * (size_t)sample + k] - t->points[3 * (size_t)kept + k];
   const double *mine = &t->normals[3 * (size_t)sample], *theirs = &t->normals[3 * (size_t)kept];
-  return dot(offset, offset) < t->radii[sample] * t->radii[sample] && dot(mine, theirs) >= same_way &&
-         fabs(dot(offset, mine)) <= t->detail && fabs(dot(offset, theirs)) <= t->detail;
+  return qmat_dot(offset, offset) < t->radii[sample] * t->radii[sample] && qmat_dot(mine, theirs) >= same_way &&
+         fabs(qmat_dot(offset, mine)) <= t->detail && fabs(qmat_dot(offset, theirs)) <= t->detail;
 }
 
 /* The kept sample that stands for this one, or the sample itself. The cells of its level are at least twice its radius
@@ -119,7 +116,7 @@ static void find_normals(const qmat_surface *surface, const qmat_samples *sample
   }
   for (size_t i = 0; i < samples->vertex_count; i++) {
     double *normal = &normals[3 * i];
-    const double length = sqrt(dot(normal, normal));
+    const double length = sqrt(qmat_dot(normal, normal));
     for (size_t k = 0; k < 3; k++) normal[k] = length > 0 ? normal[k] / length : 0;
   }
   for (size_t i = samples->vertex_count; i < samples->count; i++) {

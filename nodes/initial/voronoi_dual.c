@@ -8,6 +8,7 @@
 #include "core/disjoint_sets.h"
 #include "core/geometry/medial_build.h"
 #include "core/geometry/thickness.h"
+#include "core/geometry/vector.h"
 #include "core/json_text.h"
 #include "nodes/initial/delaunay_cgal.h"
 #include "nodes/initial/edge_halving.h"
@@ -38,35 +39,15 @@ typedef struct {
   size_t edge_count, triangle_count;
 } delaunay;
 
-static void subtract(const double *a, const double *b, double *d) {
-  for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
-}
-
-static double dot(const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double *a, const double *b, double *c) {
-  c[0] = a[1] * b[2] - a[2] * b[1];
-  c[1] = a[2] * b[0] - a[0] * b[2];
-  c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double distance(const double *a, const double *b) {
-  double d[3];
-  subtract(a, b, d);
-  return sqrt(dot(d, d));
-}
-
 /* The circumcentre and circumradius of a tetrahedron; false when it is too flat to have one inside the unit frame. */
 static bool circumsphere(const double *const p[4], double sphere[4]) {
   double e[3][3], square[3], normal[3][3];
   for (int k = 0; k < 3; k++) {
-    subtract(p[k + 1], p[0], e[k]);
-    square[k] = dot(e[k], e[k]);
+    qmat_subtract(p[k + 1], p[0], e[k]);
+    square[k] = qmat_dot(e[k], e[k]);
   }
-  for (int k = 0; k < 3; k++) cross(e[(k + 1) % 3], e[(k + 2) % 3], normal[k]);
-  const double determinant = dot(e[0], normal[0]);
+  for (int k = 0; k < 3; k++) qmat_cross(e[(k + 1) % 3], e[(k + 2) % 3], normal[k]);
+  const double determinant = qmat_dot(e[0], normal[0]);
   if (determinant == 0) return false;
   double offset[3];
   for (int i = 0; i < 3; i++) {
@@ -74,7 +55,7 @@ static bool circumsphere(const double *const p[4], double sphere[4]) {
     sphere[i] = p[0][i] + offset[i];
     if (!(fabs(sphere[i]) <= 0.5)) return false; /* outside the bounding box, or not finite */
   }
-  sphere[3] = sqrt(dot(offset, offset));
+  sphere[3] = sqrt(qmat_dot(offset, offset));
   return true;
 }
 
@@ -84,10 +65,10 @@ static void incentre(const double *const p[4], double centre[3]) {
   for (int k = 0; k < 4; k++) {
     const double *a = p[(k + 1) & 3], *b = p[(k + 2) & 3], *c = p[(k + 3) & 3];
     double ab[3], ac[3], n[3];
-    subtract(b, a, ab);
-    subtract(c, a, ac);
-    cross(ab, ac, n);
-    const double area = sqrt(dot(n, n));
+    qmat_subtract(b, a, ab);
+    qmat_subtract(c, a, ac);
+    qmat_cross(ab, ac, n);
+    const double area = sqrt(qmat_dot(n, n));
     for (int i = 0; i < 3; i++) sum[i] += area * p[k][i];
     total += area;
   }
@@ -200,7 +181,7 @@ static qmat_status number_medial_vertices(delaunay *d) {
       const uint32_t j = d->cells.neighbours[4 * i + k];
       if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
       const uint32_t a = qmat_set_leader(parent, (uint32_t)i), b = qmat_set_leader(parent, j);
-      if (distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge)
+      if (qmat_point_distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge)
         qmat_sets_join(parent, a, b);
     }
   }
@@ -421,7 +402,7 @@ enum { LINK_LOOKS = 7 };
 /* `spheres` holds 4 doubles a medial vertex. */
 static medial_link make_link(const delaunay *d, const double *spheres, uint32_t a, uint32_t b) {
   const double *p = &spheres[4 * (size_t)a], *q = &spheres[4 * (size_t)b];
-  medial_link link = {0, distance(p, q), a < b ? a : b, a < b ? b : a};
+  medial_link link = {0, qmat_point_distance(p, q), a < b ? a : b, a < b ? b : a};
   for (int i = 1; i <= LINK_LOOKS; i++) {
     const double t = (double)i / (LINK_LOOKS + 1);
     double s[4];
@@ -501,7 +482,7 @@ static qmat_status link_across_parts(delaunay *d, const uint32_t *index, uint32_
         for (size_t j = first; j < last; j++) {
           if (qmat_set_leader(joined, index[contacts[j].sphere]) != home) continue;
           const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
-          const double length = distance(&spheres[4 * (size_t)a], &spheres[4 * (size_t)b]);
+          const double length = qmat_point_distance(&spheres[4 * (size_t)a], &spheres[4 * (size_t)b]);
           const medial_link link = {0, length, a < b ? a : b, a < b ? b : a};
           if (better_link(&link, &best) < 0) best = link;
         }
