@@ -185,7 +185,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   bad |= qmat_json_set_count(root, "rounds", (size_t)rounds);
   bad |= qmat_json_set_count(root, "cavity_filling_spheres", filled);
   bad |= qmat_json_set_count(root, "sphere_moves", run->moves);
-  bad |= qmat_json_set_count(root, "surface_distance_queries", s->dense.envelope_tracker.lattice.questions);
+  bad |= qmat_json_set_count(root, "surface_distance_queries", s->dense.envelope_tracker.lattice.queries);
   bad |= report_errors(root, s->epsilon, s->deviation, errors);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }

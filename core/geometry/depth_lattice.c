@@ -5,59 +5,37 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
-#include "core/hash.h"
 
-enum { FIRST_CAPACITY = 1 << 14, PLACES = 1 << 14 };
+enum { FIRST_CAPACITY = 1 << 13, PLACES = 1 << 14 };
 
-/* Of the spacing, how wide the cubes are of which a place is remembered. */
+/* The width of the cubes that remember a place, in spacings. */
 static const double cube_share = 0.5;
 
-/* By this much more than it is far a node has to be deep to tell a neighbour's side: far more than a side is unsure by.
- */
+/* A node decides the side of a point when its depth exceeds their distance by this much, which is far above the
+ * rounding error of a depth. */
 static const double side_margin = 1e-6;
-/* 21 bits a coordinate; the offset keeps every key of the lattice above 0. */
+/* The lattice reaches this far from the origin. A key has 21 bits per coordinate; the offset keeps them positive. */
 static const double reach = 2;
 static const int64_t key_offset = 1 << 20;
 
 qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *lattice, const qmat_surface *surface,
                                     double spacing) {
-  /* No finer than the keys can number. */
+  /* The key bits limit how fine the lattice can be. */
   *lattice = (qmat_depth_lattice){.surface = surface, .spacing = fmax(spacing, 4 * reach / (double)key_offset)};
-  lattice->nodes = qmat_calloc(FIRST_CAPACITY, sizeof *lattice->nodes);
   lattice->places = qmat_calloc(PLACES, sizeof *lattice->places);
-  if (!lattice->nodes || !lattice->places) return qmat_fail_memory(context, "depths");
-  lattice->capacity = FIRST_CAPACITY;
+  if (qmat_key_table_init(&lattice->nodes, FIRST_CAPACITY) || !lattice->places)
+    return qmat_fail_memory(context, "depths");
   return QMAT_OK;
 }
 
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
-  qmat_free(lattice->nodes);
+  qmat_key_table_uninit(&lattice->nodes);
   qmat_free(lattice->places);
   *lattice = (qmat_depth_lattice){0};
 }
 
-/* The node of a key, or where it has room. */
-static qmat_lattice_node *find_node(qmat_lattice_node *nodes, size_t capacity, uint64_t key) {
-  size_t slot = (size_t)qmat_hash_mix(key) & (capacity - 1);
-  while (nodes[slot].key != 0 && nodes[slot].key != key) slot = (slot + 1) & (capacity - 1);
-  return &nodes[slot];
-}
-
-/* Doubles the table; when memory is short it stays as it is and simply forgets nothing more. */
-static bool grow(qmat_depth_lattice *lattice) {
-  const size_t capacity = 2 * lattice->capacity;
-  qmat_lattice_node *nodes = qmat_calloc(capacity, sizeof *nodes);
-  if (!nodes) return false;
-  for (size_t i = 0; i < lattice->capacity; i++)
-    if (lattice->nodes[i].key != 0) *find_node(nodes, capacity, lattice->nodes[i].key) = lattice->nodes[i];
-  qmat_free(lattice->nodes);
-  lattice->nodes = nodes;
-  lattice->capacity = capacity;
-  return true;
-}
-
 double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[3]) {
-  lattice->questions++;
+  lattice->queries++;
   return -qmat_surface_signed_distance(lattice->surface, point);
 }
 
@@ -65,12 +43,12 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
   const double gap = distance * (1 + 1e-9) + side_margin;
   const double depth = qmat_surface_distance(lattice->surface, point, fabs(near) + gap, NULL, NULL);
   if (!(depth < INFINITY)) return qmat_depth_lattice_exact(lattice, point);
-  lattice->questions++;
+  lattice->queries++;
   const bool inside = fabs(near) > gap ? near > 0 : qmat_surface_inside(lattice->surface, point);
   return inside ? depth : -depth;
 }
 
-/* The cube that a point lies in, and where it is remembered. */
+/* The key of the cube that contains a point, and the slot of that cube. */
 static qmat_lattice_place *find_place(const qmat_depth_lattice *lattice, const double point[3], uint64_t *key) {
   const double side = cube_share * lattice->spacing;
   *key = 1;
@@ -97,7 +75,7 @@ double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double 
   const double gap = distance * (1 + 1e-9) + side_margin;
   double found;
   if (near > gap && depth < near + gap) {
-    lattice->questions++;
+    lattice->queries++;
     found = qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
   } else {
     found = qmat_depth_lattice_exact_near(lattice, point, near, distance);
@@ -106,15 +84,15 @@ double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double 
   return found;
 }
 
-/* The depth at a node; from a neighbour where one is known. */
-static double ask_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
+/* Computes the depth at a node, with the help of a neighbour whose depth is known. */
+static double compute_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
   static const uint64_t steps[3] = {1, (uint64_t)1 << 21, (uint64_t)1 << 42};
   for (int k = 0; k < 3; k++)
     for (int sign = 0; sign < 2; sign++) {
       const uint64_t beside = sign ? key + steps[k] : key - steps[k];
-      const qmat_lattice_node *neighbour = find_node(lattice->nodes, lattice->capacity, beside);
+      const qmat_key_slot *neighbour = qmat_key_table_find(&lattice->nodes, beside);
       if (neighbour->key == beside)
-        return qmat_depth_lattice_exact_near(lattice, node, neighbour->depth, lattice->spacing);
+        return qmat_depth_lattice_exact_near(lattice, node, neighbour->number, lattice->spacing);
     }
   return qmat_depth_lattice_exact(lattice, node);
 }
@@ -133,14 +111,10 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
     square += (point[k] - node[k]) * (point[k] - node[k]);
   }
   *distance = sqrt(square);
-  qmat_lattice_node *known = find_node(lattice->nodes, lattice->capacity, key);
-  if (known->key == key) return known->depth;
-  const double depth = ask_node(lattice, key, node);
-  if (2 * (lattice->count + 1) > lattice->capacity) {
-    if (!grow(lattice)) return depth;
-    known = find_node(lattice->nodes, lattice->capacity, key);
-  }
-  *known = (qmat_lattice_node){key, depth};
-  lattice->count++;
+  qmat_key_slot *slot = qmat_key_table_find(&lattice->nodes, key);
+  if (slot->key == key) return slot->number;
+  const double depth = compute_node(lattice, key, node);
+  slot = qmat_key_table_add(&lattice->nodes, key);
+  if (slot) slot->number = depth; /* when memory is short, the node is computed again next time */
   return depth;
 }

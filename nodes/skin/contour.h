@@ -2,8 +2,8 @@
 #ifndef QMAT_NODES_SKIN_CONTOUR_H
 #define QMAT_NODES_SKIN_CONTOUR_H
 
+#include "core/key_table.h"
 #include "nodes/skin/envelope_cells.h"
-#include "nodes/skin/id_table.h"
 #include "nodes/skin/skin_triangles.h"
 
 /* Dual contouring in progress, and its steps. envelope_surface.c runs them in the order below. */
@@ -27,7 +27,7 @@ typedef struct qmat_contour {
   qmat_context *context;
   int threads;
   qmat_cells cells;
-  qmat_id_table cell_table, corner_table;
+  qmat_key_table cell_table, corner_table;
   size_t corner_count, corner_capacity, owner_capacity;
   uint64_t *corners;      /* keys */
   uint32_t *owners;       /* a cell at each corner */

@@ -6,16 +6,14 @@
 /* The id of the corner at `at`, new ones with no owner; QMAT_NO_ID when memory is short. */
 static uint32_t add_corner(qmat_contour *c, const uint32_t at[3]) {
   uint64_t key = qmat_corner_key(at);
-  size_t slot = qmat_id_table_slot(&c->corner_table, key);
-  if (c->corner_table.keys[slot] == key) return c->corner_table.ids[slot];
+  qmat_key_slot *slot = qmat_key_table_find(&c->corner_table, key);
+  if (slot->key == key) return slot->id;
   if (qmat_grow((void **)&c->corners, &c->corner_capacity, c->corner_count + 1, sizeof *c->corners) ||
       qmat_grow((void **)&c->owners, &c->owner_capacity, c->corner_count + 1, sizeof *c->owners) ||
-      qmat_id_table_reserve(&c->corner_table, c->corner_count + 1)) {
+      !(slot = qmat_key_table_add(&c->corner_table, key))) {
     return QMAT_NO_ID;
   }
-  slot = qmat_id_table_slot(&c->corner_table, key);
-  c->corner_table.keys[slot] = key;
-  c->corner_table.ids[slot] = (uint32_t)c->corner_count;
+  slot->id = (uint32_t)c->corner_count;
   c->corners[c->corner_count] = key;
   c->owners[c->corner_count] = QMAT_NO_ID;
   return (uint32_t)c->corner_count++;
@@ -24,22 +22,19 @@ static uint32_t add_corner(qmat_contour *c, const uint32_t at[3]) {
 /* Cells that were halved have corners too, even where no child on that side holds surface: without them a corner at a
  * quarter of a large cell's edge could stand where there is none at its middle. */
 static qmat_status add_halved_cells(qmat_contour *c) {
-  qmat_id_table seen = {0};
+  qmat_key_table seen = {0};
   qmat_status status = QMAT_OK;
-  if (qmat_id_table_init(&seen, 64)) return qmat_fail_memory(c->context, "surface cells");
+  if (qmat_key_table_init(&seen, 64)) return qmat_fail_memory(c->context, "surface cells");
   uint32_t seen_count = 0;
   for (size_t i = 0; status == QMAT_OK && i < c->cells.count; i++) {
     const qmat_cell *cell = &c->cells.cells[i];
     for (uint32_t size = 2 * cell->size; size < c->cells.base; size *= 2) {
       uint32_t place[3] = {cell->at[0] & ~(size - 1), cell->at[1] & ~(size - 1), cell->at[2] & ~(size - 1)};
       uint64_t key = qmat_contour_cell_key(place, size);
-      if (qmat_id_table_find(&seen, key) != QMAT_NO_ID) break;
-      bool full = qmat_id_table_reserve(&seen, seen_count + 1) != 0;
-      if (!full) {
-        size_t slot = qmat_id_table_slot(&seen, key);
-        seen.keys[slot] = key;
-        seen.ids[slot] = seen_count++;
-      }
+      if (qmat_key_table_id(&seen, key) != QMAT_NO_ID) break;
+      qmat_key_slot *slot = qmat_key_table_add(&seen, key);
+      if (slot) slot->id = seen_count++;
+      bool full = !slot;
       for (unsigned k = 0; k < 8 && !full; k++) {
         uint32_t at[3];
         for (unsigned j = 0; j < 3; j++) at[j] = place[j] + (k >> j & 1) * size;
@@ -51,7 +46,7 @@ static qmat_status add_halved_cells(qmat_contour *c) {
       }
     }
   }
-  qmat_id_table_uninit(&seen);
+  qmat_key_table_uninit(&seen);
   return status;
 }
 
@@ -60,8 +55,8 @@ qmat_status qmat_contour_number_corners(qmat_contour *c) {
   c->cell_corners = qmat_alloc(8 * count, sizeof *c->cell_corners);
   c->split_edges = qmat_calloc(count, sizeof *c->split_edges);
   /* A surface in n cells has about 2 n corners. */
-  if (!c->cell_corners || !c->split_edges || qmat_id_table_init(&c->cell_table, count) ||
-      qmat_id_table_init(&c->corner_table, 2 * count)) {
+  if (!c->cell_corners || !c->split_edges || qmat_key_table_init(&c->cell_table, count) ||
+      qmat_key_table_init(&c->corner_table, 2 * count)) {
     return qmat_fail_memory(c->context, "surface cells");
   }
   for (size_t i = 0; i < count; i++) {
@@ -75,9 +70,9 @@ qmat_status qmat_contour_number_corners(qmat_contour *c) {
       if (c->owners[corner] == QMAT_NO_ID) c->owners[corner] = (uint32_t)i;
     }
     uint64_t key = qmat_contour_cell_key(cell->at, cell->size);
-    size_t slot = qmat_id_table_slot(&c->cell_table, key);
-    c->cell_table.keys[slot] = key;
-    c->cell_table.ids[slot] = (uint32_t)i;
+    qmat_key_slot *slot = qmat_key_table_add(&c->cell_table, key);
+    if (!slot) return qmat_fail_memory(c->context, "surface cells");
+    slot->id = (uint32_t)i;
   }
   return c->cells.refined_count > 0 ? add_halved_cells(c) : QMAT_OK;
 }
@@ -87,7 +82,7 @@ static void own_inner_corners(qmat_contour *c, size_t cell, const uint32_t from[
   if (length < 2) return;
   uint32_t middle[3] = {from[0], from[1], from[2]};
   middle[axis] += length / 2;
-  uint32_t corner = qmat_id_table_find(&c->corner_table, qmat_corner_key(middle));
+  uint32_t corner = qmat_key_table_id(&c->corner_table, qmat_corner_key(middle));
   if (corner == QMAT_NO_ID) return;
   if (c->owners[corner] == QMAT_NO_ID) c->owners[corner] = (uint32_t)cell;
   own_inner_corners(c, cell, from, length / 2, axis);
@@ -103,7 +98,7 @@ qmat_status qmat_contour_find_split_edges(qmat_contour *c) {
       uint32_t at[3];
       qmat_cell_edge_at(cell, e, at);
       at[e / 4] += cell->size / 2;
-      if (qmat_id_table_find(&c->corner_table, qmat_corner_key(at)) == QMAT_NO_ID) continue;
+      if (qmat_key_table_id(&c->corner_table, qmat_corner_key(at)) == QMAT_NO_ID) continue;
       c->split_edges[i] = (uint16_t)(c->split_edges[i] | 1u << e);
     }
   }

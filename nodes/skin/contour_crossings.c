@@ -11,7 +11,7 @@ enum { LONGEST_FACE = 4 * 64, CROSSING_STEPS = 24 };
 static uint32_t find_cell(const qmat_contour *c, const uint32_t at[3], uint32_t size) {
   for (; size <= c->cells.base; size *= 2) {
     uint32_t place[3] = {at[0] & ~(size - 1), at[1] & ~(size - 1), at[2] & ~(size - 1)};
-    uint32_t cell = qmat_id_table_find(&c->cell_table, qmat_contour_cell_key(place, size));
+    uint32_t cell = qmat_key_table_id(&c->cell_table, qmat_contour_cell_key(place, size));
     if (cell != QMAT_NO_ID) return cell;
   }
   return QMAT_NO_ID;
@@ -167,13 +167,13 @@ static void walk_side(const qmat_contour *c, face_walk *walk, const uint32_t fro
   if (length > 1) {
     uint32_t middle[3] = {from[0], from[1], from[2]};
     middle[axis] = up ? from[axis] + length / 2 : from[axis] - length / 2;
-    if (qmat_id_table_find(&c->corner_table, qmat_corner_key(middle)) != QMAT_NO_ID) {
+    if (qmat_key_table_id(&c->corner_table, qmat_corner_key(middle)) != QMAT_NO_ID) {
       walk_side(c, walk, from, middle, axis);
       walk_side(c, walk, middle, to, axis);
       return;
     }
   }
-  walk->corners[walk->count] = qmat_id_table_find(&c->corner_table, qmat_corner_key(from));
+  walk->corners[walk->count] = qmat_key_table_id(&c->corner_table, qmat_corner_key(from));
   walk->axes[walk->count] = (uint8_t)axis;
   walk->up[walk->count++] = up;
 }

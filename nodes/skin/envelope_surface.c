@@ -11,8 +11,8 @@ static const double RADIUS_FLOOR = 0.9;
 
 static void contour_uninit(qmat_contour *c) {
   qmat_cells_uninit(&c->cells);
-  qmat_id_table_uninit(&c->cell_table);
-  qmat_id_table_uninit(&c->corner_table);
+  qmat_key_table_uninit(&c->cell_table);
+  qmat_key_table_uninit(&c->corner_table);
   qmat_free(c->corners);
   qmat_free(c->owners);
   qmat_free(c->values);

@@ -57,7 +57,7 @@ static void test_exact_depth_is_positive_inside(void **state) {
   assert_near(qmat_depth_lattice_exact(&lattice, inside), 0.35 * middle, 0.02 * middle);
   assert_near(qmat_depth_lattice_exact(&lattice, hole), -0.65 * middle, 0.02 * middle);
   assert_true(qmat_depth_lattice_exact(&lattice, outside) < -0.8);
-  assert_true(lattice.questions == 3);
+  assert_true(lattice.queries == 3);
   qmat_depth_lattice_uninit(&lattice);
 }
 
@@ -89,7 +89,7 @@ static void test_nodes_are_exact(void **state) {
       assert_near(distance, 0, 0);
       assert_near(near, qmat_depth_lattice_exact(&lattice, point), 0);
     }
-  assert_int_equal(lattice.count, 81);
+  assert_int_equal(lattice.nodes.count, 81);
   qmat_depth_lattice_uninit(&lattice);
 }
 
@@ -103,7 +103,7 @@ static void test_answers_do_not_depend_on_what_was_asked_before(void **state) {
   qmat_depth_lattice forward, backward;
   make_lattice(&forward, state, 0.004);
   make_lattice(&backward, state, 0.004);
-  const size_t before = forward.capacity;
+  const size_t before = forward.nodes.mask;
   for (size_t i = 0; i < POINTS; i++) answers[i] = qmat_depth_lattice_near(&forward, points[i], &ways[i]);
   for (size_t i = POINTS; i-- > 0;) {
     double distance;
@@ -112,15 +112,15 @@ static void test_answers_do_not_depend_on_what_was_asked_before(void **state) {
     assert_memory_equal(&distance, &ways[i], sizeof distance);
   }
   /* The table has grown meanwhile, and still holds every node once. */
-  assert_true(forward.capacity > before && 2 * forward.count <= forward.capacity);
-  assert_int_equal(forward.count, backward.count);
-  assert_int_equal(forward.questions, forward.count);
+  assert_true(forward.nodes.mask > before && 2 * forward.nodes.count <= forward.nodes.mask + 1);
+  assert_int_equal(forward.nodes.count, backward.nodes.count);
+  assert_int_equal(forward.queries, forward.nodes.count);
   for (size_t i = 0; i < POINTS; i++) {
     double distance;
     const double near = qmat_depth_lattice_near(&forward, points[i], &distance);
     assert_memory_equal(&near, &answers[i], sizeof near);
   }
-  assert_int_equal(forward.questions, forward.count); /* remembered: nothing was asked again */
+  assert_int_equal(forward.queries, forward.nodes.count); /* remembered: nothing was asked again */
   qmat_depth_lattice_uninit(&forward);
   qmat_depth_lattice_uninit(&backward);
   free(points);
@@ -138,7 +138,7 @@ static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
     assert_near(distance, 0, 0);
     assert_near(near, qmat_depth_lattice_exact(&lattice, points[i]), 0);
   }
-  assert_int_equal(lattice.count, 0);
+  assert_int_equal(lattice.nodes.count, 0);
   qmat_depth_lattice_uninit(&lattice);
 }
 
@@ -184,7 +184,7 @@ static void test_corners_of_the_lattice_have_keys_of_their_own(void **state) {
       const double near = qmat_depth_lattice_near(&lattice, point, &distance);
       assert_near(near, qmat_depth_lattice_exact(&lattice, point), distance + 1e-12);
     }
-    assert_int_equal(lattice.count, 27);
+    assert_int_equal(lattice.nodes.count, 27);
     qmat_depth_lattice_uninit(&lattice);
   }
 }
