@@ -12,6 +12,7 @@
 #include "nodes/measure/topology.h"
 #include "nodes/measure/topology_report.h"
 #include "nodes/simplify/cavity_filling.h"
+#include "nodes/simplify/decimation_resume.h"
 #include "nodes/simplify/partitioned_collapse.h"
 #include "nodes/simplify/simplify_setup.h"
 

@@ -383,3 +383,12 @@ void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *tracker, const qm
   }
   tracker->found_count = 0;
 }
+
+uint32_t qmat_surface_to_envelope_owner(const qmat_surface_to_envelope *tracker, size_t point) {
+  uint32_t best = 0;
+  for (uint32_t k = 1; k < 3; k++)
+    if (tracker->witnesses[3 * point + k] != QMAT_NONE &&
+        tracker->weights[3 * point + k] > tracker->weights[3 * point + best])
+      best = k;
+  return tracker->witnesses[3 * point + best];
+}

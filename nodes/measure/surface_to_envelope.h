@@ -77,6 +77,9 @@ qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_sur
  * changes. */
 void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *tracker, const qmat_collapse *collapse);
 
+/* The vertex that a point belongs to: the corner of its witness with the largest weight. */
+uint32_t qmat_surface_to_envelope_owner(const qmat_surface_to_envelope *tracker, size_t point);
+
 /* Calls for each slot of a vertex: for (slot = qmat_surface_to_envelope_first(...); slot != QMAT_NONE; slot =
  * next[slot]); the constraint point is slot / 3. A point may come up twice. */
 static inline uint32_t qmat_surface_to_envelope_first(const qmat_surface_to_envelope *tracker, uint32_t vertex) {

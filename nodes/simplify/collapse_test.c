@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/collapse_test.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A loose edge all of whose responsible region is thin: a tubular feature (section 3.4). */
+static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
+  if (s->complex.edge_triangles[edge]) return false;
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  bool any = false;
+  for (int k = 0; k < 2; k++)
+    for (uint32_t slot = qmat_surface_to_envelope_first(&s->surface_tracker, ends[k]); slot != QMAT_NONE;
+         slot = s->surface_tracker.next[slot]) {
+      if (slot / 3 >= s->constraints->sample_count) continue;
+      if (!s->rules.thin[slot / 3]) return false;
+      any = true;
+    }
+  return any;
+}
+
+bool qmat_decimation_is_protected(const qmat_decimation *s, uint32_t vertex) {
+  size_t count;
+  const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count; i++)
+    if (is_tubular(s, at[i])) return true;
+  return false;
+}
+
+/* Leaves of the candidates what protection allows: a protected end keeps its sphere. */
+bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, qmat_candidates *c, bool *bound) {
+  if (is_tubular(s, edge)) return false;
+  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
+  const bool first = qmat_decimation_is_protected(s, ends[0]), second = qmat_decimation_is_protected(s, ends[1]);
+  if (first && second) return false;
+  *bound = first || second;
+  if (!*bound) return true;
+  const qmat_quadric quadric = qmat_merged_quadric(&s->complex, s->quadrics, edge);
+  c->count = 0;
+  qmat_candidates_add(c, &quadric, &s->complex.spheres[4 * (size_t)ends[second]]);
+  return true;
+}
+
+/* How the newest preview would change the Euler characteristic, and whether it satisfies the link condition (Attali et
+ * al. 2011), which keeps the homotopy type: neighbours that both ends share span a slab with the edge, and the ends
+ * span no slab with a common edge. */
+static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
+  int64_t shared_neighbours = 0, shared_edges = 0;
+  for (size_t n = 0; n < c->neighbour_count; n++)
+    shared_neighbours += c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
+  for (size_t t = 0; t < c->triangle_count; t++)
+    shared_edges += c->kept_triangles[t] != QMAT_NONE && c->removed_triangles[t] != QMAT_NONE;
+  const int64_t vanishing = (int64_t)c->vanishing_count;
+  *link_condition = shared_neighbours == vanishing && shared_edges == 0;
+  return shared_neighbours - vanishing - shared_edges;
+}
+
+/* A guarded medial mesh's Euler characteristic may be off by one for every so many spheres: tears and voids of the
+ * dense initial one come in pairs, which could never close one by one, and the fewer spheres are left the less is
+ * forgiven. Sharp features are left however few the others are. */
+enum { SPHERES_PER_FAULT = 128 };
+
+bool qmat_decimation_keeps_topology(const qmat_decimation *s, int64_t *change) {
+  bool link_condition;
+  *change = euler_change(&s->collapse, &link_condition);
+  if (s->rules.topology == QMAT_TOPOLOGY_PRESERVE) return link_condition;
+  if (s->rules.topology == QMAT_TOPOLOGY_FREE || !s->rules.has_target) return true;
+  const int64_t before = llabs(s->euler - s->rules.target_euler);
+  const int64_t after = llabs(s->euler + *change - s->rules.target_euler);
+  return after <= before || after <= (int64_t)(s->complex.live_vertices - s->creases.left) / SPHERES_PER_FAULT;
+}
+
+static bool bounds_envelope(const qmat_decimation *s) {
+  return s->threshold < INFINITY && qmat_decimation_is_two_sided(s);
+}
+
+/* Whether the newest preview merges into a sharp feature. */
+static bool merges_feature(const qmat_decimation *s) {
+  return qmat_crease_guard_is_feature(&s->creases, s->collapse.kept) ||
+         qmat_crease_guard_is_feature(&s->creases, s->collapse.removed);
+}
+
+/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may. A
+ * sharp feature lies on the surface.
+ */
+static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *sphere) {
+  const bool on_surface = merges_feature(s);
+  const bool kept =
+      qmat_envelope_to_surface_test_sphere(&s->envelope_tracker, &s->complex, &s->collapse, sphere) || on_surface;
+  s->refusal = QMAT_REFUSED_BY_SPHERE;
+  const bool inside = s->rules.published || on_surface || s->envelope_tracker.sphere_depth > 0;
+  if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return QMAT_COLLAPSE_REFUSED;
+  s->refusal = QMAT_REFUSED_BY_MIDPOINT;
+  if (!s->rules.published &&
+      !qmat_envelope_to_surface_test_midpoints(&s->envelope_tracker, &s->complex, &s->collapse, sphere))
+    return QMAT_COLLAPSE_REFUSED;
+  return kept || !(sphere[3] - s->envelope_tracker.sphere_depth > s->envelope_tracker.limit) ? QMAT_COLLAPSE_ALLOWED
+                                                                                             : QMAT_COLLAPSE_EXCEEDS;
+}
+
+/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
+ * they exceed it, `*needed` is no more than what would have to be threshold. */
+qmat_status qmat_decimation_test_sphere(qmat_decimation *s, const double *sphere, uint32_t first,
+                                        qmat_collapse_outcome *result, double *needed) {
+  bool kept;
+  s->surface_tracker.found_count = 0;
+  *result = test_inside(s, sphere);
+  *needed = sphere[3] - s->envelope_tracker.sphere_depth;
+  if (*result != QMAT_COLLAPSE_ALLOWED) {
+    s->counts.refused_by_inside_test++;
+    return QMAT_OK;
+  }
+  *result = QMAT_COLLAPSE_EXCEEDS;
+  if (s->threshold < INFINITY) {
+    const qmat_status status =
+        qmat_surface_to_envelope_test(s->context, &s->surface_tracker, &s->complex, &s->collapse, sphere, first, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->counts.refused_by_surface_to_envelope++;
+      s->refusal = QMAT_REFUSED_BY_SURFACE_TO_ENVELOPE;
+      *needed = fmax(s->threshold, qmat_decimation_is_inner(s, s->surface_tracker.failed_point)
+                                       ? -s->constraints->distances[s->surface_tracker.failed_point]
+                                       : s->surface_tracker.failed_distance);
+      return QMAT_OK;
+    }
+  }
+  if (bounds_envelope(s)) {
+    const qmat_status status =
+        qmat_envelope_to_surface_test(s->context, &s->envelope_tracker, &s->complex, &s->collapse, sphere, &kept);
+    if (status != QMAT_OK) return status;
+    if (!kept) {
+      s->counts.refused_by_envelope_to_surface++;
+      s->refusal = QMAT_REFUSED_BY_ENVELOPE_TO_SURFACE;
+      *needed = s->envelope_tracker.failed;
+      return QMAT_OK;
+    }
+  }
+  *result = QMAT_COLLAPSE_ALLOWED;
+  return QMAT_OK;
+}
+
+/* The largest error that is recorded: more than the whole model. */
+static const double most_error = 2;
+
+static void record(qmat_decimation *s, const double *sphere) {
+  const size_t i = s->log.count++;
+  s->log.ends[2 * i] = s->collapse.kept;
+  s->log.ends[2 * i + 1] = s->collapse.removed;
+  memcpy(&s->log.merged[4 * i], sphere, 4 * sizeof *sphere);
+  s->log.errors[i] = fmin(s->threshold, most_error);
+}
+
+/* Does what the newest preview and the newest test allow. */
+qmat_status qmat_decimation_commit(qmat_decimation *s, const double *sphere) {
+  if (qmat_decimation_in_order(s)) record(s, sphere);
+  if (bounds_envelope(s))
+    qmat_envelope_to_surface_commit(&s->envelope_tracker, &s->collapse);
+  else
+    s->envelope_tracker.depths[s->collapse.kept] = s->envelope_tracker.sphere_depth;
+  qmat_surface_to_envelope_commit(&s->surface_tracker, &s->collapse);
+  qmat_crease_guard_commit(&s->creases, &s->complex, &s->collapse, sphere);
+  return qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
+}

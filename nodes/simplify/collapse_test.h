@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_COLLAPSE_TEST_H
+#define QMAT_NODES_SIMPLIFY_COLLAPSE_TEST_H
+
+#include "nodes/simplify/decimation_state.h"
+
+/* The tests that a collapse or a move has to pass: protection of tubular features, topology, inside, and both errors.
+ * Each is about the newest preview (`collapse`) of a decimation. One thread. */
+
+typedef enum {
+  QMAT_COLLAPSE_ALLOWED,
+  QMAT_COLLAPSE_REFUSED,
+  QMAT_COLLAPSE_EXCEEDS /* refused, but a larger threshold would allow it */
+} qmat_collapse_outcome;
+
+/* Why the newest test of a sphere failed. */
+typedef enum {
+  QMAT_REFUSED_BY_NOTHING,
+  QMAT_REFUSED_BY_SPHERE,
+  QMAT_REFUSED_BY_MIDPOINT,
+  QMAT_REFUSED_BY_SURFACE_TO_ENVELOPE,
+  QMAT_REFUSED_BY_ENVELOPE_TO_SURFACE
+} qmat_refusal;
+
+/* Whether an edge at the vertex is a tubular feature: an edge without slabs whose responsible region is all thin
+ * (section 3.4). */
+bool qmat_decimation_is_protected(const qmat_decimation *decimation, uint32_t vertex);
+
+/* Restricts the candidates of an edge: a protected end keeps its sphere, which `*bound` says. False where the edge must
+ * stay. */
+bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_t edge, qmat_candidates *candidates,
+                                      bool *bound);
+
+/* Whether the topology policy allows the newest preview; `*change` gets its change of the Euler characteristic. */
+bool qmat_decimation_keeps_topology(const qmat_decimation *decimation, int64_t *change);
+
+/* Whether the newest preview may be done with this sphere (4 doubles): inside the model, and both errors within the
+ * threshold. `first` is a constraint point to test first (QMAT_NONE: none). Where an error exceeds the threshold,
+ * `*needed` is a lower bound of the threshold that would allow it. QMAT_ERROR_MEMORY. */
+qmat_status qmat_decimation_test_sphere(qmat_decimation *decimation, const double *sphere, uint32_t first,
+                                        qmat_collapse_outcome *result, double *needed);
+
+/* Does what the newest preview and the newest successful test allow. QMAT_ERROR_MEMORY. */
+qmat_status qmat_decimation_commit(qmat_decimation *decimation, const double *sphere);
+
+#endif

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/fitted_collapse.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "nodes/simplify/collapse_test.h"
+
+/* A sphere whose sampled error is this many times what is threshold is not worth a test. */
+static const double test_ratio = 1.1;
+
+/* Where the spheres were fitted before, a fit that starts badly is left sooner, at this share of what is threshold. */
+static const double early_exit_share = 0.6;
+
+/* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
+ * look good as they are. */
+qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
+                                       qmat_collapse_outcome *result) {
+  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
+  int least = 0;
+  qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
+                                              s->constraints->surface_count, QMAT_FITTED_POINTS);
+  for (int i = 0; i < c->count && status == QMAT_OK; i++) {
+    status = qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, c->spheres[i],
+                                   &errors[i]);
+    if (errors[i] < errors[least]) least = i;
+  }
+  memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
+  s->refusal = QMAT_REFUSED_BY_NOTHING;
+  if (status == QMAT_OK)
+    status =
+        qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse,
+                            s->rules.neighbourhoods ? early_exit_share * s->threshold : s->threshold, sphere, &error);
+  s->fitted_errors[edge] = error;
+  memcpy(s->fitted, sphere, sizeof s->fitted);
+  if (status == QMAT_OK && error <= test_ratio * s->threshold)
+    status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, result, &needed);
+  for (int i = 0; i < c->count && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
+    if (!(errors[i] <= test_ratio * s->threshold)) continue;
+    memcpy(sphere, c->spheres[i], sizeof c->spheres[i]);
+    status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, result, &needed);
+  }
+  return status;
+}
+
+typedef struct qmat_neighbourhood_state {
+  double *at, value;
+} neighbourhood_state;
+
+static qmat_status save(qmat_decimation *s, double *values, size_t count) {
+  if (qmat_grow((void **)&s->saved, &s->saved_capacity, s->saved_count + count, sizeof *s->saved))
+    return qmat_fail_memory(s->context, "a patch");
+  for (size_t i = 0; i < count; i++) s->saved[s->saved_count++] = (neighbourhood_state){&values[i], values[i]};
+  return QMAT_OK;
+}
+
+/* Remembers a sphere and the bounds of what hangs on it. */
+static qmat_status save_star(qmat_decimation *s, uint32_t vertex) {
+  qmat_status status = save(s, &s->complex.spheres[4 * (size_t)vertex], 4);
+  if (status == QMAT_OK) status = save(s, &s->envelope_tracker.depths[vertex], 1);
+  size_t count;
+  const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = save(s, &s->envelope_tracker.edge_bounds[at[i]], 1);
+  at = qmat_complex_triangles_at(&s->complex, vertex, &count);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    status = save(s, &s->envelope_tracker.triangle_bounds[at[i]], 1);
+  return status;
+}
+
+static void restore(qmat_decimation *s) {
+  for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
+}
+
+/* Moves a sphere whatever is threshold; what is known of its protrusion stays true. */
+static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphere, bool *inside) {
+  qmat_envelope_to_surface *envelope_tracker = &s->envelope_tracker;
+  const double limit = envelope_tracker->limit;
+  bool kept;
+  qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
+  if (status != QMAT_OK) return status;
+  envelope_tracker->limit = INFINITY;
+  *inside = qmat_envelope_to_surface_test_sphere(envelope_tracker, &s->complex, &s->collapse, sphere);
+  if (*inside) {
+    status = qmat_envelope_to_surface_test(s->context, envelope_tracker, &s->complex, &s->collapse, sphere, &kept);
+    if (status == QMAT_OK) qmat_envelope_to_surface_commit(envelope_tracker, &s->collapse);
+  }
+  envelope_tracker->limit = limit;
+  if (status == QMAT_OK && *inside) status = qmat_complex_collapse(s->context, &s->complex, &s->collapse, sphere);
+  return status;
+}
+
+/* What has been refused is needed for with this share of what is threshold to spare. */
+static const double margin = 0.02;
+
+/* Asks for what the newest test has refused. */
+static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
+  const double *centre = s->refusal == QMAT_REFUSED_BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
+  *needed = true;
+  if (s->refusal == QMAT_REFUSED_BY_SURFACE_TO_ENVELOPE) {
+    const size_t point = s->surface_tracker.failed_point;
+    return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->surface_tracker.points[3 * point],
+                                      qmat_decimation_is_inner(s, point) ? QMAT_TARGET_INSIDE : QMAT_TARGET_SURFACE,
+                                      s->surface_tracker.limits[point] - margin * s->threshold);
+  }
+  double closest[3];
+  uint32_t triangle;
+  *needed = s->refusal != QMAT_REFUSED_BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
+  if (!*needed) return QMAT_OK;
+  qmat_surface_distance(s->surface, centre, INFINITY, closest, &triangle);
+  return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, closest, QMAT_TARGET_BORDER,
+                                    (1 - margin) * s->threshold);
+}
+
+/* Tests a sphere of the patch, which is placed; number 0 is the collapse's. */
+static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int number, qmat_collapse_outcome *result) {
+  double needed;
+  const qmat_status status =
+      number == 0 ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
+                  : qmat_complex_preview_move(s->context, &s->complex, s->neighbourhood.vertices[number], &s->collapse);
+  return status == QMAT_OK
+             ? qmat_decimation_test_sphere(s, s->neighbourhood.spheres[number], QMAT_NONE, result, &needed)
+             : status;
+}
+
+/* Tests the spheres of the patch: `*last_refused` first, which becomes the one that is refused, and the collapse last,
+ * which is then the newest preview. */
+static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *last_refused,
+                                      qmat_collapse_outcome *result, bool *again) {
+  qmat_neighbourhood_fit *neighbourhood = &s->neighbourhood;
+  bool inside = true;
+  qmat_status status = QMAT_OK;
+  *result = QMAT_COLLAPSE_REFUSED;
+  *again = false;
+  for (int i = -1; i < neighbourhood->count && status == QMAT_OK; i++) {
+    status = place(s, i < 0 ? removed : neighbourhood->vertices[i], neighbourhood->spheres[i < 0 ? 0 : i], &inside);
+    if (!inside) return status;
+  }
+  const int first = *last_refused;
+  for (int i = 0; i <= neighbourhood->count && status == QMAT_OK; i++) {
+    const int number = i == 0 ? first : i % neighbourhood->count;
+    if (i > 0 && number == first && (number > 0 || neighbourhood->count == 1)) continue;
+    status = test_in_neighbourhood(s, edge, number, result);
+    if (status != QMAT_OK || *result == QMAT_COLLAPSE_ALLOWED) continue;
+    *last_refused = number;
+    return add_refused_target(s, neighbourhood->spheres[number], again);
+  }
+  return status;
+}
+
+/* At most so often what a test refuses is needed for and the patch fitted again. */
+enum { MOST_FITS = 6 };
+
+/* Up to this error (of its own fit) a sphere is worth a fit of the patch, and up to that error a fit of the patch is
+ * worth a test, as shares of what is threshold. */
+static const double neighbourhood_ratio = 1.3, placement_ratio = 1.02;
+
+/* The collapse of the newest preview with the sphere around which its own fit ended, and with its neighbours fitted too
+ * unless it is left `alone`. Where it can be done they are placed, and it is the newest preview and test; else nothing
+ * has changed. */
+static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
+  const qmat_collapse *c = &s->collapse;
+  uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];
+  const uint32_t removed = c->removed;
+  size_t count = 0;
+  for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_NEIGHBOURHOOD_SPHERES; n++)
+    if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
+        !(s->protecting && qmat_decimation_is_protected(s, c->neighbours[n])))
+      others[count++] = c->neighbours[n];
+  qmat_status status =
+      qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, s->fitted,
+                                   others, count, s->constraints->surface_count, s->threshold);
+  bool again = true;
+  int last_refused = 0;
+  for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
+    double error;
+    qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, i % 2 == 1, &error);
+    if (!(error <= placement_ratio * s->threshold)) return status;
+    s->saved_count = 0;
+    status = save_star(s, removed);
+    for (int k = 0; k < s->neighbourhood.count && status == QMAT_OK; k++)
+      status = save_star(s, s->neighbourhood.vertices[k]);
+    if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &last_refused, result, &again);
+    if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) return status;
+    restore(s);
+    if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+  }
+  return status;
+}
+
+/* A cone that leaves the solid in its middle does so wherever the spheres move that little. */
+qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
+  qmat_status status = QMAT_OK;
+  if (s->refusal == QMAT_REFUSED_BY_MIDPOINT) return status;
+  if (s->fitted_errors[edge] <= test_ratio * s->threshold) status = try_neighbourhood(s, edge, true, result);
+  if (status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED &&
+      s->fitted_errors[edge] <= neighbourhood_ratio * s->threshold)
+    status = try_neighbourhood(s, edge, false, result);
+  return status;
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_FITTED_COLLAPSE_H
+#define QMAT_NODES_SIMPLIFY_FITTED_COLLAPSE_H
+
+#include "nodes/simplify/collapse_test.h"
+
+/* A fit of one sphere uses at most so many constraint points. */
+enum { QMAT_FITTED_POINTS = 256 };
+
+/* Tries the newest preview, of `edge`, with a sphere that is fitted to the surface from the best candidate, then with
+ * the candidates themselves where their error is small. `sphere` is the one that `*result` allows. QMAT_ERROR_MEMORY.
+ */
+qmat_status qmat_decimation_try_fitted(qmat_decimation *decimation, uint32_t edge, const qmat_candidates *candidates,
+                                       double sphere[4], qmat_collapse_outcome *result);
+
+/* After qmat_decimation_try_fitted was refused: tries the same collapse with the spheres around it fitted at the same
+ * time. Where `*result` allows it, all of these are in place, and the collapse is the newest preview and test; else
+ * nothing has changed. QMAT_ERROR_MEMORY. */
+qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *decimation, uint32_t edge,
+                                               qmat_collapse_outcome *result);
+
+#endif
