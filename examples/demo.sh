@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Builds qmat, makes a few models, describes each by medial spheres, cones and slabs, and shows what came of it. Needs
-# nothing but a Debian 12 (it installs what is missing) and works from any folder.
+# Builds qmat, makes a few models, describes each by medial spheres, cones and slabs, and shows what came of it. It needs
+# only Debian 12, installs what is missing, and works from any folder.
 set -eu
 cd "$(dirname "$0")/.."
 build=build/release
@@ -11,11 +11,12 @@ say() {
   printf '\n%s\n' "$*"
 }
 
-sh .ci/packages.sh
+say "This builds about 0.1 GB in $PWD/build and takes a few minutes the first time."
+sh .ci/packages.sh packages.txt
 
-say "Building (a minute or two the first time) ..."
+say "Building ..."
 mkdir -p build
-if ! { cmake --preset release && cmake --build --preset release -j "$(nproc)"; } >build/demo.log 2>&1; then
+if ! { cmake --preset release && cmake --build --preset release -j "$(nproc)" --target qmat qmat_models qmat_picture; } >build/demo.log 2>&1; then
   tail -n 30 build/demo.log
   echo "The build failed; all of it: $PWD/build/demo.log"
   exit 1

@@ -30,7 +30,7 @@ fail() {
 
 skip() {
   skipped=$((skipped + 1))
-  printf 'skipped %s\n' "$*"
+  printf 'skipped: %s\n' "$*"
 }
 
 # holds WHAT COMMAND...: the command succeeds; what it says is shown when it does not.

@@ -1,8 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Sets up, builds and runs everything: the tests of every floor, optimised and under the address and undefined-behaviour
-# sanitizers, and the whole program on generated and, where they are there, on real models (tests/end_to_end.sh).
-# The last line counts: N passed, N failed, N skipped. Exit code 0 when nothing failed.
+# Installs packages, builds and tests everything:
+# - with gcc, optimised: all tests, and the whole program on generated and, where present, real models;
+# - with gcc and the address and undefined-behaviour sanitizers: all tests but the long ones;
+# - with clang and the thread sanitizer: the tests of code that runs on several threads.
+# A compiler warning is an error. The last line counts: N passed, N failed, N skipped. The lines before it list each skip
+# with its reason and the disk space that was used. Exit code 0 when nothing failed.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 started=$(date +%s)
@@ -11,12 +14,28 @@ export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
 passed=0
 failed=0
 skipped=0
+skips=$(mktemp)
 
 step() {
   printf '\n== %s (%d s)\n' "$1" $(($(date +%s) - started))
 }
 
+# list_skips FILE: the lines "skipped: REASON" of a log. In a log of ctest, each with the name of its test.
+list_skips() {
+  awk '/^[0-9]+\/[0-9]+ Test: / { test = $3 ": " }
+    /^skipped: / { sub(/^skipped: /, ""); print "  " test $0; next }
+    /^\[  SKIPPED \] test_/ { if (last !~ /^skipped: /) print "  " test $4 " (no reason given)" }
+    { last = $0 }' "$1"
+}
+
 finish() {
+  if [ -s "$skips" ]; then
+    printf '\nSkipped:\n'
+    sort -u "$skips"
+  fi
+  printf '\nDisk space used:\n'
+  du -sh build/* 2>/dev/null | awk '$1 !~ /K$/ { printf "  %6s %s\n", $1, $2 }'
+  rm -f "$skips"
   printf '\n%d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"
   [ "$failed" -eq 0 ]
   exit
@@ -64,22 +83,26 @@ run_ctest() {
   passed=$((passed + all - bad - none))
   failed=$((failed + bad))
   skipped=$((skipped + none))
+  list_skips "build/$preset/Testing/Temporary/LastTest.log" >>"$skips"
 }
 
-step "Debian packages"
-if ! sh .ci/packages.sh; then
+step "What this needs"
+echo "Builds: about 3 GB in $PWD/build. On two cores all of it takes about half an hour."
+if ! sh .ci/packages.sh packages.txt tests/packages.txt; then
   failed=1
   finish
 fi
 
 step "Build, optimised, warnings are errors"
-if build release -DQMAT_WERROR=ON; then
+if build release -DQMAT_WERROR=ON -DQMAT_TESTS=ON; then
   step "Tests, optimised"
   run_ctest release
   step "The whole program"
   counts=$(mktemp)
-  sh tests/end_to_end.sh "$PWD/build/release" "$counts"
-  result=$?
+  { sh tests/end_to_end.sh "$PWD/build/release" "$counts"; echo $? >build/end_to_end.result; } | tee build/end_to_end.log
+  result=$(cat build/end_to_end.result)
+  rm -f build/end_to_end.result
+  list_skips build/end_to_end.log >>"$skips"
   ok=0 bad=0 none=0
   read -r ok bad none <"$counts" || bad=1
   rm -f "$counts"
@@ -89,11 +112,17 @@ if build release -DQMAT_WERROR=ON; then
   skipped=$((skipped + ${none:-0}))
 fi
 
-step "Build with sanitizers"
+step "Build with the address and undefined-behaviour sanitizers"
 if build asan -DQMAT_WERROR=ON; then
-  step "Tests with sanitizers"
-  # The worked example builds the whole tree once more; once is enough. So it is with the long tests.
-  run_ctest asan -LE "builds|long"
+  step "Tests with these sanitizers"
+  # Tests that build the tree once more, the long ones, and those of the sources ran above.
+  run_ctest asan -LE "builds|long|house"
+fi
+
+step "Build with clang and the thread sanitizer"
+if build tsan -DQMAT_WERROR=ON; then
+  step "Tests with the thread sanitizer"
+  run_ctest tsan
 fi
 
 step "Done"
