@@ -2,7 +2,6 @@
 #include "core/node.h"
 
 #include <float.h>
-#include <locale.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,6 +12,7 @@
 #include <cmocka.h>
 
 #include "core/hash.h"
+#include "tests/locale.h"
 
 typedef struct example_params {
   bool caps;
@@ -390,7 +390,7 @@ static void test_numbers_are_written_short_and_exact(void **state) {
 
 static void test_numbers_do_not_depend_on_the_locale(void **state) {
   (void)state;
-  if (setlocale(LC_ALL, "de_DE.UTF-8") == NULL) skip();
+  locale_with_comma();
   char text[32], comma[8];
   snprintf(comma, sizeof comma, "%.1f", 0.5);
   double number = 0, refused = 0;

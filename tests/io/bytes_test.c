@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <fcntl.h>
 #include <float.h>
-#include <locale.h>
 #include <sys/stat.h>
 
 #include "io/scanner.h"
 #include "tests/io/files.h"
+#include "tests/locale.h"
 
 /* ---- whole files ---- */
 
@@ -133,7 +133,7 @@ static void check_written_numbers(void) {
 static void test_numbers_are_written_in_few_digits_in_any_locale(void **state) {
   (void)state;
   check_written_numbers();
-  if (!setlocale(LC_ALL, "de_DE.UTF-8") && !setlocale(LC_ALL, "de_DE")) skip();
+  locale_with_comma();
   char text[16];
   snprintf(text, sizeof text, "%.1f", 0.5);
   assert_string_equal(text, "0,5");

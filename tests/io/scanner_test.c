@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/scanner.h"
 
-#include <locale.h>
-
 #include "tests/io/files.h"
+#include "tests/locale.h"
 
 static void assert_scans(const char *text, double expected, size_t length) {
   double number = 12345;
@@ -89,7 +88,7 @@ static void test_any_double_written_in_any_length_reads_as_strtod_reads_it(void 
 
 static void test_the_locale_changes_no_number(void **state) {
   (void)state;
-  if (!setlocale(LC_ALL, "de_DE.UTF-8") && !setlocale(LC_ALL, "de_DE")) skip();
+  locale_with_comma();
   assert_scans("0.123456789012345678", 0.123456789012345678, 20);
   assert_scans("0,5", 0, 1);
   setlocale(LC_ALL, "C");
