@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How a program uses the library: a mesh in memory goes in, medial spheres come out, no file in between. What was
- * computed is kept in the cache that the command line uses too, so that the second call computes nothing; Ctrl-C
- * cancels.
+/* A program that uses the library: a mesh in memory goes in, medial spheres come out, without any file. It shares the
+ * cache of the command line, so a second call computes nothing. Ctrl-C cancels.
  *
- *     cc embed.c -lqmat && ./a.out 5%
+ *     cc embed.c $(pkg-config --cflags --libs qmat) && ./a.out 5%
  */
 #include <signal.h>
 #include <stdio.h>
 
-#include "graphs/qmat.h" /* installed: <qmat.h> */
+#include <qmat.h>
 
 /* A step: a block of 3 x 1 x 1 with a block of 1 x 1 x 1 on its left end. Counter-clockwise from outside. */
 static const double positions[] = {

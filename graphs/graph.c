@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/graph.h"
 
+#include <stdio.h>
 #include <string.h>
 
 const qmat_node *qmat_registry_find(const qmat_registry *registry, const char *name) {
@@ -29,6 +30,12 @@ const char *qmat_graph_input_name(const qmat_graph *graph, size_t node, const qm
       if (at->node == node && &graph->nodes[node].type->params[at->param] == param) return graph->inputs[i].name;
     }
   return NULL;
+}
+
+void qmat_graph_set_option(const qmat_graph *graph, size_t node, const qmat_param *param, char *text, size_t size) {
+  const char *input = qmat_graph_input_name(graph, node, param);
+  snprintf(text, size, "--set %s%s%s=%s", input ? input : graph->nodes[node].id, input ? "" : ".",
+           input ? "" : param->name, param->type == QMAT_PARAM_PATH ? "FILE" : "VALUE");
 }
 
 void qmat_graph_uninit(qmat_graph *graph) {

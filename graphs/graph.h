@@ -56,6 +56,7 @@ typedef struct qmat_graph_output {
 typedef struct qmat_graph {
   qmat_registry registry;
   char *file;   /* its name in errors */
+  bool is_file; /* `file` is a path; else the graph was read from text */
   char *folder; /* "" (the working folder), or ends in '/' */
   size_t node_count, input_count, output_count;
   qmat_graph_node *nodes;     /* in the file's order */
@@ -74,5 +75,9 @@ const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node);
 
 /* The name of the graph's input that sets this parameter, or NULL. */
 const char *qmat_graph_input_name(const qmat_graph *graph, size_t node, const qmat_param *param);
+
+/* The option that sets a parameter: "--set model=FILE", or "--set node.parameter=VALUE" if no input sets it.
+ * Terminated; cut when `size` is short. */
+void qmat_graph_set_option(const qmat_graph *graph, size_t node, const qmat_param *param, char *text, size_t size);
 
 #endif

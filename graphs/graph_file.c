@@ -418,5 +418,6 @@ qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *reg
   const char *slash = strrchr(path, '/');
   status = read_text(context, registry, path, path, slash ? (size_t)(slash - path) + 1 : 0, text, size, graph);
   qmat_free(text);
+  graph->is_file = status == QMAT_OK;
   return status;
 }

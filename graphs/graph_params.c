@@ -156,13 +156,10 @@ qmat_status qmat_graph_check_node(qmat_context *context, const qmat_graph *graph
   qmat_status status = qmat_params_check(context, node->type, params);
   if (status == QMAT_ERROR_USAGE && !context->error.file[0]) {
     const qmat_param *missing = qmat_graph_missing_param(node);
-    const char *input = missing ? qmat_graph_input_name(graph, index, missing) : NULL;
     if (missing && strcmp(missing->name, context->error.field) == 0 && !context->error.hint[0]) {
-      const char *value = missing->type == QMAT_PARAM_PATH ? "FILE" : "VALUE";
-      if (input)
-        qmat_fail_hint(context, "--set %s=%s", input, value);
-      else
-        qmat_fail_hint(context, "--set %s.%s=%s", node->id, missing->name, value);
+      char option[2 * QMAT_GRAPH_NAME_SIZE + 16];
+      qmat_graph_set_option(graph, index, missing, option, sizeof option);
+      qmat_fail_hint(context, "%s", option);
     }
     status = place_at_param(context, graph, node);
   }

@@ -169,7 +169,7 @@ qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *opt
   if (!options->remote) return QMAT_OK;
   if (strncmp(options->remote, "http://", 7) != 0 && strncmp(options->remote, "https://", 8) != 0) {
     qmat_fail(context, QMAT_ERROR_USAGE, "a remote cache is at http://... or https://..., not '%.200s'",
-              options->remote);
+              qmat_show_url(options->remote).text);
     return QMAT_ERROR_USAGE;
   }
   cache->remote = qmat_remote_open(options->remote, options->read_only || options->remote_read_only);

@@ -19,6 +19,17 @@ struct qmat_remote_cache {
   char warning[384];
 };
 
+qmat_shown_url qmat_show_url(const char *url) {
+  qmat_shown_url shown;
+  const char *scheme_end = strstr(url, "://"), *host = strrchr(url, '@');
+  const int scheme = scheme_end && host && scheme_end < host ? (int)(scheme_end - url) + 3 : 0;
+  if (host)
+    snprintf(shown.text, sizeof shown.text, "%.*s***%s", scheme, url, host);
+  else
+    snprintf(shown.text, sizeof shown.text, "%s", url);
+  return shown;
+}
+
 qmat_remote_cache *qmat_remote_open(const char *url, bool read_only) {
   qmat_remote_cache *remote = qmat_calloc(1, sizeof *remote);
   if (!remote) return NULL;
@@ -123,8 +134,8 @@ static long finish(qmat_remote_cache *remote) {
     char reason[64];
     snprintf(reason, sizeof reason, "it answers with status %ld", code);
     remote->dead = true;
-    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s is not used any more: %s", remote->url,
-             result != CURLE_OK ? curl_easy_strerror(result) : reason);
+    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s is not used any more: %s",
+             qmat_show_url(remote->url).text, result != CURLE_OK ? curl_easy_strerror(result) : reason);
     return 0;
   }
   return code;
@@ -160,8 +171,8 @@ bool qmat_remote_put(qmat_remote_cache *remote, const char *folder, const qmat_d
   if (code >= 200 && code < 300) return true;
   /* A server that takes nothing is still one that may give. */
   if (code > 0 && !*remote->warning) {
-    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s takes nothing: status %ld", remote->url,
-             code);
+    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s takes nothing: status %ld",
+             qmat_show_url(remote->url).text, code);
     remote->read_only = true;
   }
   return false;

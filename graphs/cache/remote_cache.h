@@ -10,6 +10,12 @@
  * reads checks digests. The first time that it does not answer, or too slowly, is the last that it is asked. */
 typedef struct qmat_remote_cache qmat_remote_cache;
 
+/* The URL as messages show it: what stands before its last '@', a user and password, is replaced by "***". */
+typedef struct qmat_shown_url {
+  char text[256];
+} qmat_shown_url;
+qmat_shown_url qmat_show_url(const char *url);
+
 /* `url` starts with http:// or https://; user and password may stand in it. NULL when memory is short; free with
  * qmat_remote_close. Nothing is sent yet. */
 qmat_remote_cache *qmat_remote_open(const char *url, bool read_only);

@@ -104,11 +104,12 @@ typedef struct qmat_planned_run {
   size_t *forced;
 } qmat_planned_run;
 
-/* Makes invocation->graph with `prepare`, sets what --set says, opens the cache and plans the run that the options ask
- * for. Free `*planned` with qmat_planned_run_uninit in any case. */
+/* Makes invocation->graph with `prepare`, applies --set, opens the cache and plans the run that the options ask for.
+ * With `foresee` the run is only for qmat_run_foresee, and required parameters may be missing. Free `*planned` with
+ * qmat_planned_run_uninit in any case. */
 qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
                                  qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
-                                 qmat_planned_run *planned);
+                                 bool foresee, qmat_planned_run *planned);
 void qmat_planned_run_uninit(qmat_planned_run *planned);
 
 /* A `prepare`: reads the graph file that the first argument names. */

@@ -80,6 +80,9 @@ static void print_node(const qmat_graph *graph, const qmat_run *run, size_t inde
     print_escaped(node->texts[row]);
     printf("</font></td></tr>");
   }
+  char missing[256] = "";
+  if (step) qmat_step_describe_missing(graph, step, missing, sizeof missing);
+  if (*missing) printf("<tr><td><font point-size=\"9\">%s</font></td></tr>", missing);
   if (outputs > 0) {
     printf("<tr><td><table border=\"0\" cellborder=\"0\" cellspacing=\"4\" cellpadding=\"2\">");
     print_ports(node->type->outputs, outputs, "o");
@@ -122,7 +125,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     return status;
   }
   qmat_planned_run planned;
-  qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, &planned);
+  qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, true, &planned);
   if (status == QMAT_OK) {
     qmat_run_foresee(&planned.run);
     print_graph(&invocation->graph, &planned.run);

@@ -59,7 +59,7 @@ static qmat_status tell(qmat_context *context, const qmat_invocation *invocation
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_planned_run planned;
-  qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, &planned);
+  qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, true, &planned);
   if (status == QMAT_OK && !planned.cached) {
     qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache to look into");
     status = qmat_fail_hint(context, "--cache DIR");

@@ -65,8 +65,10 @@ static qmat_status read_save(qmat_context *context, const qmat_graph *graph, con
   return context->error.status;
 }
 
-static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
+static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, bool foresee,
+                        qmat_planned_run *planned) {
   qmat_run_options options = {.saves = planned->saves,
+                              .may_lack_params = foresee,
                               .to_node = qmat_invocation_value(invocation, "to"),
                               .cache = planned->cached ? &planned->cache : NULL,
                               .forced = planned->forced};
@@ -88,7 +90,7 @@ static qmat_status plan(qmat_context *context, const qmat_invocation *invocation
 
 qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
                                  qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
-                                 qmat_planned_run *planned) {
+                                 bool foresee, qmat_planned_run *planned) {
   *planned = (qmat_planned_run){0};
   planned->saves = qmat_calloc(invocation->given_count, sizeof *planned->saves);
   planned->forced = qmat_calloc(invocation->given_count, sizeof *planned->forced);
@@ -100,7 +102,7 @@ qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocat
       if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
     }
   if (status == QMAT_OK) status = qmat_open_cache(context, invocation, &planned->cache, &planned->cached);
-  return status == QMAT_OK ? plan(context, invocation, planned) : status;
+  return status == QMAT_OK ? plan(context, invocation, foresee, planned) : status;
 }
 
 void qmat_planned_run_uninit(qmat_planned_run *planned) {
@@ -180,7 +182,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   qmat_run *run = &planned.run;
   qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
   if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
-  if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, &planned);
+  if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
   if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
     status = qmat_run_check_path(context, run, "the depfile", qmat_invocation_value(invocation, "depfile"));

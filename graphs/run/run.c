@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -13,6 +14,15 @@ double qmat_clock_seconds(void) {
 const char *qmat_step_state_name(qmat_step_state state) {
   static const char *const names[] = {"run", "hit", "same", "depends"};
   return names[state];
+}
+
+void qmat_step_describe_missing(const qmat_graph *graph, const qmat_run_step *step, char *text, size_t size) {
+  text[0] = 0;
+  if (!step->missing) return;
+  const char *input = qmat_graph_input_name(graph, step->node, step->missing);
+  char option[2 * QMAT_GRAPH_NAME_SIZE + 16];
+  qmat_graph_set_option(graph, step->node, step->missing, option, sizeof option);
+  snprintf(text, size, "%s: not given (%s)", input ? input : step->missing->name, option);
 }
 
 const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port) {

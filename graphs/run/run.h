@@ -98,6 +98,10 @@ typedef struct qmat_run {
   double seconds;
 } qmat_run;
 
+/* "model: not given (--set model=FILE)" for a step with a missing parameter, else "". Terminated; cut when `size` is
+ * short. */
+void qmat_step_describe_missing(const qmat_graph *graph, const qmat_run_step *step, char *text, size_t size);
+
 /* The value of an output port, or NULL when it was not kept. The run owns it. */
 const qmat_value *qmat_run_value(const qmat_run *run, size_t node, size_t port);
 

@@ -184,10 +184,13 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
     if (i > 0) qmat_put_text(&writer, " ");
     put_escaped(&writer, run->files[i].path);
   }
-  qmat_put_text(&writer, ": ");
-  put_escaped(&writer, run->graph->file);
+  qmat_put_text(&writer, ":");
+  if (run->graph->is_file) {
+    qmat_put_text(&writer, " ");
+    put_escaped(&writer, run->graph->file);
+  }
   for (size_t i = 0; i < run->hashed_count; i++) {
-    /* A file that was looked for and is not there cannot be waited for. */
+    /* Make cannot make a missing file. */
     if (!run->hashed[i].readable) continue;
     qmat_put_text(&writer, " \\\n  ");
     put_escaped(&writer, run->hashed[i].path);
@@ -242,8 +245,11 @@ static void print_step(const qmat_run *run, const qmat_run_step *step, FILE *out
 
 void qmat_run_print_plan(const qmat_run *run, FILE *out) {
   for (size_t i = 0; i < run->step_count; i++) {
-    print_step(run, &run->steps[i], out);
-    fputc('\n', out);
+    const qmat_run_step *step = &run->steps[i];
+    char missing[256];
+    qmat_step_describe_missing(run->graph, step, missing, sizeof missing);
+    print_step(run, step, out);
+    fprintf(out, "%s%s\n", *missing ? "  " : "", missing);
   }
   if (!run->cache) fprintf(out, "There is no cache: every node would run.\n");
 }

@@ -228,7 +228,11 @@ json_t *qmat_why(const qmat_run *run, const json_t *records, size_t index) {
   bool hit = step->state == QMAT_STEP_HIT;
   const json_t *before = step->keyed ? nearest(records, step->key_items, hit ? made_at(record) : INT64_MAX) : NULL;
   json_t *told = NULL;
-  if (step->state == QMAT_STEP_DEPENDS) {
+  if (step->missing) {
+    char missing[256];
+    qmat_step_describe_missing(run->graph, step, missing, sizeof missing);
+    told = sentence("cannot run: %s", missing);
+  } else if (step->state == QMAT_STEP_DEPENDS) {
     add_waiting(run, step, causes);
     text = "it is not known yet: it runs unless nodes before it make what they made before";
   } else if (!step->keyed) {
