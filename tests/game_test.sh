@@ -3,28 +3,13 @@
 # Installs qmat and builds examples/game on top, with Ninja and with Make: game_test.sh SOURCE_FOLDER BUILD_FOLDER
 source=$1
 built=$2
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/lib.sh"
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
-
-die() {
-  echo "FAILED: $*"
-  cat out.txt
-  exit 1
-}
 
 cmake --install "$built" --prefix "$work/installed" >out.txt 2>&1 || die "the installation"
 # It must not matter where the installation is.
 mv installed moved
-PKG_CONFIG_PATH=$(dirname "$(find "$work/moved" -name qmat.pc)")
-export PKG_CONFIG_PATH
-printf '#include <stdio.h>\n#include <qmat.h>\nint main(void) { return puts(qmat_version()) < 0; }\n' >version.c
-# It writes a space in a path as a shell reads it.
-eval "cc version.c -o version $(pkg-config --cflags --libs qmat) -Wl,-rpath,$(pkg-config --variable=libdir qmat)" \
-  >out.txt 2>&1 || die "pkg-config"
-./version >out.txt || die "the program that pkg-config helped to build"
 
 # make_assets: builds; the assets that were made anew, in $made.
 make_assets() {

@@ -6,46 +6,12 @@
 # right, and nothing but records and blobs remains.
 qmat=$1
 rounds=${2:-100}
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../lib.sh"
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
 
-cat >graph.yaml <<'END'
-qmat: 1
-nodes:
-  model:     { type: scene.read, params: { path: box.off } }
-  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
-  samples:   { type: mesh.sample, params: { spacing: 4% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
-  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
-  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
-inputs: { spacing: samples.spacing, model: model.path }
-outputs: { asset: asset.file }
-END
-cat >box.off <<'END'
-OFF
-8 6 0
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 1
-2 0 1
-2 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
-
-die() {
-  echo "FAILED in round $round: $*"
-  exit 1
-}
+write_graph graph.yaml 4% box.off
+write_box box.off
 
 # run NAME SPACING OPTION...
 run() {
@@ -56,7 +22,7 @@ run() {
 }
 
 round=0
-for spacing in 4% 5% 6% 7%; do run "right-$spacing.glb" $spacing --no-cache || die "a run without a cache"; done
+for spacing in 4% 5% 6% 7%; do run "right-$spacing.glb" $spacing --no-cache || die "round $round: a run without a cache"; done
 
 # Random delays from a counter, so that a failing seed can be run again.
 seed=${QMAT_TEST_SEED:-1}
@@ -82,13 +48,13 @@ while [ "$round" -lt "$rounds" ]; do
     wait "$pid" 2>/dev/null
     if [ $? -eq 137 ]; then killed=$((killed + 1)); fi
   done
-  "$qmat" cache verify >said.txt 2>&1 || die "$(cat said.txt)"
+  "$qmat" cache verify >said.txt 2>&1 || die "round $round: $(cat said.txt)"
 done
 for spacing in 4% 5% 6% 7%; do
-  timeout 60 "$qmat" run graph.yaml --set spacing=$spacing --quiet -o "last-$spacing.glb" || die "a run afterwards"
-  cmp "last-$spacing.glb" "right-$spacing.glb" || die "another result afterwards"
+  timeout 60 "$qmat" run graph.yaml --set spacing=$spacing --quiet -o "last-$spacing.glb" || die "round $round: a run afterwards"
+  cmp "last-$spacing.glb" "right-$spacing.glb" || die "round $round: another result afterwards"
 done
-"$qmat" cache verify >said.txt 2>&1 || die "$(cat said.txt)"
-[ -z "$(ls cache/bad cache/tmp | grep -v ':$')" ] || die "something is left over: $(ls cache/bad cache/tmp)"
-[ "$killed" -gt 0 ] || die "no process was killed"
+"$qmat" cache verify >said.txt 2>&1 || die "round $round: $(cat said.txt)"
+[ -z "$(ls cache/bad cache/tmp | grep -v ':$')" ] || die "round $round: something is left over: $(ls cache/bad cache/tmp)"
+[ "$killed" -gt 0 ] || die "round $round: no process was killed"
 echo "$rounds rounds, $killed processes killed"

@@ -2,41 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The cache as a user meets it: cache_test.sh PROGRAM
 qmat=$1
-work=$(mktemp -d) || exit 1
+. "$(dirname "$0")/../../lib.sh"
 mounted=
-trap 'if [ -n "$mounted" ]; then umount "$mounted"; fi; rm -rf "$work"' EXIT
-cd "$work" || exit 1
+clean_up() { if [ -n "$mounted" ]; then umount "$mounted"; fi; }
 unset QMAT_CACHE
 XDG_CACHE_HOME=$work/home
 export XDG_CACHE_HOME
 graph=graph.yaml
-failures=0
 
-# The shipped graph up to the initial medial mesh: what the cache does is the same, and a run takes no time.
-cat >graph.yaml <<'END'
-qmat: 1
-nodes:
-  model:     { type: scene.read }
-  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
-  samples:   { type: mesh.sample, params: { spacing: 20% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
-  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
-  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
-inputs: { model: model.path }
-outputs: { asset: asset.file }
-END
-
-fail() {
-  echo "FAILED: $*"
-  cat out.txt err.txt
-  failures=$((failures + 1))
-}
-
-# holds WHAT COMMAND...: the command must succeed.
-holds() {
-  what=$1
-  shift
-  if ! "$@"; then fail "$what"; fi
-}
+write_graph graph.yaml 20%
+write_box box.off
 
 # run OPTION...: the graph on $model; the states of its nodes, in one line, in $states.
 model=box.off
@@ -57,25 +32,6 @@ all() {
 is() {
   if ! echo " $states " | grep -q " $1:$2 "; then fail "$3: node $1 of '$states' is not $2"; fi
 }
-
-cat >box.off <<'END'
-OFF
-8 6 0
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 1
-2 0 1
-2 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
 
 # Cold and warm.
 formats="-o cold.glb -o cold.gltf -o cold.ma -o cold.ply"
@@ -350,7 +306,4 @@ holds "a file is no cache" test $? -eq 2
 "$qmat" run "$graph" --set model=box.off --cache-size many >out.txt 2>err.txt
 holds "no such size" test $? -eq 2
 
-if [ $failures -ne 0 ]; then
-  echo "$failures failed"
-  exit 1
-fi
+finish

@@ -8,7 +8,7 @@ if ! command -v nginx >/dev/null; then
   echo "skipped: there is no nginx (Debian: apt install nginx)"
   exit 77
 fi
-work=$(mktemp -d) || exit 1
+. "$(dirname "$0")/../../lib.sh"
 server=
 stop_server() {
   if [ -n "$server" ]; then
@@ -17,49 +17,11 @@ stop_server() {
   fi
   server=
 }
-trap 'stop_server; rm -rf "$work"' EXIT
-cd "$work" || exit 1
+clean_up() { stop_server; }
 export QMAT_CACHE=off no_proxy='*'
-failures=0
 
-holds() {
-  what=$1
-  shift
-  if ! "$@"; then
-    echo "FAILED: $what"
-    cat out.txt err.txt
-    failures=$((failures + 1))
-  fi
-}
-
-cat >graph.yaml <<'END'
-qmat: 1
-nodes:
-  model:     { type: scene.read, params: { path: box.off } }
-  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
-  samples:   { type: mesh.sample, params: { spacing: 20% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
-  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
-  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
-outputs: { asset: asset.file }
-END
-cat >box.off <<'END'
-OFF
-8 6 0
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 1
-2 0 1
-2 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
+write_graph graph.yaml 20% box.off
+write_box box.off
 
 # start_server LINES: nginx in the foreground of a process of ours, so that it can be killed by its number.
 start_server() {
@@ -210,7 +172,15 @@ fi
 "$qmat" run graph.yaml --remote-cache ftp://127.0.0.1 --cache ours >out.txt 2>err.txt
 holds "only http and https" test $? -eq 2
 
-if [ $failures -ne 0 ]; then
-  echo "$failures failed"
-  exit 1
-fi
+# A password in the URL is used and never printed.
+for address in "http://user:secret@127.0.0.1:$port/x" "ftp://user:secret@127.0.0.1" "user:secret@127.0.0.1" \
+  "http://user:s/e:cret@127.0.0.1:$port"; do
+  "$qmat" run graph.yaml --cache secret --force --remote-cache "$address" --report secret.json >out.txt 2>err.txt
+  "$qmat" cache stats --cache secret --remote-cache "$address" >>out.txt 2>>err.txt
+  "$qmat" cache stats --cache secret --remote-cache "$address" --json >>out.txt 2>>err.txt
+  holds "the cache is named" grep -qs '\*\*\*@127.0.0.1' err.txt secret.json
+  holds "no password is printed" test -z "$(cat out.txt err.txt secret.json | grep -e secret@ -e cret@ -e user:)"
+  rm -f secret.json
+done
+
+finish

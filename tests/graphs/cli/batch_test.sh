@@ -2,23 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # qmat batch as a user meets it: batch_test.sh PROGRAM
 qmat=$1
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../lib.sh"
 QMAT_CACHE=$work/cache
 TMPDIR=$work
 export QMAT_CACHE TMPDIR
-failures=0
-
-holds() {
-  what=$1
-  shift
-  if ! "$@"; then
-    echo "FAILED: $what"
-    cat out.txt err.txt
-    failures=$((failures + 1))
-  fi
-}
 
 # child_of PROCESS: its first child, waited for, in $child.
 child_of() {
@@ -32,37 +19,10 @@ child_of() {
   [ -n "$child" ] || child=none
 }
 
-cat >graph.yaml <<'END'
-qmat: 1
-nodes:
-  model:     { type: scene.read }
-  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }
-  samples:   { type: mesh.sample, params: { spacing: 20% }, in: { mesh: model.mesh, thickness: thickness.thickness } }
-  initial:   { type: medial.delaunay, in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples } }
-  asset:     { type: scene.write, in: { scene: model.scene, medial: initial.medial } }
-inputs: { model: model.path }
-outputs: { asset: asset.file }
-END
+write_graph graph.yaml 20%
 mkdir models
 for width in 1 2 3 4 5 6 7 8 9; do
-  cat >models/box$width.off <<END
-OFF
-8 6 0
-0 0 0
-$width 0 0
-$width 1 0
-0 1 0
-0 0 1
-$width 0 1
-$width 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
+  write_box models/box$width.off $width
 done
 echo "OFF 1 2" >"models/bad one.off"
 
@@ -165,7 +125,4 @@ holds "a folder that is a file" test $code -eq 1
 batch --inputs models/list.txt --out results --jobs 0
 holds "no jobs" test $code -eq 2
 
-if [ $failures -ne 0 ]; then
-  echo "$failures failed"
-  exit 1
-fi
+finish

@@ -3,61 +3,12 @@
 # The command line as a user meets it: cli_test.sh PROGRAM SOURCE_FOLDER
 qmat=$1
 source=$2
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../lib.sh"
 # Results of earlier builds must not stand for those of this one; tests/graphs/cache/cache_test.sh tests the cache.
 QMAT_CACHE=off
 export QMAT_CACHE
-failures=0
 
-# expect CODE TEXT COMMAND...: the exit code, and a text on either output ("" for any).
-expect() {
-  code=$1
-  text=$2
-  shift 2
-  "$@" >out.txt 2>err.txt
-  got=$?
-  if [ "$got" -ne "$code" ]; then
-    echo "FAILED (exit $got, not $code): $*"
-    cat out.txt err.txt
-    failures=$((failures + 1))
-  elif [ -n "$text" ] && ! cat out.txt err.txt | grep -qF -e "$text"; then
-    echo "FAILED (no '$text'): $*"
-    cat out.txt err.txt
-    failures=$((failures + 1))
-  fi
-}
-
-# holds WHAT COMMAND...: the command must succeed.
-holds() {
-  what=$1
-  shift
-  if ! "$@"; then
-    echo "FAILED: $what"
-    failures=$((failures + 1))
-  fi
-}
-
-# A box of quads.
-cat >box.off <<'END'
-OFF
-8 6 0
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 1
-2 0 1
-2 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
+write_box box.off
 # So few samples, and spheres, that a run takes no second, with sanitizers neither.
 coarse="--set samples.spacing=10%"
 
@@ -104,7 +55,17 @@ expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report bad.yaml
 holds "the graph file is never overwritten" grep -q 'mesh.sfd' bad.yaml
 expect 2 "did you mean '--set'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --sat model=box.off
 expect 2 "did you mean 'epsilon'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --set simple.epsilom=1
-expect 2 "path must be given" "$qmat" run "$source/graphs/qmat_plus.yaml" -o a.glb
+expect 2 "path must be given (--set model=FILE)" "$qmat" run "$source/graphs/qmat_plus.yaml" -o a.glb
+# Without a model the plan is known all the same.
+for cached in --no-cache --cache=planned; do
+  expect 0 "model: not given (--set model=FILE)" "$qmat" run "$source/graphs/qmat_plus.yaml" --dry-run $cached
+  expect 0 "model: not given" "$qmat" dot "$source/graphs/qmat_plus.yaml" --status $cached
+done
+expect 0 "model (scene.read): cannot run: model: not given (--set model=FILE)" \
+  "$qmat" why "$source/graphs/qmat_plus.yaml" simple --cache planned
+printf 'qmat: 1\nnodes: { m: { type: scene.read } }\noutputs: { mesh: m.mesh }\n' >no_input.yaml
+expect 0 "path: not given (--set m.path=FILE)" "$qmat" run no_input.yaml --dry-run
+expect 2 "path must be given (--set m.path=FILE)" "$qmat" check no_input.yaml
 
 # Runs.
 expect 2 "-o PATH" "$qmat" mat box.off
@@ -203,7 +164,4 @@ if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; t
   holds "the same bytes under de_DE" cmp box.glb comma.glb
 fi
 
-if [ $failures -ne 0 ]; then
-  echo "$failures failed"
-  exit 1
-fi
+finish

@@ -15,14 +15,14 @@ if [ "$(id -u)" -ne 0 ]; then
   echo "skipped: slurmd needs root"
   exit 77
 fi
-work=$(mktemp -d) || exit 1
+. "$(dirname "$0")/../../lib.sh"
 pids=
 clean_up() {
+  if [ $failures -ne 0 ]; then tail -n 5 log/*; fi
   # shellcheck disable=SC2086
   if [ -n "$pids" ]; then kill -KILL $pids 2>/dev/null; fi
   kill_machine one
   kill_machine two
-  rm -rf "$work"
 }
 # kill_machine NAME: what runs there, by the environment that Slurm gives to it and to nobody else, and its keepers.
 kill_machine() {
@@ -37,21 +37,12 @@ kill_machine() {
     fi
   done
 }
-trap clean_up EXIT
-cd "$work" || exit 1
 mkdir state log models
 
 skip() {
   echo "skipped: $*"
   tail -n 3 log/* 2>/dev/null
   exit 77
-}
-
-fail() {
-  echo "FAILED: $*"
-  cat out.txt err.txt
-  tail -n 5 log/*
-  exit 1
 }
 
 # ---- a cluster ----
@@ -136,7 +127,7 @@ for k in 0 1 2 3 4 5 6 7 8 9; do
     }
   }' >models/torus$k.off
 done
-"$qmat" run graph.yaml --set model=models/torus3.off --no-cache --quiet -o right.glb || fail "a run without Slurm"
+"$qmat" run graph.yaml --set model=models/torus3.off --no-cache --quiet -o right.glb || die "a run without Slurm"
 
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
@@ -145,26 +136,26 @@ batch=$!
 tries=0
 until timeout 5 squeue --noheader --states=running --nodelist=two 2>/dev/null | grep -q .; do
   tries=$((tries + 1))
-  [ $tries -lt 600 ] || fail "nothing runs on the second machine"
+  [ $tries -lt 600 ] || die "nothing runs on the second machine"
   sleep 0.1
 done
 kill -KILL $two
 kill_machine two
 wait $batch
 code=$?
-[ $code -eq 0 ] || fail "exit code 0, not $code"
-grep -q '^10 done, 0 failed, 0 not run' out.txt || fail "ten are done"
-[ "$(ls results | wc -l)" -eq 10 ] || fail "ten results"
-cmp right.glb results/torus3.glb || fail "the same bytes as without Slurm"
-[ -z "$(ls -d results/.qmat-batch-* 2>/dev/null)" ] || fail "nothing is left over"
+[ $code -eq 0 ] || die "exit code 0, not $code"
+grep -q '^10 done, 0 failed, 0 not run' out.txt || die "ten are done"
+[ "$(ls results | wc -l)" -eq 10 ] || die "ten results"
+cmp right.glb results/torus3.glb || die "the same bytes as without Slurm"
+[ -z "$(ls -d results/.qmat-batch-* 2>/dev/null)" ] || die "nothing is left over"
 
 # The same again, on the machine that is left: all from the cache; and one that fails.
 echo OFF >models/bad.off
 timeout 300 "$qmat" batch graph.yaml --inputs 'models/*.off' --out again --engine slurm --json >out.txt 2>err.txt
 code=$?
-[ $code -eq 1 ] || fail "exit code 1, not $code"
-[ "$(grep -c '"hits":5' out.txt)" -eq 10 ] || fail "the second batch comes from the cache"
-grep '"result":"failed"' out.txt | grep -q 'bad.off' || fail "the failure is told"
+[ $code -eq 1 ] || die "exit code 1, not $code"
+[ "$(grep -c '"hits":5' out.txt)" -eq 10 ] || die "the second batch comes from the cache"
+grep '"result":"failed"' out.txt | grep -q 'bad.off' || die "the failure is told"
 
 # Interrupted: the job array is cancelled, and nothing is left of it.
 "$qmat" batch graph.yaml --inputs 'models/torus*.off' --out cancelled --engine slurm --force >out.txt 2>err.txt &
@@ -172,18 +163,18 @@ batch=$!
 tries=0
 until timeout 5 squeue --noheader --states=running 2>/dev/null | grep -q .; do
   tries=$((tries + 1))
-  [ $tries -lt 600 ] || fail "nothing runs that could be cancelled"
+  [ $tries -lt 600 ] || die "nothing runs that could be cancelled"
   sleep 0.1
 done
-[ -n "$(ls -d cancelled/.qmat-batch-*)" ] || fail "what the machines tell is in the folder that they share"
+[ -n "$(ls -d cancelled/.qmat-batch-*)" ] || die "what the machines tell is in the folder that they share"
 kill -INT $batch
 wait $batch
 code=$?
-[ $code -eq 3 ] || fail "exit code 3 after a signal, not $code"
+[ $code -eq 3 ] || die "exit code 3 after a signal, not $code"
 tries=0
 while timeout 5 squeue --noheader 2>/dev/null | grep -q .; do
   tries=$((tries + 1))
-  [ $tries -lt 600 ] || fail "the job array goes on after a signal"
+  [ $tries -lt 600 ] || die "the job array goes on after a signal"
   sleep 0.1
 done
-[ -z "$(ls -d cancelled/.qmat-batch-* 2>/dev/null)" ] || fail "nothing is left over after a signal"
+[ -z "$(ls -d cancelled/.qmat-batch-* 2>/dev/null)" ] || die "nothing is left over after a signal"

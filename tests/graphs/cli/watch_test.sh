@@ -2,18 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # qmat watch: what a saved file makes it do: watch_test.sh PROGRAM
 qmat=$1
-work=$(mktemp -d) || exit 1
+. "$(dirname "$0")/../../lib.sh"
 watching=
-trap 'if [ -n "$watching" ]; then kill -KILL $watching 2>/dev/null; fi; rm -rf "$work"' EXIT
-cd "$work" || exit 1
+clean_up() { if [ -n "$watching" ]; then kill -KILL $watching 2>/dev/null; fi; }
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
-
-die() {
-  echo "FAILED: $*"
-  cat out.txt err.txt
-  exit 1
-}
 
 cat >graph.yaml <<'END'
 qmat: 1
@@ -24,24 +17,7 @@ nodes:
 outputs: { samples: samples.samples }
 END
 mkdir models
-cat >models/box.off <<'END'
-OFF
-8 6 0
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 1
-2 0 1
-2 1 1
-0 1 1
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7
-END
+write_box models/box.off
 
 # runs N WHAT: the N-th run ends within a minute, which is long also on a busy machine.
 runs() {

@@ -1,0 +1,40 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# qmat mat --depfile in a build of one's own, with Make and with Ninja: depfile_test.sh PROGRAM SOURCE_FOLDER
+qmat=$1
+source=$2
+. "$(dirname "$0")/../../lib.sh"
+QMAT_CACHE=off
+export QMAT_CACHE
+
+command="$qmat mat roof.gltf -o roof.ma --quiet --epsilon 10% --set samples.spacing=10% --depfile roof.ma.d"
+printf 'roof.ma:\n\t%s\n-include roof.ma.d\n' "$command" >Makefile
+printf 'rule mat\n  command = %s\n  depfile = roof.ma.d\nbuild roof.ma: mat\n' "$command" >build.ninja
+
+# made yes|no WHAT: builds; whether the file was made anew.
+made() {
+  touch before
+  sleep 1.1
+  $tool >out.txt 2>err.txt || die "$tool, $2"
+  new=no
+  if [ roof.ma -nt before ]; then new=yes; fi
+  [ $new = "$1" ] || fail "$tool, $2: made anew: $new"
+}
+
+for tool in make ninja; do
+  rm -f roof.ma roof.ma.d
+  cp "$source/examples/game/models/"roof.* .
+  made yes "the first time"
+  made no "the second time"
+  sed 's/"version": *"2.0"/"version": "2.0", "generator": "edited"/' roof.gltf >edited
+  cmp -s edited roof.gltf && die "the model was not edited"
+  cp edited roof.gltf
+  made yes "an edited model"
+  made no "after an edited model"
+  # x of the second vertex: 4 becomes 3.
+  printf '\000\000\100\100' | dd of=roof.bin bs=1 seek=12 conv=notrunc status=none
+  made yes "an edited side file"
+  made no "after an edited side file"
+done
+
+finish
