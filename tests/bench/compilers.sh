@@ -1,27 +1,21 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Builds qmat with gcc and with clang and compares what both write at 1, 2 and 8 threads, byte by byte: a Markdown table,
-# exit code 0 where all are the same.
-#   compilers.sh [--epsilon E] [MODEL...]      the generated models and these, at 5 %; default: spot and knight of
-#                                              ../shared/data/surfaces where they are present
-# clang needs Debian's packages clang and libomp-dev; without them the threads alone are compared, and the exit code is
-# 77. The builds stay in the folder QMAT_BUILDS, by default build: that of gcc in release, that of clang in clang.
+# Builds qmat with gcc and with clang and compares the files that both write at 1, 2 and 8 threads, byte by byte. Prints a
+# Markdown table; exit code 0 when all files are the same.
+#   compilers.sh [--epsilon E] [MODEL...]      measures the generated models and these, at 5 % by default; default
+#                                              MODELs: spot and knight of ../shared/data/surfaces, where present
+# clang needs the Debian packages clang and libomp-dev. Without them only the thread counts are compared, and the exit
+# code is 77. The builds stay in the folder QMAT_BUILDS (default: build): gcc's in release, clang's in clang.
 set -eu
-. "$(dirname "$0")/functions.sh"
 epsilon=5%
-if [ "${1:-}" = --epsilon ]; then
-  epsilon=$2
-  shift 2
-fi
+. "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then
-  for model in spot knight; do
-    for path in "$top/../shared/data/surfaces/$model".*; do
-      if [ -e "$path" ]; then set -- "$@" "$path"; fi
-    done
+  for path in "$top"/../shared/data/surfaces/spot.* "$top"/../shared/data/surfaces/knight.*; do
+    if [ -e "$path" ]; then set -- "$@" "$path"; fi
   done
 fi
 builds=${QMAT_BUILDS:-$top/build}
-QMAT_CACHE=off # what one build made must not stand for another's
+QMAT_CACHE=off # each build has to compute its own results
 export QMAT_CACHE
 
 # build FOLDER C C++: an optimised build with these compilers, without warnings.
@@ -50,7 +44,7 @@ fi
 "$builds/release/qmat_models" all "$work" >"$work/models.log"
 for model in "$work"/*.off; do set -- "$@" "$model"; done
 
-# run FOLDER THREADS MODEL GROUP: writes every kind of file, and the collapses in the other order of errors, into GROUP.
+# run FOLDER THREADS MODEL GROUP: writes every kind of file, and the result of on_exceed=raise, into GROUP.
 run() {
   mkdir "$4"
   "$builds/$1/qmat" mat "$3" -o "$4/mat.ma" -o "$4/mat.glb" -o "$4/mat.usda" -o "$4/mat.ply" --epsilon "$epsilon" \

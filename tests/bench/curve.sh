@@ -8,16 +8,13 @@
 # QMAT_BUILD is the build folder, by default build/release. An error is the largest distance that medial.evaluate's
 # branch and bound has met.
 set -eu
-. "$(dirname "$0")/functions.sh"
 svg=curve.svg
 if [ "${1:-}" = -o ]; then
   svg=$2
   shift 2
 fi
-if [ $# -eq 0 ]; then
-  given_models ant plane spot >"$work/models"
-  while read -r model; do set -- "$@" "$model"; done <"$work/models"
-fi
+default_models="ant plane spot"
+. "$(dirname "$0")/functions.sh"
 
 # measure MODEL VERTICES SETTING...: both errors of that level of the chain with these settings, as "VERTICES OUT IN".
 measure() {

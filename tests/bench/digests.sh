@@ -5,19 +5,15 @@
 #   digests.sh [--epsilon E] [MODEL...]      default: the generated models and ../shared/data/surfaces at 2 %
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
-. "$(dirname "$0")/functions.sh"
 epsilon=2%
-if [ "${1:-}" = --epsilon ]; then
-  epsilon=$2
-  shift 2
-fi
+. "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then
   "$build/qmat_models" all "$work" >"$work/models.log"
   for model in "$work"/*.off "$top"/../shared/data/surfaces/*; do
     if [ -e "$model" ]; then set -- "$@" "$model"; fi
   done
 fi
-QMAT_CACHE=off # what another build made must not stand for this one's
+QMAT_CACHE=off # this build has to compute its own results
 export QMAT_CACHE
 for model in "$@"; do
   mkdir "$work/written"

@@ -8,16 +8,9 @@
 #                                        models
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
-. "$(dirname "$0")/functions.sh"
 epsilon=1%
-if [ "${1:-}" = --epsilon ]; then
-  epsilon=$2
-  shift 2
-fi
-if [ $# -eq 0 ]; then
-  given_models ant chair plane >"$work/models"
-  while read -r model; do set -- "$@" "$model"; done <"$work/models"
-fi
+default_models="ant chair plane"
+. "$(dirname "$0")/functions.sh"
 
 # note_used: sets used to the processor seconds of the commands so far.
 note_used() {

@@ -1,29 +1,24 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# One table (Markdown) of what `qmat mat` makes of models, and how long it takes:
+# Prints a Markdown table of the results of `qmat mat` and its times:
 #   surfaces.sh [--epsilon E] [MODEL...]      default: all of ../shared/data/surfaces at 1 %
-# Of both errors the bounds and how far these are apart, as a share of epsilon. QMAT_BUILD is the build folder, by default
-# build/release.
-# With QMAT_JUDGE set to a program that takes SURFACE MEDIAL.ma (and what QMAT_JUDGE_OPTIONS holds) and prints one JSON
-# object, its eps_s2r_out and eps_r2s stand beside the bounds, followed by its components, euler and centres_outside. It
-# measures at samples, so that its figures are below ours: one above the upper bound is marked with "ABOVE", one below
-# the lower bound says that it has missed the worst place.
+# Both errors have their two bounds, and the gap between the bounds as a share of epsilon.
+# QMAT_JUDGE may name a program that takes SURFACE MEDIAL.ma and the options in QMAT_JUDGE_OPTIONS, and prints a JSON
+# object. The table then has its eps_s2r_out and eps_r2s beside the bounds, and its components, euler and
+# centres_outside. Such a program samples, so its figures are smaller than the upper bounds: "ABOVE" marks a figure that
+# is not. A figure below the lower bound means that the samples missed the worst place.
 set -eu
-. "$(dirname "$0")/functions.sh"
 epsilon=1%
-if [ "${1:-}" = --epsilon ]; then
-  epsilon=$2
-  shift 2
-fi
+. "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then set -- "$top"/../shared/data/surfaces/*; fi
 if [ ! -e "$1" ]; then
   echo "no models: name some, or put them into ../shared/data/surfaces" >&2
   exit 2
 fi
-QMAT_CACHE=off # a time is that of a run
+QMAT_CACHE=off # the times of real runs
 export QMAT_CACHE
 
-# bounds NAME JUDGED: the cells of that error, of report.json and, where there is a judge, judge.json.
+# bounds NAME JUDGED: the cells of one error from report.json and, with a judge, from judge.json.
 bounds() {
   low=$(number "$1_at_least" "$work/report.json")
   high=$(number "$1" "$work/report.json")

@@ -4,11 +4,8 @@
 #   theta.sh [MODEL...]      default: octopus and plane of ../shared/data/surfaces, else generated models
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
+default_models="octopus plane"
 . "$(dirname "$0")/functions.sh"
-if [ $# -eq 0 ]; then
-  given_models octopus plane >"$work/models"
-  while read -r model; do set -- "$@" "$model"; done <"$work/models"
-fi
 echo "| model | theta | samples | medial vertices | largest distance, at least | at most | mean distance |"
 echo "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
 for model in "$@"; do

@@ -720,7 +720,8 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: it joins a sphere to itself");
   chain = chain_example();
   chain->ends[3] = 3;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: it names a sphere that an earlier collapse removed");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY,
+                    "collapse 1: it names a sphere that an earlier collapse removed");
   chain = chain_example();
   chain->merged[7] = -1;
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the radius -1 is negative");
@@ -729,10 +730,12 @@ static void test_bad_chains_name_the_first_bad_element(void **state) {
   assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is not finite");
   chain = chain_example();
   chain->errors[0] = -0.5;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 0: the error is below that of the previous collapse, or negative");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY,
+                    "collapse 0: the error is below that of the previous collapse, or negative");
   chain = chain_example();
   chain->errors[1] = 0.125;
-  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "collapse 1: the error is below that of the previous collapse, or negative");
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY,
+                    "collapse 1: the error is below that of the previous collapse, or negative");
 }
 
 static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
@@ -746,6 +749,10 @@ static void test_part_names_stay_below_the_folder_and_are_unique(void **state) {
     assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, line);
   }
   qmat_file *file = file_example();
+  set_part_name(file, 1, "../x");
+  assert_not_sealed(&file->base, QMAT_ERROR_FORMAT,
+                    "part 1: its name '../x' is not a path below the main part's folder");
+  file = file_example();
   set_part_name(file, 2, "medial.bin");
   assert_not_sealed(&file->base, QMAT_ERROR_FORMAT, "part 2: the name 'medial.bin' is used twice");
   file = file_example();
@@ -880,10 +887,30 @@ static void test_a_huge_length_is_refused_before_it_is_allocated(void **state) {
   qmat_context context = {0};
   qmat_value *value;
   assert_int_equal(read_exactly(&context, mesh, sizeof mesh - 1, &value), QMAT_ERROR_FORMAT);
+  uint8_t wrapping[sizeof mesh]; /* 2^64 - 16 bytes, whole elements: what was read and that wrap around zero */
+  memcpy(wrapping, mesh, sizeof mesh);
+  memcpy(wrapping + sizeof mesh - 9, "\xf0\xff\xff\xff\xff\xff\xff\xff", 8);
+  assert_int_equal(read_exactly(&context, wrapping, sizeof mesh - 1, &value), QMAT_ERROR_FORMAT);
   assert_int_equal(read_exactly(&context, file, sizeof file - 1, &value), QMAT_ERROR_FORMAT);
-  assert_string_equal(context.error.message,
-                      "this is not a serialised value: there are fewer parts than it states");
+  assert_string_equal(context.error.message, "this is not a serialised value: there are fewer parts than it states");
   assert_string_equal(context.error.field, "parts");
+}
+
+static void test_an_array_that_ends_within_an_element_is_refused(void **state) {
+  (void)state;
+  static const uint8_t mesh[] =
+      "QMAT\1\0\0\0"
+      "\4\0\0\0"
+      "mesh"
+      "\x09\0\0\0"
+      "positions"
+      "\3"
+      "\x08\0\0\0\0\0\0\0"
+      "\0\0\0\0\0\0\0\0";
+  qmat_context context = {0};
+  qmat_value *value;
+  assert_int_equal(read_exactly(&context, mesh, sizeof mesh - 1, &value), QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message, "this is not a serialised value: an array ends within an element");
 }
 
 static void test_another_version_is_refused_by_number(void **state) {
@@ -1122,6 +1149,7 @@ int main(void) {
       cmocka_unit_test(test_bytes_after_the_last_row_are_refused),
       cmocka_unit_test(test_spoilt_bytes_give_an_error_or_what_they_say),
       cmocka_unit_test(test_a_huge_length_is_refused_before_it_is_allocated),
+      cmocka_unit_test(test_an_array_that_ends_within_an_element_is_refused),
       cmocka_unit_test(test_another_version_is_refused_by_number),
       cmocka_unit_test(test_content_that_breaks_a_rule_is_a_format_error_when_read),
       cmocka_unit_test(test_references_are_counted_across_threads),

@@ -152,6 +152,26 @@ static void test_a_failed_save_names_the_file_and_leaves_nothing_behind(void **s
   assert_int_equal(rmdir(folder), 0);
 }
 
+/* The side part fails when it is renamed: its folder is a link that leads nowhere. */
+static void test_the_main_part_appears_last(void **state) {
+  (void)state;
+  char folder[64], path[96], link[96];
+  make_folder(folder);
+  snprintf(path, sizeof path, "%s/main", folder);
+  snprintf(link, sizeof link, "%s/sub", folder);
+  write_file(path, "old", 3);
+  assert_int_equal(symlink("nowhere", link), 0);
+  qmat_context context = {0};
+  qmat_file *file = make_file("sub/side", 3);
+  assert_int_equal(qmat_file_save(&context, file, path), QMAT_ERROR_IO);
+  assert_content(path, "old");
+  assert_int_equal(count_entries(folder), 2);
+  qmat_value_release(&file->base);
+  unlink(path);
+  unlink(link);
+  assert_int_equal(rmdir(folder), 0);
+}
+
 static void test_a_full_disk_leaves_the_old_file_as_it_was(void **state) {
   (void)state;
   char folder[64], path[96];
@@ -184,6 +204,7 @@ int main(void) {
       cmocka_unit_test(test_a_side_file_with_the_same_bytes_is_left_alone),
       cmocka_unit_test(test_a_relative_name_is_saved_in_the_working_folder),
       cmocka_unit_test(test_a_failed_save_names_the_file_and_leaves_nothing_behind),
+      cmocka_unit_test(test_the_main_part_appears_last),
       cmocka_unit_test(test_a_full_disk_leaves_the_old_file_as_it_was),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -213,6 +213,29 @@ static void test_certified_exactly_where_epsilon_holds(void **state) {
   subject_free(&s);
 }
 
+static void test_the_deviation_of_the_mesh_is_part_of_both_errors(void **state) {
+  (void)state;
+  static const double ball[] = {0, 0, 0, 1};
+  qmat_mesh *cube = box_around(1, 1, 1);
+  cube->deviation = 0.01;
+  subject s = subject_of(cube, medial_of(ball, 1, NULL, 0, NULL, 0));
+  qmat_report *report = evaluate(&s, "tolerance=0.01", 0);
+  const struct {
+    const char *key, *at_least;
+    double length;
+  } errors[] = {{"surface_to_envelope", "surface_to_envelope_at_least", sqrt(3) - 1},
+                {"envelope_to_surface", "envelope_to_surface_at_least", 1 - 1 / sqrt(3)}};
+  for (size_t i = 0; i < sizeof errors / sizeof errors[0]; i++) {
+    const double lo = pipeline_number(report, errors[i].at_least) * s.diagonal;
+    const double hi = pipeline_number(report, errors[i].key) * s.diagonal;
+    assert_true(lo <= errors[i].length - cube->deviation + ROUNDING);
+    assert_true(hi >= errors[i].length + cube->deviation - ROUNDING);
+    assert_true(hi <= errors[i].length + cube->deviation + 0.02);
+  }
+  qmat_value_release(&report->base);
+  subject_free(&s);
+}
+
 /* Looks at middles of pieces only come closer and closer to the farthest place, where several primitives are as near:
  * an epsilon that is further above it than a sixteenth of the tolerance is told from it. */
 static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
@@ -522,6 +545,7 @@ int main(void) {
       cmocka_unit_test(test_the_groove_between_two_balls_is_the_farthest),
       cmocka_unit_test(test_a_cavity_in_the_envelope_counts),
       cmocka_unit_test(test_certified_exactly_where_epsilon_holds),
+      cmocka_unit_test(test_the_deviation_of_the_mesh_is_part_of_both_errors),
       cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
       cmocka_unit_test(test_an_open_surface_is_never_certified),
       cmocka_unit_test(test_odd_spheres_cones_and_slabs_are_counted),

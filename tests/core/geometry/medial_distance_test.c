@@ -10,6 +10,8 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/medial_primitive.h"
+
 #define EXACT 4e-13
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
@@ -339,6 +341,23 @@ static void test_the_foot_attains_the_distance(void **unused) {
   }
 }
 
+static void test_what_the_ball_of_a_primitive_passes_over_is_farther(void **unused) {
+  (void)unused;
+  size_t passed = 0;
+  for (int i = 0; i < 20000; i++) {
+    double s[3][4], p[3], weights[3];
+    qmat_primitive primitive;
+    qmat_primitive_ball ball;
+    for (int j = 0; j < 3; j++) random_sphere(s[j]);
+    point_in(p, 2);
+    qmat_primitive_prepare((const double *const[]){s[0], s[1], s[2]}, 2 + i % 2, &primitive, &ball);
+    const double f = qmat_primitive_foot(&primitive, p, weights);
+    assert_false(qmat_primitive_is_farther(&ball, p, f + 1e-12));
+    passed += qmat_primitive_is_farther(&ball, p, 0.5 * f);
+  }
+  assert_true(passed > 1000);
+}
+
 static void test_small_models_keep_relative_precision(void **unused) {
   (void)unused;
   state = 13;
@@ -372,6 +391,7 @@ int main(void) {
       cmocka_unit_test(test_rotation_does_not_matter),
       cmocka_unit_test(test_distances_are_1_lipschitz_and_convex),
       cmocka_unit_test(test_the_foot_attains_the_distance),
+      cmocka_unit_test(test_what_the_ball_of_a_primitive_passes_over_is_farther),
       cmocka_unit_test(test_small_models_keep_relative_precision),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

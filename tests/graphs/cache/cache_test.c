@@ -25,6 +25,7 @@
 static struct {
   atomic_int read, scale; /* values of a list are worked on at the same time */
   double drift;           // added by a node that breaks its promise
+  const char *written;    // put into the file just before a node reads it; NULL: nothing
 } ran;
 
 static char library_text[64];
@@ -36,6 +37,13 @@ static void describe_library(char *text, size_t size) {
 static const qmat_library test_library = {.name = "Ruler", .describe = describe_library};
 static const qmat_library *const test_libraries[] = {&test_library, NULL};
 
+static void write_text(const char *path, const char *text) {
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(text, 1, strlen(text), file), strlen(text));
+  fclose(file);
+}
+
 /* The bytes of a file, summed; one that starts with an exclamation mark refers to the file of the same path and
  * ".side", if that is there. */
 static qmat_status read_run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -46,6 +54,7 @@ static qmat_status read_run(qmat_context *context, const void *data, const qmat_
   qmat_bytes bytes = {0}, side = {0};
   double sum = 0;
   ran.read++;
+  if (ran.written) write_text(path, ran.written);
   qmat_status status = qmat_bytes_read_file(context, path, &bytes);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < bytes.size; i++) sum += bytes.data[i];
@@ -208,6 +217,7 @@ static int set_up(void **state) {
   *state = f;
   ran.read = ran.scale = 0;
   ran.drift = 0;
+  ran.written = NULL;
   test_scale.version = 1;
   strcpy(library_text, "1.0");
   strcpy(f->folder, "/tmp/qmat-cache-XXXXXX");
@@ -224,13 +234,6 @@ static int tear_down(void **state) {
   int result = system(command);
   free(f);
   return result;
-}
-
-static void put_file(const char *path, const char *text) {
-  FILE *file = fopen(path, "wb");
-  assert_non_null(file);
-  assert_int_equal(fwrite(text, 1, strlen(text), file), strlen(text));
-  fclose(file);
 }
 
 static void open_cache(const fixture *f, qmat_cache *cache) {
@@ -327,7 +330,7 @@ static size_t count_entries(const fixture *f, qmat_cache_kind kind) {
 
 static void test_a_second_run_runs_nothing_and_gives_the_same(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   assert_string_equal(f->states, "rrr");
   assert_true(f->result == 2 * 3 * ('a' + 'b' + 'c'));
@@ -340,7 +343,7 @@ static void test_a_second_run_runs_nothing_and_gives_the_same(void **state) {
 
 static void test_a_changed_parameter_reuses_what_stands_before_it(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   run_once(f, "4");
   assert_string_equal(f->states, "hrr");
@@ -352,41 +355,53 @@ static void test_a_changed_parameter_reuses_what_stands_before_it(void **state) 
 
 static void test_equal_bytes_stop_the_wave(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   run_once(f, "3.0001"); /* cut to the same whole number */
   assert_string_equal(f->states, "hsh");
-  put_file(f->model, "cba"); /* another file of the same sum */
+  write_text(f->model, "cba"); /* another file of the same sum */
   run_once(f, "3");
   assert_string_equal(f->states, "shh");
 }
 
 static void test_only_the_bytes_of_a_file_count(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
-  put_file(f->model, "abc"); /* written anew */
+  write_text(f->model, "abc"); /* written anew */
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
-  put_file(f->model, "abd");
+  write_text(f->model, "abd");
   run_once(f, "3");
   assert_string_equal(f->states, "rrr");
   assert_true(f->result == 2 * 3 * ('a' + 'b' + 'd'));
 }
 
+static void test_a_file_that_changes_before_it_is_read_is_not_kept(void **state) {
+  fixture *f = *state;
+  write_text(f->model, "abc");
+  ran.written = "xyz"; /* after the key was made of "abc" */
+  run_once(f, "3");
+  assert_true(f->result == 2 * 3 * ('x' + 'y' + 'z'));
+  ran.written = NULL;
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  assert_true(f->result == 2 * 3 * ('a' + 'b' + 'c'));
+}
+
 static void test_another_folder_hits_and_another_name_misses(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   char folder[80];
   snprintf(folder, sizeof folder, "%s/deep", f->folder);
   assert_int_equal(mkdir(folder, 0777), 0);
   snprintf(f->model, sizeof f->model, "%s/deep/model", f->folder);
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
   snprintf(f->model, sizeof f->model, "%s/other", f->folder);
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   assert_string_equal(f->states, "shh");
 }
@@ -395,24 +410,24 @@ static void test_side_files_count(void **state) {
   fixture *f = *state;
   char side[96];
   snprintf(side, sizeof side, "%s.side", f->model);
-  put_file(f->model, "!a");
+  write_text(f->model, "!a");
   run_once(f, "3"); /* without its side file */
   assert_true(f->result == 6 * ('!' + 'a'));
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
-  put_file(side, "b");
+  write_text(side, "b");
   run_once(f, "3");
   assert_string_equal(f->states, "rrr");
   assert_true(f->result == 6 * ('!' + 'a' + 1000 * 'b'));
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
-  put_file(side, "c");
+  write_text(side, "c");
   foresee(f, "3");
   assert_string_equal(f->why[0], "would run:|the side file model.side has other bytes");
   run_once(f, "3");
   assert_string_equal(f->states, "rrr");
   assert_true(f->result == 6 * ('!' + 'a' + 1000 * 'c'));
-  put_file(side, "b"); /* what was before is still there */
+  write_text(side, "b"); /* what was before is still there */
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
   assert_true(f->result == 6 * ('!' + 'a' + 1000 * 'b'));
@@ -424,7 +439,7 @@ static void test_side_files_count(void **state) {
 
 static void test_forced_nodes_run_and_are_the_same(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   run_graph(f, "3", "2", false, true);
   assert_string_equal(f->states, "sss");
@@ -470,7 +485,7 @@ static void test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_
   qmat_context context = {0};
   double sum;
   size_t lifted, hits;
-  put_file(f->model, "abcd");
+  write_text(f->model, "abcd");
   context.threads = 8;
   test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
   assert_true(sum == 2 * ('a' + 'b' + 'c' + 'd'));
@@ -485,13 +500,13 @@ static void test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_
   assert_string_equal(f->states, "hhh");
   assert_int_equal(ran.scale, 4);
 
-  put_file(f->model, "abXd");
+  write_text(f->model, "abXd");
   test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
   assert_true(sum == 2 * ('a' + 'b' + 'X' + 'd'));
   assert_int_equal(ran.scale, 5);
   assert_int_equal(hits, 3);
 
-  put_file(f->model, "b"); /* a list of one is the value, so what it made in the list is known, too */
+  write_text(f->model, "b"); /* a list of one is the value, so what it made in the list is known, too */
   test_ok(&context, run_split(f, "", &context, &sum, &lifted, &hits));
   assert_true(sum == 2 * 'b');
   assert_int_equal(ran.scale, 5);
@@ -509,7 +524,7 @@ static void test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_t
       "  twice: { type: test.scale, params: { factor: 2 }, in: { number: scale.number } }\n"
       "  all:   { type: test.sum, in: { number: twice.number } }\n"
       "  add:   { type: test.add, in: { first: all.number, second: sum.number } }\n";
-  put_file(f->model, "a?c?");
+  write_text(f->model, "a?c?");
   for (int again = 0; again < 2; again++) {
     context.threads = 1 + again;
     test_ok(&context, run_split(f, rest, &context, &sum, &lifted, &hits));
@@ -517,13 +532,13 @@ static void test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_t
     assert_string_equal(f->states, again ? "hhh" : "rrr");
     assert_int_equal(ran.scale, 4 + 2);
   }
-  put_file(f->model, "???");
+  write_text(f->model, "???");
   for (context.threads = 1; context.threads <= 4; context.threads++) {
     assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_GEOMETRY);
     assert_string_equal(context.error.message, "?: that is no number");
     assert_string_equal(context.error.node_id, "scale");
   }
-  put_file(f->model, "?"); /* one is no list: there is nothing to go on with */
+  write_text(f->model, "?"); /* one is no list: there is nothing to go on with */
   assert_int_equal(run_split(f, rest, &context, &sum, &lifted, &hits), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.message, "that is no number");
   qmat_context_uninit(&context);
@@ -579,7 +594,7 @@ static void test_a_list_is_kept_as_its_items_and_each_of_them_once(void **state)
   qmat_value_release(again);
 
   /* An item of other bytes is set aside, and the list is not. */
-  put_file(path, "what is this");
+  write_text(path, "what is this");
   assert_null(qmat_cache_value(&cache, &lists[1]->base.digest, size, QMAT_LIST));
   assert_int_equal(count_entries(f, QMAT_CACHE_BAD), 1);
   assert_int_equal(count_entries(f, QMAT_CACHE_BLOB), 5);
@@ -597,9 +612,9 @@ static void test_lists_of_different_lengths_do_not_go_together(void **state) {
   char rest[480], other[80];
   double sum;
   size_t lifted, hits;
-  put_file(f->model, "abcd");
+  write_text(f->model, "abcd");
   snprintf(other, sizeof other, "%s/other", f->folder);
-  put_file(other, "abc");
+  write_text(other, "abc");
   snprintf(rest, sizeof rest,
            "  three: { type: test.split, params: { path: %s } }\n"
            "  both:  { type: test.add, in: { first: scale.number, second: three.number } }\n"
@@ -615,7 +630,7 @@ static void test_lists_of_different_lengths_do_not_go_together(void **state) {
 
 static void test_a_node_that_breaks_its_promise_is_named(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   ran.drift = 1;
   run_graph(f, "3", "2", false, true);
@@ -652,7 +667,7 @@ static void damage(const char *path, long at, bool truncate_it) {
 static void test_a_damaged_blob_is_a_miss(void **state) {
   fixture *f = *state;
   const double sums[] = {'a' + 'b' + 'c', 3 * ('a' + 'b' + 'c'), 6 * ('a' + 'b' + 'c')};
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   for (int which = 0; which < 3; which++)
     for (int way = 0; way < 3; way++) {
       char path[256];
@@ -667,7 +682,7 @@ static void test_a_damaged_blob_is_a_miss(void **state) {
 static void test_a_blob_that_is_gone_is_a_miss(void **state) {
   fixture *f = *state;
   char path[256];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   blob_path(f, 3 * ('a' + 'b' + 'c'), path);
   assert_int_equal(unlink(path), 0);
@@ -682,7 +697,7 @@ static void test_a_damaged_record_is_a_miss(void **state) {
   qmat_cache cache;
   qmat_cache_entry *entries;
   size_t count;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   open_cache(f, &cache);
   assert_true(qmat_cache_list(&cache, &entries, &count));
@@ -700,7 +715,7 @@ static void test_a_damaged_record_is_a_miss(void **state) {
 static void test_a_record_under_another_key_is_not_believed(void **state) {
   fixture *f = *state;
   char command[512];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   foresee(f, "4");
   /* Every record takes the name of every other. */
@@ -714,7 +729,7 @@ static void test_a_record_under_another_key_is_not_believed(void **state) {
 static void test_a_cache_that_is_read_only_is_used_and_left_alone(void **state) {
   fixture *f = *state;
   char path[256];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   size_t records = count_entries(f, QMAT_CACHE_RECORD);
   f->read_only = true;
@@ -733,7 +748,7 @@ static void test_a_cache_that_is_read_only_is_used_and_left_alone(void **state) 
 static void test_a_node_that_makes_other_bytes_when_its_blob_is_lost_starts_the_run_again(void **state) {
   fixture *f = *state;
   char path[256];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   /* The last node has to run, but what it reads is damaged, and made anew it is something else. */
   blob_path(f, 3 * ('a' + 'b' + 'c'), path);
@@ -745,7 +760,7 @@ static void test_a_node_that_makes_other_bytes_when_its_blob_is_lost_starts_the_
 
 static void test_a_node_that_runs_again_for_one_output_leaves_the_other_as_it_is(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   for (int round = 0; round < 2; round++) {
     char text[512];
     snprintf(text, sizeof text,
@@ -777,7 +792,7 @@ static void test_a_node_that_runs_again_for_one_output_leaves_the_other_as_it_is
 
 static void test_a_cache_that_cannot_be_made_is_told_once_and_the_run_goes_on(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   snprintf(f->cache_folder, sizeof f->cache_folder, "/proc/nowhere/cache");
   run_once(f, "3");
   assert_true(f->result == 2 * 3 * ('a' + 'b' + 'c'));
@@ -788,7 +803,7 @@ static void test_a_file_is_no_cache(void **state) {
   fixture *f = *state;
   qmat_context context = {0};
   qmat_cache cache;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   const qmat_cache_options options = {.folder = f->model};
   assert_int_equal(qmat_cache_open(&context, &options, &cache), QMAT_ERROR_USAGE);
   assert_string_equal(context.error.file, f->model);
@@ -881,6 +896,14 @@ static void change_param(const key_facts *facts, const qmat_param *param, qmat_d
       add_key(facts, keys, count, param->name);
       *(const char **)place = "another\\xffname";
       add_key(facts, keys, count, param->name);
+      if (!text || *text) { /* an empty text is not the same as none */
+        *(const char **)place = "";
+        add_key(facts, keys, count, param->name);
+      }
+      if (text) {
+        *(const char **)place = NULL;
+        add_key(facts, keys, count, param->name);
+      }
       *(const char **)place = text;
       break;
   }
@@ -959,7 +982,7 @@ static void test_folders_are_not_in_a_key(void **state) {
 
 static void test_why_names_a_parameter(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   foresee(f, "3");
   assert_string_equal(f->states, "rdd");
   assert_string_equal(f->why[0], "would run: the cache has no result of a node of this type");
@@ -977,16 +1000,16 @@ static void test_why_names_a_parameter(void **state) {
 
 static void test_why_names_the_bytes_of_the_input(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
-  put_file(f->model, "abd");
+  write_text(f->model, "abd");
   foresee(f, "3");
   assert_string_equal(f->why[0], "would run:|the file of parameter path has other bytes (model)");
 }
 
 static void test_why_names_the_version_of_a_node(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   test_scale.version = 2;
   foresee(f, "3");
@@ -996,7 +1019,7 @@ static void test_why_names_the_version_of_a_node(void **state) {
 
 static void test_why_names_the_version_of_a_library(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   strcpy(library_text, "1.0 avx512");
   foresee(f, "3");
@@ -1006,7 +1029,7 @@ static void test_why_names_the_version_of_a_library(void **state) {
 
 static void test_why_names_the_format_of_keys(void **state) {
   fixture *f = *state;
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   /* What an earlier qmat would have left: the same records under keys of another format. */
   qmat_cache cache;
@@ -1070,14 +1093,14 @@ static void test_what_was_used_least_recently_is_deleted_first(void **state) {
 static void test_temporaries_of_dead_writers_are_swept_and_others_stay(void **state) {
   fixture *f = *state;
   char dead[160], alive[160], foreign[160];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   snprintf(dead, sizeof dead, "%s/tmp/12-3-4", f->cache_folder);
   snprintf(alive, sizeof alive, "%s/tmp/12-3-5", f->cache_folder);
   snprintf(foreign, sizeof foreign, "%s/tmp/notes.txt", f->cache_folder);
-  put_file(dead, "half");
-  put_file(alive, "half");
-  put_file(foreign, "mine");
+  write_text(dead, "half");
+  write_text(alive, "half");
+  write_text(foreign, "mine");
   const int file = open(alive, O_WRONLY);
   assert_int_equal(flock(file, LOCK_EX), 0);
   run_once(f, "4");
@@ -1096,7 +1119,7 @@ static void test_temporaries_of_dead_writers_are_swept_and_others_stay(void **st
 static void test_checking_finds_what_is_broken_and_what_is_incomplete(void **state) {
   fixture *f = *state;
   char path[256];
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   blob_path(f, 'a' + 'b' + 'c', path);
   damage(path, -6, false);
@@ -1117,7 +1140,7 @@ static void test_checking_finds_what_is_broken_and_what_is_incomplete(void **sta
 static void test_the_folder_says_that_it_is_a_cache(void **state) {
   fixture *f = *state;
   char path[128], text[64] = "";
-  put_file(f->model, "abc");
+  write_text(f->model, "abc");
   run_once(f, "3");
   snprintf(path, sizeof path, "%s/CACHEDIR.TAG", f->cache_folder);
   FILE *file = fopen(path, "rb");
@@ -1134,6 +1157,7 @@ int main(void) {
       CASE(test_a_changed_parameter_reuses_what_stands_before_it),
       CASE(test_equal_bytes_stop_the_wave),
       CASE(test_only_the_bytes_of_a_file_count),
+      CASE(test_a_file_that_changes_before_it_is_read_is_not_kept),
       CASE(test_another_folder_hits_and_another_name_misses),
       CASE(test_side_files_count),
       CASE(test_forced_nodes_run_and_are_the_same),

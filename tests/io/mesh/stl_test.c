@@ -76,6 +76,8 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
   size_t size = make_binary("solid", bytes);
   assert_refused(qmat_stl_read, bytes, size - 1,
                  "file: the binary STL header counts 2 facets, which take 184 bytes, but the file has 183");
+  assert_refused(qmat_stl_read, bytes, size + 1,
+                 "file: the binary STL header counts 2 facets, which take 184 bytes, but the file has 185");
   memcpy(bytes + 80, "\0\x28\x6B\xEE", 4); /* 4000000000 */
   assert_refused(
       qmat_stl_read, bytes, size,
