@@ -9,11 +9,13 @@
 #include "core/geometry/triangle.h"
 #include "core/json_text.h"
 #include "core/node.h"
+#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
 #include "nodes/measure/topology_report.h"
+#include "nodes/measure/unit_spheres.h"
 
 typedef struct medial_evaluate_params {
   double epsilon;   /* 0: nothing is to be certified */
@@ -21,15 +23,8 @@ typedef struct medial_evaluate_params {
   int64_t samples;
 } medial_evaluate_params;
 
-/* What the tolerance is a share of where epsilon is 0. */
-static const double default_epsilon = 0.01;
-
 /* A centre this close to the surface is not outside. */
 static const double beside_surface = 1e-5;
-
-/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
- * digits. */
-static const double farthest_sphere = 1e6;
 
 /* Searches of the surface, each from what the one before has found; those from the third on leave only a sixteenth of
  * what is left to epsilon undecided, lest they creep up to it. */
@@ -52,24 +47,13 @@ typedef struct evaluation {
 
 static qmat_status prepare(evaluation *e, const qmat_mesh *mesh, const qmat_medial *medial) {
   qmat_context *context = e->context;
-  if (medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
-    return qmat_fail_field(context, "medial");
-  }
   qmat_status status = qmat_surface_new(context, mesh, &e->surface);
   if (status != QMAT_OK) return status;
   e->deviation = mesh->deviation / qmat_surface_frame(e->surface)->diagonal;
   if (e->deviation < e->epsilon) e->epsilon -= e->deviation;
   e->unit = *medial;
-  e->unit.spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof(double));
-  if (!e->unit.spheres) return qmat_fail_memory(context, "the medial mesh");
-  qmat_frame_spheres_to_unit(qmat_surface_frame(e->surface), medial->spheres, medial->sphere_count, e->unit.spheres);
-  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
-    if (fabs(e->unit.spheres[i]) <= farthest_sphere) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
-    qmat_fail_field(context, "medial");
-    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
-  }
+  status = qmat_unit_spheres(context, qmat_surface_frame(e->surface), medial, &e->unit.spheres);
+  if (status != QMAT_OK) return status;
   return qmat_envelope_of_medial(context, &e->unit, &e->envelope);
 }
 
@@ -232,7 +216,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
                        qmat_value *outputs[]) {
   const medial_evaluate_params *params = data;
   evaluation e = {
-      .context = context, .params = params, .epsilon = params->epsilon > 0 ? params->epsilon : default_epsilon};
+      .context = context, .params = params, .epsilon = params->epsilon > 0 ? params->epsilon : QMAT_DEFAULT_EPSILON};
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
   if (status == QMAT_OK) status = prepare(&e, (const qmat_mesh *)inputs[0], (const qmat_medial *)inputs[1]);

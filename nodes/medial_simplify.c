@@ -5,6 +5,7 @@
 
 #include "core/json_text.h"
 #include "core/node.h"
+#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/envelope_to_surface.h"
@@ -22,7 +23,6 @@ typedef qmat_simplify_params medial_simplify_params;
  * run is repeated, at most this often, with constraint points in the places found. Notches and voids of the envelope
  * are filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
 enum { MOST_ROUNDS = 8, MOST_JOINT_REFITS = 3, MOST_FILLINGS = 6 };
-enum { MOST_CONSTRAINT_POINTS = 600000 };
 
 typedef struct {
   qmat_context *context;
@@ -42,11 +42,8 @@ typedef struct {
  * the second share; that from envelope to surface is a bound that is only as close as it has to be. */
 static const double error_tolerance = 0.01, least_reported = 0.5;
 
-/* What an unbounded run (epsilon 0) measures its errors against. */
-static const double default_epsilon = 0.01;
-
 static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
-  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
+  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
   const double tolerance = error_tolerance * epsilon;
   const qmat_constraint_points *constraints = &s->round_constraints[s->newest];
   qmat_status status =
@@ -107,7 +104,7 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   const bool inside = s->params->error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(s->context, s->surface, samples, medial, &dense->complex, epsilon,
-                                         MOST_CONSTRAINT_POINTS, inside, &s->constraints);
+                                         QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
   if (extra->surface_count + extra->inner_count > 0) {
     const qmat_constraint_points base = s->constraints;
     qmat_constraint_points further;
@@ -514,7 +511,7 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, params, inputs, &o);
   if (status == QMAT_OK) status = qmat_decimation_extract(&o.decimation, medial);
   qmat_medial_errors errors = {.surface_to_envelope = 0};
-  const double bound = o.params.epsilon > 0 ? o.params.epsilon : default_epsilon;
+  const double bound = o.params.epsilon > 0 ? o.params.epsilon : QMAT_DEFAULT_EPSILON;
   if (status == QMAT_OK)
     status =
         qmat_medial_surface_bound_measure(context, o.surface, medial, o.constraints.points, o.constraints.surface_count,

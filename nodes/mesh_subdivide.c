@@ -8,6 +8,7 @@
 #include "core/json_text.h"
 #include "core/node.h"
 #include "io/soup.h"
+#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/subdivision_osd.h"
 
@@ -18,9 +19,6 @@ typedef struct mesh_subdivide_params {
   int scheme;        /* a qmat_scheme; QMAT_SCHEME_NONE: as authored */
   int boundary_rule; /* a qmat_boundary + 1; 0: as authored */
 } mesh_subdivide_params;
-
-/* What the tolerance is a share of where epsilon is 0. */
-static const double default_epsilon = 0.01;
 
 /* Faces at the deepest level: a gigabyte. */
 static const double MOST_FACES = 1 << 22;
@@ -414,7 +412,7 @@ static qmat_status subdivide(subdivision *s, const qmat_mesh *mesh, attempt *bes
   int level = 0, depth = 0;
   json_t *facts = NULL;
   if (status == QMAT_OK && s->surface_count > 0) {
-    const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : default_epsilon;
+    const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
     int32_t *ids = qmat_arena_alloc(&s->context->arena, s->source.vertex_count, sizeof *ids);
     facts = json_object();
     if (!ids || !facts) status = fail_shortage(s->context);

@@ -20,6 +20,9 @@ typedef struct qmat_constraint_points {
   double spacing;       /* of the grid, unit frame */
 } qmat_constraint_points;
 
+/* At most so many points are added in grids by default. */
+enum { QMAT_MOST_CONSTRAINT_POINTS = 600000 };
+
 /* Makes the constraint points of a model whose medial mesh `complex` (unit frame) is not yet changed. `medial` gives
  * the responsible regions; without any the envelope is searched. `epsilon` is the error that is to be held (unit frame,
  * > 0, may be INFINITY: samples only). At most `most` points are added in grids; their spacing grows until they are few

@@ -5,6 +5,7 @@
 
 #include "core/geometry/surface.h"
 #include "core/geometry/thickness.h"
+#include "nodes/measure/unit_spheres.h"
 
 const char *const qmat_error_choices[] = {"two_sided", "one_sided", NULL};
 const char *const qmat_cost_choices[] = {"slab", "hausdorff", "pmat", NULL};
@@ -16,12 +17,6 @@ const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 /* The constraint points of collapses in order, which are there for any epsilon, are those of so many times the finest.
  */
 static const double constraint_error = 2;
-
-enum { MOST_CONSTRAINT_POINTS = 600000 };
-
-/* Medial spheres that are farther from the mesh or larger, in diagonals, are not of this mesh: beyond, squares lose all
- * digits. */
-static const double farthest_sphere = 1e6;
 
 /* The exact depth at the centre of a medial sphere. Most are inscribed: a look no farther than their radius finds it.
  */
@@ -82,27 +77,17 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *medial = (const qmat_medial *)inputs[3];
   qmat_status status = qmat_thickness_check(context, mesh, thickness, samples);
-  if (status == QMAT_OK && medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
-    status = qmat_fail_field(context, "medial");
-  }
   if (status == QMAT_OK) status = qmat_surface_new(context, mesh, surface);
+  double *spheres;
+  if (status == QMAT_OK) status = qmat_unit_spheres(context, qmat_surface_frame(*surface), medial, &spheres);
   if (status != QMAT_OK) return status;
   double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
-  double *spheres = qmat_arena_alloc(&context->arena, medial->sphere_count, 4 * sizeof *spheres);
   double *depths = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *depths);
   uint8_t *thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *thin);
-  if (!spheres || !depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
+  if (!depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
   qmat_thickness_of_samples(mesh, thickness, samples, values);
   const double theta = qmat_thickness_threshold(thickness, params->theta);
   for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
-  qmat_frame_spheres_to_unit(qmat_surface_frame(*surface), medial->spheres, medial->sphere_count, spheres);
-  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
-    if (fabs(spheres[i]) <= farthest_sphere) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is far away from the mesh, or far larger");
-    qmat_fail_field(context, "medial");
-    return qmat_fail_element(context, "sphere", (int64_t)(i / 4));
-  }
   *initial = (qmat_initial_medial){spheres, depths, thin};
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
 }
@@ -163,7 +148,7 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,
-                                         constraint_error * o->params.finest, MOST_CONSTRAINT_POINTS,
+                                         constraint_error * o->params.finest, QMAT_MOST_CONSTRAINT_POINTS,
                                          run->rules.error == QMAT_ERROR_TWO_SIDED, &o->constraints);
   if (status == QMAT_OK) status = qmat_decimation_init(run, &o->constraints, o->initial.depths);
   return status == QMAT_OK ? qmat_decimation_run(run) : status;

@@ -532,7 +532,7 @@ static void check_refused(qmat_medial *medial, const char *message, int64_t elem
 static void test_no_sphere_and_far_spheres_are_refused(void **state) {
   (void)state;
   static const double far_away[] = {0, 0, 0, 1, 1e9, 0, 0, 1};
-  check_refused(medial_of(NULL, 0, NULL, 0, NULL, 0), "no medial sphere", -1);
+  check_refused(medial_of(NULL, 0, NULL, 0, NULL, 0), "no sphere", -1);
   check_refused(medial_of(far_away, 2, NULL, 0, NULL, 0), "far away", 1);
 }
 
