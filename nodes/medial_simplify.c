@@ -29,6 +29,7 @@ typedef struct {
   const medial_simplify_params *params; /* with what the mesh's deviation leaves of epsilon */
   double epsilon, deviation;            /* what is asked for, and the deviation, in diagonals */
   qmat_surface *surface;
+  qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
   qmat_decimation dense;              /* where each round starts */
   size_t initial_count;               /* spheres before the first collapse */
@@ -216,17 +217,33 @@ static bool dense_satisfies(const simplifier *s, const qmat_extra_points *extra)
   return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
 }
 
-/* A result so far, and what is wrong with it: the largest distance found, epsilon at least, and a share of epsilon more
- * where it has not the topology of the solid. */
+/* A result so far. `fault` is its largest error, at least epsilon, plus a share of epsilon where its Betti numbers are
+ * not the solid's. */
 typedef struct {
   qmat_medial *medial;
   qmat_report *report;
   double fault;
-  bool within_epsilon; /* whether surface and envelope keep within epsilon of each other, as far as it was found */
-  size_t filled;       /* how many spheres were added to fill notches and voids */
+  size_t topology_faults; /* components, loops and voids too many or too few */
+  bool within_epsilon;    /* whether surface and envelope keep within epsilon of each other, as far as it was found */
+  size_t filled;          /* how many spheres were added to fill notches and voids */
 } attempt;
 
 static const double topology_fault = 0.05;
+
+static size_t difference(size_t a, size_t b) {
+  return a > b ? a - b : b - a;
+}
+
+/* Sets `a->topology_faults`, to 0 where a Betti number is not known. */
+static qmat_status judge_topology(const simplifier *s, attempt *a) {
+  qmat_topology found;
+  a->topology_faults = 0;
+  const qmat_status status = s->solid.known ? qmat_topology_of_medial(s->context, a->medial, &found) : QMAT_OK;
+  if (status != QMAT_OK || !s->solid.known || !found.known) return status;
+  a->topology_faults = difference(found.components, s->solid.components) + difference(found.loops, s->solid.loops) +
+                       difference(found.voids, s->solid.voids);
+  return QMAT_OK;
+}
 
 static void release(attempt *a) {
   qmat_value_release(a->medial ? &a->medial->base : NULL);
@@ -252,14 +269,15 @@ static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_med
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
   a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
-  if (filled > 0) { /* what is in doubt by now is to be own, too */
+  if (filled > 0) { /* what is undecided by now joins the constraints, too */
     double *const undecided = found->undecided;
     found->undecided = after.undecided;
     found->undecided_count = after.undecided_count;
     after.undecided = undecided;
     qmat_medial_errors_uninit(&after);
   }
-  if (done->rules.has_target && done->euler != done->rules.target_euler) a->fault += topology_fault * epsilon;
+  if (status == QMAT_OK) status = judge_topology(s, a);
+  if (a->topology_faults > 0) a->fault += topology_fault * epsilon;
   return status;
 }
 
@@ -364,15 +382,13 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qma
 /* Opens voids of a result that keeps within epsilon until there is none that the solid has not. A slab less leaves the
  * solid by no more, but the surface may be farther away. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
-  const qmat_decimation_rules *rules = &s->dense.rules;
-  if (!a->within_epsilon || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  if (!a->within_epsilon || !s->solid.known) return QMAT_OK;
   json_t *root = a->report->root;
   for (bool opened = true; opened;) {
     qmat_topology topology;
     qmat_medial_errors errors;
     qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
-    if (status != QMAT_OK || !topology.known || topology.voids == 0 || topology.euler <= rules->target_euler)
-      return status;
+    if (status != QMAT_OK || !topology.known || topology.voids <= s->solid.voids) return status;
     status = open_void(s, a->medial, &opened, &errors);
     if (status != QMAT_OK) return status;
     if (!opened) break;
@@ -433,16 +449,14 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
 /* Closes loops of a result that keeps within epsilon while it has more than the solid. A slab more brings the surface
  * no farther away, but may leave the solid. */
 static qmat_status close_loops(simplifier *s, attempt *a) {
-  const qmat_decimation_rules *rules = &s->dense.rules;
-  if (!a->within_epsilon || !rules->has_target || rules->topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  if (!a->within_epsilon || !s->solid.known) return QMAT_OK;
   json_t *root = a->report->root;
   for (;;) {
     qmat_topology topology;
     bool closed;
     double slab_error;
     qmat_status status = qmat_topology_of_medial(s->context, a->medial, &topology);
-    if (status != QMAT_OK || !topology.known || topology.loops == 0 || topology.euler >= rules->target_euler)
-      return status;
+    if (status != QMAT_OK || !topology.known || topology.loops <= s->solid.loops) return status;
     status = close_loop(s, a->medial, topology.loops, &closed, &slab_error);
     if (status != QMAT_OK || !closed) return status;
     const double before = json_real_value(json_object_get(root, "envelope_to_surface"));
@@ -487,6 +501,37 @@ static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, con
     if (status == QMAT_OK) status = collapse_dense(s, state, samples, initial, &in_dense);
   }
   return status;
+}
+
+/* A guarded result replaces a free one only where it takes at most this many times its spheres. */
+static const double most_spheres_for_topology = 1.25;
+
+/* Collapses freely, judges the Betti numbers of the result, and mends those that differ from the solid's. Small loops
+ * and voids of the dense initial mesh are noise at the scale of epsilon: a guard that counts them while it collapses
+ * strands simple solids at hundreds of spheres. Only where mending fails are collapses guarded from the start. */
+static qmat_status simplify_and_mend(simplifier *s, medial_simplify_params *params, const qmat_initial_medial *state,
+                                     const qmat_samples *samples, const qmat_medial *initial, attempt *best) {
+  if (params->topology != QMAT_TOPOLOGY_GUARD) return simplify(s, state, samples, initial, best);
+  for (int guarded = 0; guarded < 2; guarded++) {
+    attempt a = {.fault = INFINITY};
+    params->topology = guarded ? QMAT_TOPOLOGY_GUARD : QMAT_TOPOLOGY_FREE;
+    qmat_decimation_uninit(&s->dense);
+    qmat_status status = simplify(s, state, samples, initial, &a);
+    if (status == QMAT_OK) status = open_voids(s, &a);
+    if (status == QMAT_OK) status = close_loops(s, &a);
+    if (status == QMAT_OK && a.topology_faults > 0) status = judge_topology(s, &a);
+    const bool is_right = a.topology_faults == 0 && (a.within_epsilon || !best->within_epsilon);
+    const bool counts = !guarded || (is_right && (double)a.medial->sphere_count <=
+                                                     most_spheres_for_topology * (double)best->medial->sphere_count);
+    if (status == QMAT_OK && counts) {
+      release(best);
+      *best = a;
+    } else {
+      release(&a);
+    }
+    if (status != QMAT_OK || best->topology_faults == 0) return status;
+  }
+  return QMAT_OK;
 }
 
 static qmat_status report_in_order(qmat_context *context, const qmat_ordered_collapses *o, double epsilon,
@@ -552,9 +597,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   qmat_initial_medial state = {NULL, NULL, NULL};
   attempt best = {.fault = INFINITY};
   status = qmat_simplify_prepare(context, &own, inputs, &s.surface, &state);
-  if (status == QMAT_OK) status = simplify(&s, &state, samples, initial, &best);
-  if (status == QMAT_OK) status = open_voids(&s, &best);
-  if (status == QMAT_OK) status = close_loops(&s, &best);
+  if (status == QMAT_OK) status = qmat_topology_of_solid(context, s.surface, &s.solid);
+  if (status == QMAT_OK) status = simplify_and_mend(&s, &own, &state, samples, initial, &best);
   if (status == QMAT_OK) status = qmat_topology_report(context, best.medial, s.surface, best.report->root);
   if (status == QMAT_OK) {
     double *spheres = best.medial->spheres;
@@ -598,7 +642,8 @@ static const qmat_param params[] = {
     QMAT_ERROR_PARAM,
     {.name = "on_exceed",
      .unit = "",
-     .doc = "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise what is own to it",
+     .doc =
+         "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise the threshold up to it",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_EXCEED_SKIP,
      .choices = exceed_rules,
@@ -627,7 +672,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 11,
+    .version = 12,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -656,7 +701,7 @@ const qmat_node qmat_node_medial_simplify = {
         "With on_exceed=raise both errors are own to finest first, "
         "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
         "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
-        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but what is own rises "
+        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but the threshold rises "
         "as soon as the cheapest collapse asks for it, as in the paper. Both have constraint points of their own, "
         "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
         "leaves the surface around it nearest to the envelope, and that distance for the cost; pmat keeps the "

@@ -36,86 +36,87 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
     .type = QMAT_PARAM_ENUM, .default_number = QMAT_ERROR_TWO_SIDED, .choices = qmat_error_choices,         \
     .offset = offsetof(qmat_simplify_params, error)                                                         \
   }
-#define QMAT_COLLAPSE_PARAMS                                                                                      \
-  {.name = "cost",                                                                                                \
-   .unit = "",                                                                                                    \
-   .doc =                                                                                                         \
-       "What comes first: the least slab error (eq. 6), the least distance of the surface (HEM), or the nearest " \
-       "to a sphere within another (PMAT)",                                                                       \
-   .type = QMAT_PARAM_ENUM,                                                                                       \
-   .default_number = QMAT_COST_SLAB,                                                                              \
-   .choices = qmat_cost_choices,                                                                                  \
-   .offset = offsetof(qmat_simplify_params, cost)},                                                               \
-      {.name = "finest",                                                                                          \
-       .unit = "diagonal",                                                                                        \
-       .doc = "What both errors are held to first where that rises; finer levels take longer",                    \
-       .type = QMAT_PARAM_FLOAT,                                                                                  \
-       .default_number = 0.0025,                                                                                  \
-       .min = 1e-5,                                                                                               \
-       .max = 1,                                                                                                  \
-       .flags = QMAT_PARAM_RELATIVE,                                                                              \
-       .offset = offsetof(qmat_simplify_params, finest)},                                                         \
-      {.name = "most_cost",                                                                                       \
-       .unit = "1",                                                                                               \
-       .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                            \
-       .type = QMAT_PARAM_FLOAT,                                                                                  \
-       .default_number = 0,                                                                                       \
-       .min = 0,                                                                                                  \
-       .max = 1e9,                                                                                                \
-       .offset = offsetof(qmat_simplify_params, most_cost)},                                                      \
-      {.name = "compat",                                                                                          \
-       .unit = "",                                                                                                \
-       .doc =                                                                                                     \
-           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "     \
-           "features; the stop is vertices",                                                                      \
-       .type = QMAT_PARAM_ENUM,                                                                                   \
-       .default_number = QMAT_COMPAT_OFF,                                                                         \
-       .choices = qmat_compat_choices,                                                                            \
-       .offset = offsetof(qmat_simplify_params, compat)},                                                         \
-      {.name = "topology",                                                                                        \
-       .unit = "",                                                                                                \
-       .doc =                                                                                                     \
-           "Free as in the paper, guarded so that loops and voids become the solid's, or preserved (link "        \
-           "condition)",                                                                                          \
-       .type = QMAT_PARAM_ENUM,                                                                                   \
-       .default_number = QMAT_TOPOLOGY_GUARD,                                                                     \
-       .choices = qmat_topology_choices,                                                                          \
-       .offset = offsetof(qmat_simplify_params, topology)},                                                       \
-      {.name = "protect",                                                                                         \
-       .unit = "",                                                                                                \
-       .doc = "Keep thin tubular features whatever their cost: never, at the late stage, or from the start",      \
-       .type = QMAT_PARAM_ENUM,                                                                                   \
-       .default_number = QMAT_PROTECT_OFF,                                                                        \
-       .choices = qmat_protect_choices,                                                                           \
-       .offset = offsetof(qmat_simplify_params, protect)},                                                        \
-      {.name = "features",                                                                                        \
-       .unit = "",                                                                                                \
-       .doc = "Spheres of radius zero, as medial.features makes them, are like others, or stay on their creases", \
-       .type = QMAT_PARAM_ENUM,                                                                                   \
-       .default_number = QMAT_FEATURES_SHARP,                                                                     \
-       .choices = qmat_feature_choices,                                                                           \
-       .offset = offsetof(qmat_simplify_params, features)},                                                       \
-      {.name = "crease",                                                                                          \
-       .unit = "epsilon",                                                                                         \
-       .doc = "How far the points of a crease may be from what is left of it, as a share of what is held",        \
-       .type = QMAT_PARAM_FLOAT,                                                                                  \
-       .default_number = 0.25,                                                                                    \
-       .min = 0.01,                                                                                               \
-       .max = 1,                                                                                                  \
-       .offset = offsetof(qmat_simplify_params, crease)},                                                         \
-      {.name = "theta",                                                                                           \
-       .unit = "mean thickness",                                                                                  \
-       .doc =                                                                                                     \
-           "A feature is thin when the thickness of its whole responsible region is at most this ratio of the "   \
-           "mean",                                                                                                \
-       .type = QMAT_PARAM_FLOAT,                                                                                  \
-       .default_number = 0.5,                                                                                     \
-       .min = 0,                                                                                                  \
-       .max = 10,                                                                                                 \
-       .offset = offsetof(qmat_simplify_params, theta)},                                                          \
-  {                                                                                                               \
-    .name = "k", .unit = "1", .doc = "The constant of the collapse cost (eq. 6)", .type = QMAT_PARAM_FLOAT,       \
-    .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                       \
+#define QMAT_COLLAPSE_PARAMS                                                                                       \
+  {.name = "cost",                                                                                                 \
+   .unit = "",                                                                                                     \
+   .doc =                                                                                                          \
+       "What comes first: the least slab error (eq. 6), the least distance of the surface (HEM), or the nearest "  \
+       "to a sphere within another (PMAT)",                                                                        \
+   .type = QMAT_PARAM_ENUM,                                                                                        \
+   .default_number = QMAT_COST_SLAB,                                                                               \
+   .choices = qmat_cost_choices,                                                                                   \
+   .offset = offsetof(qmat_simplify_params, cost)},                                                                \
+      {.name = "finest",                                                                                           \
+       .unit = "diagonal",                                                                                         \
+       .doc = "What both errors are held to first where that rises; finer levels take longer",                     \
+       .type = QMAT_PARAM_FLOAT,                                                                                   \
+       .default_number = 0.0025,                                                                                   \
+       .min = 1e-5,                                                                                                \
+       .max = 1,                                                                                                   \
+       .flags = QMAT_PARAM_RELATIVE,                                                                               \
+       .offset = offsetof(qmat_simplify_params, finest)},                                                          \
+      {.name = "most_cost",                                                                                        \
+       .unit = "1",                                                                                                \
+       .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                             \
+       .type = QMAT_PARAM_FLOAT,                                                                                   \
+       .default_number = 0,                                                                                        \
+       .min = 0,                                                                                                   \
+       .max = 1e9,                                                                                                 \
+       .offset = offsetof(qmat_simplify_params, most_cost)},                                                       \
+      {.name = "compat",                                                                                           \
+       .unit = "",                                                                                                 \
+       .doc =                                                                                                      \
+           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "      \
+           "features; the stop is vertices",                                                                       \
+       .type = QMAT_PARAM_ENUM,                                                                                    \
+       .default_number = QMAT_COMPAT_OFF,                                                                          \
+       .choices = qmat_compat_choices,                                                                             \
+       .offset = offsetof(qmat_simplify_params, compat)},                                                          \
+      {.name = "topology",                                                                                         \
+       .unit = "",                                                                                                 \
+       .doc =                                                                                                      \
+           "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, loops " \
+           "and voids of the result are made those of the solid. preserve: collapses keep the topology of the "    \
+           "initial mesh (link condition)",                                                                        \
+       .type = QMAT_PARAM_ENUM,                                                                                    \
+       .default_number = QMAT_TOPOLOGY_GUARD,                                                                      \
+       .choices = qmat_topology_choices,                                                                           \
+       .offset = offsetof(qmat_simplify_params, topology)},                                                        \
+      {.name = "protect",                                                                                          \
+       .unit = "",                                                                                                 \
+       .doc = "Keep thin tubular features whatever their cost: never, at the late stage, or from the start",       \
+       .type = QMAT_PARAM_ENUM,                                                                                    \
+       .default_number = QMAT_PROTECT_OFF,                                                                         \
+       .choices = qmat_protect_choices,                                                                            \
+       .offset = offsetof(qmat_simplify_params, protect)},                                                         \
+      {.name = "features",                                                                                         \
+       .unit = "",                                                                                                 \
+       .doc = "Spheres of radius zero, as medial.features makes them, are like others, or stay on their creases",  \
+       .type = QMAT_PARAM_ENUM,                                                                                    \
+       .default_number = QMAT_FEATURES_SHARP,                                                                      \
+       .choices = qmat_feature_choices,                                                                            \
+       .offset = offsetof(qmat_simplify_params, features)},                                                        \
+      {.name = "crease",                                                                                           \
+       .unit = "epsilon",                                                                                          \
+       .doc = "How far the points of a crease may be from what is left of it, as a share of what is held",         \
+       .type = QMAT_PARAM_FLOAT,                                                                                   \
+       .default_number = 0.25,                                                                                     \
+       .min = 0.01,                                                                                                \
+       .max = 1,                                                                                                   \
+       .offset = offsetof(qmat_simplify_params, crease)},                                                          \
+      {.name = "theta",                                                                                            \
+       .unit = "mean thickness",                                                                                   \
+       .doc =                                                                                                      \
+           "A feature is thin when the thickness of its whole responsible region is at most this ratio of the "    \
+           "mean",                                                                                                 \
+       .type = QMAT_PARAM_FLOAT,                                                                                   \
+       .default_number = 0.5,                                                                                      \
+       .min = 0,                                                                                                   \
+       .max = 10,                                                                                                  \
+       .offset = offsetof(qmat_simplify_params, theta)},                                                           \
+  {                                                                                                                \
+    .name = "k", .unit = "1", .doc = "The constant of the collapse cost (eq. 6)", .type = QMAT_PARAM_FLOAT,        \
+    .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                        \
   }
 
 /* The inputs of both nodes. */

@@ -447,6 +447,75 @@ static void test_topology_is_free_guarded_or_preserved(void **state) {
   }
 }
 
+/* --- planted shapes: the boundary of known spheres, cones and slabs ----------------------------------------------- */
+
+typedef struct {
+  const char *name;
+  size_t sphere_count, edge_count, triangle_count;
+  double spheres[4 * 8];
+  uint32_t edges[2 * 8], triangles[3 * 2];
+} planted;
+
+static const planted planted_shapes[] = {
+    {.name = "chain",
+     .sphere_count = 5,
+     .edge_count = 4,
+     .spheres = {0, 0, 0, 0.3, 1, 0.2, 0, 0.2, 1.8, 0.9, 0.3, 0.35, 2.6, 0.8, 1, 0.15, 3.3, 0.2, 1.2, 0.25},
+     .edges = {0, 1, 1, 2, 2, 3, 3, 4}},
+    {.name = "ring",
+     .sphere_count = 6,
+     .edge_count = 6,
+     .spheres = {2, 0, 0, 0.3, 1, 1.8, 0.2, 0.4, -1, 1.7, 0, 0.3, -2, 0, 0.2, 0.4, -1, -1.8, 0, 0.3, 1, -1.7, 0.2, 0.4},
+     .edges = {0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 0}},
+    {.name = "slab with fingers",
+     .sphere_count = 6,
+     .edge_count = 3,
+     .triangle_count = 1,
+     .spheres = {0,   0,    0,   0.2,  2,  0,    0,   0.2, 1, 1.6, 0,   0.25,
+                 3.2, -0.6, 0.3, 0.12, -1, -0.9, 0.2, 0.1, 1, 3,   0.4, 0.14},
+     .edges = {1, 3, 0, 4, 2, 5},
+     .triangles = {0, 1, 2}},
+};
+
+static qmat_mesh *plant(const planted *shape) {
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  medial->sphere_count = shape->sphere_count;
+  medial->spheres = qmat_alloc(shape->sphere_count, 4 * sizeof(double));
+  assert_non_null(medial->spheres);
+  memcpy(medial->spheres, shape->spheres, 4 * shape->sphere_count * sizeof(double));
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, shape->edges, shape->edge_count, shape->triangles,
+                                             shape->triangle_count),
+                   QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "medial.skin", "resolution=64", (const qmat_value *[]){&medial->base}, outputs);
+  qmat_value_release(outputs[1]);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+  return (qmat_mesh *)outputs[0];
+}
+
+static void test_a_planted_medial_mesh_is_found_again(void **state) {
+  (void)state;
+  for (size_t i = 0; i < COUNT(planted_shapes); i++) {
+    const planted *shape = &planted_shapes[i];
+    pipeline p;
+    pipeline_make(&p, plant(shape), "", "");
+    result r = simplify(&p, "epsilon=1%");
+    if (r.medial->sphere_count > shape->sphere_count)
+      fail_msg("%s: %zu spheres were planted, %zu found", shape->name, shape->sphere_count, r.medial->sphere_count);
+    assert_true(pipeline_number(r.report, "surface_to_envelope") <= 0.01);
+    assert_true(pipeline_number(r.report, "envelope_to_surface") <= 0.01);
+    assert_int_equal(pipeline_count(r.report, "components"), 1);
+    assert_int_equal(pipeline_count(r.report, "loops"), pipeline_count(r.report, "loops_of_solid"));
+    assert_int_equal(pipeline_count(r.report, "voids"), 0);
+    release(&r);
+    pipeline_free(&p);
+  }
+}
+
 /* How far spheres reach from the octopus's head. */
 static double reach(const qmat_medial *medial) {
   double most = 0;
@@ -741,6 +810,7 @@ int main(void) {
       cmocka_unit_test(test_one_sided_holds_the_surface_alone),
       cmocka_unit_test(test_stopping_at_epsilon_keeps_it_and_leaves_spheres_that_skipping_does_not),
       cmocka_unit_test(test_topology_is_free_guarded_or_preserved),
+      cmocka_unit_test(test_a_planted_medial_mesh_is_found_again),
       cmocka_unit_test(test_protection_keeps_tubular_edges),
       cmocka_unit_test(test_protection_of_nothing_thin_changes_nothing),
       cmocka_unit_test(test_medial_mesh_without_regions_works),
