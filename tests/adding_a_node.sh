@@ -44,7 +44,7 @@ awk -v edit="$edit" '{ print } $0 == "set(QMAT_NODES" { print edit }' nodes/CMak
 if ! cmp -s "$copy/nodes/CMakeLists.txt" "$scratch/edited"; then cp "$copy/nodes/CMakeLists.txt" "$scratch/edited"; fi
 cp -p "$scratch/edited" "$copy/nodes/CMakeLists.txt"
 
-cmake -S "$copy" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DQMAT_WERROR=ON >"$scratch/log" 2>&1 &&
+cmake -S "$copy" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_C_FLAGS_DEBUG=-O0 -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DQMAT_WERROR=ON >"$scratch/log" 2>&1 &&
   cmake --build "$scratch/build" --target nodes_mesh_scale_test --target qmat -j "$(nproc)" >>"$scratch/log" 2>&1 || {
   tail -n 40 "$scratch/log"
   exit 1
