@@ -17,7 +17,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   if (status == QMAT_OK) status = qmat_surface_new(context, mesh, &surface);
   if (status == QMAT_OK && !(report = qmat_report_new())) status = qmat_fail_memory(context, "the report");
   if (status == QMAT_OK)
-    status = qmat_medial_dual_make(context, params, surface, thickness, samples, NULL, &medial, report);
+    status = qmat_voronoi_dual_make(context, params, surface, thickness, samples, NULL, &medial, report);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   if (status == QMAT_OK) {
     outputs[0] = &medial->base;
@@ -31,7 +31,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
 }
 
 static const qmat_param params[] = {
-    QMAT_DUAL_PARAMS,
+    QMAT_VORONOI_DUAL_PARAMS,
     {0},
 };
 
@@ -50,14 +50,18 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 4,
+    .version = 5,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
-        "Every tetrahedron of the solid becomes a medial vertex: its circumcentre where that lies inside, else its "
-        "incentre with the distance to the surface, which keeps parts that are too thin for circumcentres. Medial "
-        "edges and slabs are the duals of the facets and edges between such tetrahedra.",
+        "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
+        "Otherwise it is the incentre, with the distance to the surface as radius; this completes parts that are too "
+        "thin for circumcentres. Medial edges are dual to the facets between such tetrahedra, and medial slabs to the "
+        "Delaunay edges that they surround.\n\n"
+        "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
+        "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
+        "where one surface component contains several.",
     .citation = "Section 3.2, Algorithm 1",
-    .params_size = sizeof(qmat_dual_params),
+    .params_size = sizeof(qmat_voronoi_dual_params),
     .params = params,
     .inputs = inputs,
     .outputs = outputs,

@@ -122,8 +122,8 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   return qmat_medial_set_simplices(context, medial, new_edges, edge_count, new_triangles, triangle_count);
 }
 
-qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
-                                        double tolerance, size_t *added) {
+qmat_status qmat_edges_halve(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, double tolerance,
+                             size_t *added) {
   *added = 0;
   for (int round = 0; round < MOST_ROUNDS; round++) {
     const size_t before = *added;

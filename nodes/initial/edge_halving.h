@@ -9,7 +9,7 @@
  * interpolate them pass through concave places of the surface. A middle gets the radius that its depth allows; one that
  * lies outside is left alone. `medial` is in the unit frame and not yet sealed, its new spheres come last. `*added` is
  * their number. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. */
-qmat_status qmat_halve_protruding_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
-                                        double tolerance, size_t *added);
+qmat_status qmat_edges_halve(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, double tolerance,
+                             size_t *added);
 
 #endif

@@ -188,7 +188,7 @@ static qmat_status run_node(qmat_context *context, const char *name, const qmat_
 }
 
 static double detail_of_delaunay(void) {
-  return qmat_param_find(qmat_node_find("medial.delaunay"), "detail")->default_number;
+  return qmat_param_find(qmat_node_find("medial.delaunay"), "thinning_tolerance")->default_number;
 }
 
 /* The seconds that CGAL takes for the samples that medial.delaunay triangulates, and for all of them. */

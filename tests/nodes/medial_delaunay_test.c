@@ -12,7 +12,7 @@
 #include "tests/nodes/pipeline.h"
 
 /* The tetrahedra's own spheres: nothing that is near is merged, nothing is refined. */
-#define PLAIN "merge=0 protrusion=0 detail=0"
+#define PLAIN "merge=0 max_envelope_error=0 thinning_tolerance=0"
 
 static double distance(const double *a, const double *b) {
   return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
@@ -146,7 +146,7 @@ static void test_facet_between_two_tetrahedra_gives_an_edge(void **state) {
   /* Circumcentres at (4 - 1) / 4 up and down, 5/4 from the corners, 0.625 / sqrt(4.25) from the sides. */
   pipeline p;
   sample_vertices(&p, two_pyramids(2));
-  pipeline_delaunay(&p, 0, "protrusion=0");
+  pipeline_delaunay(&p, 0, "max_envelope_error=0");
   const double radius = 0.625 / sqrt(4.25);
   const int up = p.medial->spheres[2] > 0 ? 0 : 1;
   assert_counts(p.medial, 2, 1, 0);
@@ -154,7 +154,7 @@ static void test_facet_between_two_tetrahedra_gives_an_edge(void **state) {
   assert_sphere(p.medial, (size_t)!up, 0, 0, -0.75, radius);
   assert_region(p.medial, (size_t)up, (uint32_t[]){0, 1, 2, 3}, 4);
   assert_region(p.medial, (size_t)!up, (uint32_t[]){0, 1, 2, 4}, 4);
-  pipeline_delaunay(&p, 0, "protrusion=0 radius=circumradius");
+  pipeline_delaunay(&p, 0, "max_envelope_error=0 radius=circumradius");
   assert_sphere(p.medial, (size_t)up, 0, 0, 0.75, 1.25);
   assert_sphere(p.medial, (size_t)!up, 0, 0, -0.75, 1.25);
   pipeline_free(&p);
@@ -165,7 +165,7 @@ static void test_ring_around_an_edge_gives_a_slab(void **state) {
   /* Flat: three tetrahedra around the edge between the poles, circumcentres outside, so that the incentres count. */
   pipeline p;
   sample_vertices(&p, two_pyramids(0.5));
-  static const char *const settings[] = {"", "completion=thin theta=1"};
+  static const char *const settings[] = {"", "incentres=thin theta=1"};
   for (int i = 0; i < 2; i++) {
     pipeline_delaunay(&p, 0, settings[i]);
     assert_counts(p.medial, 3, 3, 1);
@@ -187,7 +187,7 @@ static void test_ring_around_an_edge_gives_a_slab(void **state) {
   qmat_context context = {0};
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.delaunay", "completion=thin theta=0.5", inputs, outputs),
+  assert_int_equal(pipeline_run(&context, "medial.delaunay", "incentres=thin theta=0.5", inputs, outputs),
                    QMAT_ERROR_GEOMETRY);
   qmat_context_uninit(&context);
   pipeline_free(&p);
@@ -216,7 +216,7 @@ static void test_capsule_gives_its_axis(void **state) {
   /* Vertices alone lie on the ideal surface: empty spheres are as deep as the axis, but for those of slivers. */
   pipeline p;
   sample_vertices(&p, pipeline_model("capsule", 24));
-  pipeline_delaunay(&p, 0, PLAIN " radius=circumradius completion=thin theta=0");
+  pipeline_delaunay(&p, 0, PLAIN " radius=circumradius incentres=thin theta=0");
   assert_true(p.medial->sphere_count > 100);
   size_t near = 0;
   for (size_t i = 0; i < p.medial->sphere_count; i++) {
@@ -250,7 +250,7 @@ static void test_thin_sheet_gives_one_piece_near_its_middle(void **state) {
   assert_true((double)middle > 0.6 * (double)p.medial->sphere_count);
   /* Without completion, where samples are farther apart than the sheet is thick, hardly anything of it is found. */
   const size_t all = p.medial->sphere_count;
-  pipeline_delaunay(&p, 0, "completion=thin theta=0");
+  pipeline_delaunay(&p, 0, "incentres=thin theta=0");
   assert_true(p.medial->sphere_count < all);
   assert_int_equal(pipeline_count(p.report, "incentres"), 0);
   pipeline_free(&p);
@@ -332,7 +332,7 @@ static void test_cavity_is_left_out(void **state) {
 static void test_circumradius_touches_its_samples_and_holds_none(void **state) {
   (void)state;
   pipeline p;
-  pipeline_make(&p, pipeline_model("l-bracket", 8), "spacing=8%", PLAIN " radius=circumradius completion=thin theta=0");
+  pipeline_make(&p, pipeline_model("l-bracket", 8), "spacing=8%", PLAIN " radius=circumradius incentres=thin theta=0");
   const double tolerance = 1e-6 * pipeline_diagonal(p.mesh);
   size_t tight = 0;
   for (size_t i = 0; i < p.medial->sphere_count; i++) {
@@ -353,7 +353,7 @@ static void test_flat_parts_are_thinned_and_every_sample_is_answered_for(void **
   size_t triangulated[2];
   for (int resolution = 0; resolution < 2; resolution++) {
     pipeline p;
-    pipeline_make(&p, pipeline_model("l-bracket", 20 << resolution), "spacing=0", "merge=0 detail=0.2%");
+    pipeline_make(&p, pipeline_model("l-bracket", 20 << resolution), "spacing=0", "merge=0 thinning_tolerance=0.2%");
     triangulated[resolution] = (size_t)pipeline_count(p.report, "samples_triangulated");
     assert_int_equal(pipeline_count(p.report, "samples"), p.samples->count);
     assert_int_equal(pipeline_components(p.medial), 1);
@@ -369,7 +369,7 @@ static void test_flat_parts_are_thinned_and_every_sample_is_answered_for(void **
     qmat_free(answered);
     if (resolution == 1) assert_true(3 * triangulated[1] < 2 * p.samples->count);
     if (resolution == 0) {
-      pipeline_delaunay(&p, 0, "merge=0 detail=0");
+      pipeline_delaunay(&p, 0, "merge=0 thinning_tolerance=0");
       assert_int_equal(pipeline_count(p.report, "samples_triangulated"), p.samples->count);
     }
     pipeline_free(&p);
@@ -413,13 +413,13 @@ static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(
 static void test_completion_adds_incentres_and_keeps_the_rest(void **state) {
   (void)state;
   pipeline p;
-  pipeline_make(&p, pipeline_model("octopus", 6), "spacing=0", "completion=all");
+  pipeline_make(&p, pipeline_model("octopus", 6), "spacing=0", "incentres=all");
   const int64_t circumcentres = pipeline_count(p.report, "circumcentres");
   const int64_t incentres = pipeline_count(p.report, "incentres");
   assert_true(incentres > 0);
   int64_t before = -1;
-  static const char *const thetas[] = {"completion=thin theta=0", "completion=thin theta=0.5",
-                                       "completion=thin theta=1", "completion=thin theta=10"};
+  static const char *const thetas[] = {"incentres=thin theta=0", "incentres=thin theta=0.5", "incentres=thin theta=1",
+                                       "incentres=thin theta=10"};
   for (int i = 0; i < 4; i++) {
     pipeline_delaunay(&p, 0, thetas[i]);
     assert_true(pipeline_count(p.report, "circumcentres") >= circumcentres); /* also of tetrahedra outside */

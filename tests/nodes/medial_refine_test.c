@@ -85,7 +85,7 @@ static void test_a_cubes_inscribed_sphere_is_farthest_from_its_corners(void **st
   /* From the corner, sqrt(3) from the centre, to the sphere of radius 1, over a diagonal of 2 sqrt(3). */
   const double expected = (sqrt(3) - 1) / (2 * sqrt(3));
   qmat_value *outputs[PIPELINE_MOST_PORTS];
-  must_refine(&p, 0, "epsilon=0.1 rounds=0 share=1", outputs);
+  must_refine(&p, 0, "epsilon=0.1 rounds=0 target=1", outputs);
   const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
   assert_near(pipeline_number(report, "farthest_place"), expected, 1e-12);
   assert_near(pipeline_number(report, "farthest_place_left"), expected, 1e-12);

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_INITIAL_DUAL_COMPLEX_H
+#define QMAT_NODES_INITIAL_DUAL_COMPLEX_H
+
+#include "core/geometry/surface.h"
+#include "nodes/initial/delaunay_cgal.h"
+#include "nodes/initial/voronoi_dual.h"
+
+/* The origin of a tetrahedron's medial vertex. A dropped tetrahedron has none. */
+typedef enum { QMAT_CELL_DROPPED = 0, QMAT_CELL_CIRCUMCENTRE, QMAT_CELL_INCENTRE } qmat_cell_kind;
+
+#define QMAT_NO_ID UINT32_MAX
+
+/* The dual of the Delaunay tetrahedra while it is built, in the unit frame. Arrays live in the context's arena except
+ * `edges` and `triangles`, which the owner frees. */
+typedef struct qmat_dual_complex {
+  qmat_context *context;
+  const qmat_voronoi_dual_params *params;
+  const qmat_mesh *mesh;
+  const qmat_samples *samples;
+  const qmat_surface *surface;
+  const double *points;               /* 3 per sample */
+  const uint8_t *thin;                /* per sample */
+  const uint32_t *surface_components; /* per mesh vertex: smallest vertex of its component; NULL: one component */
+  const uint32_t *stand_ins;          /* per sample: the sample triangulated in its place, possibly itself */
+  size_t site_count;                  /* triangulated samples */
+  qmat_tetrahedra cells;              /* corners are samples */
+  uint8_t *kinds;                     /* per cell: a qmat_cell_kind */
+  double *spheres;                    /* 4 per cell */
+  uint32_t *sphere_of;                /* per cell: its medial vertex, or QMAT_NO_ID */
+  size_t sphere_count;
+  uint32_t *edges, *triangles; /* of medial vertices */
+  size_t edge_count, triangle_count;
+} qmat_dual_complex;
+
+/* The surface component of a sample. */
+static inline uint32_t qmat_dual_surface_component(const qmat_dual_complex *dual, uint32_t sample) {
+  const qmat_mesh *mesh = dual->mesh;
+  return dual->surface_components ? dual->surface_components[mesh->triangles[3 * (size_t)dual->samples->facets[sample]]]
+                                  : 0;
+}
+
+#endif

@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The components of the initial medial mesh: specks are dropped, the others linked. */
+#include "nodes/initial/dual_components.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/disjoint_sets.h"
+#include "core/geometry/vector.h"
+
+#define NONE QMAT_NO_ID
+
+typedef struct {
+  uint32_t root, size;
+} component;
+
+static int larger_component(const void *left, const void *right) {
+  const component *a = left, *b = right;
+  if (a->size != b->size) return a->size < b->size ? 1 : -1;
+  return a->root < b->root ? -1 : 1;
+}
+
+/* The components, largest first; `index` gets the component of each sphere. NULL when memory is short. */
+static component *find_components(qmat_dual_complex *d, uint32_t *index, size_t *count) {
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *parent = qmat_sets_new(d->context, d->sphere_count);
+  component *components = qmat_arena_calloc(arena, d->sphere_count, sizeof *components);
+  uint32_t *order = qmat_arena_alloc(arena, d->sphere_count, sizeof *order);
+  if (!parent || !components || !order) return NULL;
+  for (size_t e = 0; e < d->edge_count; e++) qmat_sets_join(parent, d->edges[2 * e], d->edges[2 * e + 1]);
+  *count = 0;
+  for (size_t i = 0; i < d->sphere_count; i++) {
+    const uint32_t root = qmat_set_leader(parent, (uint32_t)i);
+    if (root == i) {
+      index[i] = (uint32_t)*count;
+      components[(*count)++].root = root;
+    }
+    components[index[root]].size++;
+  }
+  qsort(components, *count, sizeof *components, larger_component);
+  for (size_t i = 0; i < *count; i++) order[components[i].root] = (uint32_t)i;
+  for (size_t i = 0; i < d->sphere_count; i++) index[i] = order[qmat_set_leader(parent, (uint32_t)i)];
+  return components;
+}
+
+/* --- specks ------------------------------------------------------------------------------------------------------ */
+
+/* Marks the components that are responsible for a sample which no larger component is responsible for. */
+static qmat_status mark_needed(qmat_dual_complex *d, const uint32_t *index, size_t count, uint8_t *needed) {
+  qmat_arena *arena = &d->context->arena;
+  size_t *starts = qmat_arena_calloc(arena, count + 2, sizeof *starts);
+  uint32_t *members = qmat_arena_alloc(arena, d->cells.count, sizeof *members);
+  uint8_t *covered = qmat_arena_calloc(arena, d->samples->count, sizeof *covered);
+  if (!starts || !members || !covered) return qmat_fail_memory(d->context, "components");
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) starts[index[d->sphere_of[cell]] + 2]++;
+  for (size_t i = 0; i < count; i++) starts[i + 2] += starts[i + 1];
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) members[starts[index[d->sphere_of[cell]] + 1]++] = (uint32_t)cell;
+  for (size_t i = 0; i < count; i++) {
+    const size_t first = 4 * starts[i], last = 4 * starts[i + 1];
+    needed[i] = 0;
+    for (size_t m = first; m < last && !needed[i]; m++)
+      needed[i] = !covered[d->cells.corners[4 * (size_t)members[m / 4] + m % 4]];
+    for (size_t m = first; m < last && needed[i]; m++)
+      covered[d->cells.corners[4 * (size_t)members[m / 4] + m % 4]] = 1;
+  }
+  return QMAT_OK;
+}
+
+/* Renumbers the corners of simplices and leaves out those whose first corner is gone; returns how many are kept. */
+static size_t renumber_simplices(uint32_t *simplices, size_t count, size_t corners, const uint32_t *renumbered) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (renumbered[simplices[corners * i]] == NONE) continue;
+    for (size_t k = 0; k < corners; k++) simplices[corners * kept + k] = renumbered[simplices[corners * i + k]];
+    kept++;
+  }
+  return kept;
+}
+
+static qmat_status drop_specks(qmat_dual_complex *d, qmat_dual_component_counts *counts) {
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
+  uint32_t *renumbered = qmat_arena_alloc(arena, d->sphere_count, sizeof *renumbered);
+  size_t count = 0;
+  component *components = index ? find_components(d, index, &count) : NULL;
+  uint8_t *needed = qmat_arena_alloc(arena, count, sizeof *needed);
+  if (!renumbered || !components || !needed) return qmat_fail_memory(d->context, "components");
+  const qmat_status status = mark_needed(d, index, count, needed);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < count; i++) {
+    counts->components += needed[i];
+    counts->specks += !needed[i];
+    counts->speck_spheres += needed[i] ? 0 : components[i].size;
+  }
+  uint32_t next = 0;
+  for (size_t i = 0; i < d->sphere_count; i++) renumbered[i] = needed[index[i]] ? next++ : NONE;
+  for (size_t cell = 0; cell < d->cells.count; cell++) {
+    if (!d->kinds[cell]) continue;
+    d->sphere_of[cell] = renumbered[d->sphere_of[cell]];
+    if (d->sphere_of[cell] == NONE) d->kinds[cell] = QMAT_CELL_DROPPED;
+  }
+  d->edge_count = renumber_simplices(d->edges, d->edge_count, 2, renumbered);
+  d->triangle_count = renumber_simplices(d->triangles, d->triangle_count, 3, renumbered);
+  d->sphere_count = next;
+  return QMAT_OK;
+}
+
+/* --- links ------------------------------------------------------------------------------------------------------- */
+
+/* A medial edge that would link two components. */
+typedef struct {
+  double outside; /* how far its cone leaves the solid, at the test points */
+  double length;
+  uint32_t a, b;
+} medial_link;
+
+static int better_link(const void *left, const void *right) {
+  const medial_link *p = left, *q = right;
+  if (p->outside != q->outside) return p->outside < q->outside ? -1 : 1;
+  if (p->length != q->length) return p->length < q->length ? -1 : 1;
+  if (p->a != q->a) return p->a < q->a ? -1 : 1;
+  return p->b < q->b ? -1 : p->b > q->b;
+}
+
+static medial_link link_of(const double *spheres, uint32_t a, uint32_t b) {
+  const double length = qmat_point_distance(&spheres[4 * (size_t)a], &spheres[4 * (size_t)b]);
+  return (medial_link){0, length, a < b ? a : b, a < b ? b : a};
+}
+
+enum { LINK_TEST_POINTS = 7 };
+
+/* `spheres` holds 4 doubles per medial vertex. */
+static medial_link measured_link(const qmat_dual_complex *d, const double *spheres, uint32_t a, uint32_t b) {
+  const double *p = &spheres[4 * (size_t)a], *q = &spheres[4 * (size_t)b];
+  medial_link link = link_of(spheres, a, b);
+  for (int i = 1; i <= LINK_TEST_POINTS; i++) {
+    const double t = (double)i / (LINK_TEST_POINTS + 1);
+    double s[4];
+    for (int k = 0; k < 4; k++) s[k] = (1 - t) * p[k] + t * q[k];
+    link.outside = fmax(link.outside, s[3] + qmat_surface_signed_distance(d->surface, s));
+  }
+  return link;
+}
+
+/* A sphere at a site: a sample, or a component of the surface. */
+typedef struct {
+  uint32_t site, sphere;
+} contact;
+
+static int by_site(const void *left, const void *right) {
+  const contact *p = left, *q = right;
+  if (p->site != q->site) return p->site < q->site ? -1 : 1;
+  return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
+}
+
+/* Sorted contacts without duplicates. By sample: only the samples that several components are responsible for. By
+ * surface component: all spheres. */
+static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, bool by_surface_component, size_t *count) {
+  qmat_arena *arena = &d->context->arena;
+  const size_t samples = d->samples->count;
+  uint32_t *component_of = qmat_arena_alloc(arena, samples, sizeof *component_of);
+  uint8_t *shared = qmat_arena_calloc(arena, samples, sizeof *shared);
+  if (!component_of || !shared) return NULL;
+  for (size_t i = 0; i < samples; i++) component_of[i] = NONE;
+  for (size_t i = 0; i < 4 * d->cells.count; i++) {
+    if (!d->kinds[i / 4]) continue;
+    const uint32_t sample = d->cells.corners[i], component = index[d->sphere_of[i / 4]];
+    if (component_of[sample] != NONE && component_of[sample] != component) shared[sample] = 1;
+    component_of[sample] = component;
+  }
+  size_t room = 0;
+  for (size_t i = 0; i < 4 * d->cells.count; i++)
+    room += d->kinds[i / 4] && (by_surface_component || shared[d->cells.corners[i]]);
+  contact *contacts = qmat_arena_alloc(arena, room, sizeof *contacts);
+  if (!contacts) return NULL;
+  *count = 0;
+  for (size_t i = 0; i < 4 * d->cells.count; i++) {
+    const uint32_t sample = d->cells.corners[i];
+    if (!d->kinds[i / 4] || !(by_surface_component || shared[sample])) continue;
+    contacts[(*count)++] =
+        (contact){by_surface_component ? qmat_dual_surface_component(d, sample) : sample, d->sphere_of[i / 4]};
+  }
+  qsort(contacts, *count, sizeof *contacts, by_site);
+  size_t kept = 0;
+  for (size_t i = 0; i < *count; i++)
+    if (kept == 0 || by_site(&contacts[kept - 1], &contacts[i]) != 0) contacts[kept++] = contacts[i];
+  *count = kept;
+  return contacts;
+}
+
+static qmat_status add_link(qmat_dual_complex *d, uint32_t a, uint32_t b) {
+  size_t capacity = 2 * d->edge_count;
+  if (qmat_grow((void **)&d->edges, &capacity, 2 * (d->edge_count + 1), sizeof *d->edges))
+    return qmat_fail_memory(d->context, "medial edges");
+  d->edges[2 * d->edge_count] = a;
+  d->edges[2 * d->edge_count + 1] = b;
+  d->edge_count++;
+  return QMAT_OK;
+}
+
+/* Links components by edges between spheres that are responsible for a common sample, so that they touch the surface at
+ * the same place. The edges that stay inside come first. */
+static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, uint32_t *joined, const double *spheres,
+                                   size_t *links) {
+  size_t count = 0, candidate_count = 0, capacity = 0;
+  const contact *contacts = find_contacts(d, index, false, &count);
+  medial_link *candidates = NULL;
+  qmat_status status = contacts ? QMAT_OK : qmat_fail_memory(d->context, "components");
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    for (size_t j = i + 1; j < count && contacts[j].site == contacts[i].site; j++) {
+      const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
+      if (index[a] == index[b]) continue;
+      if (qmat_grow((void **)&candidates, &capacity, candidate_count + 1, sizeof *candidates)) {
+        status = qmat_fail_memory(d->context, "components");
+        break;
+      }
+      candidates[candidate_count++] = measured_link(d, spheres, a, b);
+    }
+  if (candidate_count) qsort(candidates, candidate_count, sizeof *candidates, better_link);
+  for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
+    if (!qmat_sets_join(joined, index[candidates[i].a], index[candidates[i].b])) continue;
+    ++*links;
+    status = add_link(d, candidates[i].a, candidates[i].b);
+  }
+  qmat_free(candidates);
+  return status;
+}
+
+/* Links the nearest two spheres of different components in the same component of the surface, until that has only one.
+ * Quadratic, but rare: components that share a sample are already linked. */
+static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, uint32_t *joined, const double *spheres,
+                                size_t *links) {
+  size_t count = 0;
+  contact *contacts = find_contacts(d, index, true, &count);
+  if (!contacts) return qmat_fail_memory(d->context, "components");
+  for (size_t first = 0, last; first < count; first = last) {
+    for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
+    for (;;) {
+      const uint32_t home = qmat_set_leader(joined, index[contacts[first].sphere]);
+      medial_link best = {0, INFINITY, NONE, NONE};
+      for (size_t i = first; i < last; i++) {
+        if (qmat_set_leader(joined, index[contacts[i].sphere]) == home) continue;
+        for (size_t j = first; j < last; j++) {
+          if (qmat_set_leader(joined, index[contacts[j].sphere]) != home) continue;
+          const medial_link link = link_of(spheres, contacts[i].sphere, contacts[j].sphere);
+          if (better_link(&link, &best) < 0) best = link;
+        }
+      }
+      if (best.a == NONE) break;
+      const qmat_status status = add_link(d, best.a, best.b);
+      if (status != QMAT_OK) return status;
+      qmat_sets_join(joined, index[best.a], index[best.b]);
+      ++*links;
+    }
+  }
+  return QMAT_OK;
+}
+
+static qmat_status link_components(qmat_dual_complex *d, qmat_dual_component_counts *counts) {
+  if (counts->components < 2) return QMAT_OK;
+  qmat_arena *arena = &d->context->arena;
+  uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
+  double *spheres = qmat_arena_alloc(arena, d->sphere_count, 4 * sizeof *spheres);
+  size_t count = 0;
+  const component *components = index && spheres ? find_components(d, index, &count) : NULL;
+  uint32_t *joined = qmat_sets_new(d->context, count);
+  if (!components || !joined) return qmat_fail_memory(d->context, "components");
+  for (size_t cell = 0; cell < d->cells.count; cell++)
+    if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
+  qmat_status status = link_at_samples(d, index, joined, spheres, &counts->links);
+  if (status == QMAT_OK) status = link_nearest(d, index, joined, spheres, &counts->links);
+  counts->components -= counts->links;
+  return status;
+}
+
+qmat_status qmat_dual_components_join(qmat_dual_complex *d, qmat_dual_component_counts *counts) {
+  const qmat_status status = drop_specks(d, counts);
+  return status == QMAT_OK ? link_components(d, counts) : status;
+}

@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Algorithm 1: which tetrahedra give a medial vertex, and which sphere. */
+#include "nodes/initial/medial_vertices.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/disjoint_sets.h"
+#include "core/geometry/vector.h"
+
+/* The circumsphere of a tetrahedron; false if it is degenerate or its centre is outside the unit frame. */
+static bool circumsphere(const double *const p[4], double sphere[4]) {
+  double e[3][3], square[3], normal[3][3];
+  for (int k = 0; k < 3; k++) {
+    qmat_subtract(p[k + 1], p[0], e[k]);
+    square[k] = qmat_dot(e[k], e[k]);
+  }
+  for (int k = 0; k < 3; k++) qmat_cross(e[(k + 1) % 3], e[(k + 2) % 3], normal[k]);
+  const double determinant = qmat_dot(e[0], normal[0]);
+  if (determinant == 0) return false;
+  double offset[3];
+  for (int i = 0; i < 3; i++) {
+    offset[i] = (square[0] * normal[0][i] + square[1] * normal[1][i] + square[2] * normal[2][i]) / (2 * determinant);
+    sphere[i] = p[0][i] + offset[i];
+    if (!(fabs(sphere[i]) <= 0.5)) return false; /* outside the bounding box, or not finite */
+  }
+  sphere[3] = sqrt(qmat_dot(offset, offset));
+  return true;
+}
+
+/* The centre of the inscribed sphere: the corners weighted by the areas of the facets opposite them. */
+static void incentre(const double *const p[4], double centre[3]) {
+  double total = 0, sum[3] = {0, 0, 0};
+  for (int k = 0; k < 4; k++) {
+    const double *a = p[(k + 1) & 3], *b = p[(k + 2) & 3], *c = p[(k + 3) & 3];
+    double ab[3], ac[3], n[3];
+    qmat_subtract(b, a, ab);
+    qmat_subtract(c, a, ac);
+    qmat_cross(ab, ac, n);
+    const double area = sqrt(qmat_dot(n, n));
+    for (int i = 0; i < 3; i++) sum[i] += area * p[k][i];
+    total += area;
+  }
+  for (int i = 0; i < 3; i++) centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
+}
+
+/* Points closer to the surface than this (unit frame) do not count as inside. Coplanar samples are coplanar only up to
+ * rounding and make flat tetrahedra on the surface, whose side would depend on chance. */
+static const double least_depth = 1e-8;
+
+static bool deep_inside(const qmat_surface *surface, const double *point) {
+  return qmat_surface_inside(surface, point) &&
+         !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
+}
+
+/* Names each connected component of the surface by its smallest vertex. */
+static qmat_status find_surface_components(qmat_dual_complex *d) {
+  const qmat_mesh *mesh = d->mesh;
+  uint32_t *component = qmat_sets_new(d->context, mesh->vertex_count);
+  if (!component) return qmat_fail_memory(d->context, "the surface's components");
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    qmat_sets_join(component, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
+    qmat_sets_join(component, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
+  }
+  size_t count = 0;
+  for (size_t i = 0; i < mesh->vertex_count; i++) {
+    component[i] = qmat_set_leader(component, (uint32_t)i);
+    count += component[i] == i;
+  }
+  d->surface_components = count > 1 ? component : NULL;
+  return QMAT_OK;
+}
+
+/* Whether a tetrahedron connects two components of the surface through the outside. The incentre of such a needle can
+ * still be inside, between the samples and a surface that bulges past them. */
+static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
+  const double tolerance = d->params->thinning_tolerance;
+  for (int a = 0; a < 3 && d->surface_components; a++)
+    for (int b = a + 1; b < 4; b++) {
+      if (qmat_dual_surface_component(d, corners[a]) == qmat_dual_surface_component(d, corners[b])) continue;
+      double middle[3];
+      for (size_t k = 0; k < 3; k++)
+        middle[k] = 0.5 * (d->points[3 * (size_t)corners[a] + k] + d->points[3 * (size_t)corners[b] + k]);
+      if (!qmat_surface_inside(d->surface, middle) &&
+          qmat_surface_distance(d->surface, middle, tolerance, NULL, NULL) > tolerance)
+        return true;
+    }
+  return false;
+}
+
+/* Algorithm 1 for one tetrahedron. With incentres "all" a tetrahedron belongs to the solid if its incentre is inside;
+ * its medial vertex is still the circumcentre if that is inside too. */
+static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t cell, double sphere[4]) {
+  const uint32_t *corner = &d->cells.corners[4 * cell];
+  const double *p[4];
+  bool thin = true;
+  for (int k = 0; k < 4; k++) {
+    p[k] = &d->points[3 * (size_t)corner[k]];
+    thin = thin && d->thin[corner[k]];
+  }
+  double centre[3];
+  incentre(p, centre);
+  const bool all = d->params->incentres == QMAT_INCENTRES_ALL;
+  const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
+  if (all && (!in_solid || spans_gap(d, corner))) return QMAT_CELL_DROPPED;
+  if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
+    const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
+    if (nearest > least_depth) {
+      if (d->params->radius == QMAT_RADIUS_DISTANCE) sphere[3] = nearest;
+      return QMAT_CELL_CIRCUMCENTRE;
+    }
+  }
+  if (!in_solid) return QMAT_CELL_DROPPED;
+  memcpy(sphere, centre, sizeof centre);
+  sphere[3] = qmat_surface_distance(d->surface, centre, INFINITY, NULL, NULL);
+  return QMAT_CELL_INCENTRE;
+}
+
+qmat_status qmat_medial_vertices_select(qmat_dual_complex *d) {
+  qmat_context *context = d->context;
+  const size_t count = d->cells.count, slice = 1 << 11;
+  d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);
+  d->spheres = qmat_arena_alloc(&context->arena, count, 4 * sizeof *d->spheres);
+  if (!d->kinds || !d->spheres) return qmat_fail_memory(context, "medial vertices");
+  qmat_status status = find_surface_components(d);
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < count && status == QMAT_OK; first += slice) {
+    if ((status = qmat_progress(context, first, count, "tetrahedra")) != QMAT_OK) break;
+    const size_t last = first + slice < count ? first + slice : count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t cell = first; cell < last; cell++)
+      d->kinds[cell] = (uint8_t)select_medial_vertex(d, cell, &d->spheres[4 * cell]);
+  }
+  return status;
+}
+
+/* Distances are between the first centres of the merged sets; a chain of close centres does not become one vertex. */
+qmat_status qmat_medial_vertices_number(qmat_dual_complex *d) {
+  const size_t count = d->cells.count;
+  uint32_t *parent = qmat_sets_new(d->context, count);
+  d->sphere_of = qmat_arena_alloc(&d->context->arena, count, sizeof *d->sphere_of);
+  if (!parent || !d->sphere_of) return qmat_fail_memory(d->context, "medial vertices");
+  for (size_t i = 0; i < count; i++) {
+    if (!d->kinds[i]) continue;
+    for (size_t k = 0; k < 4; k++) {
+      const uint32_t j = d->cells.neighbours[4 * i + k];
+      if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
+      const uint32_t a = qmat_set_leader(parent, (uint32_t)i), b = qmat_set_leader(parent, j);
+      if (qmat_point_distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge)
+        qmat_sets_join(parent, a, b);
+    }
+  }
+  uint32_t next = 0;
+  for (size_t i = 0; i < count; i++) {
+    d->sphere_of[i] = QMAT_NO_ID;
+    if (!d->kinds[i]) continue;
+    const uint32_t root = qmat_set_leader(parent, (uint32_t)i);
+    d->sphere_of[i] = root == i ? next++ : d->sphere_of[root];
+  }
+  d->sphere_count = next;
+  return QMAT_OK;
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_INITIAL_MEDIAL_VERTICES_H
+#define QMAT_NODES_INITIAL_MEDIAL_VERTICES_H
+
+#include "nodes/initial/dual_complex.h"
+
+/* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Reads `points`, `thin` and `cells`, and sets
+ * `surface_components`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
+qmat_status qmat_medial_vertices_select(qmat_dual_complex *dual);
+
+/* Merges adjacent medial vertices whose centres are no farther apart than the parameter `merge`, and numbers them in
+ * the order of their first tetrahedron: sets `sphere_of` and `sphere_count`. QMAT_ERROR_MEMORY. One thread. */
+qmat_status qmat_medial_vertices_number(qmat_dual_complex *dual);
+
+#endif
