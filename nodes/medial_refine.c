@@ -24,7 +24,7 @@ typedef struct {
 /* The spacing of the test points on the surface, as a share of epsilon. */
 static const double spacing_share = 0.5;
 
-enum { MOST_TEST_POINTS = 600000, MOST_ROUNDS = 8 };
+enum { MOST_ROUNDS = 8 };
 
 /* Samples, and the initial medial mesh made of them. */
 typedef struct {
@@ -69,7 +69,7 @@ static qmat_status find_far_points(const refiner *r, double limit, refinement *f
   qmat_status status = qmat_complex_init(context, &complex, medial, spheres);
   if (status == QMAT_OK)
     status = qmat_surface_places_make(context, r->mesh, r->positions, found->samples, points, medial, &complex,
-                                      r->spacing, MOST_TEST_POINTS, limit, &places);
+                                      r->spacing, QMAT_MOST_CONSTRAINT_POINTS, limit, &places);
   qmat_complex_uninit(&complex);
   if (status != QMAT_OK) return status;
   found->far_count = 0;
