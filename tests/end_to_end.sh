@@ -1,9 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The whole program, as a user meets it: end_to_end.sh BUILD_FOLDER [COUNTS_FILE]
+# Tests the whole program from the command line: end_to_end.sh BUILD_FOLDER [COUNTS_FILE]
 #
-# Every generated model, and every real one in ../shared/data where that folder is, goes through `qmat mat`; a judge that
-# shares no code with the library (tests/judge.c) looks at what comes out. COUNTS_FILE gets "passed failed skipped".
+# `qmat mat` runs on every generated model, and on the real ones in ../shared/data where that folder is present.
+# tests/judge.c, which shares no code with the library, measures the results, and tests/quality/gate.sh compares them
+# with the committed table. COUNTS_FILE gets "passed failed skipped".
 set -u
 source=$(cd "$(dirname "$0")/.." && pwd) || exit 1
 build=$(cd "$1" && pwd) || exit 1
@@ -12,7 +13,7 @@ data=$source/../shared/data
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-QMAT_CACHE=off # results of earlier builds must not stand for those of this one
+QMAT_CACHE=off # this build has to compute its own results
 export QMAT_CACHE
 passed=0
 failed=0
@@ -33,7 +34,7 @@ skip() {
   printf 'skipped: %s\n' "$*"
 }
 
-# holds WHAT COMMAND...: the command succeeds; what it says is shown when it does not.
+# holds WHAT COMMAND...: the command succeeds. Its output is shown when it does not.
 holds() {
   what=$1
   shift
@@ -49,7 +50,7 @@ qmat() {
   timeout 300 "$build/qmat" "$@"
 }
 
-# judge NAME FILE.off FILE.ma CHECK...: with the judge's figures in the line.
+# judge WHAT SURFACE FILE.ma CHECK...: the judge's checks hold. Its figures are part of the line.
 judge() {
   what=$1
   shift
@@ -64,33 +65,32 @@ judge() {
 # ---- Generated models ----
 
 mkdir -p reports/generated reports/surfaces
-holds "the models are made" "$build/qmat_models" all models
+holds "generated models: made" "$build/qmat_models" all models
 for surface in models/*.off; do
   name=$(basename "$surface" .off)
   holds "$name: mat" qmat mat "$surface" -o "$name.ma" -o "$name.glb" --epsilon 1% \
     --report "reports/generated/$name@1%.json"
   if [ ! -s "$name.ma" ]; then continue; fi
-  # Each solid is one piece; its medial mesh has no loop unless the solid has one.
+  # Each solid has one component; only the torus has a loop.
   euler=1
   if [ "$name" = torus ]; then euler=0; fi
-  judge "$name: two-sided error, one part, Euler characteristic" "$surface" "$name.ma" --within 1% --components 1 \
+  judge "$name: two-sided error, one component, Euler characteristic" "$surface" "$name.ma" --within 1% --components 1 \
     --euler $euler
-  holds "$name: a binary glTF file" test "$(head -c 4 "$name.glb")" = glTF
-  holds "$name: the report has both errors" grep -q '"envelope_to_surface"' \
-    "reports/generated/$name@1%.json"
+  holds "$name: the .glb starts as binary glTF" test "$(head -c 4 "$name.glb")" = glTF
+  holds "$name: the report has both errors" grep -q '"envelope_to_surface"' "reports/generated/$name@1%.json"
 done
 
-# Where the true medial axis is known, it is found: spheres have its places and its radii.
+# Where the true medial axis is known, the spheres have its centres and radii.
 for name in sphere capsule tapered-capsule torus sheet box; do
   if [ ! -s "$name.ma" ]; then continue; fi
   holds "$name: its known medial mesh is made" "$build/qmat_models" "$name" --medial "$name-known.ma"
-  # The sheet is 1 % thick: its spheres are held to a quarter of that.
+  # The sheet is 1 % thick, so its spheres are checked to a quarter of that.
   near=1%
   if [ "$name" = sheet ]; then near=0.25%; fi
   judge "$name: the true medial axis" "models/$name.off" "$name.ma" --known "$name-known.ma" --near $near --samples 1000
 done
 
-# The same bytes whoever runs it.
+# The number of threads and the command do not change a byte.
 for name in octopus torus l-bracket curved-sheet; do
   for threads in 1 2 8; do
     holds "$name: mat with $threads threads" qmat mat "models/$name.off" -o "$name-$threads.ma" -o "$name-$threads.glb" \
@@ -103,14 +103,14 @@ for name in octopus torus l-bracket curved-sheet; do
   holds "$name: the same .ma from run" cmp "$name.ma" "$name-run.ma"
 done
 
-# The unit of the model does not matter, nor does where it is.
+# The unit of the model does not matter.
 awk 'NR == 2 { vertices = $1 }
   NR > 2 && NR <= vertices + 2 { printf "%.17g %.17g %.17g\n", 1024 * $1, 1024 * $2, 1024 * $3; next } { print }' \
   models/l-bracket.off >large.off
 holds "l-bracket, 1024 times as large: mat" qmat mat large.off -o large.ma --epsilon 1%
 judge "l-bracket, 1024 times as large" large.off large.ma --within 1% --components 1 --euler 1
 
-# A looser bound needs fewer spheres, and a number of spheres is kept to.
+# A larger epsilon needs fewer spheres, and --vertices limits their number.
 spheres() {
   head -n 1 "$1" | cut -d ' ' -f 1
 }
@@ -121,7 +121,7 @@ fi
 holds "octopus: mat to 150 spheres" qmat mat models/octopus.off -o few.ma --vertices 150
 if [ -s few.ma ]; then holds "octopus: 150 spheres at most" test "$(spheres few.ma)" -le 150; fi
 
-# Parts that reach into each other are one solid: two boxes, one through a side of the other.
+# Overlapping components are one solid: two boxes, one through a side of the other.
 awk 'BEGIN {
   print "OFF\n16 24 0"
   box("0 2 0 1 0 1"); box("1 3 0.25 0.75 0.5 2")
@@ -134,14 +134,14 @@ function box(text, e, j) {
   for (j = 0; j < 8; j++) print e[1 + j % 2], e[3 + int(j / 2) % 2], e[5 + int(j / 4)]
 }' >parts.off
 holds "parts: mat" qmat mat parts.off -o parts.ma -o parts.glb --epsilon 2% --report parts.json
-judge "parts: two-sided error, one part, Euler characteristic" parts.off parts.ma --within 2% --components 1 --euler 1
+judge "parts: two-sided error, one component, Euler characteristic" parts.off parts.ma --within 2% --components 1 \
+  --euler 1
 holds "parts: both were united" grep -q '"parts_united": 2' parts.json
-holds "parts: the errors hold" qmat info parts.glb --against parts.off
+holds "parts: the stated errors hold" qmat info parts.glb --against parts.off
 
-# ---- Input that is no model ----
+# ---- Bad input ----
 
-# refused NAME FILE [OPTION...]: exit code 1, one line on stderr that names the file or the node that cannot work on what
-# was read, and no output.
+# refused WHAT FILE [OPTION...]: exit code 1, no output, and one line on stderr that names the file or the node.
 refused() {
   what=$1
   file=$2
@@ -162,13 +162,13 @@ refused() {
 model=models/l-bracket.off
 last=$(($(wc -l <$model) - 1))
 vertices=$(sed -n 2p $model | cut -d ' ' -f 1)
-refused "a file that is not there" nowhere.off
+refused "a file that does not exist" nowhere.off
 : >empty.off
 refused "an empty file" empty.off
 head -n 300 $model >cut.off
-refused "a file cut off among its vertices" cut.off
+refused "a file that ends among its vertices" cut.off
 head -n "$last" $model >cut-facets.off
-refused "a file cut off among its facets" cut-facets.off
+refused "a file that ends among its facets" cut-facets.off
 printf 'OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n' >no-facets.off
 refused "no facets" no-facets.off
 sed '10s/.*/nan 0 0/' $model >nan.off
@@ -180,18 +180,18 @@ refused "an index out of range" range.off
 sed '$s/.*/3 0 1 -1/' $model >negative.off
 refused "a negative index" negative.off
 sed '2s/.*/4000000000 5 0/' $model >counts.off
-refused "more vertices promised than the file can hold" counts.off
+refused "a count of vertices that the file cannot hold" counts.off
 sed '2s/.*/99999999999999999999999 5 0/' $model >overflow.off
 refused "a count that overflows" overflow.off
 sed '$s/.*/3 0 0 1/' $model >degenerate.off
 refused "a facet that names a vertex twice" degenerate.off
 sed "\$s/.*/$(sed -n "$((vertices + 5))p" $model)/" $model >duplicate.off
-refused "a facet that is there twice" duplicate.off
+refused "a repeated facet" duplicate.off
 cp $model wrong.stl
 refused "an ending that disagrees with the content" wrong.stl
 cp $model model.xyz
 printf 'not a model\n' >model.xyz
-refused "an ending that nobody knows" model.xyz
+refused "an unknown ending" model.xyz
 mkdir folder.off
 refused "a folder" folder.off
 head -c 65536 /dev/zero >zeros.glb
@@ -205,23 +205,23 @@ refused "all vertices in one point" point.off
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n' >range.obj
 refused "an OBJ index out of range" range.obj
 printf 'ply\nformat binary_little_endian 1.0\nelement vertex 900000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\nabc' >counts.ply
-refused "a PLY header that promises more than the file holds" counts.ply
+refused "a PLY header that counts more than the file holds" counts.ply
 head -c 80 /dev/zero >counts.stl
 printf '\377\377\377\177' >>counts.stl
-refused "an STL header that promises more than the file holds" counts.stl
+refused "an STL header that counts more than the file holds" counts.stl
 
-# Files of our own, broken: a compressed glTF whose identifiers lead nowhere must not reach the decoder.
+# Our own files, damaged: ids that are out of range must not reach the Draco decoder.
 if qmat mat $model -o good.glb --epsilon 2% --set asset.draco=true >said.txt 2>&1; then
   holds "a compressed glTF file can be read" qmat mat good.glb -o good.ma --epsilon 5%
   for id in POSITION NORMAL; do
     LC_ALL=C sed "s/\"$id\":[0-9]/\"$id\":9/g" good.glb >hostile.glb
     if cmp -s good.glb hostile.glb; then continue; fi
-    refused "a $id that leads nowhere" hostile.glb
+    refused "an id of $id that is out of range" hostile.glb
   done
   LC_ALL=C sed 's/"bufferView":[0-9]/"bufferView":9/g' good.glb >hostile.glb
-  refused "a buffer view that is not there" hostile.glb
+  refused "a buffer view that does not exist" hostile.glb
   LC_ALL=C sed 's/"buffer":[0-9]/"buffer":9/g' good.glb >hostile.glb
-  refused "a buffer that is not there" hostile.glb
+  refused "a buffer that does not exist" hostile.glb
   size=$(wc -c <good.glb)
   head -c $((size / 2)) good.glb >half.glb
   refused "half a glTF file" half.glb
@@ -230,10 +230,10 @@ else
   sed 's/^/        /' said.txt
 fi
 
-# Told to, defects are left out.
-holds "defects are dropped when told to" qmat mat duplicate.off -o dropped.ma --set model.defects=drop
+# model.defects=drop leaves defects out.
+holds "defects are dropped with model.defects=drop" qmat mat duplicate.off -o dropped.ma --set model.defects=drop
 
-# misused NAME TEXT ARGUMENT...: exit code 2, and the text on stderr.
+# misused WHAT TEXT ARGUMENT...: exit code 2, and the text on stderr.
 misused() {
   what=$1
   text=$2
@@ -251,7 +251,7 @@ misused "an unknown option" "did you mean '--epsilon'?" mat $model -o out.ma --e
 misused "an unknown command" "did you mean 'mat'?" mta $model -o out.ma
 misused "an unknown parameter" "did you mean 'epsilon'?" mat $model -o out.ma --set simple.epsilom=1%
 
-# A glTF scene comes back with all that is in it; each mesh has a medial mesh of its own, on all of its nodes.
+# A glTF scene keeps all of its content. Each mesh gets its own medial mesh, on all of its nodes.
 mkdir scene scene/out
 cat >scene/in.gltf <<END
 {"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2]}],"extensionsUsed":["ACME_glow"],
@@ -272,14 +272,14 @@ AAMAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAIA/AABAQAAAAAAA
 END
 echo "a picture" >scene/picture.png
 holds "a scene: mat" qmat mat scene/in.gltf -o scene/out/scene.gltf --epsilon 10% --threads 1
-holds "a scene: its files are beside it" cmp scene/picture.png scene/out/picture.png
-holds "a scene: unknown extensions stay" grep -q '"much": 0.25' scene/out/scene.gltf
+holds "a scene: its side files are copied" cmp scene/picture.png scene/out/picture.png
+holds "a scene: unknown extensions are kept" grep -q '"much": 0.25' scene/out/scene.gltf
 holds "a scene: a medial mesh on each node" test "$(grep -c '"qmat_data"' scene/out/scene.gltf)" -eq 3
-holds "a scene: one by name" qmat extract scene/out/scene.gltf --node long -o long.ma
-holds "a scene: one of an instance" qmat extract scene/out/scene.gltf --node left -o left.ma
-holds "a scene: one of another instance" qmat extract scene/out/scene.gltf --node right -o right.ma
-holds "a scene: both are the same" cmp left.ma right.ma
-holds "a scene: its errors hold" qmat info scene/out/scene.gltf --against scene/in.gltf
+holds "a scene: extract a node by name" qmat extract scene/out/scene.gltf --node long -o long.ma
+holds "a scene: extract an instance" qmat extract scene/out/scene.gltf --node left -o left.ma
+holds "a scene: extract another instance" qmat extract scene/out/scene.gltf --node right -o right.ma
+holds "a scene: both instances have the same medial mesh" cmp left.ma right.ma
+holds "a scene: the stated errors hold" qmat info scene/out/scene.gltf --against scene/in.gltf
 for threads in 2 8; do
   holds "a scene: mat with $threads threads" qmat mat scene/in.gltf -o scene/out/again.gltf --epsilon 10% \
     --threads $threads
@@ -287,18 +287,18 @@ for threads in 2 8; do
 done
 holds "a scene: one of its meshes" qmat mat scene/in.gltf -o bar.ma --epsilon 10% --set model.mesh=bar
 if qmat mat scene/in.gltf -o all.ma --epsilon 10% --set model.mesh=all >said.txt 2>complaints.txt; then
-  fail "a scene: several medial meshes in a format of one"
+  fail "a scene: a .ma file cannot hold two medial meshes"
 else
-  holds "a scene: several do not fit where one does" grep -q 'holds one medial mesh, and there are 2' complaints.txt
+  holds "a scene: a .ma file cannot hold two medial meshes" grep -q 'holds one medial mesh, and there are 2' complaints.txt
   qmat mat scene/in.gltf -o all.ma --set model.mesh=all --progress json >events.txt 2>&1
-  holds "a scene: that is found before anything is computed" test "$(grep -c '"start"' events.txt)" -eq 1
+  holds "a scene: the run fails before it computes anything" test "$(grep -c '"start"' events.txt)" -eq 1
 fi
 
-# A mesh that encloses nothing stays as it is, and is told; where no mesh is left, there is no result.
+# A mesh that encloses nothing is left as it is, with a warning. The run fails where no other mesh exists.
 sed -e 's/"POSITION":2},"indices":1/"POSITION":2},"indices":3/' \
   -e 's/"max":\[3,1,1\]}/&,{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}/' scene/in.gltf >scene/flat.gltf
 qmat mat scene/flat.gltf -o scene/out/flat.gltf --epsilon 10% >flat.txt 2>flat_warnings.txt
-holds "a flat mesh in a scene: the run goes on" test $? -eq 0
+holds "a flat mesh in a scene: the run succeeds" test $? -eq 0
 holds "a flat mesh in a scene: one warning names it" \
   test "$(grep -c "mesh 'bar' cannot be described: " flat_warnings.txt)$(grep -c . flat_warnings.txt)" = 11
 holds "a flat mesh in a scene: it is counted" grep -q 'describe 1 of the 2 meshes' flat.txt
@@ -321,15 +321,15 @@ if [ -d "$data/surfaces" ]; then
     if [ -s real.ma ]; then judge "$name: two-sided error" "$surface" real.ma --within 1% --samples 3000; fi
     rm -f real.ma real.glb
   done
-  # Surfaces that are not closed have no inside: a result or one clear line, but no crash.
+  # Open surfaces have no inside: qmat gives a result or one line of error, and does not crash.
   for surface in "$data"/dirty/*; do
     name=$(basename "$surface")
     qmat mat "$surface" -o real.ma --epsilon 2% --set model.defects=drop >said.txt 2>complaints.txt
     code=$?
     if { [ $code -eq 0 ] && [ -s real.ma ]; } || { [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ]; }; then
-      pass "$name: not closed: exit code $code $(cut -c 1-150 complaints.txt)"
+      pass "$name: open: exit code $code $(cut -c 1-150 complaints.txt)"
     else
-      fail "$name: not closed: exit code $code"
+      fail "$name: open: exit code $code"
       sed 's/^/        /' complaints.txt | head -n 5
     fi
     rm -f real.ma
@@ -339,7 +339,7 @@ if [ -d "$data/surfaces" ]; then
     holds "$name: mat" qmat mat "$asset" -o real.glb --epsilon 2%
   done
 else
-  skip "real models: there is no folder $data"
+  skip "the real models: the folder ../shared/data/surfaces is not present"
 fi
 
 # ---- Quality: no row of tests/quality/expected.txt gets worse ----
@@ -351,7 +351,7 @@ passed=$((passed + $(grep -c '^ok ' quality.txt)))
 bad=$(grep -c '^FAILED ' quality.txt)
 if [ "$code" -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
 failed=$((failed + bad))
-skipped=$((skipped + $(grep -c '^skipped ' quality.txt)))
+skipped=$((skipped + $(grep -c '^skipped: ' quality.txt)))
 
 echo "$passed $failed $skipped" >"$counts"
 printf 'end to end: %d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"

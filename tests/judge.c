@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* qmat_judge: says how well a medial mesh (.ma) describes a surface (.off, .obj), and whether that is good enough. It
- * shares no code with the library: its own readers, its own distances, brute force over everything. Errors are taken
- * at samples, so they are lower bounds of the true ones. */
+/* qmat_judge: measures how well a medial mesh (.ma) describes a surface (.off, .obj), and checks the result. It shares
+ * no code with the library: it has its own readers and distances, and compares everything with everything. It measures
+ * errors at samples, so they are lower bounds of the true errors. */
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -13,16 +13,15 @@
 
 static const char usage[] =
     "usage: qmat_judge SURFACE.(off|obj) MEDIAL.ma [CHECK ...]\n"
-    "Prints what it finds; exit code 1 when a check fails. Fractions are of the bounding-box diagonal.\n"
-    "  --within FRACTION         both errors are at most that\n"
+    "Prints its figures; exit code 1 when a check fails. Fractions are of the bounding-box diagonal.\n"
+    "  --within FRACTION         both errors are at most FRACTION\n"
     "  --components N            the medial mesh has N connected parts\n"
     "  --euler N                 vertices - edges + triangles is N\n"
     "  --known KNOWN.ma          the true medial mesh; with\n"
-    "  --near FRACTION           every sphere is that near to it, in centre and in radius\n"
-    "  --samples N               on each side (default 20000)\n"
-    "Always checked: finite numbers, radii not negative, indices in range, no simplex twice or degenerate, the edges "
-    "of\n"
-    "every triangle listed, centres inside the surface.\n";
+    "  --near FRACTION           every sphere is at most FRACTION away from it, in centre and in radius\n"
+    "  --samples N               samples of the surface, and of the envelope (default 20000)\n"
+    "It always checks that numbers are finite, radii are not negative, indices are in range, no simplex is repeated\n"
+    "or degenerate, the edges of every triangle are listed, and centres are inside the surface.\n";
 
 typedef struct vec {
   double x, y, z;
@@ -53,7 +52,7 @@ typedef struct sphere {
   double r;
 } sphere;
 
-/* One, two or three spheres and all between them; ids rise. */
+/* A sphere, a cone or a slab, by the rising ids of its one to three spheres. */
 typedef struct simplex {
   uint32_t ids[3];
   int count;
@@ -203,8 +202,8 @@ static double sphere_value(const sphere *s, vec p) {
   return length(sub(p, s->c)) - s->r;
 }
 
-/* min over the segment of |p - c| - r. At an inner minimum the way from the foot of p to c is the radius' growth per
- * length times |p - c|. */
+/* The minimum of |p - c| - r over the spheres (c, r) of a segment. At a minimum inside the segment, the distance along
+ * the segment from the foot of p to c is the slope of the radius times |p - c|. */
 static double cone_value(const sphere *a, const sphere *b, vec p) {
   const double best = fmin(sphere_value(a, p), sphere_value(b, p));
   const vec d = sub(b->c, a->c), q = sub(p, a->c);
@@ -215,7 +214,8 @@ static double cone_value(const sphere *a, const sphere *b, vec p) {
   return at > 0 && at < l ? fmin(best, distance - a->r - growth * at) : best;
 }
 
-/* The gradient of the radius over a slab: in its plane, with the corners' differences along the sides. */
+/* The gradient of the radius over a slab: the vector in its plane that gives the radii's differences along two sides.
+ */
 static vec radius_gradient(const sphere *a, const sphere *b, const sphere *c, vec normal) {
   const vec u = sub(b->c, a->c), v = sub(c->c, a->c);
   const double area = dot(normal, normal);
@@ -244,7 +244,7 @@ static double simplex_value(const medial *m, const simplex *x, vec p) {
   return slab_value(s + x->ids[0], s + x->ids[1], s + x->ids[2], p);
 }
 
-/* The value of the nearest simplex. Simplices whose box around is farther are not looked at. */
+/* The signed distance to the nearest simplex. Simplices with a farther bounding box are skipped. */
 static double envelope_value(const medial *m, vec p) {
   double best = INFINITY;
   for (size_t i = 0; i < m->simplex_count; i++) {
@@ -260,7 +260,7 @@ static double envelope_value(const medial *m, vec p) {
   return best;
 }
 
-/* The point of the triangle or segment of `count` corners that is nearest to p, as weights. */
+/* The weights of the point nearest to p in a triangle or segment of `count` corners. */
 static double nearest_weights(const vec *corners, int count, vec p, double *weights) {
   double best = INFINITY, w[3];
   for (int side = 0; side < (count == 3 ? 3 : 1); side++) { /* the sides, or the one segment, or the one point */
@@ -291,7 +291,7 @@ static void triangle_corners(const surface *s, size_t t, vec corners[3]) {
   for (size_t k = 0; k < 3; k++) corners[k] = s->vertices[s->triangles[3 * t + k]];
 }
 
-/* Anything at or below `enough` will do. */
+/* The distance to the surface; the search ends early at a distance of at most `enough`. */
 static double surface_distance(const surface *s, vec p, double enough) {
   double best = INFINITY, weights[3];
   for (size_t t = 0; t < s->triangle_count && best > enough; t++) {
@@ -303,7 +303,7 @@ static double surface_distance(const surface *s, vec p, double enough) {
   return best;
 }
 
-/* Whole turns of the surface around p: 1 inside, 0 outside (Van Oosterom and Strackee 1983). */
+/* The winding number of the surface around p: 1 inside, 0 outside (Van Oosterom and Strackee 1983). */
 static double winding_number(const surface *s, vec p) {
   double sum = 0;
   for (size_t t = 0; t < s->triangle_count; t++) {
@@ -344,7 +344,7 @@ static double surface_to_envelope(const surface *s, const medial *m, size_t samp
     triangle_corners(s, t, c);
     area += length(cross(sub(c[1], c[0]), sub(c[2], c[0])));
     sums[t] = area;
-    worst = fmax(worst, envelope_value(m, c[0])); /* all corners come up as a first one, or nearly */
+    worst = fmax(worst, envelope_value(m, c[0])); /* nearly every vertex is some triangle's first corner */
   }
   for (size_t i = 0; i < samples; i++) {
     size_t low = 0, high = s->triangle_count - 1;
@@ -372,8 +372,8 @@ static vec random_direction(void) {
   return (vec){flat * cos(turn), flat * sin(turn), z};
 }
 
-/* A random point where the simplex itself ends: on the plane that touches a slab, the line that touches a cone, or the
- * ball of a sphere. False where the simplex has no such plane or line. */
+/* A random point of the boundary of one simplex: of a tangent plane of a slab, a tangent line of a cone, or a sphere.
+ * False where the slab has no tangent plane or the cone no tangent line. */
 static bool random_boundary_point(const medial *m, const simplex *x, vec *p) {
   const sphere *s[3];
   double w[3], r = 0;
@@ -403,7 +403,7 @@ static bool random_boundary_point(const medial *m, const simplex *x, vec *p) {
   return true;
 }
 
-/* Boundary points of a simplex that lie in no other one are points of the envelope. */
+/* A boundary point of a simplex is on the envelope's boundary where no other simplex contains it. */
 static double envelope_to_surface(const surface *s, const medial *m, double diagonal, size_t samples) {
   double worst = 0;
   simplex *all = need(calloc(m->simplex_count + m->sphere_count + 1, sizeof *all));
@@ -423,7 +423,7 @@ static double envelope_to_surface(const surface *s, const medial *m, double diag
   return worst;
 }
 
-/* ---- The verdict ---- */
+/* ---- Checks ---- */
 
 static int failures = 0;
 
@@ -496,7 +496,7 @@ static void judge_centres(const surface *s, const medial *m, double diagonal) {
   if (outside > 0) fail("centres outside the surface", (double)outside, 0);
 }
 
-/* How far the spheres are from the true medial mesh, as the larger of the distances in space and in radius. */
+/* The largest distance of a sphere from the true medial mesh: of its centre or of its radius, whichever is larger. */
 static void judge_known(const medial *m, const medial *known, double diagonal, double near) {
   double worst = 0;
   for (size_t i = 0; i < m->sphere_count; i++) {

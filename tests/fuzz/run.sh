@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Looks for inputs that break a reader, with libFuzzer: run.sh [--minutes M] [TARGET...]
-# M minutes (default: 1) are divided among the targets (default: all). Builds the preset fuzz (build/fuzz) first. What is
-# found stays in build/fuzz/found and is named; exit code 1 then. Exit code 77: clang or one of its libraries is missing.
+# Searches for inputs that break a reader, with libFuzzer: run.sh [--minutes M] [TARGET...]
+# M minutes (default: 1) are divided among the targets (default: all). Builds the preset fuzz (build/fuzz) first. Inputs
+# that break a reader stay in build/fuzz/found; exit code 1 then. Exit code 77: clang or one of its libraries is missing.
+# Add an input that broke a reader to tests/fuzz/corpus/TARGET: the test fuzz.corpus repeats it with every compiler.
 set -u
 top=$(cd "$(dirname "$0")/../.." && pwd) || exit 2
 build=$top/build/fuzz
@@ -41,7 +42,7 @@ for target in "$@"; do
   dictionary=$top/tests/fuzz/dictionaries/$target.dict
   mkdir -p "$build/grown/$target"
   if [ -e "$dictionary" ]; then dictionary=-dict=$dictionary; else dictionary=-use_value_profile=1; fi
-  # New inputs of interest stay in build/fuzz/grown, where the next run continues.
+  # Inputs that reach new code stay in build/fuzz/grown, where the next run continues.
   if "$build/qmat_fuzz" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=16384 \
     -print_final_stats=1 -artifact_prefix="$build/found/$target-" "$dictionary" "$build/grown/$target" "$corpus" \
     >"$work/said" 2>&1; then

@@ -55,14 +55,19 @@ if [ -n "$check" ] || [ $failed -ne 0 ]; then
   exit $failed
 fi
 
-# The copy keeps its build. A file that an interrupted run left mutated is compiled again.
+# The copy keeps its build. Only files that differ are replaced, and so compiled again: also one that an interrupted run
+# left mutated.
 mkdir -p "$tree"
-rm -rf "$tree/core" "$tree/io" "$tree/nodes" "$tree/graphs" "$tree/tests" "$tree/examples" "$tree/cmake"
-(cd "$top" && tar cf - --exclude=./build --exclude=./.git .) | (cd "$tree" && tar xf -) || exit 2
-if [ -s "$tree/build/mutated" ]; then touch "$tree/$(cat "$tree/build/mutated")"; fi
+(cd "$top" && find CMakeLists.txt core io nodes graphs tests examples cmake -type f) | LC_ALL=C sort >"$work/wanted"
+(cd "$tree" && find core io nodes graphs tests examples cmake -type f 2>"$work/log") | LC_ALL=C sort >"$work/present"
+LC_ALL=C comm -13 "$work/wanted" "$work/present" | while read -r file; do rm -f "$tree/$file"; done
+while read -r file; do
+  cmp -s "$top/$file" "$tree/$file" && continue
+  mkdir -p "$tree/$(dirname "$file")" && cp "$top/$file" "$tree/$file" || exit 2
+done <"$work/wanted"
 # shellcheck disable=SC2086 # options are words
-if ! cmake -S "$tree" -B "$tree/build/release" -G Ninja -DCMAKE_BUILD_TYPE=Release ${QMAT_CMAKE_OPTIONS:-} \
-  >"$work/log" 2>&1; then
+if ! cmake -S "$tree" -B "$tree/build/release" -G Ninja -DCMAKE_BUILD_TYPE=Release -DQMAT_TESTS=ON \
+  ${QMAT_CMAKE_OPTIONS:-} >"$work/log" 2>&1; then
   tail -n 20 "$work/log"
   exit 2
 fi
@@ -93,7 +98,6 @@ caught=0
 while IFS=$separator read -r number name text with test; do
   find_text "$tree" "$text"
   cp "$tree/$file" "$work/original"
-  echo "$file" >"$tree/build/mutated"
   started=$(date +%s)
   TEXT=$text WITH=$with awk '{
     at = index($0, ENVIRON["TEXT"])
@@ -103,7 +107,6 @@ while IFS=$separator read -r number name text with test; do
   build_and_run "$test" </dev/null
   result=$?
   cp "$work/original" "$tree/$file"
-  : >"$tree/build/mutated"
   seconds=$(($(date +%s) - started))
   case $result in
     1) caught=$((caught + 1)) && echo "ok      mutant $number $name: caught by $test ($seconds s)" ;;

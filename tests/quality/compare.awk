@@ -51,6 +51,6 @@ END {
     if (row ~ /^surfaces\// && !surfaces) { absent++; list = list (list ? ", " : "") row }
     else { failed = 1; print "FAILED  quality: " row ": was not measured" }
   }
-  if (absent) print "skipped quality: " list ": the folder ../shared/data/surfaces is not present"
+  if (absent) print "skipped: quality of " list ": the folder ../shared/data/surfaces is not present"
   exit failed
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# One row of the quality table from the report of `qmat mat --report`: awk -v model=NAME -v epsilon=1% -f figures.awk FILE.
+# Makes a row of the quality table from a report of `qmat mat --report`:
+#   awk -v model=NAME -v epsilon=1% -f figures.awk REPORT
 # Errors are percent of the diagonal, rounded up to a thousandth. A Betti number that the report does not state is "-".
 function round_up(x, thousandths) {
   thousandths = int(x * 1e5)
@@ -17,6 +18,7 @@ found && match($0, /"[a-z_]+": [-+.0-9a-z]+,?$/) {
 }
 END {
   if (!("surface_to_envelope" in figures) || !("spheres" in figures)) exit 1
+  certified = figures["certified"] == "true" ? "yes" : "no"
   print model, epsilon, figures["spheres"], round_up(figures["surface_to_envelope"]), \
-    round_up(figures["envelope_to_surface"]), figures["certified"] == "true" ? "yes" : "no", betti(""), betti("_of_solid")
+    round_up(figures["envelope_to_surface"]), certified, betti(""), betti("_of_solid")
 }
