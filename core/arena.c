@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Under AddressSanitizer the unused part of a block is poisoned, so that running past an arena array is found. */
+/* Under AddressSanitizer the unused part of a block is poisoned, so that an overrun of an arena array is found. */
 #if defined(__SANITIZE_ADDRESS__)
 #define QMAT_ARENA_POISON 1
 #elif defined(__has_feature)
@@ -23,7 +23,7 @@
 enum { ALIGNMENT = 64, PADDING = 16 };
 static const size_t FIRST_BLOCK = (size_t)1 << 16, LARGEST_SHARED_BLOCK = (size_t)1 << 24;
 
-/* Precedes the memory that it hands out; padded to ALIGNMENT. */
+/* The header of a block, followed by its memory; padded to ALIGNMENT. */
 typedef struct qmat_arena_block {
   struct qmat_arena_block *older;
   size_t used, capacity; /* bytes after the header */
@@ -57,7 +57,7 @@ void *qmat_arena_alloc(qmat_arena *arena, size_t count, size_t size) {
     *fresh = (qmat_arena_block){.older = block, .capacity = capacity};
     ASAN_POISON_MEMORY_REGION(block_memory(fresh), capacity);
     if (block && block->capacity - block->used > capacity - bytes) {
-      /* A large array took a block of its own: what is left of the current one stays in use. */
+      /* A large array gets its own block, so that the rest of the current block stays in use. */
       fresh->older = block->older;
       block->older = fresh;
     } else {

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* How a surface of a cage is subdivided, and what its border does: as USD says it. */
+/* The subdivision scheme and the boundary rule of a surface, as defined by USD. */
 typedef enum qmat_scheme {
   QMAT_SCHEME_NONE,
   QMAT_SCHEME_CATMULL_CLARK,
@@ -15,24 +15,25 @@ typedef enum qmat_scheme {
 } qmat_scheme;
 
 typedef enum qmat_boundary {
-  QMAT_BOUNDARY_NONE,            /* faces at the border are left out */
+  QMAT_BOUNDARY_NONE,            /* faces at the border are dropped */
   QMAT_BOUNDARY_EDGE,            /* the border is a smooth curve */
-  QMAT_BOUNDARY_EDGE_AND_CORNER, /* the same, and vertices of one face are corners */
+  QMAT_BOUNDARY_EDGE_AND_CORNER, /* the same, and vertices with a single face are sharp corners */
   QMAT_BOUNDARY_COUNT
 } qmat_boundary;
 
-/* The polygons that triangles were made of, where some of them are control cages of subdivision surfaces: one surface
- * after the other, each a run of faces with vertices of its own. Sharpness 0 is smooth, from 10 on it is infinite. */
+/* The polygons that a mesh was triangulated from, kept when some of them are control cages of subdivision surfaces. The
+ * surfaces follow one another; each is a run of faces with its own vertices. Sharpness 0 is smooth, 10 and more is
+ * infinitely sharp. */
 typedef struct qmat_cage {
   size_t surface_count, vertex_count, face_count, corner_count, hole_count, crease_count, sharp_count;
-  uint32_t *surface_faces;  /* surface_count: how many faces it has */
+  uint32_t *surface_faces;  /* surface_count: the number of its faces */
   uint32_t *schemes;        /* surface_count: a qmat_scheme */
   uint32_t *boundaries;     /* surface_count: a qmat_boundary */
   double *positions;        /* 3 * vertex_count: x y z */
-  uint32_t *face_sizes;     /* face_count: how many corners it has */
-  uint32_t *corners;        /* corner_count: vertices of the faces, one face after the other */
-  uint32_t *holes;          /* hole_count: faces that are not part of the surface, but shape it */
-  uint32_t *creases;        /* 2 * crease_count: the vertices of a sharp edge */
+  uint32_t *face_sizes;     /* face_count: the number of its corners */
+  uint32_t *corners;        /* corner_count: the vertices of the faces, face by face */
+  uint32_t *holes;          /* hole_count: faces that shape the surface without being part of it */
+  uint32_t *creases;        /* 2 * crease_count: the ends of a sharp edge */
   double *crease_sharpness; /* crease_count */
   uint32_t *sharp_vertices; /* sharp_count */
   double *vertex_sharpness; /* sharp_count */

@@ -23,7 +23,7 @@ void qmat_note_file_read(const qmat_context *context, const char *path, const ui
   if (context->file_read) context->file_read(context->file_read_user, path, bytes, size);
 }
 
-/* Copies what fits, without cutting a UTF-8 sequence; NULL becomes "". */
+/* Copies as much as fits, without splitting a UTF-8 sequence. NULL becomes "". */
 static void copy_text(char *to, size_t size, const char *from) {
   if (!from) from = "";
   size_t length = strnlen(from, size);
@@ -35,7 +35,7 @@ static void copy_text(char *to, size_t size, const char *from) {
   to[length] = '\0';
 }
 
-/* Formats by way of a copy, since the arguments may be texts of the error itself. */
+/* Formats into a copy first: the arguments may point into the error itself. */
 static void format_text(char *to, size_t size, const char *format, va_list arguments)
     __attribute__((format(printf, 3, 0)));
 static void format_text(char *to, size_t size, const char *format, va_list arguments) {
@@ -119,7 +119,7 @@ static bool starts_with_word(const char *message, const char *word) {
 
 void qmat_error_format(const qmat_error *error, char *text, size_t size) {
   if (size == 0) return;
-  char line[2048]; /* every part at its longest fits */
+  char line[2048]; /* large enough for the longest parts */
   size_t used = 0;
 #define APPEND(...) used += (size_t)snprintf(line + used, sizeof line - used, __VA_ARGS__)
   line[0] = '\0';
@@ -143,7 +143,7 @@ void qmat_error_format(const qmat_error *error, char *text, size_t size) {
   APPEND("%s", error->message[0] != '\0' ? error->message : qmat_status_name(error->status));
   if (error->hint[0] != '\0') APPEND(" (%s)", error->hint);
 #undef APPEND
-  /* Names and library texts may hold line ends and terminal controls. */
+  /* Names and texts from libraries may contain line breaks and terminal controls. */
   for (size_t i = 0; i < used; i++) {
     if ((unsigned char)line[i] < 0x20 || line[i] == 0x7F) line[i] = ' ';
   }

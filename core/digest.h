@@ -20,10 +20,10 @@ typedef struct qmat_hasher {
 
 /* Starts a hash; QMAT_ERROR_MEMORY or QMAT_ERROR_DEPENDENCY when OpenSSL cannot. */
 qmat_status qmat_hasher_init(qmat_hasher *hasher);
-/* Adds `size` bytes; NULL is allowed for 0. Does nothing after a failed init. */
+/* Adds `size` bytes; `bytes` may be NULL when size is 0. Does nothing after a failed init. */
 void qmat_hasher_add(qmat_hasher *hasher, const void *bytes, size_t size);
-/* Gives the digest and frees the hasher; NULL `digest` only frees. Safe after a failed init: QMAT_ERROR_DEPENDENCY and
- * a digest of zeros when the hasher never started or OpenSSL failed on the way. */
+/* Writes the digest and frees the hasher; with `digest` NULL it only frees. QMAT_ERROR_DEPENDENCY and a digest of zeros
+ * when init failed or OpenSSL failed since. */
 qmat_status qmat_hasher_finish(qmat_hasher *hasher, qmat_digest *digest);
 
 /* The digest of `size` bytes; statuses as above. */
@@ -32,7 +32,7 @@ qmat_status qmat_digest_of(const void *bytes, size_t size, qmat_digest *digest);
 /* The digest of the bytes of a regular file, read in pieces. QMAT_ERROR_IO when it cannot be read. Cost: one pass. */
 qmat_status qmat_digest_of_file(const char *path, qmat_digest *digest);
 
-/* The digest that exactly 64 lower-case hexadecimal digits stand for; false leaves `*digest` alone. */
+/* Parses exactly 64 lower-case hexadecimal digits. On false, `*digest` is unchanged. */
 bool qmat_digest_parse(const char *text, qmat_digest *digest);
 
 bool qmat_digest_equal(const qmat_digest *a, const qmat_digest *b);

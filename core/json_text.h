@@ -6,15 +6,16 @@
 
 #include <jansson.h>
 
-/* The text of `json`, ended by a zero, with jansson's flags. `size` may be NULL; it gets the length without the zero.
- * NULL when memory is short; json_dumps of jansson 2.14 may lose keys then and say nothing. Free with qmat_free. */
+/* The zero-terminated text of `json`, written with jansson's flags. `size` (may be NULL) receives the length without
+ * the zero. NULL when memory is short, where json_dumps of jansson 2.14 may silently drop keys. Free with qmat_free. */
 char *qmat_json_text(const json_t *json, size_t flags, size_t *size);
 
 /* A JSON string of `text`, whose bytes that are not UTF-8 become '?'; a path may have such bytes. NULL when memory is
  * short; the caller calls json_decref. */
 json_t *qmat_json_string(const char *text);
 
-/* Sets a whole number of an object: 0, or -1 when memory is short or `object` is NULL, as json_object_set_new does. */
+/* Sets a whole number of an object. Returns 0, or -1 when memory is short or `object` is NULL, like
+ * json_object_set_new. */
 int qmat_json_set_count(json_t *object, const char *key, size_t count);
 
 #endif

@@ -49,7 +49,6 @@ size_t qmat_output_find(const qmat_node *node, const char *name) {
   return port_find(node->outputs, name);
 }
 
-/* The parameter's place in the node's struct. */
 static void *slot(const qmat_param *param, void *params) {
   return (char *)params + param->offset;
 }
@@ -97,7 +96,7 @@ static qmat_status fail_range(qmat_context *context, const qmat_param *param, co
   qmat_format_number(param->min, min, sizeof min);
   qmat_format_number(param->max, max, sizeof max);
   format_unit(param, unit, sizeof unit);
-  const double huge = param->type == QMAT_PARAM_INT ? 0x1p53 : 1e300; /* such bounds say "none" */
+  const double huge = param->type == QMAT_PARAM_INT ? 0x1p53 : 1e300; /* such bounds mean "none" */
   if (param->max >= huge && param->min <= -huge) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%s is out of range: %s", param->name, text);
   } else if (param->max >= huge) {
@@ -157,7 +156,7 @@ static qmat_status parse_float(qmat_context *context, const qmat_param *param, c
     return qmat_fail_field(context, param->name);
   }
   if (!float_in_range(param, number)) return fail_range(context, param, text);
-  *value = number + 0.0; /* -0 becomes 0: one canonical zero */
+  *value = number + 0.0; /* -0 becomes 0, the canonical zero */
   return QMAT_OK;
 }
 
@@ -232,7 +231,7 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
     if (param->type == QMAT_PARAM_ENUM) {
       const int choice = *(const int *)place;
       if (choice < 0 || (size_t)choice >= choice_count(param)) {
-        qmat_fail(context, QMAT_ERROR_USAGE, "%s has no choice of number %d", param->name, choice);
+        qmat_fail(context, QMAT_ERROR_USAGE, "%s has no choice number %d", param->name, choice);
         return qmat_fail_field(context, param->name);
       }
     }
@@ -302,7 +301,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
     if (status == QMAT_OK) {
       status = check_outputs(context, node, outputs);
     } else if (context->error.status != status) {
-      qmat_fail(context, status, "the node failed and did not say why");
+      qmat_fail(context, status, "the node failed without recording an error");
     }
   }
   for (size_t i = 0; status != QMAT_OK && i < qmat_output_count(node); i++) {

@@ -6,28 +6,29 @@
 #include <string.h>
 
 #include "core/geometry/medial_distance.h"
+#include "core/value_check.h"
 
-/* A leaf holds at most this many primitives. Median splits halve the count, so that the depth stays below 64. */
+/* LEAF_SIZE: the most primitives of a leaf. Median splits halve the count, so the depth stays below 64. */
 enum { LEAF_SIZE = 3, STACK_SIZE = 72 };
 
 /* A node of the hierarchy, in depth-first order: the left child follows its parent. */
 typedef struct envelope_node {
-  double low[3], high[3]; /* of the primitives' volumes */
-  double largest;         /* radius */
-  uint32_t right;         /* the right child; of a leaf its first item */
-  uint32_t count;         /* items of a leaf; 0: an inner node */
+  double low[3], high[3]; /* the box of the primitives */
+  double largest;         /* the largest radius */
+  uint32_t right;         /* the right child, or the first item of a leaf */
+  uint32_t count;         /* the items of a leaf; 0: an inner node */
 } envelope_node;
 
 typedef struct envelope_item {
-  uint32_t primitive; /* as numbered for the caller */
+  uint32_t primitive; /* its number for the caller */
   uint32_t slot;      /* in the array of its kind */
 } envelope_item;
 
 struct qmat_envelope {
   size_t primitive_count, slab_count, cone_count, sphere_count, node_count;
-  uint32_t *ids;    /* 3 a slab, then 2 a cone, then 1 a sphere */
-  double *ends;     /* the spheres of the primitives, 4 an id, laid out as the ids */
-  qmat_slab *slabs; /* all kinds in the order of the leaves */
+  uint32_t *ids;    /* 3 per slab, then 2 per cone, then 1 per sphere */
+  double *ends;     /* the spheres of the primitives: 4 doubles for each of `ids` */
+  qmat_slab *slabs; /* slabs, cones and spheres in the order of the leaves */
   qmat_cone *cones;
   double *spheres;
   envelope_item *items;
@@ -81,7 +82,7 @@ static uint64_t edge_key(uint32_t a, uint32_t b) {
   return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
 }
 
-static bool holds_key(const uint64_t *keys, size_t count, uint64_t key) {
+static bool has_key(const uint64_t *keys, size_t count, uint64_t key) {
   size_t low = 0;
   while (count > 0) {
     size_t half = count / 2;
@@ -92,27 +93,18 @@ static bool holds_key(const uint64_t *keys, size_t count, uint64_t key) {
       count = half;
     }
   }
-  return keys[low] == key; /* the array ends with a key that is larger than all */
+  return keys[low] == key; /* the array ends with a sentinel that is larger than every key */
 }
 
-static qmat_status check_ids(qmat_context *context, const uint32_t *ids, size_t rows, size_t per_row, const char *kind,
-                             size_t sphere_count) {
-  for (size_t i = 0; i < rows * per_row; i++) {
-    if (ids[i] < sphere_count) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "The %s names sphere %u of %zu", kind, ids[i], sphere_count);
-    return qmat_fail_element(context, kind, (int64_t)(i / per_row));
-  }
-  return QMAT_OK;
-}
-
-/* Numbers the primitives: fills the counts, ids and ends. */
+/* Numbers the primitives: sets the counts, ids and ends. */
 static qmat_status number_primitives(qmat_context *context, qmat_envelope *envelope, const double *spheres,
                                      size_t sphere_count, const uint32_t *edges, size_t edge_count,
                                      const uint32_t *triangles, size_t triangle_count) {
-  qmat_status status = check_ids(context, edges, edge_count, 2, "edge", sphere_count);
-  if (status == QMAT_OK) status = check_ids(context, triangles, triangle_count, 3, "triangle", sphere_count);
+  qmat_status status = qmat_check_ids(context, edges, 2 * edge_count, sphere_count, "edge", 2, "sphere");
+  if (status == QMAT_OK)
+    status = qmat_check_ids(context, triangles, 3 * triangle_count, sphere_count, "triangle", 3, "sphere");
   if (status != QMAT_OK) return status;
-  /* Items are numbered with 32 bits. */
+  /* Items have 32-bit numbers. */
   if (triangle_count + edge_count + sphere_count > UINT32_MAX / 2)
     return qmat_fail_memory(context, "medial primitives");
 
@@ -138,7 +130,7 @@ static qmat_status number_primitives(qmat_context *context, qmat_envelope *envel
   for (size_t e = 0; e < edge_count; e++) {
     uint32_t a = edges[2 * e], b = edges[2 * e + 1];
     used[a] = used[b] = true;
-    if (holds_key(sides, 3 * triangle_count, edge_key(a, b))) continue;
+    if (has_key(sides, 3 * triangle_count, edge_key(a, b))) continue;
     envelope->ids[filled++] = a;
     envelope->ids[filled++] = b;
     envelope->cone_count++;
@@ -165,18 +157,18 @@ done:
 
 typedef struct hierarchy_build {
   qmat_envelope *envelope;
-  double *centres; /* 3 a primitive: of its box */
+  double *centres; /* 3 per primitive: of its box */
   uint32_t *order; /* primitives, permuted */
   uint32_t next_slab, next_cone, next_sphere;
 } hierarchy_build;
 
-/* Orders by centre along the axis, then by number: one order only, whatever the sorting does. */
+/* Orders by centre along the axis, then by number. The order is total, so results do not depend on the algorithm. */
 static bool before(const hierarchy_build *build, int axis, uint32_t a, uint32_t b) {
   double x = build->centres[3 * (size_t)a + (size_t)axis], y = build->centres[3 * (size_t)b + (size_t)axis];
   return x < y || (x == y && a < b);
 }
 
-/* Hoare's selection: order[middle] gets its place in the sorted order, smaller ones before it. */
+/* Hoare's selection: puts the element of rank `middle` at that index and all smaller ones before it. */
 static void select_median(const hierarchy_build *build, int axis, size_t first, size_t end, size_t middle) {
   uint32_t *order = build->order;
   ptrdiff_t low = (ptrdiff_t)first, high = (ptrdiff_t)end - 1, wanted = (ptrdiff_t)middle;
@@ -264,7 +256,7 @@ static qmat_status build_hierarchy(qmat_context *context, qmat_envelope *envelop
   envelope->cones = qmat_alloc(envelope->cone_count, sizeof *envelope->cones);
   envelope->spheres = qmat_alloc(4 * envelope->sphere_count, sizeof *envelope->spheres);
   envelope->items = qmat_alloc(count, sizeof *envelope->items);
-  /* Leaves hold two at least where anything was split, so there are fewer nodes than primitives, or one. */
+  /* After a split every leaf has at least two items, so there are fewer nodes than primitives, or exactly one. */
   envelope->nodes = qmat_alloc(count + 1, sizeof *envelope->nodes);
   qmat_status status = QMAT_OK;
   if (!build.centres || !build.order || !envelope->slabs || !envelope->cones || !envelope->spheres ||
@@ -313,8 +305,9 @@ qmat_status qmat_envelope_of_medial(qmat_context *context, const qmat_medial *me
                            medial->triangles, medial->triangle_count, envelope);
 }
 
-/* Below this no primitive of the node gets. A sphere inside the box is no larger than its centre's distance to the
- * box's sides, so a point at depth d below them lies at most d deep in it. */
+/* A lower bound of F over the node's primitives. Outside the box it is the distance to the box. Inside, a sphere's
+ * radius is at most the distance of its centre to the box's sides, so a point at depth d in the box is at most d deep
+ * in it. */
 static inline double lower_bound(const envelope_node *node, const double p[3]) {
   double outside2 = 0, depth = -INFINITY;
   for (int k = 0; k < 3; k++) {
@@ -334,8 +327,8 @@ static inline double item_distance(const qmat_envelope *envelope, envelope_item 
   return qmat_sphere_distance(envelope->spheres + 4 * (size_t)item.slot, p);
 }
 
-/* The smallest distance that is at most `limit`, INFINITY when there is none, and the item that attains it; or the
- * first that is found below `enough`. */
+/* The smallest signed distance that is at most `limit` and the item that attains it; INFINITY when there is none. The
+ * search ends early with the first distance below `enough`. */
 static double search(const qmat_envelope *envelope, const double p[3], double limit, double enough,
                      envelope_item *nearest) {
   if (envelope->node_count == 0) return INFINITY;

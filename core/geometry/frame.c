@@ -18,11 +18,11 @@ qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qma
   }
   double largest = 0;
   for (int axis = 0; axis < 3; axis++) {
-    /* Halves first: the sum of two large coordinates would overflow. */
+    /* Halved before adding: the sum of two large coordinates could overflow. */
     frame->centre[axis] = 0.5 * low[axis] + 0.5 * high[axis];
     largest = fmax(largest, high[axis] - low[axis]);
   }
-  /* Scaled by the largest extent, so that the squares of a tiny model do not vanish. */
+  /* Scaled by the largest extent, so that the squares of a tiny model do not underflow. */
   double sum = 0;
   for (int axis = 0; axis < 3 && largest > 0; axis++) {
     const double ratio = (high[axis] - low[axis]) / largest;
@@ -40,7 +40,7 @@ qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qma
   return QMAT_OK;
 }
 
-/* Divides rather than multiplies by the reciprocal, which would overflow for the tiniest diagonals. */
+/* Divides by the diagonal, because the reciprocal of a tiny diagonal could overflow. */
 void qmat_frame_to_unit(const qmat_frame *frame, const double *model, size_t count, double *unit) {
   for (size_t i = 0; i < 3 * count; i++) unit[i] = (model[i] - frame->centre[i % 3]) / frame->diagonal;
 }

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "core/value_check.h"
+
 #define MOST_ROWS ((size_t)1 << 40) /* keeps 3 * count and count * 12 bytes far from overflow */
 
 static void put_ids_in_order(uint32_t *row, size_t width) {
@@ -15,26 +17,15 @@ static void put_ids_in_order(uint32_t *row, size_t width) {
   }
 }
 
-static bool names_a_sphere_twice(const uint32_t *row, size_t width) {
+static bool is_degenerate(const uint32_t *row, size_t width) {
   for (size_t i = 1; i < width; i++) {
     if (row[i] == row[i - 1]) return true;
   }
   return false;
 }
 
-static qmat_status check_ids(qmat_context *context, const char *kind, const uint32_t *ids, size_t count, size_t width,
-                             size_t sphere_count) {
-  for (size_t i = 0; i < count * width; i++) {
-    if (ids[i] >= sphere_count) {
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "names sphere %u of %zu", ids[i], sphere_count);
-      return qmat_fail_element(context, kind, (int64_t)(i / width));
-    }
-  }
-  return QMAT_OK;
-}
-
-/* One stable pass per column, last column first, leaves the rows in dictionary order. `swap` has the rows' size,
- * `starts` sphere_count + 1 elements. The sorted rows are in `rows`, without repeats; returns how many. */
+/* Sorts the rows lexicographically, by one stable counting sort per column from last to first, and drops repeats.
+ * `swap` is as large as `rows`; `starts` has sphere_count + 1 elements. Returns the number of rows left. */
 static size_t sort_rows(uint32_t *rows, uint32_t *swap, size_t *starts, size_t count, size_t width,
                         size_t sphere_count) {
   uint32_t *from = rows, *to = swap;
@@ -66,9 +57,9 @@ qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial
   if (edge_count > MOST_ROWS || triangle_count > MOST_ROWS || sphere_count > UINT32_MAX) {
     return qmat_fail_memory(context, "the edges and triangles of a medial mesh");
   }
-  qmat_status status = check_ids(context, "edge", edges, edge_count, 2, sphere_count);
+  qmat_status status = qmat_check_ids(context, edges, 2 * edge_count, sphere_count, "edge", 2, "sphere");
   if (status != QMAT_OK) return status;
-  status = check_ids(context, "triangle", triangles, triangle_count, 3, sphere_count);
+  status = qmat_check_ids(context, triangles, 3 * triangle_count, sphere_count, "triangle", 3, "sphere");
   if (status != QMAT_OK) return status;
 
   size_t all_edges = edge_count + 3 * triangle_count;
@@ -87,7 +78,7 @@ qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial
     uint32_t *row = new_triangles + 3 * kept;
     memcpy(row, triangles + 3 * i, 3 * sizeof *row);
     put_ids_in_order(row, 3);
-    if (!names_a_sphere_twice(row, 3)) kept++;
+    if (!is_degenerate(row, 3)) kept++;
   }
   size_t new_triangle_count = sort_rows(new_triangles, swap, starts, kept, 3, sphere_count);
 
@@ -96,7 +87,7 @@ qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial
     uint32_t *row = new_edges + 2 * kept;
     memcpy(row, edges + 2 * i, 2 * sizeof *row);
     put_ids_in_order(row, 2);
-    if (!names_a_sphere_twice(row, 2)) kept++;
+    if (!is_degenerate(row, 2)) kept++;
   }
   for (size_t i = 0; i < new_triangle_count; i++) {
     const uint32_t *t = new_triangles + 3 * i;

@@ -57,7 +57,7 @@ static void rows_append(qmat_rows *rows, uint32_t row, uint32_t item) {
   rows->items[rows->starts[row] + rows->counts[row]++] = item;
 }
 
-/* Fills triangle_edges by looking each side up in the sorted rows of edges. */
+/* Sets triangle_edges and edge_triangles. */
 static qmat_status find_triangle_edges(qmat_context *context, qmat_complex *complex) {
   for (size_t t = 0; t < complex->triangle_count; t++)
     for (size_t k = 0; k < 3; k++) {
@@ -142,7 +142,7 @@ uint32_t qmat_complex_find_edge(const qmat_complex *complex, uint32_t a, uint32_
   return QMAT_NONE;
 }
 
-/* Room for `extra` more rows in all of the parallel arrays. */
+/* Grows the parallel arrays of neighbours to at least `needed` elements. */
 static int reserve_neighbours(qmat_collapse *c, size_t needed) {
   size_t capacity = c->neighbour_capacity;
   if (needed <= capacity) return 0;
@@ -178,14 +178,14 @@ void qmat_collapse_uninit(qmat_collapse *collapse) {
   *collapse = (qmat_collapse){0};
 }
 
-/* Which corner of a triangle is `vertex`; 3 when none. */
+/* The corner of a triangle that is `vertex`; 3 when there is none. */
 static size_t corner_of(const uint32_t *triangle, uint32_t vertex) {
   size_t k = 0;
   while (k < 3 && triangle[k] != vertex) k++;
   return k;
 }
 
-/* Asks for what a look at a vertex's star reads, all at once: collapses jump around in memory. */
+/* Prefetches a vertex's star: successive collapses touch distant memory. */
 static void fetch_star(const qmat_complex *complex, uint32_t vertex) {
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(complex, vertex, &count);
@@ -197,15 +197,15 @@ static void fetch_star(const qmat_complex *complex, uint32_t vertex) {
   }
 }
 
-/* What the union of the stars of `kept` and `removed` will be; QMAT_NONE for `removed`: the star of `kept` alone. */
-static qmat_status look_at_stars(qmat_context *context, qmat_complex *complex, uint32_t kept, uint32_t removed,
+/* Computes the union of the stars of `kept` and `removed`; with `removed` QMAT_NONE, the star of `kept`. */
+static qmat_status preview_stars(qmat_context *context, qmat_complex *complex, uint32_t kept, uint32_t removed,
                                  qmat_collapse *c) {
   fetch_star(complex, kept);
   if (removed != QMAT_NONE) fetch_star(complex, removed);
   c->kept = kept;
   c->removed = removed;
   c->neighbour_count = c->triangle_count = c->vanishing_count = 0;
-  if (++complex->stamp == 0) { /* the marks of four billion previews ago must not come alive again */
+  if (++complex->stamp == 0) { /* after overflow, marks of 2^32 previews ago would be valid again */
     memset(complex->mark_of_vertex, 0, complex->vertex_count * sizeof(uint32_t));
     memset(complex->mark_of_edge, 0, complex->edge_count * sizeof(uint32_t));
     complex->stamp = 1;
@@ -273,17 +273,17 @@ static qmat_status look_at_stars(qmat_context *context, qmat_complex *complex, u
 
 qmat_status qmat_complex_preview(qmat_context *context, qmat_complex *complex, uint32_t edge, qmat_collapse *collapse) {
   collapse->edge = edge;
-  return look_at_stars(context, complex, complex->edges[2 * (size_t)edge], complex->edges[2 * (size_t)edge + 1],
+  return preview_stars(context, complex, complex->edges[2 * (size_t)edge], complex->edges[2 * (size_t)edge + 1],
                        collapse);
 }
 
 qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *complex, uint32_t vertex,
                                       qmat_collapse *collapse) {
   collapse->edge = QMAT_NONE;
-  return look_at_stars(context, complex, vertex, QMAT_NONE, collapse);
+  return preview_stars(context, complex, vertex, QMAT_NONE, collapse);
 }
 
-/* Takes a triangle out of everything but the rows of `kept` and `removed`, which are rebuilt as a whole. */
+/* Removes a triangle everywhere but in the rows of `kept` and `removed`, which are rebuilt anyway. */
 static void kill_triangle(qmat_complex *complex, uint32_t t, uint32_t kept, uint32_t removed) {
   for (size_t k = 0; k < 3; k++) {
     const uint32_t v = complex->triangles[3 * (size_t)t + k];
@@ -321,7 +321,7 @@ qmat_status qmat_complex_collapse(qmat_context *context, qmat_complex *complex, 
     complex->edge_alive[theirs] = 0;
     complex->live_edges--;
     rows_remove(&complex->vertex_edges, c->neighbours[i], theirs);
-    complex->edge_to_vertex[c->neighbours[i]] = mine; /* for relabelling the sides below */
+    complex->edge_to_vertex[c->neighbours[i]] = mine; /* used below to replace the sides of triangles */
   }
   for (size_t i = 0; i < c->triangle_count; i++) {
     if (c->kept_triangles[i] != QMAT_NONE) continue;

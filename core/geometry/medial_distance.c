@@ -6,8 +6,8 @@
 
 #include "core/geometry/vector.h"
 
-/* A triangle flatter than this (height over longest side) is the union of its cones: what lies between them is then
- * within twice the height of one of them, below what double precision resolves. */
+/* A triangle flatter than this (height over longest side) is treated as the union of its cones. Every point between
+ * them is within twice the height of one of them, which is below the resolution of double precision. */
 #define FLAT 1e-13
 
 static double clamp(double x, double high) {
@@ -43,11 +43,11 @@ void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]) {
                       .inverse = 1 / length};
 }
 
-/* The distance, and where along the axis the nearest sphere sits. */
+/* The distance, and the position of the nearest sphere along the axis. */
 static inline double cone_at(const qmat_cone *cone, const double point[3], double *along) {
   double w[3] = {point[0] - cone->origin[0], point[1] - cone->origin[1], point[2] - cone->origin[2]};
   double axial = qmat_dot(w, cone->axis);
-  /* The radial part as a vector: |w|^2 - axial^2 would lose half the digits near the axis. */
+  /* The radial part is computed as a vector: |w|^2 - axial^2 would lose half the digits near the axis. */
   for (int k = 0; k < 3; k++) w[k] -= axial * cone->axis[k];
   double radial2 = qmat_dot(w, w);
   double t = clamp(axial + sqrt(radial2) * cone->lean, cone->length);
@@ -93,7 +93,7 @@ static void edge_prepare(qmat_slab_edge *edge, const double a[2], double ra, con
                            .lean = slope / cosine(slope)};
 }
 
-/* A unit vector at right angles to the unit vector u. */
+/* A unit vector perpendicular to the unit vector u. */
 static void any_perpendicular(const double u[3], double v[3]) {
   int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2) : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
   for (int i = 0; i < 3; i++) v[i] = (i == k) - u[k] * u[i];
@@ -125,7 +125,7 @@ void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], co
   for (int k = 0; k < 3; k++) v[k] = w[k] - slab->third * u[k];
   double height = sqrt(qmat_dot(v, v));
   if (height > FLAT * side) {
-    /* Of a sliver, rounding leaves some u in v: take it out once more. */
+    /* For a sliver, rounding leaves a component of u in v: orthogonalise again. */
     for (int k = 0; k < 3; k++) v[k] /= height;
     double rest = qmat_dot(v, u);
     for (int k = 0; k < 3; k++) v[k] -= rest * u[k];
@@ -168,9 +168,9 @@ static inline double edge_at(const qmat_slab_edge *edge, double u, double v, dou
   return sqrt((axial - t) * (axial - t) + radial2) - edge->radius - edge->slope * t;
 }
 
-/* The distance; `part` is the edge that holds the minimum, with where along it, or 3 for the tangent planes, with the
- * weights of own corners 1 and 2. f is convex: where its free minimum leaves the triangle, the bound minimum lies on
- * an edge that faces it, so that at most two edges are looked at. */
+/* The distance. `part` is the edge that attains it, and at[0] the position along that edge; or 3 for the tangent
+ * planes, and `at` the weights of own corners 1 and 2. f is convex: when its unconstrained minimum is outside the
+ * triangle, the constrained one is on an edge that faces it, so at most two edges are tested. */
 static inline double slab_at(const qmat_slab *slab, const double point[3], int *part, double at[2]) {
   double w[3] = {point[0] - slab->origin[0], point[1] - slab->origin[1], point[2] - slab->origin[2]};
   double u = qmat_dot(w, slab->u), v = qmat_dot(w, slab->v), z = fabs(qmat_dot(w, slab->normal));

@@ -9,32 +9,33 @@
  *
  *   f(p) = min over x of |p - c(x)| - r(x)
  *
- * is positive outside and there exactly the distance to the primitive; inside it is negative and bounds the depth from
- * below in size. f is convex and 1-Lipschitz. A sphere is 4 doubles (centre, radius >= 0), a point 3 doubles, all in
- * one unit. Every degenerate case is exact to rounding: coincident centres, spheres inside others, collinear centres,
- * radii that grow faster than the distance between centres. Nothing here allocates or keeps state; any thread. */
+ * is positive outside, where it is exactly the distance to the primitive. Inside it is negative, and -f is a lower
+ * bound of the depth. f is convex and 1-Lipschitz. A sphere is 4 doubles (centre, radius >= 0), a point 3 doubles, all
+ * in one unit. Degenerate cases are exact up to rounding: coincident centres, spheres inside others, collinear centres,
+ * radii that grow faster than the distance between centres. Nothing here allocates or keeps state. Safe from any
+ * thread. */
 
-/* A medial cone made ready for many points. Where one end sphere holds the other, length is 0 and only the larger end
- * is left. */
+/* A medial cone prepared for many points. When one end sphere contains the other, length is 0 and only the larger end
+ * counts. */
 typedef struct qmat_cone {
-  double origin[3]; /* centre of the first end (or of the only one that counts) */
-  double axis[3];   /* unit vector to the second end; 0 where only one counts */
+  double origin[3]; /* centre of the first end, or of the only end that counts */
+  double axis[3];   /* unit vector to the second end; 0 when only one counts */
   double length;    /* between the centres */
   double radius;    /* at the origin */
   double slope;     /* growth of the radius per length; |slope| < 1 */
-  double lean;      /* slope / sqrt(1 - slope^2): how far along the axis the nearest sphere leans per radial length */
+  double lean;      /* slope / sqrt(1 - slope^2): shift along the axis of the nearest sphere, per radial distance */
   double inverse;   /* 1 / length, 0 for length 0 */
   int only;         /* 0: both ends count; 1 or 2: only the first or the second */
 } qmat_cone;
 
-/* One edge of a slab in the coordinates of the slab's plane; the members as in qmat_cone. */
+/* One edge of a slab in the coordinates of the slab's plane; members as in qmat_cone. */
 typedef struct qmat_slab_edge {
   double origin[2], axis[2], length, radius, slope, lean;
   int only;
 } qmat_slab_edge;
 
-/* A medial slab made ready for many points. Edge i lies opposite to corner i, in the slab's own order of corners,
- * which starts at the longest side: own corner i is the caller's corner order[i]. */
+/* A medial slab prepared for many points. Edge i is opposite corner i. The slab has its own order of corners, which
+ * starts with the longest side: own corner i is the caller's corner order[i]. */
 typedef struct qmat_slab {
   double origin[3];             /* centre of own corner 0 */
   double u[3], v[3], normal[3]; /* orthonormal; u along the longest side, v towards own corner 2 */
@@ -46,28 +47,28 @@ typedef struct qmat_slab {
   double inverse_side, inverse_height;
   qmat_slab_edge edges[3];
   unsigned char order[3];
-  bool solid; /* has tangent planes: neither collinear nor with a gradient of 1 or more; else only the edges count */
+  bool solid; /* has tangent planes: not collinear, and the gradient is below 1. Otherwise only the edges count. */
 } qmat_slab;
 
 /* |p - c| - r. */
 double qmat_sphere_distance(const double sphere[4], const double point[3]);
 
-/* The signed distance to the cone of two spheres; any order of the spheres gives the same up to rounding. */
+/* The signed distance to the cone of two spheres; their order does not matter, up to rounding. */
 double qmat_cone_distance(const double a[4], const double b[4], const double point[3]);
 
-/* The signed distance to the slab of three spheres; any order of the spheres gives the same up to rounding. */
+/* The signed distance to the slab of three spheres; their order does not matter, up to rounding. */
 double qmat_slab_distance(const double a[4], const double b[4], const double c[4], const double point[3]);
 
 /* Fills `cone` from its two end spheres. */
 void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]);
 double qmat_cone_prepared_distance(const qmat_cone *cone, const double point[3]);
-/* The same distance, and the weights of the two ends (sum 1) at the medial point where the minimum is. */
+/* The same distance, and the weights of the two ends (sum 1) at the medial point that attains it. */
 double qmat_cone_foot(const qmat_cone *cone, const double point[3], double weights[2]);
 
 /* Fills `slab` from its three corner spheres. */
 void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], const double c[4]);
 double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3]);
-/* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point where the minimum is. */
+/* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point that attains it. */
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]);
 
 #endif

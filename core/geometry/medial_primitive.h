@@ -16,12 +16,12 @@ typedef struct qmat_primitive {
   bool is_slab;
 } qmat_primitive;
 
-/* A ball that holds a primitive. */
+/* A ball that contains a primitive. */
 typedef struct qmat_primitive_ball {
   double centre[3], radius;
 } qmat_primitive_ball;
 
-/* Prepares the cone of two spheres or the slab of three (4 doubles each), and the ball around it. */
+/* Prepares the cone of two spheres, or the slab of three (4 doubles each), and its ball. */
 static inline void qmat_primitive_prepare(const double *const spheres[], int count, qmat_primitive *primitive,
                                           qmat_primitive_ball *ball) {
   for (int k = 0; k < 3; k++) {
@@ -38,7 +38,7 @@ static inline void qmat_primitive_prepare(const double *const spheres[], int cou
     qmat_cone_prepare(&primitive->cone, spheres[0], spheres[1]);
 }
 
-/* Whether no point of what the ball holds is as close to `point` (3 doubles) as `best`. */
+/* Whether the whole ball is farther than `best` from `point` (3 doubles). */
 static inline bool qmat_primitive_is_farther(const qmat_primitive_ball *ball, const double *point, double best) {
   double square = 0;
   for (int k = 0; k < 3; k++) square += (point[k] - ball->centre[k]) * (point[k] - ball->centre[k]);
@@ -46,8 +46,8 @@ static inline bool qmat_primitive_is_farther(const qmat_primitive_ball *ball, co
   return reach < 0 || square > reach * reach;
 }
 
-/* The signed distance from `point` to a primitive; `weights` (3 doubles) are those of its spheres at the foot, the
- * third 0 for a cone. */
+/* The signed distance from `point` to a primitive, and the weights (3 doubles) of its spheres at the foot; the third is
+ * 0 for a cone. */
 static inline double qmat_primitive_foot(const qmat_primitive *primitive, const double *point, double weights[3]) {
   if (primitive->is_slab) return qmat_slab_foot(&primitive->slab, point, weights);
   weights[2] = 0;

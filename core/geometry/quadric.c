@@ -36,7 +36,7 @@ bool qmat_tangent_normals(const double a[4], const double b[4], const double c[4
   }
   const double determinant = g11 * g22 - g12 * g12;
   if (!(determinant > 1e-14 * g11 * g22)) return false;
-  /* The in-plane gradient of the radius; a common tangent plane leans by -g. */
+  /* The in-plane gradient g of the radius; the normal of a common tangent plane has the in-plane part -g. */
   const double d1 = b[3] - a[3], d2 = c[3] - a[3];
   const double s = (g22 * d1 - g12 * d2) / determinant, t = (g11 * d2 - g12 * d1) / determinant;
   double slope = 0;
@@ -69,8 +69,8 @@ bool qmat_quadric_add_cone(qmat_quadric *quadric, const double a[4], const doubl
   const double change = b[3] - a[3];
   if (!(fabs(change) < length)) return false;
   for (int k = 0; k < 3; k++) axis[k] /= length;
-  /* A tangent normal is cos * axis + sin * (any unit vector across): its mean is cos * axis, the mean of its square
-   * cos^2 axis axis' + sin^2 / 2 (I - axis axis'). */
+  /* A tangent normal n is cos * axis + sin * (a unit vector perpendicular to the axis). Over the rotation, the mean of
+   * n is cos * axis, and the mean of n n' is cos^2 axis axis' + sin^2 / 2 (I - axis axis'). */
   const double cosine = -change / length, across = 0.5 * (1 - cosine * cosine);
   const double along = cosine * cosine - across;
   double matrix[4][4], row[4];

@@ -11,23 +11,23 @@
 #include "core/geometry/triangle_blocks.h"
 #include "core/geometry/vector.h"
 
-/* Embree stores single precision. In the unit frame coordinates are at most 1/2 and rays at most about 2 long, so that
- * its hits are within a few 1e-7 of the triangle's plane; TIE is well above that. */
+/* Embree computes in single precision. In the unit frame coordinates are at most 1/2 and rays about 2 long, so its hits
+ * are within a few 1e-7 of the triangle's plane. TIE is well above that. */
 #define TIE 4e-6
-/* How far along the ray the double precision hit may be from the single precision one. */
+/* The largest distance along the ray between a hit in double and the same hit in single precision. */
 #define LONGEST_CORRECTION 1e-4
-/* Barycentric coordinate and cosine below which a ray that counts crossings may have met an edge. */
+/* A crossing whose barycentric coordinate or cosine is below this may have hit an edge. */
 #define GRAZING 1e-4f
 #define RAY_COUNT 7
 #define LEAF_SIZE 8
-/* Nodes farther away than this many of their radii are taken as one dipole (Barill et al. 2018, section 3). */
+/* A node farther away than this many of its radii is evaluated as one dipole (Barill et al. 2018, section 3). */
 #define DIPOLE_BETA 2.3
 
 /* A node of the winding number tree: its triangles as one dipole. */
 typedef struct winding_node {
   double centre[3];
   double area_vector[3];
-  double radius; /* of a ball around the centre that holds all its triangles */
+  double radius; /* of a ball around the centre that contains all its triangles */
 } winding_node;
 
 struct qmat_surface {
@@ -38,8 +38,9 @@ struct qmat_surface {
   RTCDevice device;
   RTCScene scene;
   qmat_triangle_blocks *blocks; /* for distances */
-  /* The winding number tree, for surfaces that are not closed and oriented: node 1 is the root, node k has the children
-   * 2 k and 2 k + 1, leaf k (node leaf_count + k) holds order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
+  /* The winding number tree of a surface that is not closed and oriented. Node 1 is the root; node k has the children
+   * 2 k and 2 k + 1; leaf k is node leaf_count + k and contains the triangles
+   * order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
   size_t leaf_count; /* a power of two; 0: no tree */
   winding_node *nodes;
   uint32_t *order;
@@ -47,15 +48,15 @@ struct qmat_surface {
 
 typedef enum query_kind { COUNT_CROSSINGS, NEAREST_HIT } query_kind;
 
-/* Embree hands the context that it was given to the filter function. */
+/* Passed through Embree to the filter function. */
 typedef struct query_context {
   struct RTCIntersectContext base;
   query_kind kind;
-  int winding; /* COUNT_CROSSINGS: +1 for each triangle left through its back, -1 entered through its front */
+  int winding; /* COUNT_CROSSINGS: +1 for each triangle left through its back, -1 for each entered through its front */
   bool grazing;
   const double *origin, *direction; /* NEAREST_HIT, in double */
-  double offset, start;             /* origin of the single precision ray along the ray, and what hits must exceed */
-  double distance;                  /* the nearest so far */
+  double offset, start;             /* start of the single precision ray along the ray; hits must be beyond `start` */
+  double distance;                  /* of the nearest hit so far */
   uint32_t triangle;
 } query_context;
 
@@ -75,8 +76,8 @@ static void triangle_normal(const qmat_surface *surface, uint32_t triangle, doub
 
 /* --- rays ------------------------------------------------------------------------------------------------------- */
 
-/* The distance at which the ray meets the triangle's plane; what single precision found where the ray runs so close to
- * along the plane that the plane says nothing. */
+/* The distance at which the ray meets the triangle's plane, in double precision. Where the ray is nearly parallel to
+ * the plane that distance is meaningless, and the single precision one is kept. */
 static double refine_hit(const qmat_surface *surface, const query_context *query, uint32_t triangle, double found) {
   double normal[3], to_plane[3];
   triangle_normal(surface, triangle, normal);
@@ -87,9 +88,9 @@ static double refine_hit(const qmat_surface *surface, const query_context *query
   return meets_plane && correction <= LONGEST_CORRECTION ? distance : found;
 }
 
-/* Sees every hit of an occlusion ray and refuses it, so that Embree goes on: which hits come does not depend on the
- * layout of the tree, only their order does. Single rays only, so that N is 1. */
-static void see_hit(const struct RTCFilterFunctionNArguments *args) {
+/* Records every hit of an occlusion ray and rejects it, so that Embree reports all of them. The set of hits does not
+ * depend on the layout of Embree's tree; only their order does. Rays are single, so N is 1. */
+static void record_hit(const struct RTCFilterFunctionNArguments *args) {
   const qmat_surface *surface = args->geometryUserPtr;
   query_context *query = (query_context *)(void *)args->context;
   const struct RTCRay *ray = (const struct RTCRay *)(const void *)args->ray;
@@ -139,13 +140,13 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   query.direction = direction;
   query.start = start;
 
-  /* Single precision starts a little before `start`, and never far from the unit ball that holds the model. */
+  /* The single precision ray starts just before `start`, and never far from the unit ball around the model. */
   const double foot = -qmat_dot(origin, direction);
   query.offset = start - TIE;
   if (foot - 1 > query.offset) query.offset = foot - 1;
   if (!(foot + 1 > query.offset)) return false;
 
-  /* All hits in one go: a look at the nearest one first, and at its equals after, takes longer. */
+  /* One query that visits all hits is faster than one for the nearest hit and another for its ties. */
   struct RTCRay ray;
   query.distance = INFINITY;
   query.triangle = UINT32_MAX;
@@ -164,8 +165,9 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
 
 /* --- inside ----------------------------------------------------------------------------------------------------- */
 
-/* In exact arithmetic a ray that meets no edge counts how often a closed oriented surface winds around its origin.
- * Directions in general position, near the axes first because models tend to be axis-aligned and rays then short. */
+/* In exact arithmetic, a ray that hits no edge counts how often a closed oriented surface winds around its origin. The
+ * directions are in general position. Those near the axes come first: most models are axis-aligned, so these rays are
+ * short. */
 static const double ray_directions[RAY_COUNT][3] = {
     {0.98632441, 0.13298071, 0.09771263},  {-0.11407731, 0.98765432, 0.10754219}, {0.09135721, -0.12643157, 0.98776113},
     {0.57391847, 0.61173295, 0.54451219},  {-0.60357124, 0.52117943, 0.60331877}, {0.55127391, -0.58719213, 0.59270351},
@@ -175,7 +177,7 @@ static const double ray_directions[RAY_COUNT][3] = {
 static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
   int score = 0;
   for (int i = 0; i < RAY_COUNT && abs(score) < 4; i++) {
-    /* Away from the centre, where less of the model lies. */
+    /* Rays point away from the centre, where they cross less of the model. */
     const double sign = qmat_dot(point, ray_directions[i]) < 0 ? -1 : 1;
     const double direction[3] = {sign * ray_directions[i][0], sign * ray_directions[i][1], sign * ray_directions[i][2]};
     query_context query;
@@ -206,7 +208,7 @@ static double solid_angle(const qmat_surface *surface, uint32_t triangle, const 
 
 static void leaf_range(const qmat_surface *surface, size_t leaf, size_t *begin, size_t *end) {
   const size_t n = surface->mesh->triangle_count;
-  /* leaf * n / leaf_count without overflow. */
+  /* This is leaf * n / leaf_count without overflow. */
   const size_t share = n / surface->leaf_count, rest = n % surface->leaf_count;
   *begin = leaf * share + leaf * rest / surface->leaf_count;
   *end = (leaf + 1) * share + (leaf + 1) * rest / surface->leaf_count;
@@ -276,7 +278,7 @@ static int compare_items(const void *left, const void *right) {
   return a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
 }
 
-/* Every third bit of the result holds a bit of a 21-bit number. */
+/* Spreads the bits of a 21-bit number to every third bit of the result. */
 static uint64_t spread_bits(uint64_t x) {
   x &= 0x1fffff;
   x = (x | x << 32) & 0x1f00000000ffff;
@@ -309,7 +311,7 @@ static double farthest_corner(const qmat_surface *surface, size_t begin, size_t 
   return sqrt(square);
 }
 
-/* Area-weighted centre, dipole and radius of the triangles of one leaf. */
+/* The area-weighted centre, dipole and radius of the triangles of one leaf. */
 static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t begin, size_t end, double *area) {
   double vector[3], centroid[3], mean[3] = {0, 0, 0};
   *area = 0;
@@ -371,7 +373,7 @@ static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surfa
       node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
       node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
     }
-    /* From the corners and not from the children's balls, which would be twice too large further up. */
+    /* Computed from the corners: from the children's balls, radii near the root would be twice too large. */
     size_t first = index, last = index + 1, begin, end, unused;
     while (first < leaf_count) first *= 2, last *= 2;
     leaf_range(surface, first - leaf_count, &begin, &unused);
@@ -390,7 +392,7 @@ static void keep_message(void *user, enum RTCError code, const char *text) {
   if (message->text[0] == '\0') snprintf(message->text, sizeof message->text, "%s", text != NULL ? text : "");
 }
 
-/* Embree's newest error as a status. */
+/* Converts Embree's newest error to a status. */
 static qmat_status embree_status(qmat_context *context, RTCDevice device, const device_message *message) {
   const enum RTCError code = rtcGetDeviceError(device);
   if (code == RTC_ERROR_NONE) return QMAT_OK;
@@ -402,7 +404,7 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   const qmat_mesh *mesh = surface->mesh;
   device_message message = {""};
   RTCGeometry geometry = NULL;
-  /* Settings of the user's own Embree files must not change results. */
+  /* The user's Embree configuration files must not change results. */
   char config[64];
   snprintf(config, sizeof config, "ignore_config_files=1,threads=%d", qmat_threads(context));
   surface->device = rtcNewDevice(config);
@@ -419,7 +421,7 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   geometry = rtcNewGeometry(surface->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   if (!surface->scene || !geometry) goto check;
   rtcSetSceneFlags(surface->scene, RTC_SCENE_FLAG_ROBUST);
-  /* High quality would split triangles, and a ray would then cross them twice. */
+  /* High build quality may split triangles, and a ray could then hit one twice. */
   rtcSetSceneBuildQuality(surface->scene, RTC_BUILD_QUALITY_MEDIUM);
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
   float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
@@ -429,7 +431,7 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh->triangles, 0,
                              3 * sizeof(uint32_t), mesh->triangle_count);
   rtcSetGeometryUserData(geometry, surface);
-  rtcSetGeometryOccludedFilterFunction(geometry, see_hit);
+  rtcSetGeometryOccludedFilterFunction(geometry, record_hit);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(surface->scene, geometry);
   rtcCommitScene(surface->scene);
@@ -438,7 +440,7 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
 check:
   if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
   if (status == QMAT_OK && (!surface->scene || !geometry)) {
-    status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree made no scene");
+    status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree created no scene");
   }
 done:
   if (geometry) rtcReleaseGeometry(geometry);
@@ -471,7 +473,6 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
     }
   }
   status = build_scene(context, made);
-  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status != QMAT_OK) goto failed;
   if (!(mesh->closed && mesh->oriented)) {

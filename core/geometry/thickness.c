@@ -36,7 +36,7 @@ double qmat_thickness_threshold(const qmat_field *thickness, double ratio) {
 
 void qmat_thickness_of_samples(const qmat_mesh *mesh, const qmat_field *thickness, const qmat_samples *samples,
                                double *out) {
-  /* A vertex of no facet stays infinitely thick: nothing there is thin. */
+  /* A vertex without facets has infinite thickness. */
   for (size_t i = 0; i < samples->vertex_count; i++) out[i] = INFINITY;
   for (size_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
     const uint32_t vertex = mesh->triangles[corner];

@@ -4,17 +4,18 @@
 
 #include "core/value.h"
 
-/* Whether the thickness (per facet) and the samples are of this mesh: their counts fit, every facet is one of its own,
- * and the first samples are its vertices. QMAT_ERROR_GEOMETRY names the field "thickness" or "samples". Cost: linear.
- */
+/* Checks that the thickness (per facet) and the samples belong to this mesh: their counts match, every facet id exists,
+ * and the first samples are the mesh's vertices. QMAT_ERROR_GEOMETRY names the field "thickness" or "samples". Cost:
+ * linear. */
 qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                                  const qmat_samples *samples);
 
-/* The threshold theta of eq. 8 in the field's unit: `ratio` times the area-free mean of the facets' thickness. */
+/* The threshold theta of eq. 8 in the field's unit: `ratio` times the mean thickness of the facets, not weighted by
+ * area. */
 double qmat_thickness_threshold(const qmat_field *thickness, double ratio);
 
-/* The thickness at each sample: a vertex takes the minimum of its facets, an added sample its facet's value.
- * `out` holds samples->count doubles. */
+/* The thickness at each sample: the minimum of its facets at a vertex, its facet's value at any other sample. `out` has
+ * samples->count doubles. */
 void qmat_thickness_of_samples(const qmat_mesh *mesh, const qmat_field *thickness, const qmat_samples *samples,
                                double *out);
 

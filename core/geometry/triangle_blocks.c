@@ -11,10 +11,10 @@
 
 enum { LANES = 8 };
 
-/* Where single precision is not spent on the triangles any more. */
+/* Beyond this distance single precision cannot tell the triangles apart. */
 static const double far_away = 1e4;
 
-/* Eight triangles in single precision, each in a disc around its centre; in a ball where its normal is zero. */
+/* Eight triangles in single precision. Each lies in a disc around its centre, or in a ball when its normal is zero. */
 typedef struct block {
   float centre[3][LANES], normal[3][LANES], radius[LANES];
   uint32_t triangles[LANES];
@@ -33,10 +33,10 @@ static void corners_of(const qmat_triangle_blocks *blocks, uint32_t triangle, co
     corners[i] = blocks->positions + 3 * (size_t)blocks->triangles[3 * (size_t)triangle + i];
 }
 
-/* Where the sine of an angle is below this, rounding turns the plane by as much as the triangle is thin. */
+/* A triangle whose sine at the first corner is below this has no reliable plane: rounding tilts it too much. */
 static const double least_sine = 1e-8;
 
-/* Twice the area vector, and its square; false where the triangle is so thin that it says nothing of a plane. */
+/* Twice the area vector and its squared length; false when the triangle is too thin to define a plane. */
 static bool find_normal(const double *const corners[3], double normal[3], double *square) {
   double side[3], other_side[3];
   qmat_subtract(corners[1], corners[0], side);
@@ -57,11 +57,11 @@ static void closest_on_segment(const double a[3], const double b[3], const doubl
   for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
 }
 
-/* A plane is surely farther than a distance when its square is larger by this factor. */
+/* A squared distance that exceeds another by this factor is larger in spite of rounding. */
 static const double surely_farther = 1 + 1e-9;
 
-/* The squared distance to a triangle: to its plane where the foot is inside, else to the edges that face the point.
- * INFINITY where the plane alone is farther than the square `enough`. */
+/* The squared distance to a triangle: to its plane when the foot is inside, else to the edges that face the point.
+ * INFINITY when the plane is farther away than the squared distance `enough`. */
 static double closest_on_triangle(const qmat_triangle_blocks *blocks, uint32_t triangle, const double point[3],
                                   double enough, double closest[3]) {
   const uint32_t *ids = blocks->triangles + 3 * (size_t)triangle;
@@ -83,7 +83,7 @@ static double closest_on_triangle(const qmat_triangle_blocks *blocks, uint32_t t
     qmat_cross(edge, normal, outward);
     if (has_plane && qmat_dot(outward, to_point) <= 0) continue;
     facing = true;
-    /* The same order of ends for both triangles of an edge, so that both get the same bits. */
+    /* Both triangles of an edge use the same order of its ends, so both compute the same bits. */
     const bool rising = ids[i] < ids[j];
     double candidate[3], offset[3];
     closest_on_segment(corners[rising ? i : j], corners[rising ? j : i], point, candidate);
@@ -104,20 +104,20 @@ static double closest_on_triangle(const qmat_triangle_blocks *blocks, uint32_t t
 typedef struct nearest_query {
   const qmat_triangle_blocks *blocks;
   const double *point;
-  double slack;         /* by how much single precision may misplace the point or a triangle */
-  double square, reach; /* of the nearest so far: the squared distance and the distance */
-  float square_limit;   /* discs that are surely farther than that have a larger bound */
+  double slack;         /* rounding error of the point and the triangles in single precision */
+  double square, reach; /* squared distance and distance of the nearest triangle so far */
+  float square_limit;   /* a disc with a larger squared bound is farther away */
   double closest[3];
   uint32_t triangle;
 } nearest_query;
 
-/* Where what single precision knows of a triangle says no more than this, it has to be looked at. */
+/* A triangle whose squared bound in single precision is at most this needs an exact test. */
 static float square_limit(const nearest_query *query) {
   const double limit = (query->reach + 2 * query->slack) * (1 + 1e-6);
   return (float)(limit * limit);
 }
 
-/* Looks at one triangle; true when it is the nearest so far. */
+/* Tests one triangle exactly; true when it is the nearest so far. */
 static bool try_triangle(nearest_query *query, uint32_t triangle) {
   double closest[3];
   const double square = closest_on_triangle(query->blocks, triangle, query->point, query->square, closest);
@@ -134,30 +134,29 @@ static float search_radius(const nearest_query *query, double distance) {
   return nextafterf((float)(distance * (1 + 1e-6) + query->slack), INFINITY);
 }
 
-/* By how much of the squared distance to a disc's centre single precision may be wrong about its parts: a few dozen
- * roundings of 6e-8. */
-static const float misjudged = 2e-6f;
+/* The relative rounding error of a squared distance to a disc's centre: a few dozen roundings of 6e-8. */
+static const float rounding_share = 2e-6f;
 
 /* A lower bound of the squared distance to each triangle of a block. */
 static void bound_block(const block *b, float x, float y, float z, float bounds[LANES]) {
   for (int k = 0; k < LANES; k++) {
     const float dx = x - b->centre[0][k], dy = y - b->centre[1][k], dz = z - b->centre[2][k];
-    const float square = dx * dx + dy * dy + dz * dz, doubt = misjudged * square;
+    const float square = dx * dx + dy * dy + dz * dz, error = rounding_share * square;
     const float height = dx * b->normal[0][k] + dy * b->normal[1][k] + dz * b->normal[2][k];
-    const float across_square = square - height * height - doubt;
+    const float across_square = square - height * height - error;
     const float across = sqrtf(across_square > 0 ? across_square : 0) - b->radius[k];
     const float beside = across > 0 ? across : 0;
-    bounds[k] = beside * beside + height * height - doubt;
+    bounds[k] = beside * beside + height * height - error;
   }
 }
 
-static bool see_block(struct RTCPointQueryFunctionArguments *args) {
+static bool visit_block(struct RTCPointQueryFunctionArguments *args) {
   nearest_query *query = args->userPtr;
   const block *b = &query->blocks->blocks[args->primID];
   const size_t left = query->blocks->count - LANES * (size_t)args->primID, count = left < LANES ? left : LANES;
   float bounds[LANES];
   bound_block(b, args->query->x, args->query->y, args->query->z, bounds);
-  size_t first = 0; /* likely the nearest, so that few of the others are left to be tried */
+  size_t first = 0; /* likely the nearest; trying it first rules out most of the others */
   for (size_t k = 1; k < count; k++)
     if (bounds[k] < bounds[first]) first = k;
   if (bounds[first] > query->square_limit) return false;
@@ -189,7 +188,7 @@ double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const d
                                  .z = (float)point[2],
                                  .time = 0,
                                  .radius = limit < 4 * far_away ? search_radius(&query, limit) : INFINITY};
-    rtcPointQuery(blocks->scene, &ball, &context, see_block, &query);
+    rtcPointQuery(blocks->scene, &ball, &context, visit_block, &query);
   } else {
     for (size_t i = 0; i < blocks->count; i++) try_triangle(&query, (uint32_t)i);
   }
@@ -216,8 +215,8 @@ static void centroid(const double *const corners[3], double centre[3]) {
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
 }
 
-/* The disc around a triangle, about its centre as it is when it is rounded; that its plane is rounded, too, moves no
- * corner by as much as points are misplaced. */
+/* Sets the disc around a triangle. Its radius is measured from the rounded centre. Rounding the normal moves the
+ * corners by less than the slack of a query. */
 static void fill_lane(const qmat_triangle_blocks *blocks, block *b, size_t lane, uint32_t triangle) {
   const double *corners[3];
   double centre[3], normal[3], square;
@@ -253,7 +252,7 @@ static void bound_for_embree(const struct RTCBoundsFunctionArguments *args) {
   for (int k = 0; k < 3; k++) out[k] = nextafterf((float)high[k], INFINITY);
 }
 
-/* Fails without a word: the device knows why. */
+/* Reports no failure: it is in the device's error state. */
 static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
   blocks->scene = rtcNewScene(device);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
@@ -270,7 +269,7 @@ static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
   if (geometry) rtcReleaseGeometry(geometry);
 }
 
-/* A triangle to be put into a block. */
+/* A triangle that is to be assigned to a block. */
 typedef struct item {
   double centre[3];
   uint32_t triangle;
@@ -286,9 +285,9 @@ static void swap_items(item *a, item *b) {
   *b = swap;
 }
 
-/* Puts the first `few` along the axis before the others (Hoare's selection). */
+/* Moves the `few` smallest items along the axis to the front (Hoare's selection). */
 static void select_first(item *items, size_t count, size_t few, int axis) {
-  size_t low = 0, high = count; /* the border lies between */
+  size_t low = 0, high = count; /* the boundary is in between */
   while (high - low > 1) {
     const item *a = &items[low], *b = &items[low + (high - low) / 2], *c = &items[high - 1];
     const bool a_b = comes_first(a, b, axis), b_c = comes_first(b, c, axis), a_c = comes_first(a, c, axis);
@@ -321,10 +320,10 @@ static int widest_axis(const item *items, size_t count) {
   return axis;
 }
 
-/* More than so many are divided by a thread each. */
+/* Larger halves are divided in a task of their own. */
 enum { WORTH_A_THREAD = 1 << 13 };
 
-/* Halves them across their widest side, at a whole number of blocks, until each block has its own. */
+/* Splits the items in half along their widest axis, at a multiple of the block size, until each block has its items. */
 static void divide(item *items, size_t count) {
   if (count <= LANES) return;
   const size_t few = LANES * (((count + LANES - 1) / LANES) / 2);

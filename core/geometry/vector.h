@@ -4,13 +4,15 @@
 
 #include <math.h>
 
-/* The distance of two points (3 doubles each; of spheres, their centres). */
+/* Vectors and points are 3 doubles. Every function evaluates in a fixed order, so results are the same everywhere. */
+
+/* The distance between two points, or between the centres of two spheres. */
 static inline double qmat_point_distance(const double *a, const double *b) {
   const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
   return sqrt(x * x + y * y + z * z);
 }
 
-/* Of vectors of 3 doubles: a - b, the scalar and the vector product. */
+/* a - b, the scalar product and the vector product. */
 static inline void qmat_subtract(const double a[3], const double b[3], double out[3]) {
   for (int k = 0; k < 3; k++) out[k] = a[k] - b[k];
 }
@@ -22,13 +24,13 @@ static inline void qmat_cross(const double a[3], const double b[3], double out[3
   out[1] = a[2] * b[0] - a[0] * b[2];
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
-/* Scales a vector to length 1; its length is not 0. */
+/* Scales a vector to length 1; its length must not be 0. */
 static inline void qmat_normalize(double v[3]) {
   const double length = sqrt(qmat_dot(v, v));
   for (int k = 0; k < 3; k++) v[k] /= length;
 }
 
-/* A maximum and minimum that compile to one instruction; the second operand where the first is not a number. */
+/* A maximum and a minimum that compile to one instruction. They give the second operand when the first is NaN. */
 static inline double qmat_larger(double a, double b) {
   return a > b ? a : b;
 }

@@ -55,7 +55,7 @@ static void test_ids_out_of_range_are_named_and_change_nothing(void **state) {
   assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, 2, NULL, 0), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.element_kind, "edge");
   assert_int_equal(context.error.element, 1);
-  assert_string_equal(context.error.message, "names sphere 3 of 3");
+  assert_string_equal(context.error.message, "it names sphere 3 of 3");
   assert_int_equal(qmat_medial_set_simplices(&context, medial, good, 1, triangles, 2), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.element_kind, "triangle");
   assert_int_equal(context.error.element, 1);
