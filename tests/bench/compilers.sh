@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Builds qmat with gcc and with clang and compares the files that both write at 1, 2 and 8 threads, byte by byte. Prints a
-# Markdown table; exit code 0 when all files are the same.
+# Builds qmat with gcc and with clang and compares the files that both write at 1, 2 and 8 threads, byte by byte. Prints
+# a Markdown table; exit code 0 when all files are the same.
 #   compilers.sh [--epsilon E] [MODEL...]      measures the generated models and these, at 5 % by default; default
 #                                              MODELs: spot and knight of ../shared/data/surfaces, where present
 # clang needs the Debian packages clang and libomp-dev. Without them only the thread counts are compared, and the exit

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# An SVG of error against vertices, both logarithmic, from lines of: model, method, vertices, surface to envelope,
-# envelope to surface; tabs between. A column a model, a row a direction.
+# Draws error against vertices, both logarithmic, as an SVG. Input lines have model, method, vertices, surface to
+# envelope and envelope to surface, separated by tabs. Each model is a column, each direction a row.
 BEGIN {
   FS = "\t"
   width = 300; height = 220; left = 62; top = 62; gap_x = 24; gap_y = 70

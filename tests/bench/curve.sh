@@ -1,12 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Error against the number of medial vertices, in both directions: of Q-MAT+ as it is here, of the paper's rules (one
-# error held, ending with the first collapse that exceeds it), of PMAT and of the public Q-MAT's, each from one chain of
-# collapses of the same initial medial mesh. Writes an SVG, and the same as a Markdown table to stdout.
+# Measures both errors against the number of medial vertices for four methods: Q-MAT+ as implemented here, the paper's
+# rules (one bounded error; the first collapse that exceeds it ends the run), PMAT, and the public Q-MAT. Each is one
+# chain of collapses of the same initial medial mesh. Writes an SVG, and the same as a Markdown table to stdout.
 #   curve.sh [-o FILE.svg] [MODEL...]      default: curve.svg; ant, plane and spot of ../shared/data/surfaces, else
 #                                          generated models
-# QMAT_BUILD is the build folder, by default build/release. An error is the largest distance that medial.evaluate's
-# branch and bound has met.
+# QMAT_BUILD is the build folder, by default build/release. An error is the lower bound of medial.evaluate.
 set -eu
 svg=curve.svg
 if [ "${1:-}" = -o ]; then
@@ -16,7 +15,7 @@ fi
 default_models="ant plane spot"
 . "$(dirname "$0")/functions.sh"
 
-# measure MODEL VERTICES SETTING...: both errors of that level of the chain with these settings, as "VERTICES OUT IN".
+# measure MODEL VERTICES SETTING...: "VERTICES OUT IN", both errors of that level of the chain with these settings.
 measure() {
   model=$1
   vertices=$2

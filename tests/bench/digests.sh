@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Prints a SHA-256 of every file that `qmat mat` writes, in every format. A change that must not alter a result prints
-# the same lines before and after it.
+# Prints the SHA-256 of every file that `qmat mat` writes, in every format. The lines before and after a change are the
+# same when it does not alter results.
 #   digests.sh [--epsilon E] [MODEL...]      default: the generated models and ../shared/data/surfaces at 2 %
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The paper's table 2: time and vertices of HEM (cost: hausdorff) and of Q-MAT+ (cost: slab), as a Markdown table. Of each
-# model a row as in the paper, one-sided and ending with the first collapse that exceeds epsilon; and a row two-sided,
-# where the other edges go on. Both methods have the same points. Times are processor seconds of the whole command, which
-# reads the initial medial mesh from the cache.
+# The paper's table 2: time and vertices of HEM (cost: hausdorff) and of Q-MAT+ (cost: slab), as a Markdown table. Each
+# model has a row as in the paper, one-sided and ended by the first collapse that exceeds epsilon, and a two-sided row
+# in which all edges are tried. Both methods have the same constraint points. Times are processor seconds of the whole
+# command, which reads the initial medial mesh from the cache.
 #   hem.sh [--epsilon E] [MODEL...]      default: ant, chair and plane of ../shared/data/surfaces at 1 %, else generated
 #                                        models
 # QMAT_BUILD is the build folder, by default build/release.
@@ -31,7 +31,7 @@ simplify() {
   spheres=$(number spheres "$work/run.json")
 }
 
-echo "| model (initial vertices) | errors held | on_exceed | HEM | Q-MAT+ | ratio of time |"
+echo "| model (initial vertices) | bounded errors | on_exceed | HEM | Q-MAT+ | ratio of time |"
 echo "| --- | --- | --- | ---: | ---: | ---: |"
 for model in "$@"; do
   "$build/qmat" run "$top/graphs/qmat_plus.yaml" --to initial --set "model=$model" --cache "$work/cache" --quiet \

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* qmat_scale: what `qmat mat` takes for models of some ten thousand and of a million triangles, as one JSON object.
+/* qmat_scale: the time and memory of `qmat mat` for models of some ten thousand and of a million triangles, as one JSON
+ * object.
  *
  *   qmat_scale QMAT FOLDER [MODEL...]
  *
- * QMAT is the program to measure, FOLDER takes scratch files. Every model is measured as it is, and the first one once
- * more with its triangles divided into four until there are about a million. Without a model: a generated octopus. */
+ * QMAT is the program to measure; FOLDER is for temporary files. Every model is measured. The first one is measured
+ * again with its triangles divided into four until there are about a million. The default model is a generated octopus.
+ */
 #include <errno.h>
 #include <fcntl.h>
 #include <jansson.h>

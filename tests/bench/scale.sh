@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Prints one JSON object: what `qmat mat` takes for models and for a million triangles, stage by stage, its memory, and
-# its initial medial mesh against CGAL's plain Delaunay triangulation of the same samples.
-#   scale.sh [MODEL...]      the first model is also divided into a million triangles; default: a generated octopus
+# Prints one JSON object: the time of `qmat mat` per node, its memory, and the time of its initial medial mesh relative
+# to CGAL's Delaunay triangulation of the same samples.
+#   scale.sh [MODEL...]      the first model is measured again in a million triangles; default: a generated octopus
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
 . "$(dirname "$0")/functions.sh"
