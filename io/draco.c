@@ -2,7 +2,6 @@
 #include "io/draco.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "core/geometry/medial_build.h"
 #include "core/node.h"
@@ -91,8 +90,8 @@ static qmat_status make_faces(qmat_context *context, const qmat_medial *medial, 
   return QMAT_OK;
 }
 
-qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, int position_bits,
-                                     int radius_bits, uint8_t **bytes, size_t *size) {
+qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, const double *origin,
+                                     int position_bits, int radius_bits, uint8_t **bytes, size_t *size) {
   *bytes = NULL;
   *size = 0;
   qmat_status status = check_bits(context, "position_bits", position_bits);
@@ -112,10 +111,10 @@ qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *m
   }
   for (size_t i = 0; i < count; i++) {
     const double *sphere = medial->spheres + 4 * i;
-    for (size_t k = 0; k < 3; k++) centres[3 * i + k] = (float)sphere[k];
+    for (size_t k = 0; k < 3; k++) centres[3 * i + k] = (float)(sphere[k] - (origin ? origin[k] : 0));
     radii[i] = (float)sphere[3];
     for (size_t k = 0; k < 4; k++) {
-      if (isfinite((float)sphere[k])) continue;
+      if (isfinite(k < 3 ? centres[3 * i + k] : radii[i])) continue;
       char number[32];
       qmat_format_number(sphere[k], number, sizeof number);
       qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s does not fit into single precision", number);
@@ -157,7 +156,8 @@ static void part_faces(uint32_t *faces, size_t face_count, size_t *triangle_coun
   }
 }
 
-qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes, size_t size, qmat_medial **medial) {
+qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes, size_t size, const double *origin,
+                                     qmat_medial **medial) {
   *medial = NULL;
   qmat_draco_mesh *mesh = NULL;
   double *values = NULL;
@@ -189,7 +189,7 @@ qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes
   if (status == QMAT_OK) status = qmat_draco_mesh_attribute(context, mesh, radius, 1, values + 3 * count);
   if (status != QMAT_OK) goto done;
   for (size_t i = 0; i < count; i++) {
-    memcpy(made->spheres + 4 * i, values + 3 * i, 3 * sizeof *values);
+    for (size_t k = 0; k < 3; k++) made->spheres[4 * i + k] = values[3 * i + k] + (origin ? origin[k] : 0);
     made->spheres[4 * i + 3] = values[3 * count + i];
   }
   qmat_draco_mesh_faces(mesh, faces);
@@ -209,16 +209,6 @@ done:
   qmat_free(values);
   qmat_draco_mesh_free(mesh);
   return status;
-}
-
-double qmat_draco_medial_loss(const qmat_medial *given, const qmat_medial *decoded) {
-  double loss = 0;
-  for (size_t i = 0; i < given->sphere_count && i < decoded->sphere_count; i++) {
-    const double *a = given->spheres + 4 * i, *b = decoded->spheres + 4 * i;
-    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    loss = fmax(loss, sqrt(x * x + y * y + z * z) + fabs(a[3] - b[3]));
-  }
-  return loss;
 }
 
 /* ---- triangle meshes, to be shown ---- */

@@ -25,23 +25,21 @@ void qmat_draco_medial_ranges(const qmat_medial *medial, double *position_range,
 /* ---- medial meshes ---- */
 
 /* Encodes a medial mesh as a sequential Draco mesh: POSITION holds the centres and a GENERIC attribute the radii, each
- * quantised on its own to `position_bits` and `radius_bits` (1 to 30). Spheres keep their order. The faces are the
+ * quantised on its own to `position_bits` and `radius_bits` (1 to 30). Centres count from the three numbers of `origin`
+ * (NULL: from zero), so that single precision suffices far from zero. Spheres keep their order. The faces are the
  * triangles in their order, then each edge (i, j) that lies on no triangle as (i, j, j), then each sphere i on no edge
  * as (i, i, i). Edgebreaker would be smaller, but it reorders and splits vertices and drops degenerate faces.
  * `*bytes` (qmat_free it) is NULL on failure. QMAT_ERROR_USAGE for bits out of range, QMAT_ERROR_GEOMETRY for a medial
  * mesh without spheres or beyond the range of single precision, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY.
  * Cost: linear, and a binary search per side of a triangle. */
-qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, int position_bits,
-                                     int radius_bits, uint8_t **bytes, size_t *size);
+qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, const double *origin,
+                                     int position_bits, int radius_bits, uint8_t **bytes, size_t *size);
 
-/* The medial mesh, sealed, that `size` bytes made by qmat_draco_encode_medial describe. Sizes and ids are checked
- * before they are trusted: QMAT_ERROR_FORMAT says what is wrong. `*medial` is NULL on failure; the caller releases it.
- * Cost: linear. */
-qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes, size_t size, qmat_medial **medial);
-
-/* What encoding cost: the largest |dc| + |dr| over the spheres of two medial meshes of equally many spheres, in model
- * units. Cones and slabs interpolate their spheres, so no point of the solid moves farther. */
-double qmat_draco_medial_loss(const qmat_medial *given, const qmat_medial *decoded);
+/* The medial mesh, sealed, that `size` bytes made by qmat_draco_encode_medial with this origin describe. Sizes and ids
+ * are checked before they are trusted: QMAT_ERROR_FORMAT says what is wrong. `*medial` is NULL on failure; the caller
+ * releases it. Cost: linear. */
+qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes, size_t size, const double *origin,
+                                     qmat_medial **medial);
 
 /* ---- triangle meshes, to be shown ---- */
 

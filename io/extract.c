@@ -41,6 +41,12 @@ static const json_t *data_of(const json_t *node) {
   return json_is_string(data) ? data : NULL;
 }
 
+/* Where the spheres of a node count from, in the space of the model that was read. */
+static void take_origin(const json_t *extras, double origin[3]) {
+  static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
+  for (int k = 0; k < 3; k++) origin[k] = json_number_value(json_object_get(extras, axes[k]));
+}
+
 static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                              qmat_medial **medial, json_t *facts) {
   qmat_gltf_asset asset;
@@ -70,8 +76,10 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
     qmat_fail_hint(context, "by its name or its number; qmat info lists them");
   } else if (status == QMAT_OK) {
     const json_t *data = data_of(found);
+    double origin[3];
+    take_origin(json_object_get(found, "extras"), origin);
     status = qmat_base64_decode(context, json_string_value(data), json_string_length(data), &blob, &size);
-    if (status == QMAT_OK) status = qmat_draco_decode_medial(context, blob, size, medial);
+    if (status == QMAT_OK) status = qmat_draco_decode_medial(context, blob, size, origin, medial);
     if (status != QMAT_OK) qmat_fail_element(context, "node", (int64_t)index);
     if (status == QMAT_OK) status = take_facts(context, json_object_get(found, "extras"), facts);
     if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);

@@ -7,7 +7,8 @@
 #include "core/value.h"
 
 /* Takes the medial mesh back out of a file that carries one: glTF (qmat_data in the extras of a node), USD (as
- * io/usd/usd_write.h writes it), or .ma. It is in the space of the node or prim that carries it. `name` is that node's
+ * io/usd/usd_write.h writes it), or .ma. It is in the space of the model or mesh that was
+ * described: the node's or prim's own, moved by the origin that the file states. `name` is that node's
  * or prim's name, or NULL where there is one only; it does not apply to .ma. `facts` (a JSON object, may be NULL) gains
  * what the file says of it: the extras or customData that start with qmat_, without the data. Stated counts are checked
  * against what is there. `*medial` is sealed and released by the caller; NULL on failure. QMAT_ERROR_FORMAT,

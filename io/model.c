@@ -5,6 +5,7 @@
 
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_keep.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/scanner.h"

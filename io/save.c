@@ -28,8 +28,7 @@ static char *join(const char *folder, size_t folder_length, const char *name) {
   return path;
 }
 
-/* Whether the file `path` holds these bytes. */
-static bool holds(const char *path, const qmat_file_part *part) {
+bool qmat_file_holds(const char *path, const qmat_file_part *part) {
   FILE *file = fopen(path, "rbe");
   if (!file) return false;
   uint8_t chunk[16384];
@@ -54,7 +53,7 @@ static qmat_status check_target(qmat_context *context, const qmat_file_part *byt
     return qmat_fail_file(context, QMAT_ERROR_IO, part->final, "cannot write the file: %s has this name",
                           S_ISDIR(about.st_mode) ? "a folder" : "a pipe or device");
   }
-  part->is_there = is_side && holds(part->final, bytes);
+  part->is_there = is_side && qmat_file_holds(part->final, bytes);
   if (part->is_there) return QMAT_OK;
   if (access(part->final, W_OK) != 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
   part->replaces = true;

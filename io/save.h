@@ -11,4 +11,7 @@
  * permissions. QMAT_ERROR_IO names the file; QMAT_ERROR_MEMORY. One thread. Cost: one pass over the bytes. */
 qmat_status qmat_file_save(qmat_context *context, const qmat_file *file, const char *path);
 
+/* Whether `path` is a file that holds the bytes of the part, and no others. */
+bool qmat_file_holds(const char *path, const qmat_file_part *part);
+
 #endif

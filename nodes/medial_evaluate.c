@@ -14,6 +14,7 @@
 #include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
+#include "nodes/measure/storage_share.h"
 #include "nodes/measure/topology_report.h"
 #include "nodes/measure/unit_spheres.h"
 
@@ -33,7 +34,7 @@ enum { MOST_SEARCHES = 4, CREEPING = 2 };
 typedef struct evaluation {
   qmat_context *context;
   const medial_evaluate_params *params;
-  double epsilon;   /* of the bounds: never 0 */
+  double epsilon;   /* what the bounds are refined to: below that of the parameters, never 0 */
   double deviation; /* of the mesh, in diagonals */
   qmat_surface *surface;
   qmat_envelope *envelope;
@@ -50,6 +51,7 @@ static qmat_status prepare(evaluation *e, const qmat_mesh *mesh, const qmat_medi
   qmat_status status = qmat_surface_new(context, mesh, &e->surface);
   if (status != QMAT_OK) return status;
   e->deviation = mesh->deviation / qmat_surface_frame(e->surface)->diagonal;
+  e->epsilon *= 1 - QMAT_STORAGE_SHARE;
   if (e->deviation < e->epsilon) e->epsilon -= e->deviation;
   e->unit = *medial;
   status = qmat_unit_spheres(context, qmat_surface_frame(e->surface), medial, &e->unit.spheres);
@@ -280,7 +282,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 4,
+    .version = 5,
     .summary = "Proves how far a medial mesh and a surface are apart",
     .doc =
         "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "

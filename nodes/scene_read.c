@@ -66,7 +66,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 4,
+    .version = 5,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF scene",
     .doc =
         "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "

@@ -8,18 +8,19 @@
 #include "io/mesh/mesh_formats.h"
 #include "io/usd/usd_write.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/descriptor/medial_summary.h"
+#include "nodes/measure/storage_share.h"
 
-/* Quantisation spends this part of epsilon at most; without a report epsilon is taken for this part of the diagonal. */
-#define PART_OF_EPSILON 0.05
-#define USUAL_EPSILON 1e-3
-/* So little of the diagonal is near what single precision can tell apart: quantisation is not asked to do better. */
-#define LEAST_QUANTISATION 1e-6
+/* Without a report, epsilon is taken for this share of the diagonal. */
+#define DEFAULT_EPSILON 1e-3
+/* Quantisation is never held to less than this share of the diagonal, which is near single precision. */
+#define LEAST_QUANTISATION 1e-7
 
 typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMAT_USDA, FORMAT_USDZ } file_format;
 
 typedef struct scene_write_params {
   int format; /* a file_format */
-  bool draco, draco_meshes, skin_beside;
+  bool draco, draco_meshes, skin_beside, side_files;
   int64_t position_bits, radius_bits;
 } scene_write_params;
 
@@ -59,36 +60,40 @@ static const qmat_value *given_for(const qmat_value *value, size_t index) {
   return item && !qmat_value_failure(item) ? item : NULL;
 }
 
-/* What is to be written of one medial mesh; NULL: none. */
+/* What the report says of one medial mesh. */
+static qmat_stated_errors errors_of(const qmat_medial *medial, const qmat_report *report) {
+  const double stated = reported(report, "diagonal");
+  return (qmat_stated_errors){.diagonal = stated > 0 || !medial ? stated : diagonal_of(medial),
+                              .epsilon = reported(report, "epsilon"),
+                              .error_out = reported(report, "surface_to_envelope"),
+                              .error_in = reported(report, "envelope_to_surface"),
+                              .certified = certificate_of(report)};
+}
+
+/* How far storage may move the solid, in model units. What is certified stays so where that is possible. */
+static double storage_of(const qmat_stated_errors *errors) {
+  const double allowed = QMAT_STORAGE_SHARE / 2 * (errors->epsilon > 0 ? errors->epsilon : DEFAULT_EPSILON);
+  const double left = errors->epsilon - fmax(errors->error_out, errors->error_in);
+  const bool is_tight = errors->certified == QMAT_CERTIFICATE_YES && left < allowed;
+  return errors->diagonal * (is_tight ? fmax(0.99 * left, LEAST_QUANTISATION) : allowed);
+}
+
+/* What is written of one medial mesh; NULL: none. */
 static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_medial *medial,
-                                      const qmat_mesh *skin, const qmat_report *report, const char *name) {
-  const double epsilon = reported(report, "epsilon"), told = reported(report, "diagonal");
-  const double diagonal = told > 0 || !medial ? told : diagonal_of(medial);
-  qmat_gltf_addition addition = {
-      .medial = medial,
-      .skin = skin,
-      .options =
-          {
-              .binary = params->format == FORMAT_GLB,
-              .compress_skin = params->draco,
-              .position_bits = (int)params->position_bits,
-              .radius_bits = (int)params->radius_bits,
-              .name = name,
-              .diagonal = diagonal,
-              .epsilon = epsilon,
-              .error_out = reported(report, "surface_to_envelope"),
-              .error_in = reported(report, "envelope_to_surface"),
-              .certified = certificate_of(report),
-          },
-  };
-  qmat_gltf_options *options = &addition.options;
-  double quantisation = PART_OF_EPSILON * (epsilon > 0 ? epsilon : USUAL_EPSILON);
-  /* What is certified shall stay so. */
-  const double left = epsilon - fmax(options->error_out, options->error_in);
-  if (options->certified == QMAT_CERTIFICATE_YES && left < quantisation)
-    quantisation = fmax(0.99 * left, LEAST_QUANTISATION);
-  options->quantisation = quantisation * diagonal;
-  return addition;
+                                      const qmat_mesh *skin, const qmat_report *report, const char *name,
+                                      qmat_stated_errors *stated) {
+  const qmat_stated_errors errors = errors_of(medial, report);
+  return (qmat_gltf_addition){.medial = medial,
+                              .skin = skin,
+                              .options = {.binary = params->format == FORMAT_GLB,
+                                          .embed = !params->side_files,
+                                          .compress_skin = params->draco,
+                                          .position_bits = (int)params->position_bits,
+                                          .radius_bits = (int)params->radius_bits,
+                                          .quantisation = storage_of(&errors),
+                                          .name = name,
+                                          .errors = errors,
+                                          .stated = stated}};
 }
 
 /* Of a mesh among several its own, else the scene's; NULL: none. */
@@ -97,9 +102,9 @@ static const char *name_of(const qmat_scene *scene, const qmat_value *medial, si
   return scene ? scene->name : NULL;
 }
 
-/* All inputs of one mesh, or lists of one length. */
+/* All inputs of one mesh, or lists of one length. `stated` has one element a medial mesh. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
-                              json_t *report, qmat_file **file) {
+                              json_t *report, qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
   const bool kept = scene && scene->part_count > 0;
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
@@ -112,10 +117,10 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   if (!additions) return qmat_fail_memory(context, "a glTF file");
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
-    additions[i] =
-        addition_of(params, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
-                    shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
-                    (const qmat_report *)given_for(inputs[IN_REPORT], i), name_of(scene, inputs[IN_MEDIAL], i));
+    additions[i] = addition_of(params, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
+                               shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
+                               (const qmat_report *)given_for(inputs[IN_REPORT], i),
+                               name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);
   }
   const qmat_status status =
       kept ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
@@ -125,21 +130,66 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
 }
 
 static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
-                             qmat_file **file) {
+                             qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  const qmat_report *report = (const qmat_report *)inputs[IN_REPORT];
+  const qmat_stated_errors errors =
+      errors_of((const qmat_medial *)inputs[IN_MEDIAL], (const qmat_report *)inputs[IN_REPORT]);
   const qmat_usd_options options = {
       .package = params->format == FORMAT_USDZ,
       .name = scene ? scene->name : NULL,
       .meters_per_unit = scene ? scene->meters_per_unit : 0,
       .is_z_up = scene && scene->is_z_up,
-      .epsilon = reported(report, "epsilon"),
-      .error_out = reported(report, "surface_to_envelope"),
-      .error_in = reported(report, "envelope_to_surface"),
-      .certified = certificate_of(report),
+      .moved = storage_of(&errors),
+      .errors = errors,
+      .stated = stated,
   };
   return qmat_usd_write(context, (const qmat_medial *)inputs[IN_MEDIAL], (const qmat_mesh *)inputs[IN_SKIN], &options,
                         file);
+}
+
+/* Writes what the file states of one medial mesh into a report; nothing where no errors are known. */
+static bool put_stated(json_t *report, const qmat_medial *medial, const qmat_stated_errors *stated) {
+  const struct {
+    const char *key;
+    double value;
+  } numbers[] = {{"epsilon", stated->epsilon},
+                 {"surface_to_envelope", stated->error_out},
+                 {"envelope_to_surface", stated->error_in}};
+  bool done = true;
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+    if (!isfinite(numbers[i].value)) return done;
+    done = json_object_set_new(report, numbers[i].key, json_real(numbers[i].value)) == 0 && done;
+  }
+  if (stated->certified != QMAT_CERTIFICATE_UNKNOWN)
+    done =
+        json_object_set_new(report, "certified", json_boolean(stated->certified == QMAT_CERTIFICATE_YES)) == 0 && done;
+  return json_object_set_new(report, "spheres", json_integer((json_int_t)medial->sphere_count)) == 0 && done;
+}
+
+/* The errors that the file states: one mesh's in the report itself, of several a list as a step has it that runs once
+ * for each. */
+static qmat_status report_stated(qmat_context *context, const qmat_value *given, const qmat_stated_errors *stated,
+                                 json_t *report) {
+  const size_t count = qmat_value_count(given);
+  json_t *meshes = given->type == QMAT_LIST ? json_array() : NULL;
+  bool done = given->type != QMAT_LIST || json_object_set_new(report, "meshes", meshes) == 0;
+  for (size_t i = 0; i < count && done; i++) {
+    const qmat_medial *medial = (const qmat_medial *)given_for(given, i);
+    if (!meshes) {
+      done = put_stated(report, medial, &stated[i]);
+      continue;
+    }
+    const qmat_list *list = (const qmat_list *)given;
+    json_t *of_mesh = json_pack("{s:s}", "name", list->names[i]), *own = medial ? json_object() : NULL;
+    if (medial) {
+      done = put_stated(own, medial, &stated[i]);
+      done = json_object_set_new(of_mesh, "report", own) == 0 && done;
+    } else {
+      done = json_object_set_new(of_mesh, "failure", json_string(qmat_value_failure(list->items[i]))) == 0;
+    }
+    done = json_array_append_new(meshes, of_mesh) == 0 && done;
+  }
+  return done ? QMAT_OK : qmat_fail_memory(context, "the report");
 }
 
 /* What goes with a list of medial meshes is a list, too, of as many; not every format holds several. */
@@ -183,30 +233,35 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_status status = check_spheres(context, inputs);
   if (status != QMAT_OK) return status;
   qmat_report *report = qmat_report_new();
-  if (!report) return qmat_fail_memory(context, "the report");
-  switch ((file_format)params->format) {
-    case FORMAT_MA:
-      status = qmat_ma_write(context, medial, &file);
-      break;
-    case FORMAT_PLY:
-      status = qmat_ply_write_medial(context, medial, &file);
-      break;
-    case FORMAT_USDA:
-    case FORMAT_USDZ:
-      status = write_usd(context, params, inputs, &file);
-      break;
-    default:
-      status = write_gltf(context, params, inputs, report->root, &file);
-      break;
+  qmat_stated_errors *stated = qmat_calloc(qmat_value_count(inputs[IN_MEDIAL]), sizeof *stated);
+  if (!report || !stated) status = qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK) {
+    switch ((file_format)params->format) {
+      case FORMAT_MA:
+      case FORMAT_PLY:
+        stated[0] = errors_of(medial, (const qmat_report *)inputs[IN_REPORT]);
+        status = params->format == FORMAT_MA ? qmat_ma_write(context, medial, &file)
+                                             : qmat_ply_write_medial(context, medial, &file);
+        break;
+      case FORMAT_USDA:
+      case FORMAT_USDZ:
+        status = write_usd(context, params, inputs, stated, &file);
+        break;
+      default:
+        status = write_gltf(context, params, inputs, report->root, stated, &file);
+        break;
+    }
   }
+  if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
+  qmat_free(stated);
   if (status == QMAT_OK) {
     outputs[OUT_FILE] = &file->base;
     outputs[OUT_REPORT] = &report->base;
     return QMAT_OK;
   }
   if (file) qmat_value_release(&file->base);
-  qmat_value_release(&report->base);
+  qmat_value_release(report ? &report->base : NULL);
   return status;
 }
 
@@ -236,6 +291,11 @@ static const qmat_param params[] = {
      .doc = "Add the skin to a glTF scene that is handed on, as a mesh beside the one that it describes",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, skin_beside)},
+    {.name = "side_files",
+     .unit = "",
+     .doc = "Leave the buffers and images of a glTF scene in files beside a .glb instead of putting them into it",
+     .type = QMAT_PARAM_BOOL,
+     .offset = offsetof(scene_write_params, side_files)},
     {.name = "position_bits",
      .unit = "bits",
      .doc = "Quantisation of the spheres' centres (glb and gltf); 0 takes what epsilon asks for",
@@ -282,7 +342,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 3,
+    .version = 4,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A scene that scene.read took from glTF goes on as glb or gltf with all that is in it: each mesh's medial mesh "
@@ -314,6 +374,7 @@ const qmat_node qmat_node_scene_write = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .report_summary = &qmat_medial_summary,
     .check_counts = check_counts,
     .run = run,
 };

@@ -76,7 +76,10 @@ void qmat_run_uninit(qmat_run *run) {
   for (size_t i = 0; i < run->hashed_count; i++) qmat_free(run->hashed[i].path);
   qmat_free(run->hashed);
   for (size_t i = 0; run->slots && i < run->slot_count; i++) release_slot(&run->slots[i]);
-  for (size_t i = 0; i < run->file_count; i++) qmat_free(run->files[i].path);
+  for (size_t i = 0; i < run->file_count; i++) {
+    qmat_free(run->files[i].path);
+    if (run->files[i].written) qmat_value_release(&run->files[i].written->base);
+  }
   qmat_free(run->steps);
   qmat_free(run->slots);
   qmat_free(run->files);

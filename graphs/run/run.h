@@ -73,6 +73,7 @@ typedef struct qmat_run_file {
   char *path;
   size_t bytes;       /* of the main part */
   qmat_digest sha256; /* of the main part's bytes */
+  qmat_file *written; /* what is saved, side files under their own names; NULL: a report, or nothing yet */
 } qmat_run_file;
 
 /* A file that a run reads, with its digest at the first reading. A file is hashed once. */

@@ -6,6 +6,7 @@
 #include "core/json_text.h"
 #include "graphs/run/run_paths.h"
 #include "io/save.h"
+#include "io/side_files.h"
 
 /* The files of one folder, in the form that qmat_file_save takes. */
 typedef struct part_group {
@@ -36,13 +37,28 @@ static qmat_status check_side_part(qmat_context *context, const qmat_run *run, c
   return status;
 }
 
+/* Names an output's side files, and refuses those that would replace a file of something else. */
+static qmat_status name_side_files(qmat_context *context, const qmat_run *run, qmat_run_file *file) {
+  const qmat_value *value = run->slots[file->slot].value;
+  if (qmat_value_item_type(value) == QMAT_REPORT) return QMAT_OK;
+  if (value->type == QMAT_LIST) {
+    return qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' has %zu files, one per mesh, but a single path",
+                     run->graph->outputs[file->output].name, qmat_value_count(value));
+  }
+  if (file->written) qmat_value_release(&file->written->base);
+  qmat_status status = qmat_file_name_sides(context, (const qmat_file *)value, file->path, &file->written);
+  for (size_t i = 1; status == QMAT_OK && i < file->written->part_count; i++)
+    status = check_side_part(context, run, file->path, file->written->parts[i].name);
+  return status == QMAT_OK ? qmat_file_check_sides(context, file->written, file->path) : status;
+}
+
 static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run_file *file, part_group *group,
                                   char **text) {
-  const qmat_value *value = run->slots[file->slot].value;
   /* qmat_file_save gives its path to the part without a name: the first of the group. */
   const char *main_name = group->count == 0 ? "" : file->path + qmat_folder_length(file->path);
-  if (qmat_value_item_type(value) == QMAT_REPORT) {
-    json_t *root = qmat_report_json(value);
+  const qmat_file *made = file->written;
+  if (!made) {
+    json_t *root = qmat_report_json(run->slots[file->slot].value);
     *text = root ? qmat_json_text(root, JSON_INDENT(2) | JSON_SORT_KEYS, NULL) : NULL;
     json_decref(root);
     if (!*text) return qmat_fail_memory(context, "report");
@@ -52,22 +68,10 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run *run, qmat_run
     qmat_status status = digest_bytes(context, *text, file->bytes, &file->sha256);
     return status == QMAT_OK ? add_part(context, group, main_name, *text, file->bytes) : status;
   }
-  if (value->type == QMAT_LIST) {
-    return qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' has %zu files, one per mesh, but a single path",
-                     run->graph->outputs[file->output].name, qmat_value_count(value));
-  }
-  const qmat_file *made = (const qmat_file *)value;
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < made->part_count && status == QMAT_OK; i++) {
-    if (i == 0) {
-      file->bytes = made->parts[0].size;
-      status = digest_bytes(context, made->parts[0].bytes, file->bytes, &file->sha256);
-    } else {
-      status = check_side_part(context, run, file->path, made->parts[i].name);
-    }
-    if (status == QMAT_OK)
-      status = add_part(context, group, i ? made->parts[i].name : main_name, made->parts[i].bytes, made->parts[i].size);
-  }
+  file->bytes = made->parts[0].size;
+  qmat_status status = digest_bytes(context, made->parts[0].bytes, file->bytes, &file->sha256);
+  for (size_t i = 0; i < made->part_count && status == QMAT_OK; i++)
+    status = add_part(context, group, i ? made->parts[i].name : main_name, made->parts[i].bytes, made->parts[i].size);
   return status;
 }
 
@@ -95,6 +99,8 @@ qmat_status qmat_run_write(qmat_context *context, qmat_run *run) {
   char **texts = qmat_calloc(run->file_count, sizeof *texts);
   if (!texts) return qmat_fail_memory(context, "outputs");
   qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++)
+    status = name_side_files(context, run, &run->files[i]);
   for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
     bool written = false;
     for (size_t before = 0; before < i; before++)

@@ -5,6 +5,7 @@
 
 #include "core/json_text.h"
 #include "graphs/node_json.h"
+#include "graphs/run/run_paths.h"
 #include "io/bytes.h"
 #include "io/save.h"
 
@@ -56,7 +57,7 @@ static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
 
 static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
   const qmat_value *value = run->slots[file->slot].value;
-  const qmat_file *made = value->type == QMAT_FILE ? (const qmat_file *)value : NULL;
+  const qmat_file *made = file->written ? file->written : value->type == QMAT_FILE ? (const qmat_file *)value : NULL;
   json_t *json = json_object();
   json_object_set_new(json, "name", json_string(run->graph->outputs[file->output].name));
   json_object_set_new(json, "path", qmat_json_string(file->path));
@@ -285,7 +286,13 @@ void qmat_run_print(const qmat_run *run, FILE *out) {
   for (size_t i = 0; i < run->file_count; i++) {
     char size[32];
     qmat_format_bytes(run->files[i].bytes, size);
-    fprintf(out, "%s -> %s (%s)\n", graph->outputs[run->files[i].output].name, run->files[i].path, size);
+    const char *name = graph->outputs[run->files[i].output].name, *path = run->files[i].path;
+    const qmat_file *written = run->files[i].written;
+    fprintf(out, "%s -> %s (%s)\n", name, path, size);
+    for (size_t part = 1; written && part < written->part_count; part++) {
+      qmat_format_bytes(written->parts[part].size, size);
+      fprintf(out, "%s -> %.*s%s (%s)\n", name, (int)qmat_folder_length(path), path, written->parts[part].name, size);
+    }
   }
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_graph_output *output = &graph->outputs[i];

@@ -86,13 +86,38 @@ static json_t *summarise_step(const qmat_run *run, const qmat_run_step *step) {
   return NULL;
 }
 
+static bool makes_files(const qmat_run *run, const qmat_run_step *step) {
+  const qmat_node *type = run->graph->nodes[step->node].type;
+  for (size_t port = 0; port < qmat_output_count(type); port++)
+    if (type->outputs[port].type == QMAT_FILE) return true;
+  return false;
+}
+
+/* Replaces bounds and flags by those that the written files state: storage changes what is stored. */
+static void merge_written(const qmat_run *run, const qmat_report_summary *type, json_t *summary) {
+  bool first = true;
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_run_step *step = &run->steps[i];
+    if (!step->done || !step->report || run->graph->nodes[step->node].type->report_summary != type) continue;
+    json_t *written = makes_files(run, step) ? summarise_step(run, step) : NULL;
+    for (const qmat_summary_entry *entry = type->entries; written && entry->key; entry++) {
+      const bool is_bound = entry->kind == QMAT_SUMMARY_BOUND;
+      if (is_bound || (entry->kind == QMAT_SUMMARY_ALL && json_object_get(summary, entry->key)))
+        merge_entry(entry, written, first && is_bound, summary);
+    }
+    first = first && !written;
+    json_decref(written);
+  }
+}
+
 json_t *qmat_run_summarise(const qmat_run *run, char *text, size_t size) {
   for (size_t i = run->step_count; i-- > 0;) {
     const qmat_run_step *step = &run->steps[i];
     const qmat_report_summary *type = run->graph->nodes[step->node].type->report_summary;
-    if (!step->done || !step->report || !type) continue;
+    if (!step->done || !step->report || !type || makes_files(run, step)) continue;
     json_t *summary = summarise_step(run, step);
     if (!summary) continue;
+    merge_written(run, type, summary);
     type->sentence(run->name, summary, text, size);
     return summary;
   }

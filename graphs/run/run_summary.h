@@ -5,9 +5,10 @@
 #include "graphs/run/run.h"
 
 /* The summary of a run: that of its last finished step whose node declares one (qmat_node.report_summary) and whose
- * report has its entries. A JSON object: "name", "node", the entries in their order, and for several meshes the counts
- * "meshes" and "failures". Writes the sentence to `text` of `size` bytes. NULL when there is no summary or memory is
- * short; the caller calls json_decref. */
+ * report has its entries. Nodes that make files have no summary of their own: where one declares the same summary,
+ * bounds are the largest and flags hold for all of what its reports state. A JSON object: "name", "node", the entries
+ * in their order, and for several meshes the counts "meshes" and "failures". Writes the sentence to `text` of `size`
+ * bytes. NULL when there is no summary or memory is short; the caller calls json_decref. */
 json_t *qmat_run_summarise(const qmat_run *run, char *text, size_t size);
 
 #endif

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/arena.h"
-#include "io/bytes.h"
+#include "core/json_text.h"
 
 /* ---- the container ---- */
 
@@ -96,54 +96,52 @@ void qmat_gltf_asset_uninit(qmat_gltf_asset *asset) {
   *asset = (qmat_gltf_asset){0};
 }
 
-/* ---- names of files ---- */
-
-static int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
+static void put_chunk_head(qmat_writer *out, size_t size, const char *type) {
+  qmat_put_u32(out, (uint32_t)size);
+  qmat_put_bytes(out, type, 4);
 }
 
-qmat_status qmat_gltf_relative_path(qmat_context *context, const char *uri, size_t length, char **name) {
-  char *path = *name = qmat_alloc(length + 1, 1);
-  if (!path) return qmat_fail_memory(context, "the name of a file");
-  size_t used = 0;
-  bool sound = length > 0;
-  for (size_t i = 0; i < length && sound; i++) {
-    char c = uri[i];
-    if (c == '?' || c == '#' || (c == ':' && memchr(uri, '/', i) == NULL)) sound = false; /* a query, or a scheme */
-    if (c == '%') {
-      int high = i + 1 < length ? hex_digit(uri[i + 1]) : -1, low = i + 2 < length ? hex_digit(uri[i + 2]) : -1;
-      if (high < 0 || low < 0) sound = false;
-      c = (char)(high * 16 + low);
-      i += 2;
-    }
-    if (c == '\0' || c == '\\') sound = false;
-    path[used++] = c;
+static qmat_status put_glb(qmat_context *context, const qmat_gltf_asset *asset, const char *json, const uint8_t *data,
+                           size_t data_size, qmat_writer *out) {
+  const size_t json_size = (strlen(json) + 3) / 4 * 4, kept = asset->chunk ? (asset->chunk_size + 3) / 4 * 4 : 0;
+  const size_t chunk_size = kept + data_size;
+  const bool has_chunk = asset->chunk || data_size > 0;
+  const uint64_t total = 12 + 8 + (uint64_t)json_size + (has_chunk ? 8 + chunk_size : 0) + asset->more_size;
+  if (total > UINT32_MAX) {
+    qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes is beyond the format's 4 GiB",
+              (unsigned long long)total);
+    return qmat_fail_hint(context, "set side_files to true, or write a .gltf");
   }
-  path[used] = '\0';
-  if (path[0] == '/') sound = false;
-  for (const char *part = path; sound && *part;) {
-    size_t part_length = strcspn(part, "/");
-    if (part_length == 2 && part[0] == '.' && part[1] == '.') sound = false;
-    part += part_length;
-    if (*part == '/') part++;
+  qmat_put_text(out, "glTF");
+  qmat_put_u32(out, 2);
+  qmat_put_u32(out, (uint32_t)total);
+  put_chunk_head(out, json_size, "JSON");
+  qmat_put_text(out, json);
+  qmat_gltf_pad(out, ' ');
+  if (has_chunk) {
+    put_chunk_head(out, chunk_size, "BIN");
+    if (asset->chunk) qmat_put_bytes(out, asset->chunk, asset->chunk_size);
+    qmat_gltf_pad(out, 0);
+    qmat_put_bytes(out, data, data_size);
   }
-  if (sound && path[used - 1] != '/') return QMAT_OK;
-  qmat_free(path);
-  *name = NULL;
+  if (asset->more_size > 0) qmat_put_bytes(out, asset->more, asset->more_size);
   return QMAT_OK;
 }
 
-char *qmat_gltf_beside(const char *asset, const char *name) {
-  const char *slash = strrchr(asset, '/');
-  size_t folder = slash ? (size_t)(slash - asset) + 1 : 0, length = strlen(name);
-  char *path = qmat_alloc(folder + length + 1, 1);
-  if (!path) return NULL;
-  memcpy(path, asset, folder);
-  memcpy(path + folder, name, length + 1);
-  return path;
+qmat_status qmat_gltf_asset_put(qmat_context *context, const qmat_gltf_asset *asset, const uint8_t *data,
+                                size_t data_size, qmat_writer *out) {
+  const size_t flags = JSON_REAL_PRECISION(17) | (asset->binary ? JSON_COMPACT : JSON_INDENT(2));
+  char *json = qmat_json_text(asset->root, flags, NULL);
+  if (!json) return qmat_fail_memory(context, "a glTF file");
+  qmat_status status = QMAT_OK;
+  if (asset->binary) {
+    status = put_glb(context, asset, json, data, data_size, out);
+  } else {
+    qmat_put_text(out, json);
+    qmat_put_u8(out, '\n');
+  }
+  qmat_free(json);
+  return status;
 }
 
 /* ---- meshes ---- */
@@ -159,6 +157,23 @@ char *qmat_gltf_mesh_name(const json_t *root, size_t mesh) {
 size_t qmat_gltf_component_size(int64_t component_type) {
   static const uint8_t sizes[] = {1, 1, 2, 2, 4, 4, 4};
   return component_type >= 5120 && component_type <= 5126 ? sizes[component_type - 5120] : 0;
+}
+
+bool qmat_gltf_set(json_t *object, const char *key, json_t *value) {
+  return value && json_object_set_new(object, key, value) == 0;
+}
+
+bool qmat_gltf_add(json_t *root, const char *key, json_t *member, json_int_t *number) {
+  json_t *array = json_object_get(root, key);
+  if (!array && qmat_gltf_set(root, key, json_array())) array = json_object_get(root, key);
+  if (number) *number = (json_int_t)json_array_size(array);
+  if (json_is_array(array) && member) return json_array_append_new(array, member) == 0;
+  json_decref(member);
+  return false;
+}
+
+void qmat_gltf_pad(qmat_writer *writer, uint8_t with) {
+  while (!writer->failed && writer->size % 4 != 0) qmat_put_u8(writer, with);
 }
 
 static bool add_name(json_t *root, const char *key, const char *name) {
@@ -257,115 +272,4 @@ qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, c
     qmat_free(chosen);
   }
   return status;
-}
-
-/* ---- keeping all of it ---- */
-
-typedef struct keeper {
-  qmat_context *context;
-  const char *path; /* of the asset */
-  qmat_scene *scene;
-  size_t capacity;
-  json_t *warnings;
-} keeper;
-
-static qmat_status add_part(keeper *keeper, const char *name, const uint8_t *bytes, size_t size) {
-  qmat_scene *scene = keeper->scene;
-  if (qmat_grow((void **)&scene->parts, &keeper->capacity, scene->part_count + 1, sizeof *scene->parts) != 0)
-    return qmat_fail_memory(keeper->context, "a glTF asset");
-  qmat_file_part *part = &scene->parts[scene->part_count++];
-  *part = (qmat_file_part){.name = qmat_strdup(name), .bytes = qmat_alloc(size, 1)};
-  if (!part->name || !part->bytes) return qmat_fail_memory(keeper->context, "a glTF asset");
-  memcpy(part->bytes, bytes, size);
-  part->size = size;
-  return QMAT_OK;
-}
-
-static qmat_status warn(const keeper *keeper, const char *uri, const char *what) {
-  enum { MOST_BYTES = 200 };
-  size_t length = strnlen(uri, MOST_BYTES);
-  while (length > 0 && ((unsigned char)uri[length] & 0xC0) == 0x80) length--; /* not within a character */
-  json_t *text = json_sprintf("the file \"%.*s\" %s: it is not copied", (int)length, uri, what);
-  return json_array_append_new(keeper->warnings, text) == 0
-             ? QMAT_OK
-             : qmat_fail_memory(keeper->context, "the warnings of a reader");
-}
-
-/* Takes steps that lead nowhere ("./", "//") out of a relative path. */
-static void shorten(char *name) {
-  char *to = name;
-  for (const char *from = name; *from;) {
-    const size_t length = strcspn(from, "/");
-    const bool nowhere = length == 0 || (length == 1 && from[0] == '.');
-    if (!nowhere) {
-      if (to > name) *to++ = '/';
-      memmove(to, from, length);
-      to += length;
-    }
-    from += length;
-    if (*from == '/') from++;
-  }
-  *to = '\0';
-}
-
-static qmat_status keep_file(keeper *keeper, const char *uri, size_t length) {
-  if (strncmp(uri, "data:", 5) == 0) return QMAT_OK;
-  char *name;
-  qmat_status status = qmat_gltf_relative_path(keeper->context, uri, length, &name);
-  if (status != QMAT_OK) return status;
-  if (name) shorten(name);
-  if (!name || !qmat_is_part_name(name) || !qmat_is_utf8(name)) {
-    qmat_free(name);
-    return warn(keeper, uri, "does not lie below the scene's folder");
-  }
-  bool known = false;
-  for (size_t i = 1; i < keeper->scene->part_count && !known; i++)
-    known = strcmp(keeper->scene->parts[i].name, name) == 0;
-  if (!known) {
-    qmat_context *context = keeper->context;
-    const qmat_error before = context->error;
-    qmat_bytes bytes = {0};
-    char *path = qmat_gltf_beside(keeper->path, name);
-    status = path ? qmat_bytes_read_file(context, path, &bytes) : qmat_fail_memory(context, "a glTF asset");
-    if (status == QMAT_OK) {
-      status = add_part(keeper, name, bytes.data, bytes.size);
-    } else if (status == QMAT_ERROR_IO || status == QMAT_ERROR_FORMAT) {
-      context->error = before;
-      status = warn(keeper, uri, "cannot be read");
-    }
-    qmat_bytes_uninit(&bytes);
-    qmat_free(path);
-  }
-  qmat_free(name);
-  return status;
-}
-
-static bool is_uri(const char *key) {
-  const size_t length = strlen(key);
-  return strcmp(key, "uri") == 0 || (length > 3 && strcmp(key + length - 3, "Uri") == 0);
-}
-
-/* jansson parses 2048 levels at most, which bounds the recursion. */
-static qmat_status keep_files(keeper *keeper, const json_t *json) {
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < json_array_size(json) && status == QMAT_OK; i++)
-    status = keep_files(keeper, json_array_get(json, i));
-  const char *key;
-  json_t *value;
-  json_object_foreach((json_t *)(uintptr_t)json, key, value) {
-    if (status != QMAT_OK) break;
-    if (json_is_string(value) && is_uri(key)) {
-      status = keep_file(keeper, json_string_value(value), json_string_length(value));
-    } else if (strcmp(key, "extras") != 0) { /* what is said there is nobody else's business */
-      status = keep_files(keeper, value);
-    }
-  }
-  return status;
-}
-
-qmat_status qmat_gltf_keep(qmat_context *context, const json_t *root, const uint8_t *bytes, size_t size,
-                           const char *path, qmat_scene *scene, json_t *warnings) {
-  keeper keeper = {.context = context, .path = path, .scene = scene, .warnings = warnings};
-  const qmat_status status = add_part(&keeper, "", bytes, size);
-  return status == QMAT_OK ? keep_files(&keeper, root) : status;
 }

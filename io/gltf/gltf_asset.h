@@ -9,6 +9,17 @@
 #include <jansson.h>
 
 #include "core/value.h"
+#include "io/bytes.h"
+
+/* The types of an accessor's components. */
+enum {
+  QMAT_GLTF_BYTE = 5120,
+  QMAT_GLTF_UNSIGNED_BYTE,
+  QMAT_GLTF_SHORT,
+  QMAT_GLTF_UNSIGNED_SHORT,
+  QMAT_GLTF_UNSIGNED_INT = 5125,
+  QMAT_GLTF_FLOAT
+};
 
 /* The key in a mesh's extras that says that it is the skin of a medial mesh, and no model. */
 #define QMAT_GLTF_SKIN_MARK "qmat_skin"
@@ -30,19 +41,26 @@ qmat_status qmat_gltf_asset_init(qmat_context *context, const uint8_t *bytes, si
                                  qmat_gltf_asset *asset);
 void qmat_gltf_asset_uninit(qmat_gltf_asset *asset);
 
-/* The name of an external file that the `length` characters of a URI stand for, below the asset's folder: percent
- * signs decoded, blanks kept. `*name` is NULL when it is not a relative path that stays inside that folder; the caller
- * frees it with qmat_free. QMAT_ERROR_MEMORY. */
-qmat_status qmat_gltf_relative_path(qmat_context *context, const char *uri, size_t length, char **name);
-
-/* The path of a file below the folder of the file `asset`; NULL when memory is short. qmat_free frees it. */
-char *qmat_gltf_beside(const char *asset, const char *name);
+/* Appends the asset as a file: a .glb with `data_size` bytes of `data` behind its binary chunk, or a .gltf, which takes
+ * no data. QMAT_ERROR_MEMORY, also beyond the 4 GiB of a .glb. Linear. */
+qmat_status qmat_gltf_asset_put(qmat_context *context, const qmat_gltf_asset *asset, const uint8_t *data,
+                                size_t data_size, qmat_writer *out);
 
 /* The name of a mesh, or "mesh 3" where it has none; NULL when memory is short. qmat_free frees it. */
 char *qmat_gltf_mesh_name(const json_t *root, size_t mesh);
 
 /* The bytes of a number of an accessor's componentType, 5120 (BYTE) to 5126 (FLOAT); 0: there is no such type. */
 size_t qmat_gltf_component_size(int64_t component_type);
+
+/* Sets object[key] and takes the value over; false when memory is short or the value is NULL. */
+bool qmat_gltf_set(json_t *object, const char *key, json_t *value);
+
+/* Appends a member to the array root[key], which is made where there is none, and takes it over. `*number` (may be
+ * NULL) becomes its index. False when memory is short, the member is NULL or root[key] is no array. */
+bool qmat_gltf_add(json_t *root, const char *key, json_t *member, json_int_t *number);
+
+/* Appends bytes `with` until the size is a multiple of 4. */
+void qmat_gltf_pad(qmat_writer *writer, uint8_t with);
 
 /* Names an extension among those that the asset uses and requires, once each; false when memory is short. */
 bool qmat_gltf_require_extension(json_t *root, const char *name);
@@ -62,11 +80,5 @@ size_t qmat_gltf_mesh_carriers(const json_t *root, size_t mesh);
  * where no node carries a mesh, QMAT_ERROR_MEMORY. Linear. */
 qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, const char *path, const char *choice,
                                     uint32_t **meshes, size_t *count);
-
-/* Keeps the asset in `scene`: `bytes` as its first part, then every file that the JSON refers to as the value of a key
- * "uri" (or one that ends in "Uri") by a relative path inside its folder, once each. Files that are not there or lie
- * elsewhere are left out; `warnings` (an array) gains a text for each. QMAT_ERROR_MEMORY. */
-qmat_status qmat_gltf_keep(qmat_context *context, const json_t *root, const uint8_t *bytes, size_t size,
-                           const char *path, qmat_scene *scene, json_t *warnings);
 
 #endif

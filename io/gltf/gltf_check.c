@@ -10,13 +10,12 @@
 #include "core/arena.h"
 #include "io/base64.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_uri.h"
 
 #define MOST_BUFFERS 4096
 /* An accessor without a buffer view stands for zeros that no byte pays for. Morph targets use it, with as many as the
  * mesh has vertices, which other bytes have paid for. */
 #define FREE_ZEROS 65536
-
-enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
 
 /* An accessor, as far as its users are checked against it. */
 typedef struct accessor {
@@ -248,9 +247,10 @@ static qmat_status load_external(const checker *check, size_t index, const char 
     }
   }
   char *name;
-  qmat_status status = qmat_gltf_relative_path(check->context, uri, uri_length, &name);
+  qmat_status status = qmat_gltf_file_name(check->context, uri, uri_length, &name);
   if (status != QMAT_OK) return status;
-  if (!name) {
+  if (!name || qmat_gltf_is_outside(name)) {
+    qmat_free(name);
     return fail(check, "buffer", index, "its uri \"%.100s\" is not a relative path inside the asset's folder", uri);
   }
   char *path = qmat_gltf_beside(check->path, name);
@@ -384,10 +384,11 @@ static qmat_status check_sparse(const checker *check, size_t index, json_t *spar
     }
   }
   if (status == QMAT_OK) {
-    status = take_whole(check, indices, "componentType", "accessor", index, BYTE, FLOAT, &type, NULL);
+    status =
+        take_whole(check, indices, "componentType", "accessor", index, QMAT_GLTF_BYTE, QMAT_GLTF_FLOAT, &type, NULL);
   }
   if (status != QMAT_OK) return status;
-  if (type != UNSIGNED_BYTE && type != UNSIGNED_SHORT && type != UNSIGNED_INT) {
+  if (type != QMAT_GLTF_UNSIGNED_BYTE && type != QMAT_GLTF_UNSIGNED_SHORT && type != QMAT_GLTF_UNSIGNED_INT) {
     return fail(check, "accessor", index, "sparse.indices.componentType must be 5121, 5123 or 5125");
   }
   int64_t index_size = (int64_t)qmat_gltf_component_size(type);
@@ -420,8 +421,8 @@ static qmat_status check_accessor(const checker *check, size_t index, json_t *ob
 
   int64_t view_id = 0, offset = 0;
   bool present;
-  qmat_status status =
-      take_whole(check, object, "componentType", "accessor", index, BYTE, FLOAT, &out->component_type, NULL);
+  qmat_status status = take_whole(check, object, "componentType", "accessor", index, QMAT_GLTF_BYTE, QMAT_GLTF_FLOAT,
+                                  &out->component_type, NULL);
   if (status == QMAT_OK) {
     status = take_whole(check, object, "count", "accessor", index, 1, UINT32_MAX, &out->count, NULL);
   }
@@ -473,19 +474,19 @@ static qmat_status check_use(const checker *check, int64_t id, const char *what,
   const accessor *of = &check->accessors[id];
   bool fits = of->components == components;
   switch (of->component_type) {
-    case BYTE:
+    case QMAT_GLTF_BYTE:
       fits = fits && (allowed & ALLOW_BYTES) && (allowed & ALLOW_SIGNED);
       break;
-    case UNSIGNED_BYTE:
+    case QMAT_GLTF_UNSIGNED_BYTE:
       fits = fits && (allowed & ALLOW_BYTES);
       break;
-    case SHORT:
+    case QMAT_GLTF_SHORT:
       fits = fits && (allowed & ALLOW_SHORTS) && (allowed & ALLOW_SIGNED);
       break;
-    case UNSIGNED_SHORT:
+    case QMAT_GLTF_UNSIGNED_SHORT:
       fits = fits && (allowed & ALLOW_SHORTS);
       break;
-    case UNSIGNED_INT:
+    case QMAT_GLTF_UNSIGNED_INT:
       fits = fits && (allowed & ALLOW_UINTS);
       break;
     default:

@@ -11,7 +11,6 @@
 #include "io/draco_draco.h"
 #include "io/gltf/gltf_asset.h"
 
-enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
 enum { LEAST_POSITION_BITS = 14, NORMAL_BITS = 10, TEXCOORD_BITS = 12, COLOR_BITS = 8, OTHER_BITS = 12 };
 enum { MOST_ATTRIBUTES = 24 };
 
@@ -220,8 +219,10 @@ static void choose_bits(const compressor *c, packing *p, size_t index) {
 
 static bool draco_number_of(json_int_t type, qmat_draco_number *number) {
   static const qmat_draco_number numbers[] = {QMAT_DRACO_INT8, QMAT_DRACO_UINT8, QMAT_DRACO_INT16, QMAT_DRACO_UINT16};
-  *number = type == FLOAT ? QMAT_DRACO_FLOAT : type <= UNSIGNED_SHORT ? numbers[type - BYTE] : QMAT_DRACO_FLOAT;
-  return type == FLOAT || type <= UNSIGNED_SHORT;
+  *number = type == QMAT_GLTF_FLOAT            ? QMAT_DRACO_FLOAT
+            : type <= QMAT_GLTF_UNSIGNED_SHORT ? numbers[type - QMAT_GLTF_BYTE]
+                                               : QMAT_DRACO_FLOAT;
+  return type == QMAT_GLTF_FLOAT || type <= QMAT_GLTF_UNSIGNED_SHORT;
 }
 
 /* Takes an attribute's numbers, one vertex after the other. */
@@ -260,7 +261,8 @@ static qmat_status take_corners(compressor *c, packing *p, const json_t *value, 
   p->indices = whole_of(value);
   *why = OBSTACLE_DATA;
   if (!view_accessor(c, p->indices, &view) || view.components != 1 || view.count % 3 != 0 ||
-      (view.type != UNSIGNED_BYTE && view.type != UNSIGNED_SHORT && view.type != UNSIGNED_INT))
+      (view.type != QMAT_GLTF_UNSIGNED_BYTE && view.type != QMAT_GLTF_UNSIGNED_SHORT &&
+       view.type != QMAT_GLTF_UNSIGNED_INT))
     return QMAT_OK;
   *why = OBSTACLE_SHARED;
   if (c->shared[p->indices]) return QMAT_OK;
@@ -313,7 +315,7 @@ static qmat_status describe(compressor *c, const packing *p, const uint8_t *byte
     done =
         json_object_set_new(accessor, "count", json_integer((json_int_t)(is_index ? 3 * faces : points))) == 0 && done;
     if (is_index && points > 65535)
-      done = json_object_set_new(accessor, "componentType", json_integer(UNSIGNED_INT)) == 0 && done;
+      done = json_object_set_new(accessor, "componentType", json_integer(QMAT_GLTF_UNSIGNED_INT)) == 0 && done;
     if (is_index || i != p->position) continue;
     for (size_t k = 0; k < 3; k++) {
       low[k] = INFINITY;
@@ -358,7 +360,7 @@ static qmat_status pack(compressor *c, const packing *p, json_t **extension, obs
                              (json_int_t)size);
     *extension = make_extension(p, json_array_size(c->new_views));
     qmat_put_bytes(&c->blobs, bytes, size);
-    while (!c->blobs.failed && c->blobs.size % 4 != 0) qmat_put_u8(&c->blobs, 0);
+    qmat_gltf_pad(&c->blobs, 0);
     if (!*extension || json_array_append_new(c->new_views, view) != 0 || c->blobs.failed)
       status = qmat_fail_memory(c->context, "a glTF file");
   }
@@ -504,7 +506,7 @@ static bool rebuild_chunk(compressor *c, const view_table *table, size_t *moved_
       qmat_put_bytes(&chunk, c->chunk + 4 * w, held);
     }
   }
-  while (done && !chunk.failed && chunk.size % 4 != 0) qmat_put_u8(&chunk, 0);
+  qmat_gltf_pad(&chunk, 0);
   size_t i;
   json_t *view;
   json_array_foreach(c->new_views, i, view) {

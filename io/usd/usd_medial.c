@@ -29,7 +29,9 @@ static qmat_status find_child(reader *r, qmat_usd_prim *prim, const char *name, 
   return status;
 }
 
-static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim) {
+/* `data` are the carrier's customData, which say where its space begins in the space of the model. */
+static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim, const qmat_usd_value *data) {
+  static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   const qmat_usd_value *points, *radii;
   qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, "points", &points);
   if (status == QMAT_OK) status = qmat_usd_prim_attribute(r->context, r->stage, prim, "primvars:radius", &radii);
@@ -42,7 +44,8 @@ static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim) {
   if (!r->medial->spheres) return qmat_fail_memory(r->context, "a medial mesh");
   r->medial->sphere_count = points->count;
   for (size_t i = 0; i < points->count; i++) {
-    memcpy(r->medial->spheres + 4 * i, points->numbers + 3 * i, 3 * sizeof(double));
+    for (size_t k = 0; k < 3; k++)
+      r->medial->spheres[4 * i + k] = points->numbers[3 * i + k] + qmat_usd_number(qmat_usd_entry(data, axes[k]), 0);
     r->medial->spheres[4 * i + 3] = radii->numbers[i];
   }
   return QMAT_OK;
@@ -123,7 +126,7 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
   }
   if (status == QMAT_OK) {
     r->medial = qmat_medial_new();
-    status = r->medial ? read_spheres(r, &spheres) : qmat_fail_memory(r->context, "a medial mesh");
+    status = r->medial ? read_spheres(r, &spheres, data) : qmat_fail_memory(r->context, "a medial mesh");
   }
   qmat_usd_prim_uninit(&spheres);
   if (status == QMAT_OK) status = read_simplices(r, prim);

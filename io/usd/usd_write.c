@@ -29,15 +29,49 @@ static qmat_status check_single(qmat_context *context, const double *numbers, si
   return QMAT_OK;
 }
 
-/* How far single precision moves the spheres at most. */
-static double single_loss(const qmat_medial *medial) {
-  double most = 0;
-  for (size_t i = 0; i < medial->sphere_count; i++) {
-    double d[4];
-    for (size_t k = 0; k < 4; k++) d[k] = (double)(float)medial->spheres[4 * i + k] - medial->spheres[4 * i + k];
-    most = fmax(most, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + fabs(d[3]));
+/* The medial mesh and the skin as the file has them: counting from an origin. */
+typedef struct stored {
+  double origin[3];
+  qmat_medial medial;
+  qmat_mesh skin; /* no triangles: there is none */
+  double loss;    /* how far storage moved the solid */
+} stored;
+
+static bool has_origin(const stored *s) {
+  return s->origin[0] != 0 || s->origin[1] != 0 || s->origin[2] != 0;
+}
+
+static void stored_uninit(stored *s) {
+  qmat_free(s->medial.spheres);
+  qmat_free(s->skin.positions);
+}
+
+/* Shares the simplices of what it is given; only points are its own. */
+static qmat_status stored_init(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin, double moved,
+                               stored *s) {
+  *s = (stored){.medial = *medial};
+  if (skin) s->skin = *skin;
+  qmat_storage_origin(medial, skin, moved, s->origin);
+  s->medial.spheres = qmat_alloc(medial->sphere_count, 4 * sizeof(double));
+  s->skin.positions = qmat_alloc(s->skin.vertex_count, 3 * sizeof(double));
+  double *back = qmat_alloc(medial->sphere_count, 4 * sizeof *back);
+  if (!s->medial.spheres || !s->skin.positions || !back) {
+    qmat_free(back);
+    return qmat_fail_memory(context, "the output file");
   }
-  return most;
+  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
+    const double from = i % 4 < 3 ? s->origin[i % 4] : 0;
+    s->medial.spheres[i] = medial->spheres[i] - from;
+    back[i] = (double)(float)s->medial.spheres[i] + from;
+  }
+  for (size_t i = 0; skin && i < 3 * skin->vertex_count; i++)
+    s->skin.positions[i] = skin->positions[i] - s->origin[i % 3];
+  const qmat_medial read = {.sphere_count = medial->sphere_count, .spheres = back};
+  s->loss = qmat_medial_move(medial, &read);
+  qmat_free(back);
+  qmat_status status = check_single(context, s->medial.spheres, medial->sphere_count, 4, "sphere", "medial");
+  if (status == QMAT_OK) status = check_single(context, s->skin.positions, s->skin.vertex_count, 3, "vertex", "skin");
+  return status;
 }
 
 /* ---- parts of the text ---- */
@@ -229,16 +263,17 @@ static void put_number_entry(qmat_writer *writer, const char *name, double numbe
   qmat_put_text(writer, "\n");
 }
 
-static void put_custom_data(qmat_writer *writer, const qmat_medial *medial, const qmat_usd_options *options) {
+static void put_custom_data(qmat_writer *writer, const stored *s, const char *name, const qmat_stated_errors *stated) {
+  const qmat_medial *medial = &s->medial;
   const struct {
     const char *name;
     double value;
   } errors[] = {
-      {"qmat_epsilon", options->epsilon}, {"qmat_error_out", options->error_out}, {"qmat_error_in", options->error_in}};
+      {"qmat_epsilon", stated->epsilon}, {"qmat_error_out", stated->error_out}, {"qmat_error_in", stated->error_in}};
   bool any = false;
   qmat_put_text(writer, "    customData = {\n");
   put_text_entry(writer, "qmat_version", QMAT_VERSION);
-  put_text_entry(writer, "qmat_name", options->name ? options->name : "");
+  put_text_entry(writer, "qmat_name", name ? name : "");
   put_count_entry(writer, "qmat_vertices", medial->sphere_count);
   put_count_entry(writer, "qmat_edges", medial->edge_count);
   put_count_entry(writer, "qmat_triangles", medial->triangle_count);
@@ -248,18 +283,31 @@ static void put_custom_data(qmat_writer *writer, const qmat_medial *medial, cons
     any = true;
   }
   if (any) put_text_entry(writer, "qmat_error_unit", "diagonal");
-  if (options->certified != QMAT_CERTIFICATE_UNKNOWN) {
+  if (stated->certified != QMAT_CERTIFICATE_UNKNOWN) {
     put_entry(writer, "bool", "qmat_certified");
-    qmat_put_text(writer, options->certified == QMAT_CERTIFICATE_YES ? "true\n" : "false\n");
+    qmat_put_text(writer, stated->certified == QMAT_CERTIFICATE_YES ? "true\n" : "false\n");
   }
-  put_number_entry(writer, "qmat_quantisation", single_loss(medial));
+  put_number_entry(writer, "qmat_quantisation", s->loss);
   put_text_entry(writer, "qmat_quantisation_unit", "model");
   put_text_entry(writer, "qmat_frame", "prim");
+  static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
+  for (int k = 0; k < 3 && has_origin(s); k++) put_number_entry(writer, axes[k], s->origin[k]);
   qmat_put_text(writer, "    }\n");
 }
 
-static void put_layer(qmat_writer *writer, const qmat_medial *medial, const qmat_mesh *skin,
-                      const qmat_usd_options *options, const char *prim) {
+/* The prim's own place, in double precision. */
+static void put_translation(qmat_writer *writer, const double origin[3]) {
+  qmat_put_text(writer, "\n    double3 xformOp:translate = (");
+  for (int k = 0; k < 3; k++) {
+    if (k > 0) qmat_put_text(writer, ", ");
+    qmat_put_number(writer, origin[k]);
+  }
+  qmat_put_text(writer, ")\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n");
+}
+
+static void put_layer(qmat_writer *writer, const stored *s, const qmat_usd_options *options,
+                      const qmat_stated_errors *stated, const char *prim) {
+  const qmat_medial *medial = &s->medial;
   qmat_put_text(writer, "#usda 1.0\n(\n    defaultPrim = ");
   put_quoted(writer, prim);
   qmat_put_text(writer, "\n    doc = \"qmat " QMAT_VERSION "\"\n    metersPerUnit = ");
@@ -268,9 +316,10 @@ static void put_layer(qmat_writer *writer, const qmat_medial *medial, const qmat
   qmat_put_text(writer, "def Xform ");
   put_quoted(writer, prim);
   qmat_put_text(writer, " (\n");
-  put_custom_data(writer, medial, options);
+  put_custom_data(writer, s, options->name, stated);
   qmat_put_text(writer, "    kind = \"component\"\n)\n{");
-  if (skin && skin->triangle_count > 0) put_skin(writer, skin);
+  if (has_origin(s)) put_translation(writer, s->origin);
+  if (s->skin.triangle_count > 0) put_skin(writer, &s->skin);
   put_spheres(writer, medial);
   if (medial->edge_count > 0) put_cones(writer, medial);
   if (medial->triangle_count > 0) put_slabs(writer, medial);
@@ -284,21 +333,28 @@ qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, con
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
     return qmat_fail_field(context, "medial");
   }
-  qmat_status status = check_single(context, medial->spheres, medial->sphere_count, 4, "sphere", "medial");
-  if (status == QMAT_OK && skin) {
-    status = check_single(context, skin->positions, skin->vertex_count, 3, "vertex", "skin");
+  stored s;
+  const qmat_status status = stored_init(context, medial, skin, options->moved, &s);
+  if (status != QMAT_OK) {
+    stored_uninit(&s);
+    return status;
   }
-  if (status != QMAT_OK) return status;
+  const qmat_stated_errors stated = qmat_errors_after_move(&options->errors, s.loss);
+  if (options->stated) *options->stated = stated;
 
   char prim[LONGEST_NAME + 2], member[LONGEST_NAME + 8];
   make_prim_name(options->name, prim);
   qmat_writer writer = {0}, package = {0};
   const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-  if (plain == (locale_t)0) return qmat_fail_memory(context, "the output file");
+  if (plain == (locale_t)0) {
+    stored_uninit(&s);
+    return qmat_fail_memory(context, "the output file");
+  }
   const locale_t before = uselocale(plain);
-  put_layer(&writer, medial, skin, options, prim);
+  put_layer(&writer, &s, options, &stated, prim);
   uselocale(before);
   freelocale(plain);
+  stored_uninit(&s);
   if (!options->package) return qmat_writer_to_file(context, &writer, "usda", file);
   snprintf(member, sizeof member, "%s.usda", prim);
   if (!writer.failed) qmat_usdz_put(&package, member, writer.bytes, writer.size);

@@ -122,11 +122,11 @@ static void read_draco(const uint8_t *content, size_t size) {
   qmat_context context = {0};
   qmat_bytes bytes = memory_file(content, size);
   qmat_medial *medial = NULL;
-  require_explained(&context, qmat_draco_decode_medial(&context, bytes.data, size, &medial));
+  require_explained(&context, qmat_draco_decode_medial(&context, bytes.data, size, NULL, &medial));
   if (medial) {
     uint8_t *encoded = NULL;
     size_t encoded_size = 0;
-    require_explained(&context, qmat_draco_encode_medial(&context, medial, 11, 9, &encoded, &encoded_size));
+    require_explained(&context, qmat_draco_encode_medial(&context, medial, NULL, 11, 9, &encoded, &encoded_size));
     qmat_free(encoded);
     qmat_value_release(&medial->base);
   }

@@ -12,6 +12,7 @@
 
 #include "io/draco.h"
 #include "io/draco_draco.h"
+#include "io/stored_medial.h"
 #include "tests/io/medial_examples.h"
 
 static void assert_same_simplices(const qmat_medial *a, const qmat_medial *b) {
@@ -28,8 +29,9 @@ static void assert_round_trip(const qmat_medial *medial, int position_bits, int 
   uint8_t *bytes;
   size_t size;
   qmat_medial *decoded;
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, position_bits, radius_bits, &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_draco_decode_medial(&context, bytes, size, &decoded), QMAT_OK);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, position_bits, radius_bits, &bytes, &size),
+                   QMAT_OK);
+  assert_int_equal(qmat_draco_decode_medial(&context, bytes, size, NULL, &decoded), QMAT_OK);
   assert_true(decoded->base.sealed);
   assert_same_simplices(medial, decoded);
   double position_range, radius_range, largest = 0;
@@ -46,7 +48,7 @@ static void assert_round_trip(const qmat_medial *medial, int position_bits, int 
     if (moved > position_bound) fail_msg("sphere %zu moved by %g, more than %g", i, moved, position_bound);
     if (fabs(a[3] - b[3]) > radius_bound) fail_msg("radius %zu changed by %g", i, fabs(a[3] - b[3]));
   }
-  assert_true(qmat_draco_medial_loss(medial, decoded) <= position_bound + radius_bound);
+  assert_true(qmat_medial_move(medial, decoded) <= position_bound + radius_bound);
   qmat_value_release(&decoded->base);
   qmat_free(bytes);
   qmat_context_uninit(&context);
@@ -93,7 +95,7 @@ static void test_the_same_medial_mesh_gives_the_same_bytes(void **state) {
   uint8_t *bytes[2];
   size_t size[2];
   for (int i = 0; i < 2; i++) {
-    assert_int_equal(qmat_draco_encode_medial(&context, medial, 12, 10, &bytes[i], &size[i]), QMAT_OK);
+    assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 12, 10, &bytes[i], &size[i]), QMAT_OK);
   }
   assert_int_equal(size[0], size[1]);
   assert_memory_equal(bytes[0], bytes[1], size[0]);
@@ -113,7 +115,7 @@ static void test_faces_are_triangles_then_edges_then_spheres(void **state) {
   uint8_t *bytes;
   size_t size;
   qmat_draco_mesh *mesh;
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 12, 12, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 12, 12, &bytes, &size), QMAT_OK);
   assert_int_equal(qmat_draco_mesh_new(&context, bytes, size, &mesh), QMAT_OK);
   assert_int_equal(qmat_draco_mesh_point_count(mesh), 6);
   assert_int_equal(qmat_draco_mesh_face_count(mesh), 4);
@@ -149,20 +151,20 @@ static void test_bad_bits_and_empty_medial_meshes_are_refused(void **state) {
   qmat_medial *medial = example_medial(3);
   uint8_t *bytes;
   size_t size;
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 0, 8, &bytes, &size), QMAT_ERROR_USAGE);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 0, 8, &bytes, &size), QMAT_ERROR_USAGE);
   assert_string_equal(context.error.field, "position_bits");
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 8, 31, &bytes, &size), QMAT_ERROR_USAGE);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 8, 31, &bytes, &size), QMAT_ERROR_USAGE);
   assert_string_equal(context.error.field, "radius_bits");
   assert_null(bytes);
   qmat_value_release(&medial->base);
 
   medial = qmat_medial_new();
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 8, 8, &bytes, &size), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 8, 8, &bytes, &size), QMAT_ERROR_GEOMETRY);
   qmat_value_release(&medial->base);
 
   const double large[8] = {0, 0, 0, 1, 0, 1e300, 0, 1};
   medial = example_build(large, 2, NULL, 0, NULL, 0);
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 8, 8, &bytes, &size), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 8, 8, &bytes, &size), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.element_kind, "sphere");
   assert_int_equal(context.error.element, 1);
   qmat_value_release(&medial->base);
@@ -264,7 +266,7 @@ static void test_a_skin_is_no_medial_mesh(void **state) {
                                           b.triangle_count, 12, 8, &skin),
                    QMAT_OK);
   qmat_medial *medial;
-  assert_int_equal(qmat_draco_decode_medial(&context, skin.bytes, skin.size, &medial), QMAT_ERROR_FORMAT);
+  assert_int_equal(qmat_draco_decode_medial(&context, skin.bytes, skin.size, NULL, &medial), QMAT_ERROR_FORMAT);
   assert_null(medial);
   assert_non_null(strstr(context.error.message, "no medial mesh"));
   qmat_draco_skin_uninit(&skin);
@@ -279,7 +281,7 @@ static qmat_status decode_copy(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size > 0 ? size : 1);
   assert_non_null(copy);
   if (size > 0) memcpy(copy, bytes, size);
-  const qmat_status status = qmat_draco_decode_medial(&context, copy, size, &medial);
+  const qmat_status status = qmat_draco_decode_medial(&context, copy, size, NULL, &medial);
   assert_true((status == QMAT_OK) == (medial != NULL));
   if (medial) qmat_value_release(&medial->base);
   free(copy);
@@ -293,7 +295,7 @@ static void test_truncated_and_noisy_data_fail_cleanly(void **state) {
   qmat_medial *medial = example_medial(60);
   uint8_t *bytes;
   size_t size;
-  assert_int_equal(qmat_draco_encode_medial(&context, medial, 12, 10, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 12, 10, &bytes, &size), QMAT_OK);
   for (size_t length = 0; length < size; length++) assert_int_not_equal(decode_copy(bytes, length), QMAT_OK);
   uint64_t random = 42;
   for (int round = 0; round < 4000; round++) {

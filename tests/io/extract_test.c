@@ -37,7 +37,7 @@ static qmat_status extract_from(qmat_context *context, const char *file, const v
 static json_t *write_gltf(const qmat_medial *medial) {
   qmat_context context = {0};
   qmat_file *file;
-  const qmat_gltf_options options = {.quantisation = 1e-4, .name = "first", .epsilon = 0.01};
+  const qmat_gltf_options options = {.quantisation = 1e-4, .name = "first", .errors.epsilon = 0.01};
   assert_int_equal(qmat_gltf_write(&context, medial, NULL, &options, &file), QMAT_OK);
   json_t *root = json_loadb((const char *)file->parts[0].bytes, file->parts[0].size, 0, NULL);
   assert_non_null(root);
@@ -128,8 +128,8 @@ static void test_every_form_gives_back_what_was_written_within_what_it_states(vo
     if (counts[c] == 200) assert_true(loose_spheres > 0 && loose_edges > 0 && medial->triangle_count > 0);
     for (size_t form = 0; form < 4; form++) {
       qmat_context context = {0};
-      const qmat_gltf_options gltf = {.binary = form == 0, .quantisation = 1e-4, .epsilon = 0.01};
-      const qmat_usd_options usd = {.package = form == 3, .epsilon = 0.01};
+      const qmat_gltf_options gltf = {.binary = form == 0, .quantisation = 1e-4, .errors.epsilon = 0.01};
+      const qmat_usd_options usd = {.package = form == 3, .errors.epsilon = 0.01};
       qmat_file *file;
       qmat_medial *read;
       json_t *facts = json_object();

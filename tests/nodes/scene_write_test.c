@@ -164,16 +164,16 @@ static void test_what_is_certified_stays_so_where_quantisation_can_be_fine_enoug
   qmat_value_release(&medial->base);
 }
 
-static void test_quantisation_spends_a_twentieth_of_epsilon_at_most(void **state) {
+static void test_quantisation_takes_half_of_the_share_of_storage_at_most(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
   /* Centres span 4, so b bits are good for sqrt(3) / 2 * 4 / (2^b - 1); radii span 0.5: 0.25 / (2^b - 1). Each gets
-   * half of epsilon * diagonal / 20. For 0.02 * sqrt(44) / 40 = 0.0033: 1044.4 steps, 11 bits, and 75.4 steps, 7 bits.
-   * For 1e-3: 20890 steps, 15 bits, and 1507.6 steps, 11 bits. */
+   * half of epsilon * diagonal / 400. For 0.02 * sqrt(44) / 800 = 1.658e-4: 20890 steps, 15 bits, and 1507.6 steps, 11
+   * bits. For 1e-3: 417791 steps, 19 bits, and 30151 steps, 15 bits. */
   static const struct {
     double epsilon;
     int position_bits, radius_bits;
-  } cases[] = {{0.02, 11, 7}, {0, 15, 11}};
+  } cases[] = {{0.02, 15, 11}, {0, 19, 15}};
   for (size_t i = 0; i < 2; i++) {
     qmat_report *report = cases[i].epsilon > 0 ? make_report(json_pack("{s:f}", "epsilon", cases[i].epsilon)) : NULL;
     qmat_file *file = must_write(medial, (wiring){.report = report}, NULL);
@@ -181,7 +181,7 @@ static void test_quantisation_spends_a_twentieth_of_epsilon_at_most(void **state
     assert_int_equal(json_integer_value(extra(root, "qmat_position_bits")), cases[i].position_bits);
     assert_int_equal(json_integer_value(extra(root, "qmat_radius_bits")), cases[i].radius_bits);
     const double epsilon = report ? cases[i].epsilon : 1e-3;
-    assert_true(json_real_value(extra(root, "qmat_quantisation")) <= epsilon * sqrt(44) / 20);
+    assert_true(json_real_value(extra(root, "qmat_quantisation")) <= epsilon * sqrt(44) / 400);
     json_decref(root);
     qmat_value_release(&file->base);
     if (report) qmat_value_release(&report->base);
@@ -315,7 +315,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_report_goes_into_the_extras_with_what_quantisation_adds),
       cmocka_unit_test(test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough),
-      cmocka_unit_test(test_quantisation_spends_a_twentieth_of_epsilon_at_most),
+      cmocka_unit_test(test_quantisation_takes_half_of_the_share_of_storage_at_most),
       cmocka_unit_test(test_scene_and_skin_name_and_show_the_node),
       cmocka_unit_test(test_each_format_is_made),
       cmocka_unit_test(test_ma_keeps_every_number),

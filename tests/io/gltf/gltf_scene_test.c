@@ -7,6 +7,7 @@
 #include "core/json_text.h"
 #include "io/extract.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_keep.h"
 #include "io/gltf/gltf_write.h"
 #include "io/model.h"
 #include "io/save.h"
@@ -158,9 +159,9 @@ static qmat_file *enrich(fixture *f, size_t count, bool binary, const qmat_mesh 
                                         .options = {.binary = binary,
                                                     .compress_skin = compress,
                                                     .quantisation = 1e-3,
-                                                    .epsilon = (double)NAN,
-                                                    .error_out = (double)NAN,
-                                                    .error_in = (double)NAN,
+                                                    .errors.epsilon = (double)NAN,
+                                                    .errors.error_out = (double)NAN,
+                                                    .errors.error_in = (double)NAN,
                                                     .name = "scene"}};
   }
   qmat_file *file;

@@ -16,6 +16,7 @@
 #include "io/draco_draco.h"
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_write.h"
+#include "io/stored_medial.h"
 #include "tests/io/medial_examples.h"
 #include "tests/shapes.h"
 
@@ -44,10 +45,10 @@ static qmat_gltf_options usual_options(void) {
   return (qmat_gltf_options){.binary = true,
                              .quantisation = 1e-3,
                              .name = "thing",
-                             .epsilon = 0.01,
-                             .error_out = 0.007,
-                             .error_in = 0.009,
-                             .certified = QMAT_CERTIFICATE_YES};
+                             .errors.epsilon = 0.01,
+                             .errors.error_out = 0.007,
+                             .errors.error_in = 0.009,
+                             .errors.certified = QMAT_CERTIFICATE_YES};
 }
 
 static void open_glb(written *w) {
@@ -147,7 +148,7 @@ static qmat_medial *decode_extras(const written *w) {
   size_t size;
   qmat_medial *medial;
   assert_int_equal(qmat_base64_decode(&context, text, strlen(text), &bytes, &size), QMAT_OK);
-  assert_int_equal(qmat_draco_decode_medial(&context, bytes, size, &medial), QMAT_OK);
+  assert_int_equal(qmat_draco_decode_medial(&context, bytes, size, NULL, &medial), QMAT_OK);
   qmat_free(bytes);
   qmat_context_uninit(&context);
   return medial;
@@ -182,7 +183,7 @@ static void test_the_medial_mesh_comes_back_within_the_stated_quantisation(void 
         assert_memory_equal(decoded->triangles, medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
       }
       const double stated = json_real_value(extra(&w, "qmat_quantisation"));
-      assert_near(stated, qmat_draco_medial_loss(medial, decoded), 0);
+      assert_near(stated, qmat_medial_move(medial, decoded), 0);
       assert_true(stated <= options.quantisation);
       assert_int_equal(count_of(json_object_get(node_of(&w), "extras"), "qmat_vertices"), medial->sphere_count);
       assert_int_equal(count_of(json_object_get(node_of(&w), "extras"), "qmat_edges"), medial->edge_count);
@@ -232,14 +233,14 @@ static void test_extras_are_flat_and_leave_out_what_is_not_known(void **state) {
   assert_string_equal(json_string_value(extra(&w, "qmat_frame")), "node");
   assert_string_equal(json_string_value(extra(&w, "qmat_error_unit")), "diagonal");
   close_file(&w);
-  options.epsilon = options.error_out = options.error_in = NAN;
-  options.certified = QMAT_CERTIFICATE_UNKNOWN;
+  options.errors.epsilon = options.errors.error_out = options.errors.error_in = NAN;
+  options.errors.certified = QMAT_CERTIFICATE_UNKNOWN;
   w = write_file(medial, NULL, &options);
   static const char *const unknown[] = {"qmat_epsilon", "qmat_error_out", "qmat_error_in", "qmat_error_unit",
                                         "qmat_certified"};
   for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) assert_null(extra(&w, unknown[i]));
   close_file(&w);
-  options.certified = QMAT_CERTIFICATE_NO;
+  options.errors.certified = QMAT_CERTIFICATE_NO;
   w = write_file(medial, NULL, &options);
   assert_true(json_is_false(extra(&w, "qmat_certified")));
   close_file(&w);

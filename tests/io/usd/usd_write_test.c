@@ -59,7 +59,8 @@ static void test_a_medial_mesh_comes_back_as_it_was_within_what_the_file_states(
   qmat_medial *cases[] = {make_small(), example_medial(1), example_medial(3), example_medial(200)};
   for (size_t i = 0; i < 8; i++) {
     const qmat_medial *medial = cases[i / 2];
-    const qmat_usd_options options = {.package = i % 2, .epsilon = (double)NAN, .error_out = 0.5, .error_in = 0.25};
+    const qmat_usd_options options = {
+        .package = i % 2, .errors.epsilon = (double)NAN, .errors.error_out = 0.5, .errors.error_in = 0.25};
     qmat_file *file = must_write(medial, NULL, &options);
     assert_string_equal(file->format, i % 2 ? "usdz" : "usda");
     json_t *facts = json_object();
@@ -107,10 +108,10 @@ static void test_the_text_of_a_small_one_is_as_by_hand(void **state) {
   const qmat_usd_options options = {.name = "2 caf\xC3\xA9\"s",
                                     .meters_per_unit = 0.01,
                                     .is_z_up = true,
-                                    .epsilon = 0.01,
-                                    .error_out = (double)NAN,
-                                    .error_in = (double)NAN,
-                                    .certified = QMAT_CERTIFICATE_YES};
+                                    .errors.epsilon = 0.01,
+                                    .errors.error_out = (double)NAN,
+                                    .errors.error_in = (double)NAN,
+                                    .errors.certified = QMAT_CERTIFICATE_YES};
   qmat_file *file = must_write(medial, NULL, &options);
   char *text = calloc(file->parts[0].size + 1, 1);
   assert_non_null(text);

@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf/gltf_skin.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/triangle.h"
+#include "core/node.h"
+#include "io/draco.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_compress.h"
+
+enum { NORMAL_BITS = 10, ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
+
+/* ---- the data ---- */
+
+/* Writes 3 floats a vertex; QMAT_ERROR_GEOMETRY names the first that does not fit. */
+static qmat_status single_positions(qmat_context *context, const qmat_mesh *skin, const double origin[3],
+                                    float *positions) {
+  for (size_t i = 0; i < 3 * skin->vertex_count; i++) {
+    positions[i] = (float)(skin->positions[i] - origin[i % 3]);
+    if (isfinite(positions[i])) continue;
+    char number[32];
+    qmat_format_number(skin->positions[i], number, sizeof number);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s does not fit into single precision", number);
+    qmat_fail_element(context, "vertex", (int64_t)(i / 3));
+    return qmat_fail_field(context, "skin");
+  }
+  return QMAT_OK;
+}
+
+/* Unit normals, the sum of the facets' area vectors (cross products, whose length is twice the area). Vertices whose
+ * sum vanishes get the z axis: glTF asks for unit length everywhere. `sums` is scratch of 3 doubles a vertex, zeroed.
+ */
+static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
+  for (size_t t = 0; t < skin->triangle_count; t++) {
+    const uint32_t *corner = skin->triangles + 3 * t;
+    double normal[3];
+    qmat_triangle_normal(skin->positions + 3 * (size_t)corner[0], skin->positions + 3 * (size_t)corner[1],
+                         skin->positions + 3 * (size_t)corner[2], normal);
+    for (int k = 0; k < 3; k++) {
+      for (int axis = 0; axis < 3; axis++) sums[3 * (size_t)corner[k] + (size_t)axis] += normal[axis];
+    }
+  }
+  for (size_t i = 0; i < skin->vertex_count; i++) {
+    const double *sum = sums + 3 * i;
+    /* Scaled first: areas of tiny or huge models leave the range of squares. */
+    double largest = fmax(fabs(sum[0]), fmax(fabs(sum[1]), fabs(sum[2])));
+    float *normal = normals + 3 * i;
+    normal[0] = normal[1] = 0;
+    normal[2] = 1;
+    if (!(largest > 0) || !isfinite(largest)) continue;
+    double x = sum[0] / largest, y = sum[1] / largest, z = sum[2] / largest;
+    double length = sqrt(x * x + y * y + z * z);
+    normal[0] = (float)(x / length);
+    normal[1] = (float)(y / length);
+    normal[2] = (float)(z / length);
+  }
+}
+
+static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, qmat_gltf_skin *data,
+                           qmat_writer *buffer) {
+  size_t count = 3 * skin->vertex_count;
+  data->vertex_count = skin->vertex_count;
+  data->index_count = 3 * skin->triangle_count;
+  /* The largest index of a type means "restart", so 65535 vertices still fit. */
+  data->wide = skin->vertex_count > 65535;
+  for (int k = 0; k < 3; k++) data->min[k] = data->max[k] = positions[k];
+  for (size_t i = 0; i < count; i++) {
+    data->min[i % 3] = fminf(data->min[i % 3], positions[i]);
+    data->max[i % 3] = fmaxf(data->max[i % 3], positions[i]);
+    qmat_put_f32(buffer, positions[i]);
+  }
+  for (size_t i = 0; i < count; i++) qmat_put_f32(buffer, normals[i]);
+  for (size_t i = 0; i < data->index_count; i++) {
+    if (data->wide) {
+      qmat_put_u32(buffer, skin->triangles[i]);
+    } else {
+      qmat_put_u16(buffer, (uint16_t)skin->triangles[i]);
+    }
+  }
+  data->sizes[0] = data->sizes[1] = count * sizeof(float);
+  data->sizes[2] = data->index_count * (data->wide ? 4 : 2);
+}
+
+static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, const float *positions,
+                                  const float *normals, double allowed, qmat_gltf_skin *data, qmat_writer *buffer) {
+  double range = 0;
+  float low[3], high[3];
+  for (int k = 0; k < 3; k++) low[k] = high[k] = positions[k];
+  for (size_t i = 0; i < 3 * skin->vertex_count; i++) {
+    low[i % 3] = fminf(low[i % 3], positions[i]);
+    high[i % 3] = fmaxf(high[i % 3], positions[i]);
+  }
+  for (int k = 0; k < 3; k++) range = fmax(range, (double)high[k] - (double)low[k]);
+  qmat_draco_skin packed;
+  qmat_status status =
+      qmat_draco_encode_mesh(context, positions, normals, skin->vertex_count, skin->triangles, skin->triangle_count,
+                             qmat_draco_bits_for(3, range, allowed), NORMAL_BITS, &packed);
+  if (status != QMAT_OK) return status;
+  data->compressed = true;
+  data->vertex_count = packed.vertex_count;
+  data->index_count = 3 * (size_t)packed.triangle_count;
+  data->wide = packed.vertex_count > 65535;
+  data->position_id = packed.position_id;
+  data->normal_id = packed.normal_id;
+  memcpy(data->min, packed.min, sizeof data->min);
+  memcpy(data->max, packed.max, sizeof data->max);
+  data->sizes[0] = packed.size;
+  qmat_put_bytes(buffer, packed.bytes, packed.size);
+  qmat_draco_skin_uninit(&packed);
+  return QMAT_OK;
+}
+
+qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, const double origin[3], double moved,
+                               qmat_gltf_skin *data, qmat_writer *buffer) {
+  float *positions = qmat_alloc(skin->vertex_count, 3 * sizeof *positions);
+  float *normals = qmat_alloc(skin->vertex_count, 3 * sizeof *normals);
+  double *sums = qmat_calloc(skin->vertex_count, 3 * sizeof *sums);
+  qmat_status status = positions && normals && sums ? single_positions(context, skin, origin, positions)
+                                                    : qmat_fail_memory(context, "the skin");
+  if (status == QMAT_OK) {
+    area_normals(skin, sums, normals);
+    if (moved > 0) {
+      status = put_draco_skin(context, skin, positions, normals, moved, data, buffer);
+    } else {
+      put_plain_skin(skin, positions, normals, data, buffer);
+    }
+    qmat_gltf_pad(buffer, 0);
+    if (status == QMAT_OK && buffer->failed) status = qmat_fail_memory(context, "the skin");
+  }
+  qmat_free(sums);
+  qmat_free(normals);
+  qmat_free(positions);
+  return status;
+}
+
+/* ---- the JSON ---- */
+
+/* NULL is carried through json_pack, which fails on it and frees the rest, so that one check at the end is enough. */
+
+/* Adds the buffer views of a skin whose data start at `offset`; `*first` is the number of the first. */
+static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset, json_int_t *first) {
+  static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
+  for (int i = 0; i < (data->compressed ? 1 : 3); i++) {
+    json_int_t number;
+    json_t *view = json_pack("{s:I, s:I, s:I}", "buffer", buffer, "byteOffset", (json_int_t)offset, "byteLength",
+                             (json_int_t)data->sizes[i]);
+    if (view && !data->compressed && !qmat_gltf_set(view, "target", json_integer(targets[i]))) {
+      json_decref(view);
+      view = NULL;
+    }
+    if (!qmat_gltf_add(root, "bufferViews", view, &number)) return false;
+    if (i == 0) *first = number;
+    offset += data->sizes[i];
+  }
+  return true;
+}
+
+/* Adds positions, normals and indices, in this order. */
+static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t first_view, json_int_t *first) {
+  json_t *position =
+      json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", QMAT_GLTF_FLOAT, "count",
+                (json_int_t)data->vertex_count, "type", "VEC3", "min", (double)data->min[0], (double)data->min[1],
+                (double)data->min[2], "max", (double)data->max[0], (double)data->max[1], (double)data->max[2]);
+  json_t *normal = json_pack("{s:i, s:I, s:s}", "componentType", QMAT_GLTF_FLOAT, "count",
+                             (json_int_t)data->vertex_count, "type", "VEC3");
+  json_t *indices =
+      json_pack("{s:i, s:I, s:s}", "componentType", data->wide ? QMAT_GLTF_UNSIGNED_INT : QMAT_GLTF_UNSIGNED_SHORT,
+                "count", (json_int_t)data->index_count, "type", "SCALAR");
+  json_t *accessors[3] = {position, normal, indices};
+  bool done = true;
+  for (int i = 0; i < 3; i++) {
+    json_int_t number;
+    if (accessors[i] && !data->compressed)
+      done = qmat_gltf_set(accessors[i], "bufferView", json_integer(first_view + i)) && done;
+    done = qmat_gltf_add(root, "accessors", accessors[i], &number) && done;
+    if (i == 0) *first = number;
+  }
+  return done;
+}
+
+static bool add_material(json_t *root, json_int_t *number) {
+  if (*number >= 0) return true;
+  json_t *material = json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}}", "name", "skin", "pbrMetallicRoughness",
+                               "baseColorFactor", 0.75, 0.72, 0.65, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.6);
+  return qmat_gltf_add(root, "materials", material, number);
+}
+
+bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset,
+                        json_int_t *material, const char *name, bool mark, json_int_t *mesh_number) {
+  json_int_t view = 0, accessor = 0;
+  if (!add_material(root, material) || !add_views(root, data, buffer, offset, &view) ||
+      !add_accessors(root, data, view, &accessor))
+    return false;
+  json_t *primitive = json_pack("{s:{s:I, s:I}, s:I, s:I}", "attributes", "POSITION", accessor, "NORMAL", accessor + 1,
+                                "indices", accessor + 2, "material", *material);
+  bool done = true;
+  if (primitive && data->compressed) {
+    json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", QMAT_GLTF_DRACO, "bufferView", view, "attributes",
+                                  "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
+    done = qmat_gltf_set(primitive, "extensions", extension) && qmat_gltf_require_extension(root, QMAT_GLTF_DRACO);
+  }
+  json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
+  if (mesh && name) done = qmat_gltf_set(mesh, "name", json_string(name)) && done;
+  if (mesh && mark) done = qmat_gltf_set(mesh, "extras", json_pack("{s:b}", QMAT_GLTF_SKIN_MARK, 1)) && done;
+  return qmat_gltf_add(root, "meshes", mesh, mesh_number) && done;
+}
