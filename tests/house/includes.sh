@@ -89,9 +89,9 @@ find core io nodes graphs -name '*.[ch]' -o -name '*.cpp' -o -name '*.c.in' | LC
       at = follower[j]
     }
     path[length_of] = at
-    text = "a circle of includes:"
+    text = at ": a circle of includes:"
     for (i = step[at]; i < length_of; i++) {
-      text = text "\n  " edge[path[i], path[i + 1]] " includes " path[i + 1] ".h"
+      text = text (i > step[at] ? ", " : " ") edge[path[i], path[i + 1]] " includes " path[i + 1] ".h"
       done[path[i]] = 1
       n = split(uses[path[i]], user, " ")
       for (j = 1; j <= n; j++) degree[user[j]]--

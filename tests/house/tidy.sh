@@ -8,6 +8,10 @@ if ! clang-tidy --version 2>/dev/null | grep -q 'version 14\.'; then
   echo "skipped: there is no clang-tidy 14 (Debian: apt install clang-tidy)"
   exit 77
 fi
-sed -n 's/^ *"file": "\(.*\.c\)",*$/\1/p' "$2/compile_commands.json" | grep "^$PWD/" | grep -v "^$2/" | LC_ALL=C sort -u |
-  xargs -n 8 -P "$(nproc)" clang-tidy -p "$2" --quiet --warnings-as-errors='*' \
-    --extra-arg=-Wno-unknown-warning-option 2>/dev/null
+files=$(sed -n 's/^ *"file": "\(.*\.c\)",*$/\1/p' "$2/compile_commands.json" | grep "^$PWD/" | grep -v "^$2/" | LC_ALL=C sort -u)
+if [ -z "$files" ]; then
+  echo "$2/compile_commands.json has no C file of $PWD"
+  exit 1
+fi
+echo "$files" | xargs -n 8 -P "$(nproc)" clang-tidy -p "$2" --quiet --warnings-as-errors='*' \
+  --extra-arg=-Wno-unknown-warning-option 2>/dev/null

@@ -338,7 +338,7 @@ static void sample_densely(const subject *s, int count_of_each, double *out, dou
     uint32_t ids[3];
     const int count =
         qmat_envelope_primitive(envelope, random_index(&random, qmat_envelope_primitive_count(envelope)), ids);
-    const double weights[3] = {count == 1 ? 1 : count == 2 ? 1 - x : 1 - x - y, count == 2 ? x : x, y};
+    const double weights[3] = {count == 1 ? 1 : count == 2 ? 1 - x : 1 - x - y, x, y};
     for (int j = 0; j < count; j++)
       for (size_t k = 0; k < 4; k++) sphere[k] += weights[j] * unit.spheres[4 * (size_t)ids[j] + k];
     random_direction(&random, d);
