@@ -35,13 +35,10 @@ char *qmat_json_text(const json_t *json, size_t flags, size_t *size) {
 }
 
 json_t *qmat_json_string(const char *text) {
-  json_t *json = json_string(text);
-  if (json) return json;
   char *copy = qmat_strdup(text);
   if (!copy) return NULL;
-  for (char *c = copy; *c; c++)
-    if ((unsigned char)*c >= 0x80) *c = '?';
-  json = json_string(copy);
+  qmat_repair_utf8(copy);
+  json_t *json = json_string(copy);
   qmat_free(copy);
   return json;
 }

@@ -44,6 +44,11 @@ bool qmat_is_utf8(const char *text) {
   return true;
 }
 
+void qmat_repair_utf8(char *text) {
+  for (; !qmat_is_utf8(text); text++)
+    if ((unsigned char)*text >= 0x80) *text = '?';
+}
+
 bool qmat_is_part_name(const char *name) {
   if (strchr(name, '\\') != NULL || strlen(name) > 255) return false;
   for (const char *step = name;; step++) {

@@ -18,6 +18,9 @@ size_t qmat_utf8_length(const char *text);
 /* Whether all of `text` is valid UTF-8. */
 bool qmat_is_utf8(const char *text);
 
+/* Makes `text` valid UTF-8: replaces its bytes above ASCII by '?', from the start, until the rest is valid. */
+void qmat_repair_utf8(char *text);
+
 /* Whether `name` is a relative path to a file below its folder: at most 255 bytes, no backslash, no "..", no "." and no
  * empty component. */
 bool qmat_is_part_name(const char *name);

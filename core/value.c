@@ -64,9 +64,7 @@ qmat_value *qmat_failure_of_error(qmat_context *context) {
   char reason[2048];
   error.node_id[0] = error.file[0] = '\0';
   qmat_error_format(&error, reason, sizeof reason);
-  for (char *c = reason; !qmat_is_utf8(reason) && *c != '\0'; c++) {
-    if ((unsigned char)*c >= 0x80) *c = '?';
-  }
+  qmat_repair_utf8(reason);
   qmat_failure *failure = qmat_failure_new();
   if (failure) failure->reason = qmat_strdup(reason);
   if (!failure || !failure->reason) {

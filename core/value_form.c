@@ -28,41 +28,25 @@ static void put(sink *to, const void *bytes, size_t size) {
   to->used += size;
 }
 
-static void encode_u32(uint8_t *to, uint32_t number) {
-  for (int i = 0; i < 4; i++) to[i] = (uint8_t)(number >> (8 * i));
+static void encode(uint8_t *to, uint64_t number, size_t size) {
+  for (size_t i = 0; i < size; i++) to[i] = (uint8_t)(number >> (8 * i));
 }
 
-static void encode_u64(uint8_t *to, uint64_t number) {
-  for (int i = 0; i < 8; i++) to[i] = (uint8_t)(number >> (8 * i));
-}
-
-static uint32_t decode_u32(const uint8_t *from) {
-  uint32_t number = 0;
-  for (int i = 0; i < 4; i++) number |= (uint32_t)from[i] << (8 * i);
-  return number;
-}
-
-static uint64_t decode_u64(const uint8_t *from) {
+static uint64_t decode(const uint8_t *from, size_t size) {
   uint64_t number = 0;
-  for (int i = 0; i < 8; i++) number |= (uint64_t)from[i] << (8 * i);
+  for (size_t i = 0; i < size; i++) number |= (uint64_t)from[i] << (8 * i);
   return number;
 }
 
-static void put_u32(sink *to, uint32_t number) {
-  uint8_t bytes[4];
-  encode_u32(bytes, number);
-  put(to, bytes, sizeof bytes);
-}
-
-static void put_u64(sink *to, uint64_t number) {
+static void put_number(sink *to, uint64_t number, size_t size) {
   uint8_t bytes[8];
-  encode_u64(bytes, number);
-  put(to, bytes, sizeof bytes);
+  encode(bytes, number, size);
+  put(to, bytes, size);
 }
 
 static void put_text(sink *to, const char *text) {
   const size_t length = strlen(text);
-  put_u32(to, (uint32_t)length);
+  put_number(to, (uint32_t)length, 4);
   put(to, text, length);
 }
 
@@ -78,13 +62,13 @@ static void put_array(sink *to, qmat_row_kind kind, const void *array, size_t le
     const size_t count = length - start < CHUNK ? length - start : CHUNK;
     if (kind == QMAT_ROW_U32) {
       const uint32_t *numbers = (const uint32_t *)array + start;
-      for (size_t i = 0; i < count; i++) encode_u32(bytes + 4 * i, numbers[i]);
+      for (size_t i = 0; i < count; i++) encode(bytes + 4 * i, numbers[i], 4);
     } else {
       const double *numbers = (const double *)array + start;
       for (size_t i = 0; i < count; i++) {
         uint64_t bits;
         memcpy(&bits, &numbers[i], sizeof bits);
-        encode_u64(bytes + 8 * i, bits);
+        encode(bytes + 8 * i, bits, 8);
       }
     }
     put(to, bytes, count * size);
@@ -117,10 +101,10 @@ static bool write_content(sink *to, const qmat_value *value, const qmat_value_ro
       put(to, *(const bool *)place ? "\1" : "\0", 1);
       return true;
     case QMAT_ROW_ENUM:
-      put_u32(to, *(const uint32_t *)place);
+      put_number(to, *(const uint32_t *)place, 4);
       return true;
     case QMAT_ROW_SIZE:
-      put_u64(to, *(const size_t *)place);
+      put_number(to, *(const size_t *)place, 8);
       return true;
     case QMAT_ROW_NUMBER:
       put_array(to, QMAT_ROW_F64, place, 1);
@@ -128,10 +112,10 @@ static bool write_content(sink *to, const qmat_value *value, const qmat_value_ro
     case QMAT_ROW_PARTS: {
       const qmat_file_part *parts = qmat_row_pointer(value, row);
       const size_t count = qmat_row_count(value, row);
-      put_u64(to, count);
+      put_number(to, count, 8);
       for (size_t i = 0; i < count; i++) {
         put_text(to, parts[i].name);
-        put_u64(to, parts[i].size);
+        put_number(to, parts[i].size, 8);
         put(to, parts[i].bytes, parts[i].size);
       }
       return true;
@@ -141,7 +125,7 @@ static bool write_content(sink *to, const qmat_value *value, const qmat_value_ro
       for (size_t i = 0; i < qmat_row_count(value, row); i++) {
         sink size = {0};
         if (!write_rows(&size, items[i])) return false;
-        put_u64(to, size.used);
+        put_number(to, size.used, 8);
         put(to, items[i]->digest.bytes, sizeof items[i]->digest.bytes);
       }
       return true;
@@ -157,7 +141,7 @@ static bool write_content(sink *to, const qmat_value *value, const qmat_value_ro
 
 static bool write_rows(sink *to, const qmat_value *value) {
   put(to, MAGIC, sizeof MAGIC);
-  put_u32(to, FORM_VERSION);
+  put_number(to, FORM_VERSION, 4);
   put_text(to, qmat_value_layouts[value->type].name);
   for (const qmat_value_row *row = qmat_value_rows(value); row->name != NULL; row++) {
     sink size = {0};
@@ -165,7 +149,7 @@ static bool write_rows(sink *to, const qmat_value *value) {
     put_text(to, row->name);
     const uint8_t kind = (uint8_t)row->kind;
     put(to, &kind, 1);
-    put_u64(to, size.used);
+    put_number(to, size.used, 8);
     if (!write_content(to, value, row)) return false;
   }
   return true;
@@ -173,18 +157,18 @@ static bool write_rows(sink *to, const qmat_value *value) {
 
 size_t qmat_value_bytes(const qmat_value *value) {
   size_t bytes = 0;
-  for (const qmat_value_row *row = qmat_value_rows(value); row->name != NULL; row++) {
-    if (!qmat_row_has_pointer(row) || qmat_row_pointer(value, row) == NULL) continue;
+  for (const qmat_value_row *row = qmat_value_rows(value); row->name; row++) {
+    if (!qmat_row_has_pointer(row) || !qmat_row_pointer(value, row)) continue;
+    const void *pointer = qmat_row_pointer(value, row);
+    sink size = {0};
     if (row->kind == QMAT_ROW_PARTS) {
-      const qmat_file_part *parts = qmat_row_pointer(value, row);
-      for (size_t i = 0; i < qmat_row_count(value, row); i++) bytes += parts[i].size;
-    } else if (row->kind == QMAT_ROW_ITEMS || row->kind == QMAT_ROW_NAMES) {
-      for (size_t i = 0; row->kind == QMAT_ROW_ITEMS && i < qmat_row_count(value, row); i++) {
-        const qmat_value *item = ((qmat_value *const *)qmat_row_pointer(value, row))[i];
+      for (size_t i = 0; i < qmat_row_count(value, row); i++) bytes += ((const qmat_file_part *)pointer)[i].size;
+    } else if (row->kind == QMAT_ROW_ITEMS) {
+      for (size_t i = 0; i < qmat_row_count(value, row); i++) {
+        const qmat_value *item = ((qmat_value *const *)pointer)[i];
         if (item) bytes += qmat_value_bytes(item);
       }
-    } else {
-      sink size = {0};
+    } else if (row->kind != QMAT_ROW_NAMES) {
       write_content(&size, value, row);
       bytes += size.used;
     }
@@ -253,23 +237,18 @@ static const uint8_t *take(reader *from, uint64_t size) {
   return bytes;
 }
 
-static bool take_u32(reader *from, uint32_t *number) {
-  const uint8_t *bytes = take(from, 4);
-  if (bytes) *number = decode_u32(bytes);
-  return bytes != NULL;
-}
-
-static bool take_u64(reader *from, uint64_t *number) {
-  const uint8_t *bytes = take(from, 8);
-  if (bytes) *number = decode_u64(bytes);
+/* The next number of `size` bytes; false when fewer are left. */
+static bool take_number(reader *from, size_t size, uint64_t *number) {
+  const uint8_t *bytes = take(from, size);
+  if (bytes) *number = decode(bytes, size);
   return bytes != NULL;
 }
 
 /* Whether the next text is `wanted`. */
 static bool take_word(reader *from, const char *wanted) {
   const size_t length = strlen(wanted);
-  uint32_t size;
-  if (!take_u32(from, &size) || size != length) return false;
+  uint64_t size;
+  if (!take_number(from, 4, &size) || size != length) return false;
   const uint8_t *bytes = take(from, size);
   return bytes != NULL && memcmp(bytes, wanted, length) == 0;
 }
@@ -319,10 +298,10 @@ static qmat_status read_array(qmat_context *context, reader *from, qmat_value *v
   const uint8_t *bytes = take(from, size);
   const size_t length = *count * row->components;
   if (row->kind == QMAT_ROW_U32) {
-    for (size_t i = 0; i < length; i++) ((uint32_t *)array)[i] = decode_u32(bytes + 4 * i);
+    for (size_t i = 0; i < length; i++) ((uint32_t *)array)[i] = (uint32_t)decode(bytes + 4 * i, 4);
   } else {
     for (size_t i = 0; i < length; i++) {
-      const uint64_t bits = decode_u64(bytes + 8 * i);
+      const uint64_t bits = decode(bytes + 8 * i, 8);
       memcpy((double *)array + i, &bits, sizeof bits);
     }
   }
@@ -333,7 +312,7 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   uint64_t count;
   size_t *part_count = mutable_slot(value, row->count_offset);
   enum { LEAST_BYTES = 12 }; /* a part has at least its two sizes */
-  if (!take_u64(from, &count) || count > (from->size - from->used) / LEAST_BYTES) {
+  if (!take_number(from, 8, &count) || count > (from->size - from->used) / LEAST_BYTES) {
     return fail_form(context, from, "there are fewer parts than it states");
   }
   if (count == 0) return QMAT_OK;
@@ -342,12 +321,11 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   set_pointer(value, row, parts);
   *part_count = (size_t)count;
   for (size_t i = 0; i < count; i++) {
-    uint32_t name_size;
-    uint64_t size;
-    if (!take_u32(from, &name_size)) return fail_form(context, from, "a part's name is missing");
+    uint64_t name_size, size;
+    if (!take_number(from, 4, &name_size)) return fail_form(context, from, "a part's name is missing");
     const qmat_status status = take_string(context, from, name_size, &parts[i].name);
     if (status != QMAT_OK) return status;
-    const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
+    const uint8_t *bytes = take_number(from, 8, &size) ? take(from, size) : NULL;
     if (!bytes) return fail_form(context, from, "a part runs past the end");
     parts[i].bytes = qmat_alloc((size_t)size, 1);
     if (!parts[i].bytes) return qmat_fail_memory(context, "the bytes of a file");
@@ -367,7 +345,7 @@ static qmat_status read_items(qmat_context *context, reader *from, qmat_value *v
   *(size_t *)mutable_slot(value, row->count_offset) = count;
   for (size_t i = 0; i < count; i++) {
     uint64_t size = 0;
-    take_u64(from, &size);
+    take_number(from, 8, &size);
     memcpy(digest.bytes, take(from, sizeof digest.bytes), sizeof digest.bytes);
     items[i] = from->items != NULL ? from->items->find(from->items->user, &digest, size) : NULL;
     if (!items[i]) return fail_form(context, from, "an item of the list is missing");
@@ -381,8 +359,8 @@ static qmat_status read_names(qmat_context *context, reader *from, qmat_value *v
   if (!names) return qmat_fail_memory(context, "the names of a list");
   set_pointer(value, row, names);
   for (size_t i = 0; i < count; i++) {
-    uint32_t size;
-    if (!take_u32(from, &size)) return fail_form(context, from, "there are fewer names than items");
+    uint64_t size;
+    if (!take_number(from, 4, &size)) return fail_form(context, from, "there are fewer names than items");
     const qmat_status status = take_string(context, from, size, &names[i]);
     if (status != QMAT_OK) return status;
   }
@@ -404,9 +382,8 @@ static qmat_status read_json(qmat_context *context, reader *from, qmat_value *va
 
 /* `from` holds exactly the content of the row. */
 static qmat_status read_content(qmat_context *context, reader *from, qmat_value *value, const qmat_value_row *row) {
+  uint64_t number;
   uint32_t small;
-  uint64_t large;
-  const uint8_t *byte;
   switch (row->kind) {
     case QMAT_ROW_U32:
     case QMAT_ROW_F64:
@@ -422,21 +399,21 @@ static qmat_status read_content(qmat_context *context, reader *from, qmat_value 
     case QMAT_ROW_NAMES:
       return read_names(context, from, value, row);
     case QMAT_ROW_BOOL:
-      byte = take(from, 1);
-      if (!byte || *byte > 1) return fail_form(context, from, "a flag is neither 0 nor 1");
-      *(bool *)mutable_slot(value, row->offset) = *byte == 1;
+      if (!take_number(from, 1, &number) || number > 1) return fail_form(context, from, "a flag is neither 0 nor 1");
+      *(bool *)mutable_slot(value, row->offset) = number == 1;
       return QMAT_OK;
     case QMAT_ROW_ENUM:
-      if (!take_u32(from, &small)) return fail_form(context, from, "an enumerator is cut short");
+      if (!take_number(from, 4, &number)) return fail_form(context, from, "an enumerator is cut short");
+      small = (uint32_t)number;
       memcpy(mutable_slot(value, row->offset), &small, sizeof small);
       return QMAT_OK;
     case QMAT_ROW_SIZE:
-      if (!take_u64(from, &large) || large > SIZE_MAX) return fail_form(context, from, "a count is cut short");
-      *(size_t *)mutable_slot(value, row->offset) = (size_t)large;
+      if (!take_number(from, 8, &number) || number > SIZE_MAX) return fail_form(context, from, "a count is cut short");
+      *(size_t *)mutable_slot(value, row->offset) = (size_t)number;
       return QMAT_OK;
     case QMAT_ROW_NUMBER:
-      if (!take_u64(from, &large)) return fail_form(context, from, "a number is cut short");
-      memcpy(mutable_slot(value, row->offset), &large, sizeof large);
+      if (!take_number(from, 8, &number)) return fail_form(context, from, "a number is cut short");
+      memcpy(mutable_slot(value, row->offset), &number, sizeof number);
       return QMAT_OK;
   }
   return fail_form(context, from, "a row has an unknown kind");
@@ -448,7 +425,7 @@ static qmat_status read_rows(qmat_context *context, reader *from, qmat_value *va
     const uint8_t *kind = take(from, 1);
     if (!kind || *kind != (uint8_t)row->kind) return fail_form(context, from, "a row has the wrong kind");
     uint64_t size;
-    const uint8_t *bytes = take_u64(from, &size) ? take(from, size) : NULL;
+    const uint8_t *bytes = take_number(from, 8, &size) ? take(from, size) : NULL;
     if (!bytes) return fail_form(context, from, "a row runs past the end");
     reader content = {bytes, (size_t)size, 0, from->items};
     const qmat_status status = read_content(context, &content, value, row);
@@ -468,14 +445,14 @@ qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, 
   *value = NULL;
   reader from = {bytes, size, 0, items};
   const uint8_t *magic = take(&from, sizeof MAGIC);
-  uint32_t version;
+  uint64_t version;
   if (!magic || memcmp(magic, MAGIC, sizeof MAGIC) != 0) {
     return fail_form(context, &from, "it does not start with QMAT");
   }
-  if (!take_u32(&from, &version)) return fail_form(context, &from, "its version is missing");
+  if (!take_number(&from, 4, &version)) return fail_form(context, &from, "its version is missing");
   if (version != FORM_VERSION) {
     return qmat_fail(context, QMAT_ERROR_FORMAT, "the serialised form has version %u; this qmat reads version %d",
-                     version, FORM_VERSION);
+                     (unsigned)version, FORM_VERSION);
   }
   const size_t name_start = from.used;
   int type = 0;

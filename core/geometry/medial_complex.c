@@ -142,28 +142,15 @@ uint32_t qmat_complex_find_edge(const qmat_complex *complex, uint32_t a, uint32_
   return QMAT_NONE;
 }
 
-/* Grows the parallel arrays of neighbours to at least `needed` elements. */
-static int reserve_neighbours(qmat_collapse *c, size_t needed) {
-  size_t capacity = c->neighbour_capacity;
-  if (needed <= capacity) return 0;
-  if (qmat_grow((void **)&c->neighbours, &capacity, needed, sizeof(uint32_t))) return -1;
-  capacity = c->neighbour_capacity;
-  if (qmat_grow((void **)&c->kept_edges, &capacity, needed, sizeof(uint32_t))) return -1;
-  capacity = c->neighbour_capacity;
-  if (qmat_grow((void **)&c->removed_edges, &capacity, needed, sizeof(uint32_t))) return -1;
-  c->neighbour_capacity = capacity;
-  return 0;
-}
-
-static int reserve_triangles(qmat_collapse *c, size_t needed) {
-  size_t capacity = c->triangle_capacity;
-  if (needed <= capacity) return 0;
-  if (qmat_grow((void **)&c->triangle_pairs, &capacity, needed, 2 * sizeof(uint32_t))) return -1;
-  capacity = c->triangle_capacity;
-  if (qmat_grow((void **)&c->kept_triangles, &capacity, needed, sizeof(uint32_t))) return -1;
-  capacity = c->triangle_capacity;
-  if (qmat_grow((void **)&c->removed_triangles, &capacity, needed, sizeof(uint32_t))) return -1;
-  c->triangle_capacity = capacity;
+/* Grows three parallel arrays to at least `needed` elements; those of the first are `first_size` bytes each. */
+static int reserve(void **first, size_t first_size, uint32_t **second, uint32_t **third, size_t *capacity,
+                   size_t needed) {
+  size_t one = *capacity, two = one, three = one;
+  if (needed <= one) return 0;
+  if (qmat_grow(first, &one, needed, first_size) || qmat_grow((void **)second, &two, needed, sizeof **second) ||
+      qmat_grow((void **)third, &three, needed, sizeof **third))
+    return -1;
+  *capacity = three;
   return 0;
 }
 
@@ -213,7 +200,9 @@ static qmat_status preview_stars(qmat_context *context, qmat_complex *complex, u
   size_t kept_count, removed_count = 0;
   const uint32_t *at_kept = qmat_complex_edges_at(complex, kept, &kept_count);
   const uint32_t *at_removed = removed == QMAT_NONE ? NULL : qmat_complex_edges_at(complex, removed, &removed_count);
-  if (reserve_neighbours(c, kept_count + removed_count)) return qmat_fail_memory(context, "a collapse");
+  if (reserve((void **)&c->neighbours, sizeof *c->neighbours, &c->kept_edges, &c->removed_edges, &c->neighbour_capacity,
+              kept_count + removed_count))
+    return qmat_fail_memory(context, "a collapse");
   for (size_t i = 0; i < kept_count; i++) {
     const uint32_t w = qmat_complex_other_end(complex, at_kept[i], kept);
     if (w == removed) continue;
@@ -236,7 +225,8 @@ static qmat_status preview_stars(qmat_context *context, qmat_complex *complex, u
   }
   at_kept = qmat_complex_triangles_at(complex, kept, &kept_count);
   if (removed != QMAT_NONE) at_removed = qmat_complex_triangles_at(complex, removed, &removed_count);
-  if (reserve_triangles(c, kept_count + removed_count) ||
+  if (reserve((void **)&c->triangle_pairs, 2 * sizeof *c->triangle_pairs, &c->kept_triangles, &c->removed_triangles,
+              &c->triangle_capacity, kept_count + removed_count) ||
       qmat_grow((void **)&c->vanishing, &c->vanishing_capacity, kept_count, sizeof(uint32_t)))
     return qmat_fail_memory(context, "a collapse");
   for (size_t i = 0; i < kept_count; i++) {

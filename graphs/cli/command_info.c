@@ -130,8 +130,11 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
   if (!facts) return qmat_fail_memory(context, "facts");
   qmat_status status = qmat_medial_extract(context, path, name, &medial, facts);
   if (status == QMAT_OK) {
-    printf("%s: a medial mesh of %zu spheres, %zu cones, %zu slabs", path, medial->sphere_count, medial->edge_count,
-           medial->triangle_count);
+    const qmat_value_count_row *rows = qmat_value_count_rows(QMAT_MEDIAL);
+    size_t counts[QMAT_MOST_COUNTS];
+    qmat_value_counts(&medial->base, counts);
+    printf("%s: a medial mesh of", path);
+    for (size_t i = 0; rows[i].name; i++) printf("%s %zu %s", i ? "," : "", counts[i], rows[i].name);
     if (name) printf(" on node %s", qmat_show(name).text);
     printf("\n");
     print_object(facts);
