@@ -10,21 +10,21 @@ typedef struct reader {
   qmat_context *context;
   qmat_usd_stage *stage;
   json_t *facts;
-  const char *name;    /* of the prim that is wanted, or NULL */
-  size_t carriers;     /* prims that have one */
-  qmat_medial *medial; /* NULL until the one is found */
+  const char *name;    /* of the prim to read, or NULL */
+  size_t carriers;     /* prims with a medial mesh */
+  qmat_medial *medial; /* NULL until it is found */
 } reader;
 
-/* Whether the prim has a child of this name, which is then composed. */
+/* Composes the child of this name, if the prim has one. */
 static qmat_status find_child(reader *r, qmat_usd_prim *prim, const char *name, qmat_usd_prim *child, bool *found) {
   const char *const *names;
   size_t count;
   *found = false;
-  qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
+  qmat_status status = qmat_usd_prim_children(prim, &names, &count);
   for (size_t i = 0; i < count && status == QMAT_OK && !*found; i++) {
     if (strcmp(names[i], name) != 0) continue;
     *found = true;
-    status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], child);
+    status = qmat_usd_prim_child(r->stage, prim, names[i], child);
   }
   return status;
 }
@@ -33,13 +33,13 @@ static qmat_status find_child(reader *r, qmat_usd_prim *prim, const char *name, 
 static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim, const qmat_usd_value *data) {
   static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   const qmat_usd_value *points, *radii;
-  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, "points", &points);
-  if (status == QMAT_OK) status = qmat_usd_prim_attribute(r->context, r->stage, prim, "primvars:radius", &radii);
+  qmat_status status = qmat_usd_prim_attribute(prim, "points", &points);
+  if (status == QMAT_OK) status = qmat_usd_prim_attribute(prim, "primvars:radius", &radii);
   if (status != QMAT_OK) return status;
   const bool good = points && radii && points->is_array && radii->is_array && qmat_usd_is_number(points->type) &&
                     qmat_usd_is_number(radii->type) && points->components == 3 && radii->components == 1 &&
                     points->count == radii->count && points->count <= UINT32_MAX;
-  if (!good) return qmat_usd_prim_fail(r->context, r->stage, prim, "the points or radii of the spheres are broken");
+  if (!good) return qmat_usd_prim_fail(prim, "points and primvars:radius do not match");
   r->medial->spheres = qmat_alloc(points->count, 4 * sizeof *r->medial->spheres);
   if (!r->medial->spheres) return qmat_fail_memory(r->context, "a medial mesh");
   r->medial->sphere_count = points->count;
@@ -51,8 +51,8 @@ static qmat_status read_spheres(reader *r, const qmat_usd_prim *prim, const qmat
   return QMAT_OK;
 }
 
-/* The ids of `corners` spheres each that the child `name` has in its attribute; none without that child. The caller
- * frees them. */
+/* The sphere indices in an attribute of the child `name`, `corners` for each simplex; none without that child. The
+ * caller frees them. */
 static qmat_status read_ids(reader *r, qmat_usd_prim *prim, const char *name, const char *attribute, size_t corners,
                             uint32_t **ids, size_t *count) {
   qmat_usd_prim child = {0};
@@ -62,10 +62,10 @@ static qmat_status read_ids(reader *r, qmat_usd_prim *prim, const char *name, co
   *count = 0;
   qmat_status status = find_child(r, prim, name, &child, &found);
   if (status == QMAT_OK && found) {
-    status = qmat_usd_prim_attribute(r->context, r->stage, &child, attribute, &value);
-    if (status == QMAT_OK &&
-        (!value || !value->is_array || !qmat_usd_is_integer(value->type) || value->count % corners != 0)) {
-      status = qmat_usd_prim_fail(r->context, r->stage, &child, "%s is not what it has to be", attribute);
+    status = qmat_usd_prim_attribute(&child, attribute, &value);
+    if (status == QMAT_OK && (!value || !value->is_array || !qmat_usd_is_integer(value->type) ||
+                              value->components != 1 || value->count % corners != 0)) {
+      status = qmat_usd_prim_fail(&child, "%s must be an array of integers, %zu for each simplex", attribute, corners);
     }
     if (status == QMAT_OK) {
       *ids = qmat_alloc(value->count, sizeof **ids);
@@ -74,8 +74,8 @@ static qmat_status read_ids(reader *r, qmat_usd_prim *prim, const char *name, co
     for (size_t i = 0; status == QMAT_OK && i < value->count; i++) {
       const int64_t id = value->integers[i];
       if (id < 0 || (uint64_t)id >= r->medial->sphere_count) {
-        status = qmat_usd_prim_fail(r->context, r->stage, &child, "%s names sphere %lld, but there are %zu", attribute,
-                                    (long long)id, r->medial->sphere_count);
+        status = qmat_usd_prim_fail(&child, "%s refers to sphere %lld, but there are %zu", attribute, (long long)id,
+                                    r->medial->sphere_count);
         break;
       }
       (*ids)[i] = (uint32_t)id;
@@ -103,14 +103,15 @@ static qmat_status read_facts(reader *r, const qmat_usd_value *data) {
   for (size_t i = 0; i < data->count && r->facts; i++) {
     const qmat_usd_value *value = data->entries[i].value;
     const char *text = qmat_usd_text(value);
-    const double number = qmat_usd_number(value, 0);
-    json_t *json = text && qmat_is_utf8(text)                             ? json_string(text)
-                   : value->type == QMAT_USD_BOOL && !value->is_array     ? json_boolean(number != 0)
-                   : qmat_usd_is_integer(value->type) && !value->is_array ? json_integer((json_int_t)number)
-                   : qmat_usd_is_number(value->type) && !value->is_array  ? json_real(number)
-                                                                          : NULL;
+    const bool is_single = !value->is_array && value->components == 1;
+    if (!qmat_is_utf8(data->entries[i].name)) continue;
+    json_t *json = text && qmat_is_utf8(text)                      ? json_string(text)
+                   : value->type == QMAT_USD_BOOL && is_single     ? json_boolean(value->integers[0] != 0)
+                   : qmat_usd_is_integer(value->type) && is_single ? json_integer(value->integers[0])
+                   : qmat_usd_is_number(value->type) && is_single  ? json_real(value->numbers[0])
+                                                                   : NULL;
     if (json && json_object_set_new(r->facts, data->entries[i].name, json) != 0) {
-      return qmat_fail_memory(r->context, "what a medial mesh says of itself");
+      return qmat_fail_memory(r->context, "the facts about a medial mesh");
     }
   }
   return QMAT_OK;
@@ -121,8 +122,7 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
   bool found;
   qmat_status status = find_child(r, prim, "spheres", &spheres, &found);
   if (status == QMAT_OK && !found) {
-    status =
-        qmat_usd_prim_fail(r->context, r->stage, prim, "it says that it carries a medial mesh, but has no spheres");
+    status = qmat_usd_prim_fail(prim, "the prim has qmat_version in its customData, but no child 'spheres'");
   }
   if (status == QMAT_OK) {
     r->medial = qmat_medial_new();
@@ -143,10 +143,10 @@ static qmat_status search(reader *r, qmat_usd_prim *prim) {
   }
   const char *const *names;
   size_t count;
-  qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
+  qmat_status status = qmat_usd_prim_children(prim, &names, &count);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     qmat_usd_prim child;
-    status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], &child);
+    status = qmat_usd_prim_child(r->stage, prim, names[i], &child);
     if (status == QMAT_OK) status = search(r, &child);
     qmat_usd_prim_uninit(&child);
   }
@@ -160,7 +160,7 @@ qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes,
   *medial = NULL;
   qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
   if (status != QMAT_OK) return status;
-  status = qmat_usd_stage_root(context, r.stage, &root);
+  status = qmat_usd_stage_root(r.stage, &root);
   if (status == QMAT_OK) status = search(&r, &root);
   qmat_usd_prim_uninit(&root);
   qmat_usd_stage_close(r.stage);
@@ -168,7 +168,7 @@ qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes,
     qmat_fail(context, status = QMAT_ERROR_GEOMETRY,
               r.carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
   } else if (status == QMAT_OK && !name && r.carriers > 1) {
-    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: one has to be named", r.carriers);
+    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: name one of them", r.carriers);
   }
   if (status == QMAT_OK) {
     *medial = r.medial;

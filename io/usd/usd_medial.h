@@ -6,12 +6,12 @@
 
 #include "io/bytes.h"
 
-/* Takes a medial mesh back out of a scene of USD: out of the prim whose customData has qmat_version, as
- * io/usd/usd_write.h writes it, in that prim's own space. `name` is the prim's name, or NULL where the scene has one
- * such prim only. `facts` (a JSON object, may be NULL) gains what its customData say. `*medial` is sealed, without
- * regions, and released by the caller; NULL on failure. QMAT_ERROR_GEOMETRY where no prim has one, QMAT_ERROR_USAGE
- * where several have one and none is named, QMAT_ERROR_FORMAT with the prim where it is broken, and what
- * io/usd/usd_stage.h fails with. One thread; linear. */
+/* Reads the medial mesh in a scene of USD: from the prim whose customData has qmat_version, as io/usd/usd_write.h
+ * writes it, in that prim's own space. `name` is the prim's name, or NULL if the scene has only one such prim. `facts`
+ * (a JSON object, may be NULL) gains the entries of its customData. The caller releases `*medial`, which is sealed and
+ * has no regions; NULL on failure. QMAT_ERROR_GEOMETRY if no prim has one, QMAT_ERROR_USAGE if several have one and
+ * none is named, QMAT_ERROR_FORMAT with the prim if it is broken, and the errors of io/usd/usd_stage.h. One thread.
+ * Cost: linear. */
 qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                                  qmat_medial **medial, json_t *facts);
 

@@ -5,21 +5,15 @@
 #include <string.h>
 
 #include "io/usd/usd_stage.h"
+#include "io/usd/usd_transform.h"
 
 #define FREE_ELEMENTS ((size_t)1 << 24)
 #define ELEMENTS_PER_BYTE 16
 
-static const double PI = 3.14159265358979323846;
-
-/* A transform of row vectors: p' = p * m, by rows. */
-typedef struct transform {
-  double m[16];
-} transform;
-
-/* What a prim takes over from those above it. */
+/* What a prim inherits from its parent. */
 typedef struct inherited {
-  transform world;
-  const char *purpose; /* "default" where none is written */
+  qmat_usd_transform world;
+  const char *purpose; /* "default" when no prim above has one */
 } inherited;
 
 typedef struct reader {
@@ -27,216 +21,14 @@ typedef struct reader {
   qmat_usd_stage *stage;
   qmat_soup *soup;
   size_t elements;      /* vertices and corners that were placed */
-  bool takes_undefined; /* also prims that are mere overs */
-  bool has_undefined;   /* one was left out */
+  bool takes_undefined; /* also reads prims that only have an 'over' */
+  bool has_undefined;   /* such a prim was found */
   size_t prims, meshes, cages, holes, instances, prims_skipped, shapes_skipped;
 } reader;
 
-/* ---- transforms ---- */
-
-static transform identity(void) {
-  return (transform){.m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
-}
-
-/* First `a`, then `b`. */
-static transform product(const transform *a, const transform *b) {
-  transform result;
-  for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < 4; j++) {
-      double sum = 0;
-      for (int k = 0; k < 4; k++) sum += a->m[4 * i + k] * b->m[4 * k + j];
-      result.m[4 * i + j] = sum;
-    }
-  }
-  return result;
-}
-
-static double determinant3(const transform *t) {
-  const double *m = t->m;
-  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
-}
-
-/* By Gauss-Jordan elimination with the largest pivots; false for a transform that has no inverse. */
-static bool inverse(const transform *t, transform *result) {
-  double a[4][8];
-  for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < 4; j++) {
-      a[i][j] = t->m[4 * i + j];
-      a[i][4 + j] = i == j;
-    }
-  }
-  for (int k = 0; k < 4; k++) {
-    int best = k;
-    for (int i = k + 1; i < 4; i++) {
-      if (fabs(a[i][k]) > fabs(a[best][k])) best = i;
-    }
-    if (!(fabs(a[best][k]) > 0)) return false;
-    for (int j = 0; j < 8; j++) {
-      double other = a[k][j];
-      a[k][j] = a[best][j];
-      a[best][j] = other;
-    }
-    for (int j = 7; j >= k; j--) a[k][j] /= a[k][k];
-    for (int i = 0; i < 4; i++) {
-      if (i == k) continue;
-      for (int j = 7; j >= k; j--) a[i][j] -= a[i][k] * a[k][j];
-    }
-  }
-  for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < 4; j++) result->m[4 * i + j] = a[i][4 + j];
-  }
-  return true;
-}
-
-/* Around the x, y or z axis, counter-clockwise as seen from its end. */
-static transform rotation(int axis, double degrees) {
-  transform result = identity();
-  const double turns = degrees / 90;
-  double c = cos(degrees * PI / 180), s = sin(degrees * PI / 180);
-  if (turns == floor(turns) && fabs(turns) < 0x1p52) { /* right angles without rounding */
-    static const double cosines[] = {1, 0, -1, 0}, sines[] = {0, 1, 0, -1};
-    const int quarter = (int)(turns - 4 * floor(turns / 4));
-    c = cosines[quarter];
-    s = sines[quarter];
-  }
-  const int i = (axis + 1) % 3, j = (axis + 2) % 3;
-  result.m[5 * i] = c;
-  result.m[4 * i + j] = s;
-  result.m[4 * j + i] = -s;
-  result.m[5 * j] = c;
-  return result;
-}
-
-/* Of a quaternion, its real part first. */
-static transform orientation(const double *q) {
-  transform result = identity();
-  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(length > 0)) return result;
-  const double w = q[0] / length, x = q[1] / length, y = q[2] / length, z = q[3] / length;
-  const double rows[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (z * x - y * w)},
-                             {2 * (x * y - z * w), 1 - 2 * (z * z + x * x), 2 * (y * z + x * w)},
-                             {2 * (z * x + y * w), 2 * (y * z - x * w), 1 - 2 * (y * y + x * x)}};
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) result.m[4 * i + j] = rows[i][j];
-  }
-  return result;
-}
-
-typedef enum op_kind { OP_TRANSLATE, OP_SCALE, OP_ROTATE, OP_EULER, OP_ORIENT, OP_TRANSFORM } op_kind;
-
-/* The operations by the second part of their names. `axes`: the one of a rotation; of Euler angles, from the first. */
-static const struct {
-  const char *name;
-  op_kind kind;
-  uint8_t components;
-  int axes[3];
-} operations[] = {
-    {"translate", OP_TRANSLATE, 3, {0}},   {"translateX", OP_TRANSLATE, 1, {0}},  {"translateY", OP_TRANSLATE, 1, {1}},
-    {"translateZ", OP_TRANSLATE, 1, {2}},  {"scale", OP_SCALE, 3, {0}},           {"scaleX", OP_SCALE, 1, {0}},
-    {"scaleY", OP_SCALE, 1, {1}},          {"scaleZ", OP_SCALE, 1, {2}},          {"rotateX", OP_ROTATE, 1, {0}},
-    {"rotateY", OP_ROTATE, 1, {1}},        {"rotateZ", OP_ROTATE, 1, {2}},        {"rotateXYZ", OP_EULER, 3, {0, 1, 2}},
-    {"rotateXZY", OP_EULER, 3, {0, 2, 1}}, {"rotateYXZ", OP_EULER, 3, {1, 0, 2}}, {"rotateYZX", OP_EULER, 3, {1, 2, 0}},
-    {"rotateZXY", OP_EULER, 3, {2, 0, 1}}, {"rotateZYX", OP_EULER, 3, {2, 1, 0}}, {"orient", OP_ORIENT, 4, {0}},
-    {"transform", OP_TRANSFORM, 16, {0}},
-};
-
-static const double *single_numbers(const qmat_usd_value *value, unsigned components) {
-  bool good = value && !value->is_array && qmat_usd_is_number(value->type) && value->components == components;
-  return good ? value->numbers : NULL;
-}
-
-static transform make_operation(size_t row, const double *numbers) {
-  transform result = identity();
-  const unsigned components = operations[row].components;
-  const int *axes = operations[row].axes;
-  switch (operations[row].kind) {
-    case OP_TRANSLATE:
-      for (unsigned i = 0; i < components; i++) result.m[12 + (components == 1 ? (unsigned)axes[0] : i)] = numbers[i];
-      break;
-    case OP_SCALE:
-      for (unsigned i = 0; i < components; i++) result.m[5 * (components == 1 ? (unsigned)axes[0] : i)] = numbers[i];
-      break;
-    case OP_ROTATE:
-      return rotation(axes[0], numbers[0]);
-    case OP_EULER:
-      for (int i = 0; i < 3; i++) {
-        const transform turn = rotation(axes[i], numbers[axes[i]]);
-        result = product(&result, &turn);
-      }
-      break;
-    case OP_ORIENT:
-      return orientation(numbers);
-    case OP_TRANSFORM:
-      memcpy(result.m, numbers, sizeof result.m);
-      break;
-  }
-  return result;
-}
-
-/* The operation of this name ("!invert!xformOp:rotateX:tilt"), from the attribute of the name without "!invert!". */
-static qmat_status read_operation(reader *r, const qmat_usd_prim *prim, const char *name, transform *result) {
-  static const char invert[] = "!invert!", prefix[] = "xformOp:";
-  const bool inverted = strncmp(name, invert, sizeof invert - 1) == 0;
-  if (inverted) name += sizeof invert - 1;
-  *result = identity();
-  if (strncmp(name, prefix, sizeof prefix - 1) != 0) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "'%.80s' is no transform operation",
-                              qmat_is_utf8(name) ? name : "?");
-  }
-  const char *kind = name + sizeof prefix - 1;
-  const size_t length = strcspn(kind, ":"), count = sizeof operations / sizeof operations[0];
-  size_t row = 0;
-  while (row < count && (strlen(operations[row].name) != length || memcmp(kind, operations[row].name, length) != 0)) {
-    row++;
-  }
-  if (row == count) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "'%.80s' is no transform operation",
-                              qmat_is_utf8(name) ? name : "?");
-  }
-  const qmat_usd_value *value;
-  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, name, &value);
-  if (status != QMAT_OK) return status;
-  if (!value) return qmat_usd_warn(r->context, r->stage, prim, "%s has no value: it moves nothing", name);
-  const double *numbers = single_numbers(value, operations[row].components);
-  if (!numbers) return qmat_usd_prim_fail(r->context, r->stage, prim, "%s is of another type than it has to be", name);
-  *result = make_operation(row, numbers);
-  if (!inverted) return QMAT_OK;
-  const transform forward = *result;
-  if (inverse(&forward, result)) return QMAT_OK;
-  return qmat_usd_prim_fail(r->context, r->stage, prim, "%s has no inverse", name);
-}
-
-/* The world transform of a prim. */
-static qmat_status read_transform(reader *r, const qmat_usd_prim *prim, const char *type, const transform *above,
-                                  transform *world) {
-  *world = *above;
-  const qmat_usd_value *order;
-  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, "xformOpOrder", &order);
-  if (status != QMAT_OK || !order || order->count == 0) return status;
-  if (!order->is_array || !qmat_usd_is_text(order->type)) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "xformOpOrder is of another type than it has to be");
-  }
-  if (type[0] == '\0' || strcmp(type, "Scope") == 0) {
-    return qmat_usd_warn(r->context, r->stage, prim, "its transform is left out: %s has none",
-                         type[0] ? "a Scope" : "a prim without a type");
-  }
-  transform local = identity();
-  for (size_t i = 0; i < order->count && status == QMAT_OK; i++) {
-    if (strcmp(order->texts[i], "!resetXformStack!") == 0) {
-      local = *world = identity();
-      continue;
-    }
-    transform operation;
-    status = read_operation(r, prim, order->texts[i], &operation);
-    local = product(&operation, &local);
-  }
-  *world = product(&local, world);
-  return status;
-}
-
 /* ---- meshes ---- */
 
-/* The arrays of a mesh; those that are not written have count 0. */
+/* The arrays of a mesh; NULL for those that it lacks. */
 typedef struct usd_mesh {
   const qmat_usd_value *points, *counts, *indices, *holes;
   const qmat_usd_value *crease_lengths, *crease_indices, *crease_sharpness, *sharp_vertices, *vertex_sharpness;
@@ -245,68 +37,72 @@ typedef struct usd_mesh {
   qmat_boundary boundary;
 } usd_mesh;
 
-static qmat_status read_array(reader *r, const qmat_usd_prim *prim, const char *name, bool numbers, unsigned components,
+static qmat_status read_array(const qmat_usd_prim *prim, const char *name, bool numbers, unsigned components,
                               const qmat_usd_value **value) {
-  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, name, value);
+  qmat_status status = qmat_usd_prim_attribute(prim, name, value);
   if (status != QMAT_OK || !*value) return status;
   const qmat_usd_value *v = *value;
   bool good = v->is_array && v->components == components &&
               (numbers ? qmat_usd_is_number(v->type) : qmat_usd_is_integer(v->type));
   if (good) return QMAT_OK;
-  return qmat_usd_prim_fail(r->context, r->stage, prim, "%s is of another type than it has to be", name);
+  return qmat_usd_prim_fail(prim, "%s has a value of the wrong type", name);
 }
 
-static qmat_status read_token(reader *r, const qmat_usd_prim *prim, const char *name, const char *otherwise,
-                              const char **token) {
+static qmat_status read_token(const qmat_usd_prim *prim, const char *name, const char *otherwise, const char **token) {
   const qmat_usd_value *value;
-  qmat_status status = qmat_usd_prim_attribute(r->context, r->stage, prim, name, &value);
+  qmat_status status = qmat_usd_prim_attribute(prim, name, &value);
   *token = value && qmat_usd_text(value) ? qmat_usd_text(value) : otherwise;
   return status;
 }
 
-/* One of a few words; another is an error. */
-static qmat_status read_choice(reader *r, const qmat_usd_prim *prim, const char *name, const char *const *words,
-                               unsigned count, unsigned otherwise, unsigned *choice) {
+/* One of the words. */
+static qmat_status read_choice(const qmat_usd_prim *prim, const char *name, const char *const *words, unsigned count,
+                               unsigned otherwise, unsigned *choice) {
   const char *word;
-  qmat_status status = read_token(r, prim, name, words[otherwise], &word);
+  qmat_status status = read_token(prim, name, words[otherwise], &word);
   for (*choice = 0; status == QMAT_OK && *choice < count; ++*choice) {
     if (strcmp(word, words[*choice]) == 0) return QMAT_OK;
   }
   if (status != QMAT_OK) return status;
-  return qmat_usd_prim_fail(r->context, r->stage, prim, "%s is '%.40s', which is unknown", name,
-                            qmat_is_utf8(word) ? word : "?");
+  return qmat_usd_prim_fail(prim, "%s is '%.40s', which is unknown", name, qmat_usd_shown(word));
 }
 
 static size_t count_of(const qmat_usd_value *value) {
   return value ? value->count : 0;
 }
 
-/* Reads creases and sharp vertices: a crease of n vertices has n - 1 edges, and one sharpness or n - 1 of them. */
-static qmat_status read_sharpness(reader *r, const qmat_usd_prim *prim, usd_mesh *mesh) {
-  qmat_status status = read_array(r, prim, "creaseLengths", false, 1, &mesh->crease_lengths);
-  if (status == QMAT_OK) status = read_array(r, prim, "creaseIndices", false, 1, &mesh->crease_indices);
-  if (status == QMAT_OK) status = read_array(r, prim, "creaseSharpnesses", true, 1, &mesh->crease_sharpness);
-  if (status == QMAT_OK) status = read_array(r, prim, "cornerIndices", false, 1, &mesh->sharp_vertices);
-  if (status == QMAT_OK) status = read_array(r, prim, "cornerSharpnesses", true, 1, &mesh->vertex_sharpness);
-  if (status != QMAT_OK) return status;
+/* Reads creases and sharp vertices. A crease of n vertices has n - 1 edges, and one sharpness or n - 1 of them. */
+static qmat_status read_sharpness(const qmat_usd_prim *prim, usd_mesh *mesh) {
+  const struct {
+    const char *name;
+    bool numbers;
+    const qmat_usd_value **value;
+  } arrays[] = {{"creaseLengths", false, &mesh->crease_lengths},
+                {"creaseIndices", false, &mesh->crease_indices},
+                {"creaseSharpnesses", true, &mesh->crease_sharpness},
+                {"cornerIndices", false, &mesh->sharp_vertices},
+                {"cornerSharpnesses", true, &mesh->vertex_sharpness}};
+  for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
+    qmat_status status = read_array(prim, arrays[i].name, arrays[i].numbers, 1, arrays[i].value);
+    if (status != QMAT_OK) return status;
+  }
   const size_t lengths = count_of(mesh->crease_lengths), indices = count_of(mesh->crease_indices),
                values = count_of(mesh->crease_sharpness);
   size_t total = 0;
   for (size_t i = 0; i < lengths; i++) {
     const int64_t length = mesh->crease_lengths->integers[i];
     if (length < 2 || (uint64_t)length > indices - total) {
-      return qmat_usd_prim_fail(r->context, r->stage, prim, "crease %zu has %lld vertices", i, (long long)length);
+      return qmat_usd_prim_fail(prim, "crease %zu has %lld vertices", i, (long long)length);
     }
     total += (size_t)length;
   }
   if (total != indices || (values != lengths && values != indices - lengths)) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim,
-                              "%zu creases of %zu vertices do not go with %zu indices and %zu sharpnesses", lengths,
+    return qmat_usd_prim_fail(prim, "%zu creases of %zu vertices do not match %zu indices and %zu sharpnesses", lengths,
                               total, indices, values);
   }
   if (count_of(mesh->sharp_vertices) != count_of(mesh->vertex_sharpness)) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "%zu corners do not go with %zu sharpnesses",
-                              count_of(mesh->sharp_vertices), count_of(mesh->vertex_sharpness));
+    return qmat_usd_prim_fail(prim, "%zu corners do not match %zu sharpnesses", count_of(mesh->sharp_vertices),
+                              count_of(mesh->vertex_sharpness));
   }
   const qmat_usd_value *const ids[] = {mesh->crease_indices, mesh->sharp_vertices}, *const sharpness[] = {
                                                                                         mesh->crease_sharpness,
@@ -314,37 +110,36 @@ static qmat_status read_sharpness(reader *r, const qmat_usd_prim *prim, usd_mesh
   for (size_t k = 0; k < 2; k++) {
     for (size_t i = 0; i < count_of(ids[k]); i++) {
       if (ids[k]->integers[i] >= 0 && (uint64_t)ids[k]->integers[i] < count_of(mesh->points)) continue;
-      return qmat_usd_prim_fail(r->context, r->stage, prim, "a %s names vertex %lld, but there are %zu points",
-                                k ? "corner" : "crease", (long long)ids[k]->integers[i], count_of(mesh->points));
+      return qmat_usd_prim_fail(prim, "a %s refers to vertex %lld, but there are %zu points", k ? "corner" : "crease",
+                                (long long)ids[k]->integers[i], count_of(mesh->points));
     }
     for (size_t i = 0; i < count_of(sharpness[k]); i++) {
       if (sharpness[k]->numbers[i] >= 0 && isfinite(sharpness[k]->numbers[i])) continue;
-      return qmat_usd_prim_fail(r->context, r->stage, prim, "the sharpness of %s %zu is negative or not finite",
-                                k ? "corner" : "crease", i);
+      return qmat_usd_prim_fail(prim, "the sharpness of %s %zu is negative or not finite", k ? "corner" : "crease", i);
     }
   }
   return QMAT_OK;
 }
 
-static qmat_status read_mesh(reader *r, const qmat_usd_prim *prim, usd_mesh *mesh) {
+static qmat_status read_mesh(const qmat_usd_prim *prim, usd_mesh *mesh) {
   static const char *const schemes[] = {"none", "catmullClark", "loop", "bilinear"}, *const boundaries[] = {
                                                                                          "none", "edgeOnly",
                                                                                          "edgeAndCorner"};
   const char *handedness;
   unsigned scheme = 0, boundary = 0;
-  qmat_status status = read_array(r, prim, "points", true, 3, &mesh->points);
-  if (status == QMAT_OK) status = read_array(r, prim, "faceVertexCounts", false, 1, &mesh->counts);
-  if (status == QMAT_OK) status = read_array(r, prim, "faceVertexIndices", false, 1, &mesh->indices);
-  if (status == QMAT_OK) status = read_array(r, prim, "holeIndices", false, 1, &mesh->holes);
-  if (status == QMAT_OK) status = read_token(r, prim, "orientation", "rightHanded", &handedness);
+  qmat_status status = read_array(prim, "points", true, 3, &mesh->points);
+  if (status == QMAT_OK) status = read_array(prim, "faceVertexCounts", false, 1, &mesh->counts);
+  if (status == QMAT_OK) status = read_array(prim, "faceVertexIndices", false, 1, &mesh->indices);
+  if (status == QMAT_OK) status = read_array(prim, "holeIndices", false, 1, &mesh->holes);
+  if (status == QMAT_OK) status = read_token(prim, "orientation", "rightHanded", &handedness);
   if (status == QMAT_OK) {
-    status = read_choice(r, prim, "subdivisionScheme", schemes, QMAT_SCHEME_COUNT, QMAT_SCHEME_CATMULL_CLARK, &scheme);
+    status = read_choice(prim, "subdivisionScheme", schemes, QMAT_SCHEME_COUNT, QMAT_SCHEME_CATMULL_CLARK, &scheme);
   }
   if (status == QMAT_OK) {
-    status = read_choice(r, prim, "interpolateBoundary", boundaries, QMAT_BOUNDARY_COUNT, QMAT_BOUNDARY_EDGE_AND_CORNER,
+    status = read_choice(prim, "interpolateBoundary", boundaries, QMAT_BOUNDARY_COUNT, QMAT_BOUNDARY_EDGE_AND_CORNER,
                          &boundary);
   }
-  if (status == QMAT_OK && scheme != QMAT_SCHEME_NONE) status = read_sharpness(r, prim, mesh);
+  if (status == QMAT_OK && scheme != QMAT_SCHEME_NONE) status = read_sharpness(prim, mesh);
   if (status != QMAT_OK) return status;
   mesh->is_left_handed = strcmp(handedness, "leftHanded") == 0;
   mesh->scheme = (qmat_scheme)scheme;
@@ -354,7 +149,7 @@ static qmat_status read_mesh(reader *r, const qmat_usd_prim *prim, usd_mesh *mes
   for (size_t f = 0; f < mesh->counts->count; f++) {
     const int64_t count = mesh->counts->integers[f];
     if (count < 0 || (uint64_t)count > mesh->indices->count - corners) {
-      return qmat_usd_prim_fail(r->context, r->stage, prim,
+      return qmat_usd_prim_fail(prim,
                                 count < 0 ? "face %zu has a negative number of corners"
                                           : "face %zu has more corners than there are faceVertexIndices",
                                 f);
@@ -362,26 +157,26 @@ static qmat_status read_mesh(reader *r, const qmat_usd_prim *prim, usd_mesh *mes
     corners += (size_t)count;
   }
   if (corners != mesh->indices->count) {
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "its faces have %zu corners, but there are %zu indices",
-                              corners, mesh->indices->count);
+    return qmat_usd_prim_fail(prim, "the faces have %zu corners, but there are %zu faceVertexIndices", corners,
+                              mesh->indices->count);
   }
   for (size_t i = 0; i < corners; i++) {
     const int64_t index = mesh->indices->integers[i];
     if (index < 0 || (uint64_t)index >= mesh->points->count) {
-      return qmat_usd_prim_fail(r->context, r->stage, prim, "corner %zu names vertex %lld, but there are %zu points", i,
-                                (long long)index, mesh->points->count);
+      return qmat_usd_prim_fail(prim, "corner %zu refers to vertex %lld, but there are %zu points", i, (long long)index,
+                                mesh->points->count);
     }
   }
   for (size_t i = 0; mesh->holes && i < mesh->holes->count; i++) {
     const int64_t hole = mesh->holes->integers[i];
     if (hole >= 0 && (uint64_t)hole < mesh->counts->count) continue;
-    return qmat_usd_prim_fail(r->context, r->stage, prim, "hole %zu names face %lld, but there are %zu faces", i,
-                              (long long)hole, mesh->counts->count);
+    return qmat_usd_prim_fail(prim, "hole %zu refers to face %lld, but there are %zu faces", i, (long long)hole,
+                              mesh->counts->count);
   }
   return QMAT_OK;
 }
 
-static qmat_status add_points(reader *r, const usd_mesh *mesh, const transform *world) {
+static qmat_status add_points(reader *r, const usd_mesh *mesh, const qmat_usd_transform *world) {
   const double *m = world->m;
   qmat_status status = QMAT_OK;
   for (size_t v = 0; v < mesh->points->count && status == QMAT_OK; v++) {
@@ -423,7 +218,7 @@ static qmat_status add_faces(reader *r, const usd_mesh *mesh, size_t first_verte
   return status;
 }
 
-/* Adds the mesh's polygons to the soup's cage; its points are the soup's from `first_vertex` on. */
+/* Adds the polygons of the mesh to the soup's cage. Its points are in the soup from `first_vertex` on. */
 static qmat_status add_cage(reader *r, const usd_mesh *mesh, size_t first_vertex, bool turned) {
   const size_t faces = mesh->counts->count, corners = mesh->indices->count, holes = count_of(mesh->holes),
                creases = count_of(mesh->crease_indices) - count_of(mesh->crease_lengths),
@@ -488,10 +283,10 @@ done:
 
 static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inherited *state) {
   usd_mesh mesh = {0};
-  qmat_status status = read_mesh(r, prim, &mesh);
+  qmat_status status = read_mesh(prim, &mesh);
   if (status != QMAT_OK) return status;
   if (!mesh.points || !mesh.counts || !mesh.indices || mesh.counts->count == 0) {
-    return qmat_usd_warn(r->context, r->stage, prim, "the mesh has no %s",
+    return qmat_usd_warn(prim, "the mesh has no %s",
                          !mesh.points    ? "points"
                          : !mesh.indices ? "faceVertexIndices"
                                          : "faces");
@@ -499,29 +294,29 @@ static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inheri
   const size_t elements = mesh.points->count + mesh.indices->count, first = r->soup->vertex_count;
   const size_t justified = FREE_ELEMENTS + ELEMENTS_PER_BYTE * qmat_usd_stage_bytes(r->stage);
   if (elements > justified - r->elements || mesh.points->count > UINT32_MAX - first) {
-    qmat_usd_prim_fail(r->context, r->stage, prim, "the copies of meshes have more vertices than the files justify");
+    qmat_usd_prim_fail(prim, "the copies of meshes have more vertices than the files justify");
     r->context->error.status = QMAT_ERROR_GEOMETRY;
     return QMAT_ERROR_GEOMETRY;
   }
   r->elements += elements;
   if (mesh.scheme != QMAT_SCHEME_NONE) r->cages++;
   if (qmat_usd_prim_has_relationship(prim, "skel:skeleton")) {
-    status = qmat_usd_warn(r->context, r->stage, prim, "its skeleton is left out: it stands as it was modelled");
+    status = qmat_usd_warn(prim, "its skeleton is ignored: the mesh keeps its modelled pose");
   }
   r->meshes++;
   if (status == QMAT_OK) {
     status = qmat_soup_reserve(r->context, r->soup, mesh.points->count, mesh.counts->count, mesh.indices->count);
   }
   if (status == QMAT_OK) status = add_points(r, &mesh, &state->world);
-  /* A mirror and a left hand cancel out. */
-  const bool turned = mesh.is_left_handed != (determinant3(&state->world) < 0);
+  /* A mirror turns a left-handed mesh into a right-handed one. */
+  const bool turned = mesh.is_left_handed != qmat_usd_mirrors(&state->world);
   if (status == QMAT_OK) status = add_faces(r, &mesh, first, turned);
   return status == QMAT_OK ? add_cage(r, &mesh, first, turned) : status;
 }
 
 /* ---- prims ---- */
 
-/* Geometry that is no mesh, and what it is called. */
+/* Whether the type is geometry other than a mesh. */
 static bool is_other_shape(const char *type) {
   static const char *const types[] = {
       "Sphere", "Cube",        "Cylinder",   "Cylinder_1", "Cone",        "Capsule",       "Capsule_1", "Plane",
@@ -532,7 +327,7 @@ static bool is_other_shape(const char *type) {
   return false;
 }
 
-/* Whether the prim and all below it are passed over, for what is written at the prim. */
+/* Whether the prim and all prims below it are skipped. Updates the inherited purpose. */
 static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited *state, bool *skipped) {
   const char *visibility, *purpose;
   *skipped = true;
@@ -545,13 +340,13 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
   if (strcmp(specifier, "class") == 0) return QMAT_OK;
   if (strcmp(specifier, "over") == 0) {
     r->has_undefined = true;
-    status = qmat_usd_warn(r->context, r->stage, prim,
-                           r->takes_undefined ? "taken for defined: the scene has only an 'over' of it"
-                                              : "left out with all below it: only an 'over', defined nowhere");
+    status =
+        qmat_usd_warn(prim, r->takes_undefined ? "read although nothing defines it: the scene has only an 'over' of it"
+                                               : "skipped with all prims below it: nothing defines this 'over'");
     if (status != QMAT_OK || !r->takes_undefined) return status;
   }
-  status = read_token(r, prim, "visibility", "inherited", &visibility);
-  if (status == QMAT_OK) status = read_token(r, prim, "purpose", state->purpose, &purpose);
+  status = read_token(prim, "visibility", "inherited", &visibility);
+  if (status == QMAT_OK) status = read_token(prim, "purpose", state->purpose, &purpose);
   if (status != QMAT_OK) return status;
   state->purpose = purpose;
   *skipped = strcmp(visibility, "invisible") == 0;
@@ -572,7 +367,7 @@ static qmat_status read_shape(reader *r, const qmat_usd_prim *prim, const char *
   }
   if (is_mesh) return place_mesh(r, prim, state);
   r->shapes_skipped++;
-  return qmat_usd_warn(r->context, r->stage, prim, "left out: a %s is no mesh", type);
+  return qmat_usd_warn(prim, "skipped: a %s is not a mesh", type);
 }
 
 static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state);
@@ -580,10 +375,10 @@ static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state);
 static qmat_status read_children(reader *r, qmat_usd_prim *prim, const inherited *state) {
   const char *const *names;
   size_t count;
-  qmat_status status = qmat_usd_prim_children(r->context, prim, &names, &count);
+  qmat_status status = qmat_usd_prim_children(prim, &names, &count);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     qmat_usd_prim child;
-    status = qmat_usd_prim_child(r->context, r->stage, prim, names[i], &child);
+    status = qmat_usd_prim_child(r->stage, prim, names[i], &child);
     if (status == QMAT_OK) status = read_prim(r, &child, *state);
     qmat_usd_prim_uninit(&child);
   }
@@ -602,12 +397,11 @@ static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state) {
   const char *type = qmat_usd_text(qmat_usd_prim_field(prim, "typeName"));
   if (!type) type = "";
   if (qmat_usd_truth(qmat_usd_prim_field(prim, "instanceable"), false)) r->instances++;
-  const transform above = state.world;
-  status = read_transform(r, prim, type, &above, &state.world);
+  status = qmat_usd_read_transform(prim, type, &state.world);
   if (status != QMAT_OK) return status;
   if (strcmp(type, "PointInstancer") == 0) {
     r->shapes_skipped++;
-    return qmat_usd_warn(r->context, r->stage, prim, "left out with all below it: a PointInstancer is not expanded");
+    return qmat_usd_warn(prim, "skipped with all prims below it: a PointInstancer is not expanded");
   }
   status = read_shape(r, prim, type, &state);
   return status == QMAT_OK ? read_children(r, prim, &state) : status;
@@ -633,7 +427,7 @@ static qmat_status fill_report(const reader *r, json_t *report) {
       return qmat_fail_memory(r->context, "a report");
     }
   }
-  /* USD's own defaults where the root layer says nothing. */
+  /* The defaults are those of USD. */
   const double unit = qmat_usd_number(qmat_usd_field_value(root, "metersPerUnit"), 0.01);
   const char *up = qmat_usd_text(qmat_usd_field_value(root, "upAxis"));
   const bool is_z = up && strcmp(up, "Z") == 0;
@@ -648,8 +442,8 @@ static qmat_status fill_report(const reader *r, json_t *report) {
 static qmat_status check_any(const reader *r, const char *path) {
   if (r->meshes > 0) return QMAT_OK;
   const char *first = json_string_value(json_array_get(qmat_usd_stage_warnings(r->stage), 0));
-  qmat_fail(r->context, QMAT_ERROR_GEOMETRY, "no mesh of the scene is left%s%s", first ? "; " : "", first ? first : "");
-  return qmat_fail_at(r->context, path, 0, 0);
+  return qmat_fail_file(r->context, QMAT_ERROR_GEOMETRY, path, "the scene has no mesh that can be read%s%s",
+                        first ? "; " : "", first ? first : "");
 }
 
 qmat_status qmat_usd_read(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_soup *soup,
@@ -658,18 +452,18 @@ qmat_status qmat_usd_read(qmat_context *context, const qmat_bytes *bytes, const 
   qmat_usd_prim root = {0};
   qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
   if (status != QMAT_OK) return status;
-  const inherited state = {.world = identity(), .purpose = "default"};
-  status = qmat_usd_stage_root(context, r.stage, &root);
+  const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
+  status = qmat_usd_stage_root(r.stage, &root);
   if (status == QMAT_OK) status = read_children(&r, &root, &state);
   if (status == QMAT_OK && r.meshes == 0 && r.has_undefined) {
-    /* A file that is made to be a layer of others, perhaps: better than nothing. */
+    /* The file may be meant as a layer of another one. */
     qmat_usd_stage_forget_warnings(r.stage);
     r = (reader){.context = context, .stage = r.stage, .soup = soup, .takes_undefined = true};
     status = read_children(&r, &root, &state);
   }
   qmat_usd_prim_uninit(&root);
   if (status == QMAT_OK) status = check_any(&r, path);
-  if (r.cages == 0) qmat_soup_clear_cage(soup); /* polygons of which nothing is to be made */
+  if (r.cages == 0) qmat_soup_clear_cage(soup); /* no subdivision surface */
   if (status == QMAT_OK && report) status = fill_report(&r, report);
   qmat_usd_stage_close(r.stage);
   return status;

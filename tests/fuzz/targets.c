@@ -265,7 +265,7 @@ static void read_usd(const uint8_t *content, size_t size) {
   qmat_medial *medial = NULL;
   json_t *report = json_object(), *facts = json_object();
   qmat_bytes bytes = memory_file(content, size);
-  require_explained(&context, qmat_usd_layer_read(&context, &bytes, path, &layer));
+  require_explained(&context, read_layer(&context, &bytes, path, &layer));
   qmat_usd_layer_uninit(&layer);
   const qmat_status status = qmat_usd_read(&context, &bytes, path, &soup, report);
   require_explained(&context, status);

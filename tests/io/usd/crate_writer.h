@@ -11,7 +11,7 @@
 
 #include <lz4.h>
 
-#include "io/usd/usd.h"
+#include "io/usd/usdc.h"
 #include "tests/io/files.h"
 
 enum { CRATE_MOST = 512, CRATE_HEADER = 88 };

@@ -4,7 +4,8 @@
 
 /* Reading and comparing layers of USD. */
 
-#include "io/usd/usd.h"
+#include "io/usd/usda.h"
+#include "io/usd/usdc.h"
 #include "tests/io/files.h"
 
 static inline qmat_status read_layer_text(qmat_context *context, const char *text, qmat_usd_layer *layer) {
@@ -12,6 +13,13 @@ static inline qmat_status read_layer_text(qmat_context *context, const char *tex
   qmat_status status = qmat_usda_read(context, &bytes, "file", layer);
   free(bytes.data);
   return status;
+}
+
+/* Reads text or a crate. */
+static inline qmat_status read_layer(qmat_context *context, const qmat_bytes *bytes, const char *path,
+                                     qmat_usd_layer *layer) {
+  return qmat_usdc_is_crate(bytes) ? qmat_usdc_read(context, bytes, path, layer)
+                                   : qmat_usda_read(context, bytes, path, layer);
 }
 
 /* The layer of a text that must be good. */

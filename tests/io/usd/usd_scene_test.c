@@ -146,9 +146,9 @@ static void test_operations_that_are_none_are_errors_that_name_the_prim(void **s
   (void)state;
 #define WITH(text) "#usda 1.0\n" MESH("m", text)
   assert_scene_refused(WITH("uniform token[] xformOpOrder = [\"xformOp:twist\"]"), QMAT_ERROR_FORMAT,
-                       "/m: 'xformOp:twist' is no transform operation");
+                       "/m: 'xformOp:twist' is not a transform operation");
   assert_scene_refused(WITH("float xformOp:scale = 1\nuniform token[] xformOpOrder = [\"xformOp:scale\"]"),
-                       QMAT_ERROR_FORMAT, "/m: xformOp:scale is of another type than it has to be");
+                       QMAT_ERROR_FORMAT, "/m: xformOp:scale has a value of the wrong type");
   assert_scene_refused(
       WITH("float3 xformOp:scale = (1, 0, 1)\nuniform token[] xformOpOrder = [\"!invert!xformOp:scale\"]"),
       QMAT_ERROR_FORMAT, "/m: xformOp:scale has no inverse");
@@ -259,9 +259,9 @@ static void test_what_is_hidden_inactive_or_for_other_purposes_is_skipped(void *
   assert_int_equal(soup.facet_count, 2);
   assert_int_equal(count_of(report, "prims_skipped"), 4);
   assert_int_equal(count_of(report, "shapes_skipped"), 2);
-  assert_string_equal(warning_of(report, 0), "/o: left out with all below it: only an 'over', defined nowhere");
-  assert_string_equal(warning_of(report, 1), "/s: left out: a Sphere is no mesh");
-  assert_string_equal(warning_of(report, 2), "/p: left out with all below it: a PointInstancer is not expanded");
+  assert_string_equal(warning_of(report, 0), "/o: skipped with all prims below it: nothing defines this 'over'");
+  assert_string_equal(warning_of(report, 1), "/s: skipped: a Sphere is not a mesh");
+  assert_string_equal(warning_of(report, 2), "/p: skipped with all prims below it: a PointInstancer is not expanded");
   assert_string_equal(warning_of(report, 3), "");
   qmat_soup_uninit(&soup);
   json_decref(report);
@@ -272,7 +272,8 @@ static void test_what_nothing_defines_is_read_where_there_is_nothing_else(void *
   json_t *report;
   qmat_soup soup = good_scene("#usda 1.0\nover \"o\" {\n" MESH("g", "") "}\n", &report);
   assert_int_equal(soup.facet_count, 1);
-  assert_string_equal(warning_of(report, 0), "/o: taken for defined: the scene has only an 'over' of it");
+  assert_string_equal(warning_of(report, 0),
+                      "/o: read although nothing defines it: the scene has only an 'over' of it");
   assert_string_equal(warning_of(report, 1), "");
   qmat_soup_uninit(&soup);
   json_decref(report);
@@ -326,7 +327,7 @@ static void test_a_variant_that_is_not_selected_is_left_out_aloud(void **state) 
                               "= { \"x\" {\n" MESH("n", "") "} } }",
                               &report);
   assert_int_equal(soup.facet_count, 1);
-  assert_string_equal(warning_of(report, 0), "/w: no variant of 'v' is selected: all are left out");
+  assert_string_equal(warning_of(report, 0), "/w: no variant of 'v' is selected: all are skipped");
   qmat_soup_uninit(&soup);
   json_decref(report);
 }
@@ -353,11 +354,11 @@ static void test_files_are_found_beside_the_layer_that_names_them(void **state) 
   assert_int_equal(count_of(report, "meshes_placed"), 3);
   assert_int_equal(count_of(report, "layers_read"), 3);
   assert_string_equal(warning_of(report, 0),
-                      "/y: the payload @no.usda@ is left out: cannot open the file: No such file or directory");
+                      "/y: the payload @no.usda@ is skipped: cannot open the file: No such file or directory");
   assert_string_equal(warning_of(report, 1),
-                      "/z: the reference @http://a/b.usd@ is left out: only files beside the layer are looked for");
-  assert_string_equal(warning_of(report, 2), "/z: the reference of </none> is left out: there is no such prim");
-  assert_string_equal(warning_of(report, 3), "/z: the reference of </z> is left out: it leads back to itself");
+                      "/z: the reference @http://a/b.usd@ is skipped: only files beside the layer are read");
+  assert_string_equal(warning_of(report, 2), "/z: the reference of </none> is skipped: there is no such prim");
+  assert_string_equal(warning_of(report, 3), "/z: the reference of </z> is skipped: it leads back to itself");
   qmat_soup_uninit(&soup);
   json_decref(report);
 
@@ -384,7 +385,7 @@ static void test_samples_over_time_give_the_first_with_a_warning(void **state) {
                                     "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"),
                  &report);
   assert_true(soup.positions[0] == 4);
-  assert_string_equal(warning_of(report, 0), "/m: xformOp:translate changes over time: its first sample is taken");
+  assert_string_equal(warning_of(report, 0), "/m: xformOp:translate changes over time: its first sample is used");
   qmat_soup_uninit(&soup);
   json_decref(report);
 }
@@ -398,31 +399,32 @@ static void test_broken_meshes_are_errors_that_name_the_prim(void **state) {
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1]", ""), QMAT_ERROR_FORMAT,
                        "/m: face 0 has more corners than there are faceVertexIndices");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2, 0]", ""), QMAT_ERROR_FORMAT,
-                       "/m: its faces have 3 corners, but there are 4 indices");
+                       "/m: the faces have 3 corners, but there are 4 faceVertexIndices");
   assert_scene_refused(BROKEN(POINTS, "[-3]", "[0, 1, 2]", ""), QMAT_ERROR_FORMAT,
                        "/m: face 0 has a negative number of corners");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 3]", ""), QMAT_ERROR_FORMAT,
-                       "/m: corner 2 names vertex 3, but there are 3 points");
+                       "/m: corner 2 refers to vertex 3, but there are 3 points");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] holeIndices = [1]"), QMAT_ERROR_FORMAT,
-                       "/m: hole 0 names face 1, but there are 1 faces");
+                       "/m: hole 0 refers to face 1, but there are 1 faces");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "uniform token subdivisionScheme = \"doo\""),
                        QMAT_ERROR_FORMAT, "/m: subdivisionScheme is 'doo', which is unknown");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [3]\nint[] creaseIndices = [0, 1]"),
                        QMAT_ERROR_FORMAT, "/m: crease 0 has 3 vertices");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] creaseLengths = [2]\nint[] creaseIndices = [0, 1]"),
-                       QMAT_ERROR_FORMAT, "/m: 1 creases of 2 vertices do not go with 2 indices and 0 sharpnesses");
+                       QMAT_ERROR_FORMAT, "/m: 1 creases of 2 vertices do not match 2 indices and 0 sharpnesses");
   assert_scene_refused(BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [7]\nfloat[] cornerSharpnesses = [1]"),
-                       QMAT_ERROR_FORMAT, "/m: a corner names vertex 7, but there are 3 points");
+                       QMAT_ERROR_FORMAT, "/m: a corner refers to vertex 7, but there are 3 points");
   assert_scene_refused(
       BROKEN(POINTS, "[3]", "[0, 1, 2]", "int[] cornerIndices = [0]\nfloat[] cornerSharpnesses = [-1]"),
       QMAT_ERROR_FORMAT, "/m: the sharpness of corner 0 is negative or not finite");
   assert_scene_refused("#usda 1.0\ndef Mesh \"m\" { float[] points = [1] }", QMAT_ERROR_FORMAT,
-                       "/m: points is of another type than it has to be");
+                       "/m: points has a value of the wrong type");
   assert_scene_refused("#usda 1.0\ndef Mesh \"m\" {}", QMAT_ERROR_GEOMETRY,
-                       "no mesh of the scene is left; /m: the mesh has no points");
-  assert_scene_refused("#usda 1.0\ndef \"m\" ( references = @x.usd@ ) {}", QMAT_ERROR_GEOMETRY,
-                       "no mesh of the scene is left; /m: the reference @x.usd@ is left out: cannot open the file: No "
-                       "such file or directory");
+                       "the scene has no mesh that can be read; /m: the mesh has no points");
+  assert_scene_refused(
+      "#usda 1.0\ndef \"m\" ( references = @x.usd@ ) {}", QMAT_ERROR_GEOMETRY,
+      "the scene has no mesh that can be read; /m: the reference @x.usd@ is skipped: cannot open the file: No "
+      "such file or directory");
 #undef BROKEN
 #undef POINTS
 }
@@ -441,7 +443,7 @@ static void test_references_that_multiply_are_stopped(void **state) {
   qmat_context context = {0};
   qmat_soup soup;
   assert_int_equal(read_text(&context, text, &soup, NULL), QMAT_ERROR_FORMAT);
-  assert_non_null(strstr(context.error.message, "the scene has become larger than its files justify"));
+  assert_non_null(strstr(context.error.message, "the scene is larger than its files justify"));
   qmat_soup_uninit(&soup);
   qmat_context_uninit(&context);
   free(text);
@@ -530,7 +532,7 @@ static void test_real_assets_are_read_whole_or_refused_by_name(void **state) {
   assert_int_equal(qmat_usd_read(&context, &bytes, DATA "reference.usda", &soup, NULL), QMAT_ERROR_GEOMETRY);
   assert_string_equal(
       context.error.message,
-      "no mesh of the scene is left; /bora: the reference @./suzanne.usdc@ is left out: cannot open the "
+      "the scene has no mesh that can be read; /bora: the reference @./suzanne.usdc@ is skipped: cannot open the "
       "file: No such file or directory");
   qmat_bytes_uninit(&bytes);
   qmat_context_uninit(&context);

@@ -171,15 +171,16 @@ static void test_broken_medial_meshes_are_errors_that_name_the_prim(void **state
 #define SPHERES "def Points \"spheres\" { point3f[] points = [(0, 0, 0)] float[] primvars:radius = [1] }\n"
   static const char *const cases[][2] = {
       {"#usda 1.0\ndef \"a\" {}", "no prim has a medial mesh"},
-      {CARRIER(""), "/a/m: it says that it carries a medial mesh, but has no spheres"},
+      {CARRIER(""), "/a/m: the prim has qmat_version in its customData, but no child 'spheres'"},
       {CARRIER("def Points \"spheres\" { point3f[] points = [(0, 0, 0)] float[] primvars:radius = [1, 2] }"),
-       "/a/m/spheres: the points or radii of the spheres are broken"},
+       "/a/m/spheres: points and primvars:radius do not match"},
       {CARRIER(SPHERES "def BasisCurves \"cones\" { int[] primvars:qmat:sphere = [0, 1] }"),
-       "/a/m/cones: primvars:qmat:sphere names sphere 1, but there are 1"},
+       "/a/m/cones: primvars:qmat:sphere refers to sphere 1, but there are 1"},
       {CARRIER(SPHERES "def BasisCurves \"cones\" { int[] primvars:qmat:sphere = [0] }"),
-       "/a/m/cones: primvars:qmat:sphere is not what it has to be"},
-      {CARRIER(SPHERES) "def \"b\" ( references = </a/m> ) {}", "2 prims have a medial mesh: one has to be named"},
-      {CARRIER(SPHERES "def Mesh \"slabs\" {}"), "/a/m/slabs: faceVertexIndices is not what it has to be"},
+       "/a/m/cones: primvars:qmat:sphere must be an array of integers, 2 for each simplex"},
+      {CARRIER(SPHERES) "def \"b\" ( references = </a/m> ) {}", "2 prims have a medial mesh: name one of them"},
+      {CARRIER(SPHERES "def Mesh \"slabs\" {}"),
+       "/a/m/slabs: faceVertexIndices must be an array of integers, 3 for each simplex"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     qmat_context context = {0};

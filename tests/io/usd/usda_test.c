@@ -156,23 +156,23 @@ static void assert_bad(const char *text, const char *expected) {
 
 static void test_mistakes_have_their_place(void **state) {
   (void)state;
-  assert_bad("usda", "file:1:1: a text layer of USD begins with '#usda 1.0'");
-  assert_bad("#usda 2.0\n", "file:1:1: only version 1 of the text form of USD is read");
-  assert_bad("#usda 1.0\ndef \"a\" {", "file:2:10: the name of a type should stand here, not the end of the file");
-  assert_bad("#usda 1.0\ndef \"a\" {}\n def \"a\" {}", "file:3:2: there is already a prim 'a' here");
-  assert_bad("#usda 1.0\ndef \"a b\" {}", "file:2:1: a prim cannot have the name 'a b'");
-  assert_bad("#usda 1.0\ndef \"a\" {\n int i = 1.5\n}", "file:3:10: a whole number of the type should stand here");
+  assert_bad("usda", "file:1:1: a text layer of USD must start with '#usda 1.0'");
+  assert_bad("#usda 2.0\n", "file:1:1: only version 1 of the text form of USD is supported");
+  assert_bad("#usda 1.0\ndef \"a\" {", "file:2:10: expected the name of a type, found the end of the file");
+  assert_bad("#usda 1.0\ndef \"a\" {}\n def \"a\" {}", "file:3:2: duplicate prim 'a'");
+  assert_bad("#usda 1.0\ndef \"a b\" {}", "file:2:1: 'a b' is not a valid name of a prim");
+  assert_bad("#usda 1.0\ndef \"a\" {\n int i = 1.5\n}",
+             "file:3:10: this is not a whole number, or out of the range of its type");
   assert_bad("#usda 1.0\ndef \"a\" {\n int i = 2147483648\n}",
-             "file:3:10: a whole number of the type should stand here");
-  assert_bad("#usda 1.0\ndef \"a\" {\n float3 p = (1, 2)\n}", "file:3:18: ',' should stand here, not ')'");
-  assert_bad("#usda 1.0\ndef \"a\" {\n float[] p = [1 2]\n}", "file:3:17: ',' or ']' should stand here, not '2'");
-  assert_bad("#usda 1.0\ndef \"a\" {\n string s = \"x\n\"}", "file:3:13: the text that begins here does not end");
-  assert_bad("#usda 1.0\ndef \"a\" {\n rel r = </x\n}", "file:3:10: the path that begins here does not end");
-  assert_bad("#usda 1.0\ndef \"a\" {\n asset r = @x\n}", "file:3:12: the asset that begins here does not end");
-  assert_bad("#usda 1.0\n?", "file:2:1: def, over or class should stand here, not '?'");
-  assert_bad("#usda 1.0\n(upAxis \"Z\")", "file:2:9: '=' should stand here, not '\"Z'");
-  assert_bad("#usda 1.0\ndef \"a\" { float x.y = 1 }",
-             "file:2:19: connect, timeSamples or spline should stand here, not 'y'");
+             "file:3:10: this is not a whole number, or out of the range of its type");
+  assert_bad("#usda 1.0\ndef \"a\" {\n float3 p = (1, 2)\n}", "file:3:18: expected ',', found ')'");
+  assert_bad("#usda 1.0\ndef \"a\" {\n float[] p = [1 2]\n}", "file:3:17: expected ',' or ']', found '2'");
+  assert_bad("#usda 1.0\ndef \"a\" {\n string s = \"x\n\"}", "file:3:13: this text has no end");
+  assert_bad("#usda 1.0\ndef \"a\" {\n rel r = </x\n}", "file:3:10: this path has no end");
+  assert_bad("#usda 1.0\ndef \"a\" {\n asset r = @x\n}", "file:3:12: this asset has no end");
+  assert_bad("#usda 1.0\n?", "file:2:1: expected def, over or class, found '?'");
+  assert_bad("#usda 1.0\n(upAxis \"Z\")", "file:2:9: expected '=', found '\"Z'");
+  assert_bad("#usda 1.0\ndef \"a\" { float x.y = 1 }", "file:2:19: expected connect, timeSamples or spline, found 'y'");
 }
 
 static void test_nesting_without_end_is_refused(void **state) {
@@ -182,8 +182,8 @@ static void test_nesting_without_end_is_refused(void **state) {
     const char *start, *repeated, *expected;
   } cases[] = {
       {"#usda 1.0\n", "def\"a\"{", "file:2: prims are nested more than 200 deep"},
-      {"#usda 1.0\n(customData={", "dictionary a={", "file:2:2813: brackets are nested more than 200 deep"},
-      {"#usda 1.0\n(x=", "[", "file:2:4: the value that begins here does not end"},
+      {"#usda 1.0\n(customData={", "dictionary a={", "file:2:2813: dictionaries are nested more than 200 deep"},
+      {"#usda 1.0\n(x=", "[", "file:2:4: this value has no end"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     size_t length = strlen(cases[i].repeated), at = strlen(cases[i].start);

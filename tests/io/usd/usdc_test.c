@@ -14,7 +14,7 @@ static qmat_usd_layer read_layer_file(const char *path) {
   qmat_usd_layer layer = {0};
   qmat_bytes bytes = {0};
   if (qmat_bytes_read_file(&context, path, &bytes) != QMAT_OK ||
-      qmat_usd_layer_read(&context, &bytes, path, &layer) != QMAT_OK) {
+      read_layer(&context, &bytes, path, &layer) != QMAT_OK) {
     char line[1024];
     qmat_error_format(&context.error, line, sizeof line);
     fail_msg("%s", line);
@@ -97,11 +97,11 @@ static void test_versions_that_are_not_read_are_refused_by_number(void **state) 
   qmat_usd_layer text = good_layer(usd_example);
   qmat_writer writer = write_crate(&text, 8);
   writer.bytes[9] = 5;
-  assert_crate_refused(&writer, writer.size, "the crate is of version 0.5; 0.6 to 0.10 are read");
+  assert_crate_refused(&writer, writer.size, "the crate has version 0.5; only 0.6 to 0.10 are supported");
   writer.bytes[9] = 11;
-  assert_crate_refused(&writer, writer.size, "the crate is of version 0.11; 0.6 to 0.10 are read");
+  assert_crate_refused(&writer, writer.size, "the crate has version 0.11; only 0.6 to 0.10 are supported");
   writer.bytes[8] = 1;
-  assert_crate_refused(&writer, writer.size, "the crate is of version 1.11; 0.6 to 0.10 are read");
+  assert_crate_refused(&writer, writer.size, "the crate has version 1.11; only 0.6 to 0.10 are supported");
   qmat_writer_uninit(&writer);
   qmat_usd_layer_uninit(&text);
 }

@@ -1,25 +1,38 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/usd/usd.h"
+#include "io/usd/usd_layer.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "core/hash.h"
+#include "io/bytes.h"
 
 #define FREE_BYTES ((size_t)1 << 24)
 #define BYTES_PER_BYTE 256
-#define MOST_FIELDS 4096 /* of a spec: looking for one is linear */
 #define CHUNK_SIZE ((size_t)16 << 10)
 #define ALIGNMENT 16
 
 qmat_status qmat_usd_layer_init(qmat_context *context, qmat_usd_layer *layer, const char *path, size_t size) {
-  *layer = (qmat_usd_layer){.path = path, .allowance = FREE_BYTES + BYTES_PER_BYTE * size};
-  layer->path = qmat_usd_copy(context, layer, path, strlen(path));
-  if (!layer->path) return context->error.status;
-  layer->root = qmat_usd_alloc(context, layer, 1, sizeof *layer->root);
-  if (!layer->root) return context->error.status;
+  *layer = (qmat_usd_layer){.context = context, .path = path, .allowance = FREE_BYTES + BYTES_PER_BYTE * size};
+  layer->path = qmat_usd_copy(layer, path, strlen(path));
+  if (!layer->path) return qmat_usd_layer_error(layer);
+  layer->root = qmat_usd_alloc(layer, 1, sizeof *layer->root);
+  if (!layer->root) return qmat_usd_layer_error(layer);
   layer->root->name = "";
   return QMAT_OK;
+}
+
+qmat_status qmat_usd_layer_fail(const qmat_usd_layer *layer, const char *what) {
+  return qmat_fail_file(layer->context, QMAT_ERROR_FORMAT, layer->path, "%s", what);
+}
+
+qmat_status qmat_usd_layer_fail_memory(const qmat_usd_layer *layer) {
+  qmat_fail_memory(layer->context, "a USD layer");
+  return qmat_fail_at(layer->context, layer->path, 0, 0);
+}
+
+qmat_status qmat_usd_layer_error(const qmat_usd_layer *layer) {
+  return layer->context->error.status;
 }
 
 void qmat_usd_layer_uninit(qmat_usd_layer *layer) {
@@ -28,11 +41,10 @@ void qmat_usd_layer_uninit(qmat_usd_layer *layer) {
   *layer = (qmat_usd_layer){0};
 }
 
-void *qmat_usd_alloc(qmat_context *context, qmat_usd_layer *layer, size_t count, size_t size) {
+void *qmat_usd_alloc(qmat_usd_layer *layer, size_t count, size_t size) {
   size_t bytes;
   if (__builtin_mul_overflow(count, size, &bytes) || bytes > layer->allowance) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "the values of the file take more memory than a file of its size justifies");
-    qmat_fail_at(context, layer->path, 0, 0);
+    qmat_usd_layer_fail(layer, "the values take more memory than a file of this size justifies");
     return NULL;
   }
   layer->allowance -= bytes;
@@ -54,15 +66,12 @@ void *qmat_usd_alloc(qmat_context *context, qmat_usd_layer *layer, size_t count,
       layer->chunk_left = CHUNK_SIZE - bytes;
     }
   }
-  if (!memory) {
-    qmat_fail_memory(context, "a USD layer");
-    qmat_fail_at(context, layer->path, 0, 0);
-  }
+  if (!memory) qmat_usd_layer_fail_memory(layer);
   return memory;
 }
 
-const char *qmat_usd_copy(qmat_context *context, qmat_usd_layer *layer, const char *text, size_t length) {
-  char *copy = qmat_usd_alloc(context, layer, length + 1, 1);
+const char *qmat_usd_copy(qmat_usd_layer *layer, const char *text, size_t length) {
+  char *copy = qmat_usd_alloc(layer, length + 1, 1);
   if (copy) memcpy(copy, text, length);
   return copy;
 }
@@ -75,7 +84,7 @@ static size_t slot_of(const qmat_usd_layer *layer, const qmat_usd_spec *parent, 
   return qmat_hash_mix(hash) & (layer->slot_count - 1);
 }
 
-/* Where the spec stands, or where it would be put. */
+/* The slot of the spec, or the free slot for it. */
 static size_t find_slot(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
                         const char *name) {
   size_t slot = slot_of(layer, parent, kind, name);
@@ -106,18 +115,17 @@ qmat_usd_spec *qmat_usd_child(const qmat_usd_layer *layer, const qmat_usd_spec *
   return layer->slot_count ? layer->slots[find_slot(layer, parent, kind, name)] : NULL;
 }
 
-qmat_usd_spec *qmat_usd_add_child(qmat_context *context, qmat_usd_layer *layer, qmat_usd_spec *parent,
-                                  qmat_usd_kind kind, const char *name) {
+qmat_usd_spec *qmat_usd_add_child(qmat_usd_layer *layer, qmat_usd_spec *parent, qmat_usd_kind kind, const char *name) {
   if (parent->depth >= QMAT_USD_DEEPEST) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "prims are nested more than %d deep", QMAT_USD_DEEPEST);
-    qmat_fail_at(context, layer->path, 0, 0);
+    qmat_fail_file(layer->context, QMAT_ERROR_FORMAT, layer->path, "prims are nested more than %d deep",
+                   QMAT_USD_DEEPEST);
     return NULL;
   }
   if (2 * layer->spec_count >= layer->slot_count && !grow_slots(layer)) {
-    qmat_fail_memory(context, "a USD layer");
+    qmat_usd_layer_fail_memory(layer);
     return NULL;
   }
-  qmat_usd_spec *spec = qmat_usd_alloc(context, layer, 1, sizeof *spec);
+  qmat_usd_spec *spec = qmat_usd_alloc(layer, 1, sizeof *spec);
   if (!spec) return NULL;
   spec->kind = kind;
   spec->name = name;
@@ -134,49 +142,49 @@ qmat_usd_spec *qmat_usd_add_child(qmat_context *context, qmat_usd_layer *layer, 
   return spec;
 }
 
-qmat_status qmat_usd_set_field(qmat_context *context, qmat_usd_layer *layer, qmat_usd_spec *spec, const char *name,
+qmat_status qmat_usd_set_field(qmat_usd_layer *layer, qmat_usd_spec *spec, const char *name,
                                const qmat_usd_value *value) {
+  qmat_usd_value *kept = qmat_usd_alloc(layer, 1, sizeof *kept);
+  if (!kept) return qmat_usd_layer_error(layer);
+  *kept = *value;
   for (size_t i = 0; i < spec->field_count; i++) {
     if (strcmp(spec->fields[i].name, name) != 0) continue;
-    spec->fields[i].value = value;
+    spec->fields[i].value = kept;
     return QMAT_OK;
   }
-  if (spec->field_count == MOST_FIELDS) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "more than %d fields in one spec", MOST_FIELDS);
-    return qmat_fail_at(context, layer->path, spec->line, spec->column);
+  if (spec->field_count == QMAT_USD_MOST_FIELDS) {
+    qmat_fail(layer->context, QMAT_ERROR_FORMAT, "a spec has more than %d fields", QMAT_USD_MOST_FIELDS);
+    return qmat_fail_at(layer->context, layer->path, spec->line, spec->column);
   }
   if (spec->field_count == spec->field_capacity) {
     size_t capacity = spec->field_capacity ? 2 * spec->field_capacity : 4;
-    qmat_usd_field *fields = qmat_usd_alloc(context, layer, capacity, sizeof *fields);
-    if (!fields) return context->error.status;
+    qmat_usd_field *fields = qmat_usd_alloc(layer, capacity, sizeof *fields);
+    if (!fields) return qmat_usd_layer_error(layer);
     if (spec->field_count > 0) memcpy(fields, spec->fields, spec->field_count * sizeof *fields);
     spec->fields = fields;
     spec->field_capacity = capacity;
   }
-  spec->fields[spec->field_count++] = (qmat_usd_field){.name = name, .value = value};
+  spec->fields[spec->field_count++] = (qmat_usd_field){.name = name, .value = kept};
   return QMAT_OK;
 }
 
-const qmat_usd_value *qmat_usd_text_value(qmat_context *context, qmat_usd_layer *layer, qmat_usd_type type,
-                                          const char *text) {
-  qmat_usd_value *value = qmat_usd_alloc(context, layer, 1, sizeof *value);
-  const char **texts = value ? qmat_usd_alloc(context, layer, 1, sizeof *texts) : NULL;
-  if (!texts) return NULL;
+qmat_status qmat_usd_make_text(qmat_usd_layer *layer, qmat_usd_type type, const char *text, qmat_usd_value *value) {
+  const char **texts = qmat_usd_alloc(layer, 1, sizeof *texts);
+  if (!texts) return qmat_usd_layer_error(layer);
   *texts = text;
   *value = (qmat_usd_value){.type = type, .components = 1, .count = 1, .texts = texts};
-  return value;
+  return QMAT_OK;
 }
 
-const qmat_usd_value *qmat_usd_bool_value(qmat_context *context, qmat_usd_layer *layer, bool truth) {
-  qmat_usd_value *value = qmat_usd_alloc(context, layer, 1, sizeof *value);
-  int64_t *integers = value ? qmat_usd_alloc(context, layer, 1, sizeof *integers) : NULL;
-  if (!integers) return NULL;
+qmat_status qmat_usd_make_bool(qmat_usd_layer *layer, bool truth, qmat_usd_value *value) {
+  int64_t *integers = qmat_usd_alloc(layer, 1, sizeof *integers);
+  if (!integers) return qmat_usd_layer_error(layer);
   *integers = truth;
   *value = (qmat_usd_value){.type = QMAT_USD_BOOL, .components = 1, .count = 1, .integers = integers};
-  return value;
+  return QMAT_OK;
 }
 
-/* ---- looking things up ---- */
+/* ---- look-ups ---- */
 
 const qmat_usd_value *qmat_usd_field_value(const qmat_usd_spec *spec, const char *name) {
   for (size_t i = 0; i < spec->field_count; i++) {
@@ -225,7 +233,7 @@ bool qmat_usd_truth(const qmat_usd_value *value, bool otherwise) {
 
 /* ---- numbers ---- */
 
-/* Half precision has 10 bits after the leading one and exponents of -14 and more. */
+/* Half precision has 11 significant bits and a least exponent of -14. */
 static double round_to_half(double number) {
   if (!isfinite(number) || number == 0) return number;
   int exponent;
@@ -239,14 +247,4 @@ double qmat_usd_round(qmat_usd_type type, double number) {
   if (type == QMAT_USD_FLOAT) return (double)(float)number;
   if (type == QMAT_USD_HALF) return round_to_half((double)(float)number);
   return number;
-}
-
-/* ---- reading ---- */
-
-qmat_status qmat_usd_layer_read(qmat_context *context, const qmat_bytes *bytes, const char *path,
-                                qmat_usd_layer *layer) {
-  if (bytes->size >= 8 && memcmp(bytes->data, "PXR-USDC", 8) == 0) {
-    return qmat_usdc_read(context, bytes, path, layer);
-  }
-  return qmat_usda_read(context, bytes, path, layer);
 }

@@ -1,0 +1,349 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_arcs.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* A scene may be composed of this many nodes, and more for each spec of its layers. */
+#define FREE_NODES ((size_t)1 << 18)
+#define NODES_PER_SPEC 64
+
+enum { MOST_ARCS_OF_PRIM = 4096 };
+
+typedef qmat_usd_node node;
+
+/* ---- nodes ---- */
+
+qmat_status qmat_usd_new_node(qmat_usd_composer *c, node *parent, qmat_usd_arc arc, size_t stack, size_t most_specs,
+                              node **made) {
+  if (*c->nodes_made >= FREE_NODES + NODES_PER_SPEC * c->files->specs_read || c->node_count >= MOST_ARCS_OF_PRIM) {
+    return qmat_usd_prim_fail(c->prim, "the scene is larger than its files justify: references multiply");
+  }
+  qmat_arena *arena = &c->prim->arena;
+  *made = qmat_arena_calloc(arena, 1, sizeof **made);
+  if (!*made) return qmat_usd_fail_prim_memory(c->prim);
+  **made = (node){.arc = arc,
+                  .introduced = c->prim->depth,
+                  .arcs_deep = parent ? parent->arcs_deep + 1 : 0,
+                  .stack = stack,
+                  .specs = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_spec *)),
+                  .layers = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_layer *)),
+                  .parent = parent};
+  if (!(*made)->specs || !(*made)->layers) return qmat_usd_fail_prim_memory(c->prim);
+  ++*c->nodes_made;
+  c->node_count++;
+  return QMAT_OK;
+}
+
+void qmat_usd_add_spec(node *to, const qmat_usd_layer *layer, const qmat_usd_spec *spec) {
+  to->layers[to->spec_count] = layer;
+  to->specs[to->spec_count++] = spec;
+}
+
+/* Inserts a child by its strength: by its arc, then arcs of the prim itself before arcs of prims above it. */
+static void link_node(node *parent, node *child) {
+  node **place = &parent->first_child;
+  while (*place &&
+         ((*place)->arc < child->arc || ((*place)->arc == child->arc && (*place)->introduced >= child->introduced))) {
+    place = &(*place)->next;
+  }
+  child->next = *place;
+  *place = child;
+}
+
+/* The prim or variant at a path in a layer; NULL when there is none. */
+static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char *path) {
+  const qmat_usd_spec *spec = layer->root;
+  if (*path != '/') return NULL;
+  while (*path && spec) {
+    char name[256], variant[256];
+    if (*path == '{') {
+      const char *equals = strchr(path, '='), *end = strchr(path, '}');
+      if (!equals || !end || equals > end || equals - path > 255 || end - equals > 255) return NULL;
+      snprintf(name, sizeof name, "%.*s", (int)(equals - path - 1), path + 1);
+      snprintf(variant, sizeof variant, "%.*s", (int)(end - equals - 1), equals + 1);
+      spec = qmat_usd_child(layer, spec, QMAT_USD_VARIANT_SET, name);
+      if (spec) spec = qmat_usd_child(layer, spec, QMAT_USD_VARIANT, variant);
+      path = end + 1;
+      continue;
+    }
+    if (*path == '/') path++;
+    size_t length = strcspn(path, "/{.[");
+    if (length == 0 || length >= sizeof name || path[length] == '.' || path[length] == '[') return NULL;
+    memcpy(name, path, length);
+    name[length] = '\0';
+    spec = qmat_usd_child(layer, spec, QMAT_USD_PRIM, name);
+    path += length;
+  }
+  return spec;
+}
+
+/* ---- edits of lists ---- */
+
+/* A list to which edits are applied. The items point into values. */
+typedef struct edited_list {
+  size_t count, capacity;
+  const void **items;
+} edited_list;
+
+static bool same_item(qmat_usd_type type, const void *a, const void *b) {
+  if (type != QMAT_USD_REFERENCE) return strcmp(a, b) == 0;
+  const qmat_usd_reference *x = a, *y = b;
+  return strcmp(x->asset, y->asset) == 0 && strcmp(x->path, y->path) == 0;
+}
+
+static const void *item_at(const qmat_usd_value *list, size_t i) {
+  return list->type == QMAT_USD_REFERENCE ? (const void *)&list->references[i] : (const void *)list->texts[i];
+}
+
+static void remove_item(edited_list *list, qmat_usd_type type, const void *item) {
+  size_t kept = 0;
+  for (size_t i = 0; i < list->count; i++) {
+    if (!same_item(type, list->items[i], item)) list->items[kept++] = list->items[i];
+  }
+  list->count = kept;
+}
+
+/* Inserts items at the front or the end of a list. Items that it already has move, or stay with `only_new`. */
+static bool insert_items(edited_list *list, const qmat_usd_value *items, bool at_front, bool only_new) {
+  if (qmat_grow((void **)&list->items, &list->capacity, list->count + items->count, sizeof *list->items) != 0) {
+    return false;
+  }
+  for (size_t i = 0; i < items->count && !only_new; i++) remove_item(list, items->type, item_at(items, i));
+  size_t at = at_front ? 0 : list->count;
+  memmove(list->items + at + items->count, list->items + at, (list->count - at) * sizeof *list->items);
+  for (size_t i = 0; i < items->count; i++) {
+    const void *item = item_at(items, i);
+    bool known = false;
+    for (size_t k = 0; k < at && only_new; k++) known = known || same_item(items->type, list->items[k], item);
+    if (known) continue;
+    list->items[at++] = item;
+    list->count++;
+  }
+  return true;
+}
+
+/* Applies the edits of a field in the node's specs, weakest first. The caller frees list->items. */
+static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const char *field, qmat_usd_type wanted,
+                             edited_list *list) {
+  *list = (edited_list){0};
+  for (size_t i = at->spec_count; i-- > 0;) {
+    const qmat_usd_value *value = qmat_usd_field_value(at->specs[i], field);
+    if (!value || value->type != QMAT_USD_LIST_OP) continue;
+    const qmat_usd_list_op *op = value->list_op;
+    bool good = true;
+    size_t total = 0;
+    for (int edit = 0; edit < QMAT_USD_EDIT_COUNT; edit++) {
+      const qmat_usd_value *items = &op->lists[edit];
+      bool is_text = qmat_usd_is_text(items->type) && qmat_usd_is_text(wanted);
+      if (items->count > 0 && items->type != wanted && !is_text) good = false;
+      total += items->count;
+    }
+    if (!good) return qmat_usd_prim_fail(c->prim, "%s has a value of the wrong type", field);
+    if (total + list->count > MOST_ARCS_OF_PRIM) {
+      return qmat_usd_prim_fail(c->prim, "%s has more than %d items", field, MOST_ARCS_OF_PRIM);
+    }
+    if (op->is_explicit) {
+      list->count = 0;
+      good = insert_items(list, &op->lists[QMAT_USD_EXPLICIT], false, false);
+    } else {
+      for (size_t k = 0; k < op->lists[QMAT_USD_DELETED].count; k++) {
+        remove_item(list, wanted, item_at(&op->lists[QMAT_USD_DELETED], k));
+      }
+      good = insert_items(list, &op->lists[QMAT_USD_ADDED], false, true) &&
+             insert_items(list, &op->lists[QMAT_USD_PREPENDED], true, false) &&
+             insert_items(list, &op->lists[QMAT_USD_APPENDED], false, false);
+    }
+    if (!good) return qmat_usd_fail_prim_memory(c->prim);
+  }
+  return QMAT_OK;
+}
+
+/* ---- arcs ---- */
+
+/* Whether a spec is, or is above, a spec of a node from this one to the root: an arc to it would never end. */
+static bool is_on_the_way(const node *at, const qmat_usd_spec *spec) {
+  for (; at; at = at->parent) {
+    for (size_t i = 0; i < at->spec_count; i++) {
+      for (const qmat_usd_spec *s = at->specs[i]; s; s = s->parent) {
+        if (s == spec) return true;
+      }
+    }
+  }
+  return false;
+}
+
+/* Adds the prim at `path` in a layer stack as a child of `at`, with its own arcs. */
+static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, size_t stack, const char *path,
+                              const char *what) {
+  const qmat_usd_stack *layers = &c->files->stacks[stack];
+  node *made;
+  qmat_status status = qmat_usd_new_node(c, at, arc, stack, layers->count, &made);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < layers->count; i++) {
+    const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
+    if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
+  }
+  if (made->spec_count == 0) {
+    return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: there is no such prim", what, qmat_usd_shown(path));
+  }
+  if (made->arcs_deep > QMAT_USD_DEEPEST_ARCS || is_on_the_way(at, made->specs[0])) {
+    return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: it leads back to itself", what, qmat_usd_shown(path));
+  }
+  link_node(at, made);
+  return qmat_usd_add_arcs(c, made);
+}
+
+/* The layer of the strongest of the node's specs with this field. */
+static const qmat_usd_layer *layer_with(const qmat_usd_composer *c, const node *at, const char *field) {
+  for (size_t i = 0; i < at->spec_count; i++) {
+    if (qmat_usd_field_value(at->specs[i], field)) return at->layers[i];
+  }
+  return c->files->stacks[at->stack].layers[0];
+}
+
+static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
+                                 const qmat_usd_reference *reference, const char *what) {
+  size_t stack = at->stack;
+  if (reference->asset[0]) {
+    qmat_status status =
+        qmat_usd_files_find(c->files, c->prim, layer_with(c, at, field), reference->asset, what, &stack);
+    if (status != QMAT_OK || stack == SIZE_MAX) return status;
+  }
+  if (reference->path[0]) return add_target(c, at, arc, stack, reference->path, what);
+  char path[256];
+  const qmat_usd_layer *layer = c->files->stacks[stack].layers[0];
+  const char *name = qmat_usd_text(qmat_usd_field_value(layer->root, "defaultPrim"));
+  if (!name || !*name || strlen(name) > 254) {
+    return qmat_usd_warn(c->prim, "the %s @%s@ is skipped: it has no path, and the file no default prim", what,
+                         qmat_usd_shown(reference->asset));
+  }
+  snprintf(path, sizeof path, "%s%s", name[0] == '/' ? "" : "/", name);
+  return add_target(c, at, arc, stack, path, what);
+}
+
+static qmat_status add_references(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
+                                  const char *what) {
+  edited_list list;
+  qmat_status status = edit_list(c, at, field, QMAT_USD_REFERENCE, &list);
+  for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
+    status = add_reference(c, at, arc, field, list.items[i], what);
+  }
+  qmat_free(list.items);
+  return status;
+}
+
+/* A layer that refers to this one may have opinions about the class, too: these are not composed. */
+static qmat_status warn_of_class(const qmat_usd_composer *c, const node *at, const char *path) {
+  for (const node *above = at->parent; above; above = above->parent) {
+    if (above->stack == at->stack) continue;
+    const qmat_usd_stack *layers = &c->files->stacks[above->stack];
+    for (size_t k = 0; k < layers->count; k++) {
+      if (!follow_path(layers->layers[k], path)) continue;
+      qmat_status status = qmat_usd_warn(c->prim, "the opinions of a referring layer about the class <%s> are skipped",
+                                         qmat_usd_shown(path));
+      if (status != QMAT_OK) return status;
+    }
+  }
+  return QMAT_OK;
+}
+
+static qmat_status add_classes(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field, const char *what) {
+  edited_list list;
+  qmat_status status = edit_list(c, at, field, QMAT_USD_PATH, &list);
+  for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
+    status = add_target(c, at, arc, at->stack, list.items[i], what);
+    if (status == QMAT_OK) status = warn_of_class(c, at, list.items[i]);
+  }
+  qmat_free(list.items);
+  return status;
+}
+
+qmat_status qmat_usd_add_arcs(qmat_usd_composer *c, node *at) {
+  for (size_t i = 0; i < at->spec_count; i++) {
+    static const char *const not_composed[] = {"relocates", "clips"};
+    for (size_t k = 0; k < sizeof not_composed / sizeof not_composed[0]; k++) {
+      if (!qmat_usd_field_value(at->specs[i], not_composed[k])) continue;
+      qmat_status status = qmat_usd_warn(c->prim, "its %s are skipped", not_composed[k]);
+      if (status != QMAT_OK) return status;
+    }
+  }
+  qmat_status status = add_classes(c, at, QMAT_USD_ARC_INHERIT, "inheritPaths", "inherit");
+  if (status == QMAT_OK) status = add_references(c, at, QMAT_USD_ARC_REFERENCE, "references", "reference");
+  if (status == QMAT_OK) status = add_references(c, at, QMAT_USD_ARC_PAYLOAD, "payload", "payload");
+  return status == QMAT_OK ? add_classes(c, at, QMAT_USD_ARC_SPECIALIZE, "specializes", "specialize") : status;
+}
+
+/* The strongest selection of a variant set in a tree, or NULL. */
+static const char *find_selection(const node *at, const char *set) {
+  for (size_t i = 0; i < at->spec_count; i++) {
+    const char *name = qmat_usd_text(qmat_usd_entry(qmat_usd_field_value(at->specs[i], "variantSelection"), set));
+    if (name && *name) return name;
+  }
+  for (const node *child = at->first_child; child; child = child->next) {
+    const char *name = find_selection(child, set);
+    if (name) return name;
+  }
+  return NULL;
+}
+
+/* Whether a node of a tree has this variant. */
+static bool has_variant(const node *at, const char *set, const char *name) {
+  for (size_t i = 0; i < at->spec_count; i++) {
+    const qmat_usd_spec *variants = qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
+    if (variants && qmat_usd_child(at->layers[i], variants, QMAT_USD_VARIANT, name)) return true;
+  }
+  for (const node *child = at->first_child; child; child = child->next) {
+    if (has_variant(child, set, name)) return true;
+  }
+  return false;
+}
+
+static qmat_status add_variant(qmat_usd_composer *c, node *at, const char *set) {
+  bool is_there = false;
+  for (size_t i = 0; i < at->spec_count; i++) {
+    is_there = is_there || qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
+  }
+  if (!is_there) return QMAT_OK;
+  const char *selection = find_selection(c->prim->tree, set);
+  if (!selection) {
+    return qmat_usd_warn(c->prim, "no variant of '%s' is selected: all are skipped", qmat_usd_shown(set));
+  }
+  node *made;
+  qmat_status status = qmat_usd_new_node(c, at, QMAT_USD_ARC_VARIANT, at->stack, at->spec_count, &made);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < at->spec_count; i++) {
+    const qmat_usd_spec *variants = qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
+    const qmat_usd_spec *spec = variants ? qmat_usd_child(at->layers[i], variants, QMAT_USD_VARIANT, selection) : NULL;
+    if (spec) qmat_usd_add_spec(made, at->layers[i], spec);
+  }
+  if (made->spec_count == 0) {
+    if (has_variant(c->prim->tree, set, selection)) return QMAT_OK;
+    return qmat_usd_warn(c->prim, "there is no variant '%s' of '%s'", qmat_usd_shown(selection), qmat_usd_shown(set));
+  }
+  link_node(at, made);
+  return qmat_usd_add_arcs(c, made);
+}
+
+/* The strongest node whose variants are not composed yet, or NULL. */
+static node *find_undone(node *at) {
+  if (!at->has_variants_done) return at;
+  for (node *child = at->first_child; child; child = child->next) {
+    node *found = find_undone(child);
+    if (found) return found;
+  }
+  return NULL;
+}
+
+qmat_status qmat_usd_add_variants(qmat_usd_composer *c) {
+  node *at;
+  while ((at = find_undone(c->prim->tree)) != NULL) {
+    at->has_variants_done = true;
+    edited_list sets;
+    qmat_status status = edit_list(c, at, "variantSetNames", QMAT_USD_STRING, &sets);
+    for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, at, sets.items[i]);
+    qmat_free(sets.items);
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}

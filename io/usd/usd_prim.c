@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_prim.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MOST_WARNINGS = 100, PATH_TEXT = 256 };
+
+/* ---- messages ---- */
+
+const char *qmat_usd_shown(const char *text) {
+  return qmat_is_utf8(text) ? text : "?";
+}
+
+/* The path of a prim, shortened at its start if necessary. */
+static const char *path_of(const qmat_usd_prim *prim, char text[PATH_TEXT]) {
+  char *at = text + PATH_TEXT - 1;
+  *at = '\0';
+  if (!prim->parent) return "/";
+  for (; prim->parent; prim = prim->parent) {
+    const char *name = qmat_usd_shown(prim->name);
+    size_t length = strlen(name);
+    if ((size_t)(at - text) < length + 5) {
+      at -= 4;
+      memcpy(at, ".../", 4);
+      break;
+    }
+    at -= length;
+    memcpy(at, name, length);
+    *--at = '/';
+  }
+  return at;
+}
+
+/* Replaces control characters, and removes a character that was cut. */
+static void clean_text(char *text) {
+  for (char *c = text; *c; c++) {
+    if ((unsigned char)*c < ' ' || *c == 127) *c = '?';
+  }
+  for (size_t end = strlen(text); end > 0 && !qmat_is_utf8(text); end--) text[end - 1] = '\0';
+}
+
+qmat_status qmat_usd_warn(const qmat_usd_prim *prim, const char *format, ...) {
+  qmat_usd_log *log = prim->log;
+  char text[1024], path[PATH_TEXT];
+  size_t used = 0;
+  if (++log->count > MOST_WARNINGS) {
+    snprintf(text, sizeof text, "and %zu more warnings", log->count - MOST_WARNINGS);
+  } else {
+    used = (size_t)snprintf(text, sizeof text, "%s: ", path_of(prim, path));
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text + used, sizeof text - used, format, arguments);
+    va_end(arguments);
+  }
+  clean_text(text);
+  json_t *warning = json_string(text);
+  int failed = log->count > MOST_WARNINGS + 1 ? json_array_set_new(log->warnings, MOST_WARNINGS, warning)
+                                              : json_array_append_new(log->warnings, warning);
+  return failed == 0 ? QMAT_OK : qmat_fail_memory(log->context, "the warnings");
+}
+
+qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ...) {
+  qmat_context *context = prim->log->context;
+  char text[512], path[PATH_TEXT];
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  qmat_fail(context, QMAT_ERROR_FORMAT, "%s: %s", path_of(prim, path), text);
+  clean_text(context->error.message);
+  return qmat_fail_at(context, prim->log->file, 0, 0);
+}
+
+qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim) {
+  return qmat_fail_memory(prim->log->context, "a composed prim");
+}
+
+void qmat_usd_prim_uninit(qmat_usd_prim *prim) {
+  qmat_arena_uninit(&prim->arena);
+  *prim = (qmat_usd_prim){0};
+}
+
+/* ---- opinions ---- */
+
+/* Whether an opinion from number `first_opinion` on, or a weaker one, has the child. */
+static bool is_below(const qmat_usd_prim *prim, size_t first_opinion, const char *name) {
+  for (size_t i = first_opinion; i < prim->opinion_count; i++) {
+    if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, QMAT_USD_PRIM, name)) return true;
+  }
+  return false;
+}
+
+qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **names, size_t *count) {
+  size_t most = 0;
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    for (const qmat_usd_spec *child = prim->opinions[i].spec->first_child; child; child = child->next) {
+      most += child->kind == QMAT_USD_PRIM;
+    }
+  }
+  const char **made = qmat_arena_alloc(&prim->arena, most, sizeof *made);
+  if (!made) return qmat_usd_fail_prim_memory(prim);
+  *count = 0;
+  /* From the weakest opinion to the strongest: each adds its new children at the end. */
+  for (size_t i = prim->opinion_count; i-- > 0;) {
+    for (const qmat_usd_spec *child = prim->opinions[i].spec->first_child; child; child = child->next) {
+      if (child->kind == QMAT_USD_PRIM && !is_below(prim, i + 1, child->name)) made[(*count)++] = child->name;
+    }
+  }
+  *names = made;
+  return QMAT_OK;
+}
+
+const qmat_usd_value *qmat_usd_prim_field(const qmat_usd_prim *prim, const char *name) {
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_value *value = qmat_usd_field_value(prim->opinions[i].spec, name);
+    if (value) return value;
+  }
+  return NULL;
+}
+
+const char *qmat_usd_prim_specifier(const qmat_usd_prim *prim) {
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const char *word = qmat_usd_text(qmat_usd_field_value(prim->opinions[i].spec, "specifier"));
+    if (!word || strcmp(word, "over") == 0) continue;
+    /* Inheriting from a class does not make the heir a class. */
+    if (strcmp(word, "class") == 0 && !prim->opinions[i].is_inherited) return "class";
+    return "def";
+  }
+  return "over";
+}
+
+qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name, const qmat_usd_value **value) {
+  *value = NULL;
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    const qmat_usd_spec *spec = qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_ATTRIBUTE, name);
+    if (!spec) continue;
+    const qmat_usd_value *fixed = qmat_usd_field_value(spec, "default"),
+                         *samples = qmat_usd_field_value(spec, "timeSamples"),
+                         *spline = qmat_usd_field_value(spec, "spline");
+    bool sampled = samples && samples->type == QMAT_USD_TIME_SAMPLES && samples->samples->count > 0;
+    if (!fixed && !sampled && !spline) continue;
+    *value = fixed;
+    qmat_status status = QMAT_OK;
+    if (sampled && !fixed) {
+      size_t first = 0;
+      for (size_t k = 1; k < samples->samples->count; k++) {
+        if (samples->samples->times[k] < samples->samples->times[first]) first = k;
+      }
+      *value = samples->samples->values[first];
+      status = qmat_usd_warn(prim, "%s changes over time: its first sample is used", qmat_usd_shown(name));
+    } else if (sampled || spline) {
+      status = qmat_usd_warn(prim, "%s changes over time: %s", qmat_usd_shown(name),
+                             fixed ? "its default is used" : "it is skipped");
+    }
+    if (*value && (*value)->type == QMAT_USD_BLOCK) *value = NULL;
+    return status;
+  }
+  return QMAT_OK;
+}
+
+bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name) {
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, QMAT_USD_RELATIONSHIP, name)) return true;
+  }
+  return false;
+}

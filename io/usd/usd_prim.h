@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_USD_USD_PRIM_H
+#define QMAT_IO_USD_USD_PRIM_H
+
+#include <jansson.h>
+
+#include "io/usd/usd_layer.h"
+
+/* A composed prim: the specs that have opinions about it, and messages about it. io/usd/usd_stage.h makes prims. */
+
+/* A spec with opinions about a prim, and its layer. */
+typedef struct qmat_usd_opinion {
+  const qmat_usd_layer *layer;
+  const qmat_usd_spec *spec;
+  bool is_inherited; /* through an inherit or specialize arc */
+} qmat_usd_opinion;
+
+/* Where the messages about the prims of a stage go. */
+typedef struct qmat_usd_log {
+  qmat_context *context;
+  const char *file; /* of the root layer, for errors */
+  json_t *warnings; /* an array of texts "PATH: ..." */
+  size_t count;     /* of warnings; after 100 the last text is their number */
+} qmat_usd_log;
+
+/* Zeroed before it is made. */
+typedef struct qmat_usd_prim {
+  qmat_usd_log *log;
+  const struct qmat_usd_prim *parent; /* NULL: the root of the scene */
+  const char *name;                   /* "" for the root */
+  int depth;                          /* 0 for the root */
+  size_t opinion_count;
+  const qmat_usd_opinion *opinions; /* strongest first */
+  struct qmat_usd_node *tree;       /* for composing its children */
+  qmat_arena arena;
+} qmat_usd_prim;
+
+/* Adds a warning about a prim, printable and in UTF-8. QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_warn(const qmat_usd_prim *prim, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* QMAT_ERROR_FORMAT about a prim, with its path and the file of the root layer. */
+qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
+/* QMAT_ERROR_MEMORY about composing a prim. */
+qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim);
+
+/* The text, or "?" when it is not UTF-8. */
+const char *qmat_usd_shown(const char *text);
+
+/* The names of the children in their order, in the prim's memory. QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **names, size_t *count);
+
+/* The strongest value of a field of the prim itself ("typeName", "active"), or NULL. */
+const qmat_usd_value *qmat_usd_prim_field(const qmat_usd_prim *prim, const char *name);
+
+/* "def", "class", or "over" when nothing defines the prim. */
+const char *qmat_usd_prim_specifier(const qmat_usd_prim *prim);
+
+/* The strongest value of an attribute, or NULL for none. An attribute that changes over time has its default, or else
+ * its first sample, with a warning. */
+qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name, const qmat_usd_value **value);
+
+/* Whether any opinion has a relationship of this name. */
+bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name);
+
+void qmat_usd_prim_uninit(qmat_usd_prim *prim);
+
+#endif
