@@ -13,7 +13,7 @@ static const char usage[] =
     "       qmat_models all FOLDER [--resolution N]\n"
     "       qmat_models --list\n";
 
-/* Ends the writing of a file: what was buffered may fail only now. */
+/* Closes a file. Buffered output may fail only here. */
 static int close_file(FILE *file, const char *path) {
   const int failed = ferror(file);
   if (fclose(file) == 0 && !failed) return 0;
@@ -41,7 +41,7 @@ static int write_surface(const qmat_model *model, const char *path) {
 
 static int write_medial(const qmat_model *model, const char *path) {
   if (model->sphere_count == 0) {
-    fprintf(stderr, "qmat_models: nothing is known of the medial axis of %s\n", model->name);
+    fprintf(stderr, "qmat_models: the medial axis of %s is not known\n", model->name);
     return 1;
   }
   FILE *file = fopen(path, "w");
@@ -87,7 +87,7 @@ static int make_all(const char *folder, int resolution) {
     if (failed != 0) break;
     const int length = snprintf(path, sizeof path, "%s/%s.off", folder, model.name);
     if (length < 0 || (size_t)length >= sizeof path) {
-      fprintf(stderr, "qmat_models: the folder's name is too long\n");
+      fprintf(stderr, "qmat_models: the name of the folder is too long\n");
       failed = 1;
     } else {
       failed = write_surface(&model, path);
@@ -132,11 +132,11 @@ int main(int argc, char **argv) {
     } else if (word[0] != '-' && !folder && strcmp(name, "all") == 0) {
       folder = word;
     } else {
-      fprintf(stderr, "qmat_models: cannot use '%s' here\n%s", word, usage);
+      fprintf(stderr, "qmat_models: unexpected argument '%s'\n%s", word, usage);
       return 2;
     }
   }
-  const bool all = name != NULL && strcmp(name, "all") == 0;
+  const bool all = name && strcmp(name, "all") == 0;
   if (!name || all != (folder != NULL) || (all && (output || medial))) {
     fputs(usage, stderr);
     return 2;

@@ -22,12 +22,12 @@ const qmat_model_kind qmat_model_kinds[] = {
 };
 const size_t qmat_model_kind_count = sizeof qmat_model_kinds / sizeof qmat_model_kinds[0];
 
-/* A model that grows. After a shortage of memory `failed` is set, nothing grows any more and every index is 0, so that
- * the makers need to look only once, at the end. */
+/* A model under construction. When memory runs out `failed` is set; from then on nothing is added and every index is 0,
+ * so the makers check once, at the end. */
 typedef struct builder {
   qmat_model *model;
   size_t vertex_capacity, triangle_capacity, sphere_capacity, edge_capacity, medial_triangle_capacity;
-  /* Vertices by their place in a lattice: open addressing, key + 1 so that 0 is free. */
+  /* Maps lattice places to vertices, by open addressing. Stores key + 1; 0 marks a free slot. */
   uint64_t *keys;
   uint32_t *key_vertices;
   size_t key_count, key_capacity;
@@ -74,7 +74,7 @@ static uint32_t add_sphere(builder *b, double x, double y, double z, double radi
 static void add_edge(builder *b, uint32_t i, uint32_t j) {
   qmat_model *m = b->model;
   const uint32_t low = i < j ? i : j, high = i < j ? j : i;
-  for (size_t e = 0; e < m->edge_count; e++) { /* the known medial meshes have a few hundred edges at most */
+  for (size_t e = 0; e < m->edge_count; e++) { /* linear: known medial meshes have a few hundred edges */
     if (m->edges[2 * e] == low && m->edges[2 * e + 1] == high) return;
   }
   m->edges = grown(b, m->edges, &b->edge_capacity, m->edge_count + 1, 2 * sizeof *m->edges);
@@ -98,7 +98,7 @@ static double distance_squared(const builder *b, uint32_t i, uint32_t j) {
   return (p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]);
 }
 
-/* Two triangles, cut along the shorter diagonal; ties along the first. */
+/* Adds two triangles, split along the shorter diagonal, on a tie along i k. */
 static void add_quad(builder *b, uint32_t i, uint32_t j, uint32_t k, uint32_t l) {
   if (b->failed) return;
   if (distance_squared(b, i, k) <= distance_squared(b, j, l)) {
@@ -110,12 +110,12 @@ static void add_quad(builder *b, uint32_t i, uint32_t j, uint32_t k, uint32_t l)
   }
 }
 
-/* A number in [-1/2, 1/2) that depends on the counters alone. */
+/* A pseudo-random number in [-1/2, 1/2), determined by its arguments. */
 static double jitter(uint64_t stream, uint64_t a, uint64_t b) {
   return qmat_hash_unit(qmat_hash3(stream, a, b)) - 0.5;
 }
 
-/* The slot of a lattice place in the table of keys: where it is, or where it would go. */
+/* The slot that holds the key, or the free slot where it belongs. */
 static size_t lattice_slot(const builder *b, uint64_t key) {
   size_t slot = (size_t)qmat_hash_mix(key) & (b->key_capacity - 1);
   while (b->keys[slot] != 0 && b->keys[slot] != key + 1) slot = (slot + 1) & (b->key_capacity - 1);
@@ -147,7 +147,7 @@ static uint64_t lattice_key(const int place[3]) {
   return (uint64_t)place[0] << 42 | (uint64_t)place[1] << 21 | (uint64_t)place[2];
 }
 
-/* The vertex at a place of the lattice, made at the first call for it: `locate` tells where it is. */
+/* The vertex at a lattice place. The first call for a place makes it, at the position that `locate` computes. */
 static uint32_t lattice_vertex(builder *b, const int place[3], const void *shape,
                                void (*locate)(const void *shape, const int place[3], double p[3])) {
   if (2 * b->key_count >= b->key_capacity && !b->failed) lattice_grow(b);
@@ -163,7 +163,7 @@ static uint32_t lattice_vertex(builder *b, const int place[3], const void *shape
   return b->key_vertices[slot];
 }
 
-/* Frees what only the making needed; on failure the model too. */
+/* Frees the builder, and after a failure the model. */
 static qmat_status finish(builder *b, const char *name) {
   free(b->keys);
   free(b->key_vertices);
@@ -177,17 +177,17 @@ static bool bad_resolution(int resolution) {
   return resolution < QMAT_MODEL_RESOLUTION_MIN || resolution > QMAT_MODEL_RESOLUTION_MAX;
 }
 
-/* ---- Round shapes: two balls and what they sweep ---- */
+/* ---- Round shapes: the convex hull of two balls ---- */
 
-/* The profile of a tapered capsule over a parameter that counts rings: the first pole at 0, the last at `rings`, and
- * steps whose length is a fixed part of the local ball's radius. */
+/* The profile of a tapered capsule. Its parameter counts rings, from 0 at the first pole. The length of a step is
+ * proportional to the radius of the local ball. */
 typedef struct profile {
   double start, end, length;
   double turn; /* angle from the first pole to where the cone begins */
   double start_steps, cone_steps, end_steps;
 } profile;
 
-/* Where the parameter u lies: along the axis, away from it, and the radius of the ball that touches there. */
+/* The point at parameter u (its coordinate along the axis, its distance from it) and the radius of the ball there. */
 static void profile_at(const profile *f, double u, double *along, double *away, double *ball) {
   double centre = 0, radius = f->start, angle = f->turn;
   if (u < f->start_steps) {
@@ -198,7 +198,7 @@ static void profile_at(const profile *f, double u, double *along, double *away, 
     angle = f->turn + (PI - f->turn) * (u - f->start_steps - f->cone_steps) / f->end_steps;
   } else if (f->cone_steps > 0) {
     const double part = (u - f->start_steps) / f->cone_steps;
-    radius = f->start * pow(f->end / f->start, part); /* even steps in proportion to the radius */
+    radius = f->start * pow(f->end / f->start, part); /* step / radius is constant */
     centre = f->start == f->end ? f->length * part : f->length * (radius - f->start) / (f->end - f->start);
   }
   *along = centre - radius * cos(angle);
@@ -211,13 +211,14 @@ typedef struct ring {
   uint32_t first;
 } ring;
 
-/* The part of a turn at which vertex i of a ring of `count` is, without the turn itself. */
+/* The angle of vertex i of a ring of `count`, in turns. */
 static double ring_angle(size_t level, size_t i, size_t count) {
   const double shift = jitter(1, level, 0) + 0.5;
   return ((double)i + shift + 0.3 * jitter(2, level, i % count)) / (double)count;
 }
 
-/* The triangles between two rings: a zip that always closes the side whose next edge is centred lower. */
+/* Triangulates the band between two rings. Each step takes the edge, of either ring, whose midpoint has the smaller
+ * angle. */
 static void zip_rings(builder *b, size_t level, ring low, ring high) {
   size_t i = 0, j = 0;
   while (i < low.count || j < high.count) {
@@ -277,7 +278,7 @@ static qmat_status make_capsule(double start, double end, double length, int res
   const double d = ball_only ? 0 : (end - start) / length;
   const double large = fmax(start, end);
   model->euler = 2;
-  /* the two caps beyond the tangent circles, and the frustum between these */
+  /* the two caps beyond the tangent circles and the frustum between them */
   const double low = -start * d, high = length - end * d, rise = sqrt(1 - d * d);
   const double cap_start = PI * start * start * start * (2 - 3 * d + d * d * d) / 3;
   const double cap_end = PI * end * end * end * (2 + 3 * d - d * d * d) / 3;
@@ -335,7 +336,7 @@ qmat_status qmat_model_make_torus(double ring_radius, double tube, int resolutio
   add_edge(b, first, last);
   model->euler = 0;
   model->volume = 2 * PI * PI * ring_radius * tube * tube;
-  /* along the ring the outer edges are longer, in proportion to the curvature's radius */
+  /* edges along the ring are longest, and flattest, on its outer side */
   model->deviation = (ring_radius + tube) * (1 - cos(1.5 * PI / around)) + tube * (1 - cos(1.5 * PI / across));
   model->medial_complete = true;
   model->medial_deviation = ring_radius * (1 - cos(PI / around));
@@ -346,14 +347,14 @@ qmat_status qmat_model_make_torus(double ring_radius, double tube, int resolutio
 
 enum { MAX_BLOCKS = 4 };
 
-/* Space cut into blocks by planes along each axis; some blocks are solid. Each interval between two planes holds
- * `cells` lattice cells. */
+/* Planes along each axis divide space into blocks, some of them solid. The interval between two planes has `cells`
+ * lattice cells. */
 typedef struct blocks {
   int count[3];
   double planes[3][MAX_BLOCKS + 1];
   int cells[3][MAX_BLOCKS];
   bool solid[MAX_BLOCKS][MAX_BLOCKS][MAX_BLOCKS];
-  double shake; /* the part of a cell by which vertices move within their side */
+  double shake; /* how far vertices move within their side, in cells */
 } blocks;
 
 static int lattice_start(const blocks *shape, int axis, int block) {
@@ -421,7 +422,7 @@ static int cells_for(double length, double cell) {
   return (int)fmax(1, round(length / cell));
 }
 
-/* The one block of a box around the origin. */
+/* A box around the origin as one block. */
 static blocks one_block(double a, double b, double c, int resolution, double shake) {
   blocks shape = {.count = {1, 1, 1}, .shake = shake};
   const double sides[3] = {a, b, c};
@@ -434,11 +435,11 @@ static blocks one_block(double a, double b, double c, int resolution, double sha
   return shape;
 }
 
-/* The medial axis of a box: a rectangle in the middle, and from its border a flat piece to each edge of the box, on
- * which the radius falls evenly to 0. */
+/* The medial axis of a box: a rectangle in the middle plane, and from its border a planar face to each edge of the box.
+ * On these faces the radius decreases linearly to 0. */
 static void add_box_medial(builder *build, double a, double b, double c) {
   uint32_t corner[2][2][2], inner[2][2];
-  const bool square = a == c, prism = b == c; /* the rectangle is a point, or a segment along x */
+  const bool square = a == c, prism = b == c; /* the rectangle degenerates to a point, or to a segment along x */
   for (int x = 0; x < 2; x++) {
     for (int y = 0; y < 2; y++) {
       const double sx = x ? 0.5 : -0.5, sy = y ? 0.5 : -0.5;
@@ -490,7 +491,7 @@ qmat_status qmat_model_make_sheet(double a, double b, double thickness, double a
                                   qmat_model *model) {
   if (angle == 0) return make_flat_box(a, b, thickness, resolution, 0.5, "sheet", model);
   *model = (qmat_model){0};
-  const double bend = a / angle; /* radius of the middle */
+  const double bend = a / angle; /* radius of the middle surface */
   if (bad_resolution(resolution) || !(a >= b && b >= thickness && thickness > 0) ||
       !(angle > 0 && angle <= PI && thickness < bend)) {
     return QMAT_ERROR_USAGE;
@@ -504,7 +505,7 @@ qmat_status qmat_model_make_sheet(double a, double b, double thickness, double a
     p[0] = radius * sin(turn);
     p[2] = radius * cos(turn) - bend;
   }
-  /* the middle of the sheet, as far as its spheres do not reach the rim */
+  /* the middle surface, except near the rim, where its spheres would reach beyond the sheet */
   const int strips = shape.cells[0][0];
   uint32_t low = 0, high = 0;
   for (int i = 0; i <= strips; i++) {
@@ -520,7 +521,7 @@ qmat_status qmat_model_make_sheet(double a, double b, double thickness, double a
     high = next_high;
   }
   model->euler = 2;
-  model->volume = a * b * thickness; /* Pappus: the middle keeps its length */
+  model->volume = a * b * thickness; /* Pappus; the middle surface keeps its length */
   model->deviation = (bend + thickness / 2) * (1 - cos(fmin(PI / 2, 1.6 * angle / strips / 2)));
   model->medial_deviation = bend * (1 - cos(angle / strips / 2));
   return finish(&build, "curved-sheet");
@@ -546,7 +547,7 @@ static qmat_status make_l_bracket(int resolution, qmat_model *model) {
   return finish(&build, "l-bracket");
 }
 
-/* ---- The octopus: tubes drawn out of the sides of a cube that is blown up to a ball ---- */
+/* ---- The octopus: a cube mapped to a ball, with tubes extruded from its sides ---- */
 
 typedef struct vec {
   double x, y, z;
@@ -572,12 +573,12 @@ static vec unit(vec a) {
   return scale(1 / sqrt(dot(a, a)), a);
 }
 
-static const double HEAD_HEIGHT = 1.5;  /* the upper half of the head is drawn out by this */
-static const double ROOT_RADIUS = 0.19; /* of a tentacle where it has left the head */
+static const double HEAD_HEIGHT = 1.5;  /* the vertical scale of the upper half of the head */
+static const double ROOT_RADIUS = 0.19; /* of a tentacle, where it leaves the head */
 static const double TIP_RADIUS = 0.042;
-static const double BLEND = 0.12; /* the part of a tentacle in which it becomes round */
+static const double BLEND = 0.12; /* the fraction of a tentacle over which its section becomes round */
 
-/* The head: a cube of `cells` lattice cells a side, mapped to the ball so that a side's lines are even in angle. */
+/* The head: a cube of `cells` lattice cells a side, mapped to the ball with equal angles between lattice lines. */
 typedef struct head {
   int cells;
 } head;
@@ -602,14 +603,14 @@ static void locate_on_head(const void *shape_, const int place[3], double p[3]) 
   p[0] = q.x, p[1] = q.y, p[2] = q.z;
 }
 
-/* A tentacle is the patch of `size` x `size` cells of one side of the cube that starts at (u, v), drawn out along a
- * curve; u runs around the z axis. */
+/* A tentacle: the square of `size` x `size` cells at (u, v) on one side of the cube, extruded along a curve. u runs
+ * around the z axis. */
 typedef struct tentacle {
   int index, axis, upper, u, v, size;
   vec root, out, side, up; /* a frame: `out` leads away from the head, `side` around the z axis */
 } tentacle;
 
-/* The middle line of a tentacle at t in [0, 1]: out of the head, down, to the side, and up again at the tip. */
+/* The centre line of a tentacle at t in [0, 1]. It leaves the head, descends, sways, and rises at the tip. */
 static vec tentacle_at(const tentacle *arm, double t) {
   const uint64_t i = (uint64_t)arm->index;
   const double reach = 1 + 0.25 * jitter(12, i, 0), lift = 0.9 + 0.8 * jitter(13, i, 0);
@@ -637,7 +638,7 @@ static vec tentacle_tangent(const tentacle *arm, double t) {
   return add(tentacle_at(arm, t + h), scale(-1, tentacle_at(arm, t - h)));
 }
 
-/* From the square [-1, 1]^2 to a disc: the ring and the angle on it (Shirley and Chiu 1997). */
+/* Maps the square [-1, 1]^2 to polar coordinates of the disc (Shirley and Chiu 1997). */
 static void square_to_disc(double x, double y, double *level, double *angle) {
   *level = fmax(fabs(x), fabs(y));
   if (*level == 0) {
@@ -649,24 +650,24 @@ static void square_to_disc(double x, double y, double *level, double *angle) {
   }
 }
 
-/* The place of the patch's corner (i, j), 0 <= i, j <= size, in the lattice of the head. */
-static void patch_place(const tentacle *arm, const head *shape, int i, int j, int place[3]) {
+/* The lattice place of the square's corner (i, j), 0 <= i, j <= size, on the head. */
+static void square_place(const tentacle *arm, const head *shape, int i, int j, int place[3]) {
   const int around = arm->axis == 0 ? 1 : 0;
-  const bool forward = (arm->axis == 0) == (arm->upper == 1); /* so that u turns counter-clockwise about z */
+  const bool forward = (arm->axis == 0) == (arm->upper == 1); /* u turns counter-clockwise about z */
   place[arm->axis] = arm->upper ? shape->cells : 0;
   place[around] = forward ? arm->u + i : shape->cells - arm->u - i;
   place[2] = arm->v + j;
 }
 
-/* Corner number k of the patch's border, counter-clockwise from outside. */
+/* Corner k of the square's border, counter-clockwise from outside. */
 static void border_corner(int size, int k, int *i, int *j) {
   const int side = k / size, step = k % size;
   *i = side == 0 ? step : side == 1 ? size : side == 2 ? size - step : 0;
   *j = side == 0 ? 0 : side == 1 ? step : side == 2 ? size : size - step;
 }
 
-/* Parameters of the rings, such that their distance is a fixed multiple of the length of a ring's edges. The caller
- * frees the array; NULL when memory is short. */
+/* The curve parameters of the rings. The distance of two rings is a fixed multiple of the edge length within a ring.
+ * NULL when memory runs out; the caller frees the array. */
 static double *tentacle_steps(const tentacle *arm, int corners, size_t *count) {
   enum { FINE = 4096 };
   const double stretch = 2.2;
@@ -701,14 +702,14 @@ static void add_tentacle(builder *b, const head *shape, const tentacle *arm) {
   double *steps = tentacle_steps(arm, corners, &count);
   uint32_t *rings = calloc(2 * (size_t)corners, sizeof *rings), *previous = rings;
   uint32_t *grid = calloc((size_t)(size + 1) * (size_t)(size + 1), sizeof *grid);
-  vec *border = calloc((size_t)corners, sizeof *border); /* the patch's border in the frame of the root */
+  vec *border = calloc((size_t)corners, sizeof *border); /* the square's border in the frame of the root */
   if (!steps || !rings || !grid || !border) {
     b->failed = true;
   }
   for (int k = 0; k < corners && !b->failed; k++) {
     int i, j, place[3];
     border_corner(size, k, &i, &j);
-    patch_place(arm, shape, i, j, place);
+    square_place(arm, shape, i, j, place);
     previous[k] = lattice_vertex(b, place, shape, locate_on_head);
     if (b->failed) break;
     const double *p = b->model->positions + 3 * (size_t)previous[k];
@@ -722,7 +723,7 @@ static void add_tentacle(builder *b, const head *shape, const tentacle *arm) {
     uint32_t *current = rings + (step % 2 == 0 ? 0 : corners);
     centre = tentacle_at(arm, t);
     tangent = unit(tentacle_tangent(arm, t));
-    side = unit(add(side, scale(-dot(side, tangent), tangent))); /* the frame turns as little as it can */
+    side = unit(add(side, scale(-dot(side, tangent), tangent))); /* the frame with the least rotation */
     up = cross(tangent, side);
     const double x = fmin(1, t / BLEND), round_part = x * x * (3 - 2 * x);
     const double spacing = sqrt(dot(tentacle_tangent(arm, t), tentacle_tangent(arm, t))) / 2e-5 * (t - steps[step - 1]);
@@ -752,7 +753,7 @@ static void add_tentacle(builder *b, const head *shape, const tentacle *arm) {
       last_sphere = sphere;
     }
   }
-  /* the round end: the patch again, its middle drawn out to the pole */
+  /* the round end: the square again, its centre extruded to the pole */
   for (int k = 0; k < corners && !b->failed; k++) {
     int i, j;
     border_corner(size, k, &i, &j);
@@ -794,7 +795,7 @@ static qmat_status make_octopus(int resolution, qmat_model *model) {
           int place[3];
           place[axis] = upper ? shape.cells : 0;
           uint32_t corner[4];
-          /* the four upright sides leave out two patches each, below the middle */
+          /* each of the four upright sides leaves out two squares, below its middle */
           const int turn = axis == 0 ? i : j, rise = axis == 0 ? j : i;
           const bool drawn_out =
               axis != 2 && rise >= unit_cells && rise < 3 * unit_cells &&
@@ -821,8 +822,8 @@ static qmat_status make_octopus(int resolution, qmat_model *model) {
     arm.v = unit_cells;
     double middle[3];
     int low[3], high[3];
-    patch_place(&arm, &shape, 0, 0, low);
-    patch_place(&arm, &shape, arm.size, arm.size, high);
+    square_place(&arm, &shape, 0, 0, low);
+    square_place(&arm, &shape, arm.size, arm.size, high);
     for (int axis = 0; axis < 3; axis++) middle[axis] = (low[axis] + high[axis]) / 2.0;
     arm.root = on_head(&shape, middle);
     arm.out = unit(arm.root);

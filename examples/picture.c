@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* qmat_picture: draws a surface (.off) and its medial mesh (.ma) as one SVG, in parallel projection. The surface is
- * shaded; the medial mesh shines through it: slabs are triangles, cones lines, spheres circles. */
+/* qmat_picture: draws a surface (.off) and its medial mesh (.ma) as an SVG, in parallel projection. The surface is
+ * shaded. The medial mesh is drawn over it: slabs as triangles, cones as lines, spheres as circles. */
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
@@ -19,7 +19,7 @@ typedef struct mesh {
   uint32_t *edges, *triangles;
 } mesh;
 
-/* One thing to paint. Later ones cover earlier ones. */
+/* One element of the drawing. Later ones cover earlier ones. */
 typedef struct shape {
   double depth;
   uint32_t index;
@@ -43,7 +43,7 @@ static void mesh_free(mesh *m) {
   *m = (mesh){0};
 }
 
-/* Room for what the header promises, if the file is long enough to hold it (2 bytes a number at least). */
+/* Allocates what the header counts. An element takes at least one byte, so larger counts are refused. */
 static int mesh_make(mesh *m, long bytes, const char *path) {
   const size_t most = bytes < 0 ? 0 : (size_t)bytes;
   if (m->vertex_count > most || m->edge_count > most || m->triangle_count > most) {
@@ -52,7 +52,7 @@ static int mesh_make(mesh *m, long bytes, const char *path) {
   m->vertices = calloc(m->vertex_count + 1, 4 * sizeof *m->vertices);
   m->edges = calloc(m->edge_count + 1, 2 * sizeof *m->edges);
   m->triangles = calloc(m->triangle_count + 1, 3 * sizeof *m->triangles);
-  return !m->vertices || !m->edges || m->triangles == NULL ? complain(path, "out of memory") : 0;
+  return !m->vertices || !m->edges || !m->triangles ? complain(path, "out of memory") : 0;
 }
 
 static int check_indices(const mesh *m, const char *path) {
@@ -101,7 +101,7 @@ static double along(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Looks at the models with z up: turned about z, then seen from above by `tilt`. */
+/* The view of a model turned about z by `turn` degrees and seen from `tilt` degrees above the horizon; z points up. */
 static view make_view(double turn, double tilt) {
   const double a = turn * acos(-1) / 180, b = tilt * acos(-1) / 180;
   return (view){.right = {cos(a), sin(a), 0},
@@ -160,7 +160,7 @@ static int compare_shapes(const void *left, const void *right) {
   return a->index < b->index ? -1 : a->index > b->index;
 }
 
-/* A colour between two, with the brightness of a facet of that normal under one lamp over the left shoulder. */
+/* Interpolates two colours by the brightness of a facet with the normal n. One lamp is at the upper left. */
 static void shade(const view *v, const double n[3], const int dark[3], const int bright[3], int colour[3]) {
   double lamp[3];
   for (int k = 0; k < 3; k++) lamp[k] = (0.75 * v->towards[k] + 0.5 * v->up[k] - 0.43 * v->right[k]) / 0.9987;
@@ -173,7 +173,7 @@ static void paint_triangle(FILE *out, const view *v, const mesh *m, const uint32
   double x[3], y[3];
   for (int k = 0; k < 3; k++) project(v, m->vertices + 4 * (size_t)t[k], x + k, y + k);
   fprintf(out, "<path d='M%.1f %.1fL%.1f %.1f %.1f %.1fz' ", x[0], y[0], x[1], y[1], x[2], y[2]);
-  /* the seam of two opaque triangles shows unless they overlap a little */
+  /* without a stroke the seams between opaque triangles show */
   if (opacity >= 1) {
     fprintf(out, "fill='#%02x%02x%02x' stroke='#%02x%02x%02x'/>\n", (unsigned)colour[0], (unsigned)colour[1],
             (unsigned)colour[2], (unsigned)colour[0], (unsigned)colour[1], (unsigned)colour[2]);
@@ -217,7 +217,7 @@ static void paint(FILE *out, const view *v, const mesh *surface, const mesh *med
   }
 }
 
-/* Everything to paint, from back to front. The caller frees it; NULL when memory is short. */
+/* All elements, from back to front. NULL when memory runs out; the caller frees the array. */
 static shape *collect(const view *v, const mesh *surface, const mesh *medial, bool with_spheres, size_t *count) {
   shape *all = calloc(surface->triangle_count + medial->vertex_count + medial->edge_count + medial->triangle_count + 1,
                       sizeof *all);
@@ -302,7 +302,7 @@ int main(int argc, char **argv) {
       *(word[3] == 'p' ? &with_spheres : &with_surface) = yes;
     }
     if (!good) {
-      fprintf(stderr, "qmat_picture: cannot use '%s %s'\n%s", word, value, usage);
+      fprintf(stderr, "qmat_picture: invalid option or value '%s %s'\n%s", word, value, usage);
       return 2;
     }
     i++;
