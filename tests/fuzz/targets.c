@@ -290,11 +290,11 @@ static void read_crate_tables(const uint8_t *content, size_t size) {
   uint64_t seed = 0;
   if (size < 1 || size > 1 + sizeof seed) return;
   memcpy(&seed, content + 1, size - 1);
-  qmat_usd_layer text = good_layer(usd_example);
+  static qmat_usd_layer text; /* read once */
+  if (!text.root) text = good_layer(usd_example);
   qmat_writer crate = write_damaged_crate(&text, 6 + content[0] % 5, seed | 1);
   read_usd(crate.bytes, crate.size);
   qmat_writer_uninit(&crate);
-  qmat_usd_layer_uninit(&text);
 }
 
 /* ---- graphs and the cache ---- */
