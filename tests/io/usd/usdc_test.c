@@ -136,12 +136,44 @@ static void test_counts_beyond_the_file_are_refused(void **state) {
   qmat_usd_layer_uninit(&text);
 }
 
+/* Damage to the packed bytes of a table seldom means anything, so the numbers are damaged before they are packed. */
+static void test_wrong_numbers_in_the_tables_are_refused_by_the_table(void **state) {
+  (void)state;
+  static const char *const complaints[] = {
+      "a string refers to a missing token",
+      "a field refers to a missing token",
+      "a path refers to a missing token",
+      "the table PATHS is not a tree",
+  };
+  enum { CRATES = 600, KINDS = sizeof complaints / sizeof complaints[0] };
+  size_t found[KINDS] = {0};
+  qmat_usd_layer text = good_layer(usd_example);
+  for (uint64_t seed = 1; seed <= CRATES; seed++) {
+    qmat_context context = {0};
+    qmat_usd_layer layer = {0};
+    qmat_writer writer = write_damaged_crate(&text, 6 + (int)(seed % 5), 2 * seed + 1);
+    qmat_bytes bytes = memory_file(writer.bytes, writer.size);
+    const qmat_status status = read_layer(&context, &bytes, "file", &layer);
+    assert_true(status == QMAT_OK || status == QMAT_ERROR_FORMAT);
+    for (size_t i = 0; i < KINDS && status != QMAT_OK; i++)
+      found[i] += strstr(context.error.message, complaints[i]) != NULL;
+    qmat_usd_layer_uninit(&layer);
+    free(bytes.data);
+    qmat_writer_uninit(&writer);
+    qmat_context_uninit(&context);
+  }
+  qmat_usd_layer_uninit(&text);
+  for (size_t i = 0; i < KINDS; i++)
+    if (found[i] == 0) fail_msg("never found: %s", complaints[i]);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_kind_of_value_comes_through_a_crate_of_every_version),
       cmocka_unit_test(test_versions_that_are_not_read_are_refused_by_number),
       cmocka_unit_test(test_every_beginning_of_a_crate_is_refused),
       cmocka_unit_test(test_counts_beyond_the_file_are_refused),
+      cmocka_unit_test(test_wrong_numbers_in_the_tables_are_refused_by_the_table),
       cmocka_unit_test(test_crates_of_real_assets_say_what_their_texts_say),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
