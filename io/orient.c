@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/vector.h"
 
 /* Half-edge 3 * t + k goes from corner k to corner k + 1 of triangle t. */
 
@@ -164,13 +165,12 @@ static void find_borders(work *w, uint8_t *odd) {
 }
 
 static double six_volumes(const double a[3], const double b[3], const double c[3], const double from[3]) {
-  double p[3], q[3], r[3];
-  for (int k = 0; k < 3; k++) {
-    p[k] = a[k] - from[k];
-    q[k] = b[k] - from[k];
-    r[k] = c[k] - from[k];
-  }
-  return p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0]);
+  double p[3], q[3], r[3], product[3];
+  qmat_subtract(a, from, p);
+  qmat_subtract(b, from, q);
+  qmat_subtract(c, from, r);
+  qmat_cross(q, r, product);
+  return qmat_dot(p, product);
 }
 
 static double triangle_volume(const work *w, size_t t, const double from[3]) {

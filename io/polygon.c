@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
+
 enum { LARGEST_BEST_FAN = 64, MOST_LOOKS = 64 };
 /* Bounds the time for polygons that cross themselves; what is left of one is then cut without looking. */
 static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28;
@@ -52,7 +54,7 @@ static bool flatten(const double *points, size_t count, double *flat) {
     normal[1] += (p[2] - q[2]) * (p[0] + q[0]);
     normal[2] += (p[0] - q[0]) * (p[1] + q[1]);
   }
-  double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+  const double length = sqrt(qmat_dot(normal, normal));
   if (!(length > 1e-300)) return false;
   for (int k = 0; k < 3; k++) normal[k] /= length;
 
@@ -61,15 +63,14 @@ static bool flatten(const double *points, size_t count, double *flat) {
   if (fabs(normal[2]) < fabs(normal[least])) least = 2;
   double u[3] = {-normal[least] * normal[0], -normal[least] * normal[1], -normal[least] * normal[2]};
   u[least] += 1;
-  length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-  for (int k = 0; k < 3; k++) u[k] /= length;
-  double v[3] = {normal[1] * u[2] - normal[2] * u[1], normal[2] * u[0] - normal[0] * u[2],
-                 normal[0] * u[1] - normal[1] * u[0]};
+  qmat_normalize(u);
+  double v[3];
+  qmat_cross(normal, u, v);
   for (size_t i = 0; i < count; i++) {
     double p[3];
     memcpy(p, flat + 3 * i, sizeof p);
-    flat[2 * i] = p[0] * u[0] + p[1] * u[1] + p[2] * u[2];
-    flat[2 * i + 1] = p[0] * v[0] + p[1] * v[1] + p[2] * v[2];
+    flat[2 * i] = qmat_dot(p, u);
+    flat[2 * i + 1] = qmat_dot(p, v);
   }
   return true;
 }

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
+
 static double raised(double error, double by) {
   return nextafter(error + nextafter(by, INFINITY), INFINITY);
 }
@@ -22,8 +24,7 @@ double qmat_medial_move(const qmat_medial *given, const qmat_medial *stored) {
   double most = 0;
   for (size_t i = 0; i < given->sphere_count && i < stored->sphere_count; i++) {
     const double *a = given->spheres + 4 * i, *b = stored->spheres + 4 * i;
-    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    most = fmax(most, sqrt(x * x + y * y + z * z) + fabs(a[3] - b[3]));
+    most = fmax(most, qmat_point_distance(a, b) + fabs(a[3] - b[3]));
   }
   return most;
 }

@@ -205,13 +205,12 @@ typedef struct flat_point {
 /* The corners of a facet in its own plane, its longest edge 1 long: the first at the origin, the second on the x axis,
  * the third above it. */
 static void flatten(const double *a, const double *b, const double *c, flat_point corners[3]) {
-  double ab[3], ac[3], bc[3], normal[3];
-  for (int k = 0; k < 3; k++) ab[k] = b[k] - a[k], ac[k] = c[k] - a[k], bc[k] = c[k] - b[k];
-  const double base = sqrt(ab[0] * ab[0] + ab[1] * ab[1] + ab[2] * ab[2]);
-  const double side = sqrt(ac[0] * ac[0] + ac[1] * ac[1] + ac[2] * ac[2]);
-  const double last = sqrt(bc[0] * bc[0] + bc[1] * bc[1] + bc[2] * bc[2]);
-  const double longest = fmax(fmax(base, side), last);
-  const double along = (ab[0] * ac[0] + ab[1] * ac[1] + ab[2] * ac[2]) / base;
+  double ab[3], ac[3], normal[3];
+  qmat_subtract(b, a, ab);
+  qmat_subtract(c, a, ac);
+  const double base = sqrt(qmat_dot(ab, ab));
+  const double longest = fmax(fmax(base, sqrt(qmat_dot(ac, ac))), qmat_point_distance(c, b));
+  const double along = qmat_dot(ab, ac) / base;
   corners[0] = (flat_point){0, 0};
   corners[1] = (flat_point){base / longest, 0};
   corners[2] = (flat_point){along / longest, 2 * qmat_triangle_area(a, b, c, normal) / base / longest};

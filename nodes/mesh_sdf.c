@@ -102,17 +102,10 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
                *c = positions + 3 * (size_t)ids[2];
   double normal[3], first[3], second[3], centroid[3];
   if (!(qmat_triangle_area(a, b, c, normal) > 0)) return DEGENERATE;
-  double length = 0;
-  for (int k = 0; k < 3; k++) {
-    first[k] = b[k] - a[k];
-    length += first[k] * first[k];
-    centroid[k] = (a[k] + b[k] + c[k]) / 3;
-  }
-  length = sqrt(length);
-  for (int k = 0; k < 3; k++) first[k] /= length;
-  second[0] = normal[1] * first[2] - normal[2] * first[1];
-  second[1] = normal[2] * first[0] - normal[0] * first[2];
-  second[2] = normal[0] * first[1] - normal[1] * first[0];
+  for (int k = 0; k < 3; k++) centroid[k] = (a[k] + b[k] + c[k]) / 3;
+  qmat_subtract(b, a, first);
+  qmat_normalize(first);
+  qmat_cross(normal, first, second);
 
   double lengths[MOST_RAYS], weights[MOST_RAYS];
   size_t count = 0;
@@ -122,7 +115,7 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
     for (int k = 0; k < 3; k++) direction[k] = local[0] * first[k] + local[1] * second[k] - local[2] * normal[k];
     if (!qmat_surface_cast(surface, centroid, direction, RAY_START, &distance, NULL, hit_normal)) continue;
     /* A surface that faces the same way was met from outside (Shapira et al. 2008, section 3.1). */
-    if (hit_normal[0] * normal[0] + hit_normal[1] * normal[1] + hit_normal[2] * normal[2] > SAME_SIDE) continue;
+    if (qmat_dot(hit_normal, normal) > SAME_SIDE) continue;
     lengths[count] = distance;
     weights[count++] = rays[i].weight;
   }

@@ -129,15 +129,12 @@ void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], co
     for (int k = 0; k < 3; k++) v[k] /= height;
     double rest = qmat_dot(v, u);
     for (int k = 0; k < 3; k++) v[k] -= rest * u[k];
-    double length = sqrt(qmat_dot(v, v));
-    for (int k = 0; k < 3; k++) v[k] /= length;
+    qmat_normalize(v);
   } else {
     any_perpendicular(u, v);
     height = 0;
   }
-  n[0] = u[1] * v[2] - u[2] * v[1];
-  n[1] = u[2] * v[0] - u[0] * v[2];
-  n[2] = u[0] * v[1] - u[1] * v[0];
+  qmat_cross(u, v, n);
 
   const double at[3][2] = {{0, 0}, {side, 0}, {slab->third, height}};
   for (int i = 0; i < 3; i++) {

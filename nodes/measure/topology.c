@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 
 /* Entries that the reduction of a matrix may go through. */
 static const size_t most_entries = 100000000;
@@ -326,11 +328,8 @@ static void triangle_vectors(const qmat_surface *surface, size_t triangle, doubl
   const uint32_t *row = &qmat_surface_mesh(surface)->triangles[3 * triangle];
   const double *p = qmat_surface_positions(surface);
   const double *a = &p[3 * (size_t)row[0]], *b = &p[3 * (size_t)row[1]], *c = &p[3 * (size_t)row[2]];
-  for (int k = 0; k < 3; k++) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    normal[k] = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
-    centre[k] = (a[k] + b[k] + c[k]) / 3;
-  }
+  qmat_triangle_normal(a, b, c, normal);
+  for (int k = 0; k < 3; k++) centre[k] = (a[k] + b[k] + c[k]) / 3;
 }
 
 /* Whether the inside lies behind the shell and the outside before it, or one of them on either side. */
@@ -359,9 +358,9 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
     shell *sum = &sums[qmat_set_leader(shells, (uint32_t)t)];
     double normal[3], centre[3];
     triangle_vectors(surface, t, normal, centre);
-    const double area = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    const double area = sqrt(qmat_dot(normal, normal));
     sum->triangle_count++;
-    sum->volume += normal[0] * centre[0] + normal[1] * centre[1] + normal[2] * centre[2];
+    sum->volume += qmat_dot(normal, centre);
     if (area > sum->largest_area) {
       sum->largest_area = area;
       sum->largest = (uint32_t)t;

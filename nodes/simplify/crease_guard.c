@@ -102,13 +102,11 @@ qmat_status qmat_crease_guard_renumber(qmat_context *context, const qmat_crease_
 }
 
 static double distance_to_segment(const double *p, const double *a, const double *b) {
-  double along = 0, square = 0, foot[3];
-  for (int k = 0; k < 3; k++) {
-    along += (p[k] - a[k]) * (b[k] - a[k]);
-    square += (b[k] - a[k]) * (b[k] - a[k]);
-  }
-  const double t = square > 0 ? fmin(fmax(along / square, 0), 1) : 0;
-  for (int k = 0; k < 3; k++) foot[k] = a[k] + t * (b[k] - a[k]);
+  double ab[3], ap[3], foot[3];
+  qmat_subtract(b, a, ab);
+  qmat_subtract(p, a, ap);
+  const double square = qmat_dot(ab, ab), t = square > 0 ? fmin(fmax(qmat_dot(ap, ab) / square, 0), 1) : 0;
+  for (int k = 0; k < 3; k++) foot[k] = a[k] + t * ab[k];
   return qmat_point_distance(p, foot);
 }
 

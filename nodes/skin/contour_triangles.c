@@ -2,6 +2,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
+
 #include "nodes/skin/contour.h"
 
 /* Triangles below this shape (area over the square of the longest side) are avoided. */
@@ -18,8 +20,9 @@ static double triangle_shape(const double *a, const double *b, const double *d) 
     w2 += (v[k] - u[k]) * (v[k] - u[k]);
   }
   longest = fmax(u2, fmax(v2, w2));
-  double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-  return longest > 0 ? 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / longest : 0;
+  double n[3];
+  qmat_cross(u, v, n);
+  return longest > 0 ? 0.5 * sqrt(qmat_dot(n, n)) / longest : 0;
 }
 
 enum cut { CUT_NONE, CUT_FIRST, CUT_SECOND, CUT_FAN };
