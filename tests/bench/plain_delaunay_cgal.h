@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* Seconds that CGAL takes for the 3D Delaunay triangulation of `count` points (3 doubles each) as its manual has it:
- * one call with the whole range, exact predicates, one thread. Negative when it fails. */
+/* The seconds of CGAL's 3D Delaunay triangulation of `count` points (3 doubles each), called as in its manual: once
+ * with the whole range, exact predicates, one thread. Negative when it fails. */
 double qmat_plain_delaunay_seconds(const double *points, size_t count);
 
 #ifdef __cplusplus

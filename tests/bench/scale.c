@@ -112,7 +112,7 @@ static int subdivide(surface *s) {
   return 0;
 }
 
-/* Writes the model `from` to `to` with its triangles divided until there are about a million. */
+/* Writes the model `from` to `to`, with its triangles divided into about a million. */
 static int write_million(const char *from, const char *to) {
   qmat_context context = {0};
   qmat_scene *scene;
@@ -159,7 +159,7 @@ static double seconds_of(struct timeval time) {
   return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
 }
 
-/* Runs `qmat mat`; what it used goes into `usage`. */
+/* Runs `qmat mat` and stores its resource usage in `usage`. */
 static int run_qmat(const char *qmat, const char *model, const char *asset, const char *report, struct rusage *usage) {
   const pid_t child = fork();
   if (child == 0) {
@@ -178,7 +178,7 @@ static int run_qmat(const char *qmat, const char *model, const char *asset, cons
   return 1;
 }
 
-/* Runs a node with its default parameters; `outputs` as qmat_node_run has it. */
+/* Runs a node with its default parameters; `outputs` is that of qmat_node_run. */
 static qmat_status run_node(qmat_context *context, const char *name, const qmat_value *const inputs[],
                             qmat_value *outputs[]) {
   double params[32]; /* for its alignment */
@@ -193,7 +193,7 @@ static double detail_of_delaunay(void) {
   return qmat_param_find(qmat_node_find("medial.delaunay"), "thinning_tolerance")->default_number;
 }
 
-/* The seconds that CGAL takes for the samples that medial.delaunay triangulates, and for all of them. */
+/* The seconds of CGAL's triangulation of the samples that medial.delaunay triangulates, and of all samples. */
 static qmat_status time_cgal(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                              const qmat_samples *samples, double seconds[2]) {
   qmat_surface *surface;
@@ -249,7 +249,7 @@ static json_t *rounded(double number) {
   return json_real(strtod(text, NULL));
 }
 
-/* The row of one model, from the report that its run wrote; NULL when that is no report. */
+/* The row of one model, from the report of its run; NULL when the report cannot be read. */
 static json_t *make_row(const char *model, const json_t *report, const struct rusage *usage, const double cgal[2]) {
   json_t *row = json_object(), *stages = json_object();
   const json_t *node, *made;

@@ -40,16 +40,18 @@ mkdir -p "$build/found"
 for target in "$@"; do
   corpus=$top/tests/fuzz/corpus/$target
   dictionary=$top/tests/fuzz/dictionaries/$target.dict
-  mkdir -p "$build/grown/$target"
+  mkdir -p "$build/grown/$target" "$work/real/$target"
+  # Small real files join the corpus where they are present.
+  find "$top/../shared/data" -name "*.$target" -size -64k -exec cp {} "$work/real/$target" \; 2>"$work/said"
   if [ -e "$dictionary" ]; then dictionary=-dict=$dictionary; else dictionary=-use_value_profile=1; fi
   # Inputs that reach new code stay in build/fuzz/grown, where the next run continues.
-  if "$build/qmat_fuzz" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=16384 \
+  if "$build/qmat_fuzz" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=65536 \
     -print_final_stats=1 -artifact_prefix="$build/found/$target-" "$dictionary" "$build/grown/$target" "$corpus" \
-    >"$work/said" 2>&1; then
+    "$work/real/$target" >"$work/said" 2>&1; then
     echo "ok      fuzz: $target: $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/said") inputs in $seconds s"
   else
     failed=1
-    echo "FAILED  fuzz: $target: $(grep -o "$build/found/.*" "$work/said" | head -n 1)"
+    echo "FAILED  fuzz: $target: $(sed -n 's/.*Test unit written to //p' "$work/said" | head -n 1)"
     grep -E 'ERROR|SUMMARY|violated|runtime error|allocated at once|^ *#[0-9]+ .* in (qmat|[a-z_]+ /)' "$work/said" |
       head -n 20 | sed 's/^/        /'
   fi
