@@ -15,11 +15,13 @@
 
 /* ---- checks ---- */
 
-/* QMAT_ERROR_GEOMETRY names the first row of numbers that single precision does not hold. */
+/* QMAT_ERROR_GEOMETRY names the first vertex, or sphere of 4 components, that single precision does not hold. A
+ * sphere's diameter and box are written, too. */
 static qmat_status check_single(qmat_context *context, const double *numbers, size_t count, size_t components,
                                 const char *kind, const char *field) {
   for (size_t i = 0; i < count * components; i++) {
-    if (isfinite((float)numbers[i])) continue;
+    const double radius = components == 4 ? fabs(numbers[i - i % 4 + 3]) : 0;
+    if (isfinite((float)(fabs(numbers[i]) + radius))) continue;
     char number[32];
     qmat_format_number(numbers[i], number, sizeof number);
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s does not fit into single precision", number);
@@ -29,12 +31,12 @@ static qmat_status check_single(qmat_context *context, const double *numbers, si
   return QMAT_OK;
 }
 
-/* The medial mesh and the skin as the file has them: counting from an origin. */
+/* The medial mesh and the skin as they are stored: relative to an origin. */
 typedef struct stored {
   double origin[3];
   qmat_medial medial;
-  qmat_mesh skin; /* no triangles: there is none */
-  double loss;    /* how far storage moved the solid */
+  qmat_mesh skin; /* no triangles: no skin */
+  double loss;    /* how far single precision moves the solid */
 } stored;
 
 static bool has_origin(const stored *s) {
@@ -46,7 +48,7 @@ static void stored_uninit(stored *s) {
   qmat_free(s->skin.positions);
 }
 
-/* Shares the simplices of what it is given; only points are its own. */
+/* Copies the points; the simplices are shared with the input. */
 static qmat_status stored_init(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin, double moved,
                                stored *s) {
   *s = (stored){.medial = *medial};
@@ -124,13 +126,13 @@ static void make_prim_name(const char *name, char prim[LONGEST_NAME + 2]) {
   for (; *name && length < LONGEST_NAME; name++) {
     const char c = *name;
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if ((c & 0xC0) == 0x80) continue; /* the rest of a character has one underscore */
+    if ((c & 0xC0) == 0x80) continue; /* one underscore for each character */
     prim[length++] = plain ? c : '_';
   }
   prim[length] = '\0';
 }
 
-/* The box of points with radii (NULL: none), as an attribute. */
+/* The box of the points, or with `radii` of spheres, as an attribute. */
 static void put_extent(qmat_writer *writer, const double *points, size_t count, size_t stride, bool radii) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < count; i++) {
@@ -167,7 +169,7 @@ static void put_triangles(qmat_writer *writer, const uint32_t *triangles, size_t
   qmat_put_text(writer, "]\n");
 }
 
-/* Radii times `factor` of the spheres that `ids` names (NULL: all), as an array of one number per point. */
+/* The radii times `factor` of the spheres `ids` (NULL: all), as an array of one number per point. */
 static void put_radii(qmat_writer *writer, const char *attribute, const qmat_medial *medial, const uint32_t *ids,
                       size_t count, double factor) {
   qmat_put_text(writer, "        float[] ");
@@ -295,7 +297,7 @@ static void put_custom_data(qmat_writer *writer, const stored *s, const char *na
   qmat_put_text(writer, "    }\n");
 }
 
-/* The prim's own place, in double precision. */
+/* The position of the prim, in double precision. */
 static void put_translation(qmat_writer *writer, const double origin[3]) {
   qmat_put_text(writer, "\n    double3 xformOp:translate = (");
   for (int k = 0; k < 3; k++) {
@@ -330,7 +332,7 @@ qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, con
                            const qmat_usd_options *options, qmat_file **file) {
   *file = NULL;
   if (medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     return qmat_fail_field(context, "medial");
   }
   stored s;

@@ -1,13 +1,28 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usdc_value.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "core/hash.h"
-#include "io/usd/usdc_plain.h"
+#include "io/usd/usdc_pack.h"
 
-/* The other types, by their number in the file. */
+enum { FEWEST_PACKED = 16 }; /* elements of an array: shorter ones are never packed */
+
+/* A representation has flags, a type, and the value itself or its offset in the file. */
+#define REP_ARRAY ((uint64_t)1 << 63)
+#define REP_INLINED ((uint64_t)1 << 62)
+#define REP_PACKED ((uint64_t)1 << 61)
+#define REP_PAYLOAD (((uint64_t)1 << 48) - 1)
+
+/* Types that are named below, by their number in the file. */
 typedef enum crate_type {
+  CRATE_INT = 3,
+  CRATE_UINT = 4,
+  CRATE_INT64 = 5,
+  CRATE_UINT64 = 6,
+  CRATE_DOUBLE = 9,
+  CRATE_DOUBLE2 = 19,
   CRATE_DICTIONARY = 31,
   CRATE_TOKEN_LIST_OP,
   CRATE_STRING_LIST_OP,
@@ -33,20 +48,287 @@ typedef enum crate_type {
   CRATE_UNREGISTERED_VALUE,
   CRATE_UNREGISTERED_VALUE_LIST_OP,
   CRATE_PAYLOAD_LIST_OP,
-  CRATE_PATH_EXPRESSION = 57
+  CRATE_TIME_CODE,
+  CRATE_PATH_EXPRESSION
 } crate_type;
 
-static qmat_status fail(const qmat_usdc_values *v, const char *what) {
-  return qmat_usd_layer_fail(v->crate->layer, what);
+/* Plain types by their number in the file. */
+static const struct {
+  qmat_usd_type type;
+  uint8_t components, rows; /* rows: of a matrix; else 0 */
+  bool is_quaternion;       /* stored with the real part last */
+} plain_types[] = {
+    [1] = {QMAT_USD_BOOL, 1, 0, false},
+    [2] = {QMAT_USD_UCHAR, 1, 0, false},
+    [3] = {QMAT_USD_INT, 1, 0, false},
+    [4] = {QMAT_USD_UINT, 1, 0, false},
+    [5] = {QMAT_USD_INT64, 1, 0, false},
+    [6] = {QMAT_USD_UINT64, 1, 0, false},
+    [7] = {QMAT_USD_HALF, 1, 0, false},
+    [8] = {QMAT_USD_FLOAT, 1, 0, false},
+    [9] = {QMAT_USD_DOUBLE, 1, 0, false},
+    [10] = {QMAT_USD_STRING, 1, 0, false},
+    [11] = {QMAT_USD_TOKEN, 1, 0, false},
+    [12] = {QMAT_USD_ASSET, 1, 0, false},
+    [13] = {QMAT_USD_DOUBLE, 4, 2, false},
+    [14] = {QMAT_USD_DOUBLE, 9, 3, false},
+    [15] = {QMAT_USD_DOUBLE, 16, 4, false},
+    [16] = {QMAT_USD_DOUBLE, 4, 0, true},
+    [17] = {QMAT_USD_FLOAT, 4, 0, true},
+    [18] = {QMAT_USD_HALF, 4, 0, true},
+    [19] = {QMAT_USD_DOUBLE, 2, 0, false},
+    [20] = {QMAT_USD_FLOAT, 2, 0, false},
+    [21] = {QMAT_USD_HALF, 2, 0, false},
+    [22] = {QMAT_USD_INT, 2, 0, false},
+    [23] = {QMAT_USD_DOUBLE, 3, 0, false},
+    [24] = {QMAT_USD_FLOAT, 3, 0, false},
+    [25] = {QMAT_USD_HALF, 3, 0, false},
+    [26] = {QMAT_USD_INT, 3, 0, false},
+    [27] = {QMAT_USD_DOUBLE, 4, 0, false},
+    [28] = {QMAT_USD_FLOAT, 4, 0, false},
+    [29] = {QMAT_USD_HALF, 4, 0, false},
+    [30] = {QMAT_USD_INT, 4, 0, false},
+    [CRATE_TIME_CODE] = {QMAT_USD_TIMECODE, 1, 0, false},
+};
+
+/* The size of a component in the file. */
+static const uint8_t component_bytes[QMAT_USD_TYPE_COUNT] = {
+    [QMAT_USD_BOOL] = 1,   [QMAT_USD_UCHAR] = 1, [QMAT_USD_INT] = 4,   [QMAT_USD_UINT] = 4,   [QMAT_USD_INT64] = 8,
+    [QMAT_USD_UINT64] = 8, [QMAT_USD_HALF] = 2,  [QMAT_USD_FLOAT] = 4, [QMAT_USD_DOUBLE] = 8, [QMAT_USD_TIMECODE] = 8,
+    [QMAT_USD_STRING] = 4, [QMAT_USD_TOKEN] = 4, [QMAT_USD_ASSET] = 4, [QMAT_USD_PATH] = 4,
+};
+
+static qmat_status fail(const qmat_usdc *c, const char *what) {
+  return qmat_usd_layer_fail(c->layer, what);
 }
 
-static qmat_status fail_short(const qmat_usdc_values *v) {
-  return qmat_usdc_fail_short(v->crate);
+static qmat_status fail_unknown(const qmat_usdc *c) {
+  return fail(c, "a value has an unknown type");
 }
 
-static qmat_status fail_unknown(const qmat_usdc_values *v) {
-  return fail(v, "a value has an unknown type");
+#define MISSING_TEXT "a value refers to a missing token or string"
+
+static unsigned type_of(uint64_t rep) {
+  return rep >> 48 & 0xFF;
 }
+
+static bool is_plain(unsigned type) {
+  return type < sizeof plain_types / sizeof plain_types[0] && plain_types[type].components > 0;
+}
+
+static qmat_status seek(const qmat_usdc *c, uint64_t rep, qmat_byte_reader *reader) {
+  const uint64_t offset = rep & REP_PAYLOAD;
+  if (offset >= c->size) return qmat_usdc_fail_short(c);
+  *reader = (qmat_byte_reader){.bytes = c->bytes, .size = c->size, .at = (size_t)offset};
+  return QMAT_OK;
+}
+
+/* ---- texts ---- */
+
+static qmat_status take_text(const qmat_usdc *c, qmat_byte_reader *reader, qmat_usd_type type, const char **text) {
+  const uint32_t index = qmat_take_u32(reader);
+  if (reader->failed) return qmat_usdc_fail_short(c);
+  /* An asset is a string in arrays, but a token where it is single. */
+  *text = type == QMAT_USD_PATH    ? qmat_usdc_path_text(c, index)
+          : type == QMAT_USD_TOKEN ? qmat_usdc_token(c, index)
+                                   : qmat_usdc_string(c, index);
+  if (*text) return QMAT_OK;
+  return type == QMAT_USD_PATH ? qmat_usd_layer_error(c->layer) : fail(c, MISSING_TEXT);
+}
+
+static qmat_status take_texts(const qmat_usdc *c, qmat_byte_reader *reader, qmat_usd_type type, uint64_t count,
+                              qmat_usd_value *value) {
+  if (reader->failed || qmat_bytes_left(reader) / 4 < count) return qmat_usdc_fail_short(c);
+  const char **texts = qmat_usd_alloc(c->layer, count, sizeof *texts);
+  if (!texts) return qmat_usd_layer_error(c->layer);
+  for (uint64_t i = 0; i < count; i++) {
+    qmat_status status = take_text(c, reader, type, &texts[i]);
+    if (status != QMAT_OK) return status;
+  }
+  *value = (qmat_usd_value){.type = type, .is_array = true, .components = 1, .count = count, .texts = texts};
+  return QMAT_OK;
+}
+
+/* ---- numbers ---- */
+
+static double half_from_bits(uint16_t bits) {
+  int exponent = bits >> 10 & 31;
+  double fraction = bits & 1023;
+  double size = exponent == 31  ? (fraction > 0 ? (double)NAN : (double)INFINITY)
+                : exponent == 0 ? ldexp(fraction, -24)
+                                : ldexp(1024 + fraction, exponent - 25);
+  return bits >> 15 ? -size : size;
+}
+
+static int64_t take_integer(qmat_byte_reader *reader, qmat_usd_type type) {
+  switch (type) {
+    case QMAT_USD_BOOL:
+      return qmat_take_u8(reader) != 0;
+    case QMAT_USD_UCHAR:
+      return qmat_take_u8(reader);
+    case QMAT_USD_INT:
+      return (int32_t)qmat_take_u32(reader);
+    case QMAT_USD_UINT:
+      return qmat_take_u32(reader);
+    default:
+      return (int64_t)qmat_take_u64(reader);
+  }
+}
+
+static double take_number(qmat_byte_reader *reader, qmat_usd_type type) {
+  if (type == QMAT_USD_HALF) return half_from_bits(qmat_take_u16(reader));
+  if (type == QMAT_USD_FLOAT) return (double)qmat_take_f32(reader);
+  return qmat_take_f64(reader);
+}
+
+static qmat_status take_elements(const qmat_usdc *c, qmat_byte_reader *reader, unsigned number, uint64_t count,
+                                 qmat_usd_value *value) {
+  const qmat_usd_type type = plain_types[number].type;
+  const unsigned components = plain_types[number].components;
+  if (reader->failed || qmat_bytes_left(reader) / (component_bytes[type] * components) < count)
+    return qmat_usdc_fail_short(c);
+  void *memory = qmat_usd_alloc(c->layer, count, 8 * components);
+  if (!memory) return qmat_usd_layer_error(c->layer);
+  *value = (qmat_usd_value){.type = type, .is_array = true, .components = (uint8_t)components, .count = count};
+  size_t total = count * components;
+  if (qmat_usd_is_integer(type)) {
+    int64_t *integers = memory;
+    for (size_t i = 0; i < total; i++) integers[i] = take_integer(reader, type);
+    value->integers = integers;
+    return QMAT_OK;
+  }
+  double *numbers = memory;
+  for (size_t i = 0; i < total; i++) numbers[i] = take_number(reader, type);
+  if (plain_types[number].is_quaternion) {
+    for (double *q = numbers; q < numbers + total; q += 4) {
+      double real = q[3];
+      memmove(q + 1, q, 3 * sizeof *q);
+      q[0] = real;
+    }
+  }
+  value->numbers = numbers;
+  return QMAT_OK;
+}
+
+/* ---- arrays ---- */
+
+static qmat_status take_packed_array(const qmat_usdc *c, qmat_byte_reader *reader, qmat_usd_type type, uint64_t count,
+                                     qmat_usd_value *value) {
+  if (reader->failed || count / 4 > qmat_usdc_largest_unpacked(qmat_bytes_left(reader))) return qmat_usdc_fail_short(c);
+  void *memory = qmat_usd_alloc(c->layer, count, 8);
+  if (!memory) return qmat_usd_layer_error(c->layer);
+  *value = (qmat_usd_value){.type = type, .is_array = true, .components = 1, .count = count};
+  qmat_status status;
+  if (qmat_usd_is_integer(type)) {
+    int64_t *integers = memory;
+    status = qmat_usdc_take_integers(c->layer, reader, count, component_bytes[type], integers);
+    if (type == QMAT_USD_UINT) {
+      for (uint64_t i = 0; i < count && status == QMAT_OK; i++) integers[i] = (uint32_t)integers[i];
+    }
+    value->integers = integers;
+    return status;
+  }
+  char code = (char)qmat_take_u8(reader);
+  uint32_t known = 0;
+  const uint8_t *table = NULL;
+  if (code == 't') {
+    known = qmat_take_u32(reader);
+    table = qmat_take_bytes(reader, (size_t)known * component_bytes[type]);
+    if (!table) return qmat_usdc_fail_short(c);
+  } else if (code != 'i') {
+    return fail(c, "a packed array of numbers has an unknown encoding");
+  }
+  int64_t *integers = qmat_alloc(count, sizeof *integers);
+  if (!integers) return qmat_usd_layer_fail_memory(c->layer);
+  status = qmat_usdc_take_integers(c->layer, reader, count, 4, integers);
+  double *numbers = memory;
+  for (uint64_t i = 0; i < count && status == QMAT_OK; i++) {
+    if (!table) {
+      numbers[i] = (double)integers[i];
+      continue;
+    }
+    uint32_t index = (uint32_t)integers[i];
+    if (index >= known) {
+      status = fail(c, "a packed array of numbers refers to a missing entry");
+      break;
+    }
+    qmat_byte_reader entry = {.bytes = table + (size_t)index * component_bytes[type], .size = component_bytes[type]};
+    numbers[i] = take_number(&entry, type);
+  }
+  qmat_free(integers);
+  value->numbers = numbers;
+  return status;
+}
+
+static qmat_status read_array(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
+  const unsigned number = type_of(rep), components = plain_types[number].components;
+  const qmat_usd_type type = plain_types[number].type;
+  qmat_byte_reader reader;
+  *value = (qmat_usd_value){.type = type, .is_array = true, .components = (uint8_t)components};
+  if ((rep & REP_PAYLOAD) == 0) return QMAT_OK;
+  qmat_status status = seek(c, rep, &reader);
+  if (status != QMAT_OK) return status;
+  const uint64_t count = c->version < 7 ? qmat_take_u32(&reader) : qmat_take_u64(&reader);
+  if (qmat_usd_is_text(type)) return take_texts(c, &reader, type, count, value);
+  const bool can_be_packed =
+      components == 1 && type != QMAT_USD_BOOL && type != QMAT_USD_UCHAR && type != QMAT_USD_TIMECODE;
+  return can_be_packed && rep & REP_PACKED && count >= FEWEST_PACKED ? take_packed_array(c, &reader, type, count, value)
+                                                                     : take_elements(c, &reader, number, count, value);
+}
+
+/* ---- single values ---- */
+
+/* The type of a single component in the low 32 bits of a representation. */
+static qmat_usd_type inlined_type(qmat_usd_type type) {
+  if (type == QMAT_USD_INT64) return QMAT_USD_INT;
+  if (type == QMAT_USD_UINT64) return QMAT_USD_UINT;
+  return type == QMAT_USD_DOUBLE || type == QMAT_USD_TIMECODE ? QMAT_USD_FLOAT : type;
+}
+
+static qmat_status read_inlined(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
+  const unsigned number = type_of(rep), components = plain_types[number].components, rows = plain_types[number].rows;
+  const qmat_usd_type type = plain_types[number].type;
+  const uint8_t bytes[4] = {rep & 0xFF, rep >> 8 & 0xFF, rep >> 16 & 0xFF, rep >> 24 & 0xFF};
+  qmat_byte_reader reader = {.bytes = bytes, .size = sizeof bytes};
+  if (qmat_usd_is_text(type)) {
+    const char *text = type == QMAT_USD_STRING ? qmat_usdc_string(c, (uint32_t)rep) : qmat_usdc_token(c, (uint32_t)rep);
+    return text ? qmat_usd_make_text(c->layer, type, text, value) : fail(c, MISSING_TEXT);
+  }
+  void *memory = qmat_usd_alloc(c->layer, components, 8);
+  if (!memory) return qmat_usd_layer_error(c->layer);
+  int64_t *integers = memory;
+  double *numbers = memory;
+  *value = (qmat_usd_value){.type = type, .components = (uint8_t)components, .count = 1};
+  for (unsigned i = 0; i < components; i++) {
+    /* Vectors are signed bytes; matrices are the signed bytes of their diagonal. */
+    const int8_t byte = (int8_t)(rows == 0 ? bytes[i] : i / rows == i % rows ? bytes[i / rows] : 0);
+    if (qmat_usd_is_integer(type)) {
+      integers[i] = components > 1 ? byte : take_integer(&reader, inlined_type(type));
+    } else {
+      numbers[i] = components > 1 ? (double)byte : take_number(&reader, inlined_type(type));
+    }
+  }
+  if (qmat_usd_is_integer(type)) {
+    value->integers = integers;
+  } else {
+    value->numbers = numbers;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status read_plain(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
+  const unsigned number = type_of(rep);
+  const bool fits = component_bytes[plain_types[number].type] <= 4 && plain_types[number].components == 1;
+  if (rep & REP_ARRAY) return read_array(c, rep, value);
+  if (rep & REP_INLINED || fits) return read_inlined(c, rep, value);
+  qmat_byte_reader reader;
+  qmat_status status = seek(c, rep, &reader);
+  if (status == QMAT_OK) status = take_elements(c, &reader, number, 1, value);
+  value->is_array = false;
+  return status;
+}
+
+/* ---- values that contain others ---- */
 
 /* Takes the distance to a representation, follows it, and takes the representation. */
 static bool take_rep(qmat_byte_reader *reader, uint64_t *rep) {
@@ -65,21 +347,21 @@ static qmat_status take_dictionary(qmat_usdc_values *v, qmat_byte_reader *reader
                                    qmat_usd_value *value) {
   qmat_usd_layer *layer = v->crate->layer;
   const uint64_t count = qmat_take_u64(reader);
-  if (reader->failed || qmat_bytes_left(reader) / 8 < count) return fail_short(v);
+  if (reader->failed || qmat_bytes_left(reader) / 8 < count) return qmat_usdc_fail_short(v->crate);
   qmat_usd_field *entries = qmat_usd_alloc(layer, count, sizeof *entries);
   if (!entries) return qmat_usd_layer_error(layer);
   for (uint64_t i = 0; i < count; i++) {
     uint64_t rep;
-    qmat_status status = qmat_usdc_take_text(v->crate, reader, QMAT_USD_STRING, &entries[i].name);
+    qmat_status status = take_text(v->crate, reader, QMAT_USD_STRING, &entries[i].name);
     if (status == QMAT_OK && of_strings) {
       const char *text;
       qmat_usd_value *entry = qmat_usd_alloc(layer, 1, sizeof *entry);
       if (!entry) return qmat_usd_layer_error(layer);
-      status = qmat_usdc_take_text(v->crate, reader, QMAT_USD_STRING, &text);
+      status = take_text(v->crate, reader, QMAT_USD_STRING, &text);
       if (status == QMAT_OK) status = qmat_usd_make_text(layer, QMAT_USD_STRING, text, entry);
       entries[i].value = entry;
     } else if (status == QMAT_OK) {
-      status = take_rep(reader, &rep) ? qmat_usdc_value(v, rep, &entries[i].value) : fail_short(v);
+      status = take_rep(reader, &rep) ? qmat_usdc_value(v, rep, &entries[i].value) : qmat_usdc_fail_short(v->crate);
     }
     if (status != QMAT_OK) return status;
   }
@@ -91,8 +373,8 @@ static qmat_status take_reference(qmat_usdc_values *v, qmat_byte_reader *reader,
                                   qmat_usd_reference *reference) {
   qmat_usd_value custom_data;
   reference->scale = 1;
-  qmat_status status = qmat_usdc_take_text(v->crate, reader, QMAT_USD_STRING, &reference->asset);
-  if (status == QMAT_OK) status = qmat_usdc_take_text(v->crate, reader, QMAT_USD_PATH, &reference->path);
+  qmat_status status = take_text(v->crate, reader, QMAT_USD_STRING, &reference->asset);
+  if (status == QMAT_OK) status = take_text(v->crate, reader, QMAT_USD_PATH, &reference->path);
   if (status == QMAT_OK && (!is_payload || v->crate->version >= 8)) {
     reference->offset = qmat_take_f64(reader);
     reference->scale = qmat_take_f64(reader);
@@ -102,7 +384,7 @@ static qmat_status take_reference(qmat_usdc_values *v, qmat_byte_reader *reader,
 
 static qmat_status take_references(qmat_usdc_values *v, qmat_byte_reader *reader, bool is_payload, uint64_t count,
                                    qmat_usd_value *value) {
-  if (reader->failed || qmat_bytes_left(reader) / 8 < count) return fail_short(v);
+  if (reader->failed || qmat_bytes_left(reader) / 8 < count) return qmat_usdc_fail_short(v->crate);
   qmat_usd_reference *references = qmat_usd_alloc(v->crate->layer, count, sizeof *references);
   if (!references) return qmat_usd_layer_error(v->crate->layer);
   for (uint64_t i = 0; i < count; i++) {
@@ -111,7 +393,7 @@ static qmat_status take_references(qmat_usdc_values *v, qmat_byte_reader *reader
   }
   *value = (qmat_usd_value){
       .type = QMAT_USD_REFERENCE, .is_array = true, .components = 1, .count = count, .references = references};
-  return reader->failed ? fail_short(v) : QMAT_OK;
+  return reader->failed ? qmat_usdc_fail_short(v->crate) : QMAT_OK;
 }
 
 static qmat_status take_list(qmat_usdc_values *v, qmat_byte_reader *reader, crate_type type, uint64_t count,
@@ -119,23 +401,23 @@ static qmat_status take_list(qmat_usdc_values *v, qmat_byte_reader *reader, crat
   const qmat_usdc *c = v->crate;
   switch (type) {
     case CRATE_TOKEN_LIST_OP:
-      return qmat_usdc_take_texts(c, reader, QMAT_USD_TOKEN, count, list);
+      return take_texts(c, reader, QMAT_USD_TOKEN, count, list);
     case CRATE_STRING_LIST_OP:
-      return qmat_usdc_take_texts(c, reader, QMAT_USD_STRING, count, list);
+      return take_texts(c, reader, QMAT_USD_STRING, count, list);
     case CRATE_PATH_LIST_OP:
-      return qmat_usdc_take_texts(c, reader, QMAT_USD_PATH, count, list);
+      return take_texts(c, reader, QMAT_USD_PATH, count, list);
     case CRATE_REFERENCE_LIST_OP:
       return take_references(v, reader, false, count, list);
     case CRATE_PAYLOAD_LIST_OP:
       return take_references(v, reader, true, count, list);
     case CRATE_INT_LIST_OP:
-      return qmat_usdc_take_elements(c, reader, QMAT_USDC_INT, count, list);
+      return take_elements(c, reader, CRATE_INT, count, list);
     case CRATE_INT64_LIST_OP:
-      return qmat_usdc_take_elements(c, reader, QMAT_USDC_INT64, count, list);
+      return take_elements(c, reader, CRATE_INT64, count, list);
     case CRATE_UINT_LIST_OP:
-      return qmat_usdc_take_elements(c, reader, QMAT_USDC_UINT, count, list);
+      return take_elements(c, reader, CRATE_UINT, count, list);
     default:
-      return qmat_usdc_take_elements(c, reader, QMAT_USDC_UINT64, count, list);
+      return take_elements(c, reader, CRATE_UINT64, count, list);
   }
 }
 
@@ -163,12 +445,12 @@ static qmat_status take_samples(qmat_usdc_values *v, qmat_byte_reader *reader, q
   qmat_usd_layer *layer = v->crate->layer;
   const qmat_usd_value *times;
   uint64_t rep, count;
-  if (!take_rep(reader, &rep)) return fail_short(v);
+  if (!take_rep(reader, &rep)) return qmat_usdc_fail_short(v->crate);
   qmat_status status = qmat_usdc_value(v, rep, &times);
   if (status != QMAT_OK) return status;
-  if (!take_rep(reader, &count) || qmat_bytes_left(reader) / 8 < count) return fail_short(v);
+  if (!take_rep(reader, &count) || qmat_bytes_left(reader) / 8 < count) return qmat_usdc_fail_short(v->crate);
   if (times->type != QMAT_USD_DOUBLE || !times->is_array || times->components != 1 || times->count != count) {
-    return fail(v, "the numbers of times and values of samples differ");
+    return fail(v->crate, "the numbers of times and values of samples differ");
   }
   qmat_usd_samples *samples = qmat_usd_alloc(layer, 1, sizeof *samples);
   const qmat_usd_value **values = samples ? qmat_usd_alloc(layer, count, sizeof *values) : NULL;
@@ -200,15 +482,15 @@ static qmat_status take_payload(qmat_usdc_values *v, qmat_byte_reader *reader, q
 static qmat_status read_choice(const qmat_usdc_values *v, uint64_t rep, const char *const *choices, unsigned count,
                                qmat_usd_value *value) {
   const uint32_t choice = (uint32_t)rep;
-  if (choice >= count) return fail(v, "a specifier, permission or variability is unknown");
+  if (choice >= count) return fail(v->crate, "a specifier, permission or variability is unknown");
   return qmat_usd_make_text(v->crate->layer, QMAT_USD_TOKEN, choices[choice], value);
 }
 
-/* A value in the 64 bits of its representation. */
-static qmat_status read_inlined(const qmat_usdc_values *v, uint64_t rep, qmat_usd_value *value) {
+/* A value without contents in the file. */
+static qmat_status read_immediate(const qmat_usdc_values *v, uint64_t rep, qmat_usd_value *value) {
   static const char *const specifiers[] = {"def", "over", "class"}, *const permissions[] = {"public", "private"},
                            *const variabilities[] = {"varying", "uniform", "uniform"};
-  switch ((crate_type)qmat_usdc_type_of(rep)) {
+  switch ((crate_type)type_of(rep)) {
     case CRATE_SPECIFIER:
       return read_choice(v, rep, specifiers, 3, value);
     case CRATE_PERMISSION:
@@ -223,7 +505,7 @@ static qmat_status read_inlined(const qmat_usdc_values *v, uint64_t rep, qmat_us
       *value = (qmat_usd_value){.type = QMAT_USD_DICTIONARY, .components = 1};
       return QMAT_OK;
     default:
-      return fail_unknown(v);
+      return fail_unknown(v->crate);
   }
 }
 
@@ -233,11 +515,11 @@ static bool is_always_inlined(crate_type type) {
 
 static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value *value) {
   const qmat_usdc *c = v->crate;
-  const crate_type type = (crate_type)qmat_usdc_type_of(rep);
+  const crate_type type = (crate_type)type_of(rep);
   qmat_byte_reader reader;
-  if (qmat_usdc_is_plain(type)) return qmat_usdc_read_plain(c, rep, value);
-  if (rep & QMAT_USDC_INLINED || is_always_inlined(type)) return read_inlined(v, rep, value);
-  qmat_status status = qmat_usdc_seek(c, rep, &reader);
+  if (is_plain(type)) return read_plain(c, rep, value);
+  if (rep & REP_INLINED || is_always_inlined(type)) return read_immediate(v, rep, value);
+  qmat_status status = seek(c, rep, &reader);
   if (status != QMAT_OK) return status;
   switch (type) {
     case CRATE_DICTIONARY:
@@ -254,15 +536,15 @@ static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value 
     case CRATE_PAYLOAD_LIST_OP:
       return take_list_op(v, &reader, type, value);
     case CRATE_PATH_VECTOR:
-      return qmat_usdc_take_texts(c, &reader, QMAT_USD_PATH, qmat_take_u64(&reader), value);
+      return take_texts(c, &reader, QMAT_USD_PATH, qmat_take_u64(&reader), value);
     case CRATE_TOKEN_VECTOR:
-      return qmat_usdc_take_texts(c, &reader, QMAT_USD_TOKEN, qmat_take_u64(&reader), value);
+      return take_texts(c, &reader, QMAT_USD_TOKEN, qmat_take_u64(&reader), value);
     case CRATE_STRING_VECTOR:
-      return qmat_usdc_take_texts(c, &reader, QMAT_USD_STRING, qmat_take_u64(&reader), value);
+      return take_texts(c, &reader, QMAT_USD_STRING, qmat_take_u64(&reader), value);
     case CRATE_DOUBLE_VECTOR:
-      return qmat_usdc_take_elements(c, &reader, QMAT_USDC_DOUBLE, qmat_take_u64(&reader), value);
+      return take_elements(c, &reader, CRATE_DOUBLE, qmat_take_u64(&reader), value);
     case CRATE_LAYER_OFFSET_VECTOR:
-      return qmat_usdc_take_elements(c, &reader, QMAT_USDC_DOUBLE2, qmat_take_u64(&reader), value);
+      return take_elements(c, &reader, CRATE_DOUBLE2, qmat_take_u64(&reader), value);
     case CRATE_TIME_SAMPLES:
       return take_samples(v, &reader, value);
     case CRATE_PAYLOAD:
@@ -271,20 +553,20 @@ static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value 
     case CRATE_UNREGISTERED_VALUE: {
       const qmat_usd_value *inner;
       uint64_t inner_rep;
-      if (!take_rep(&reader, &inner_rep)) return fail_short(v);
+      if (!take_rep(&reader, &inner_rep)) return qmat_usdc_fail_short(v->crate);
       status = qmat_usdc_value(v, inner_rep, &inner);
       if (status == QMAT_OK) *value = *inner;
       return status;
     }
     case CRATE_PATH_EXPRESSION: {
       const char *text;
-      status = qmat_usdc_take_text(c, &reader, QMAT_USD_STRING, &text);
+      status = take_text(c, &reader, QMAT_USD_STRING, &text);
       return status == QMAT_OK ? qmat_usd_make_text(c->layer, QMAT_USD_STRING, text, value) : status;
     }
     case CRATE_UNREGISTERED_VALUE_LIST_OP:
       return qmat_usd_make_text(c->layer, QMAT_USD_UNREAD, "list of values of unknown types", value);
     default:
-      return fail_unknown(v);
+      return fail_unknown(v->crate);
   }
 }
 
@@ -311,14 +593,14 @@ static bool grow_known(qmat_usdc_values *v) {
 
 qmat_status qmat_usdc_value(qmat_usdc_values *v, uint64_t rep, const qmat_usd_value **value) {
   qmat_usd_layer *layer = v->crate->layer;
-  if (rep == 0) return fail_unknown(v);
+  if (rep == 0) return fail_unknown(v->crate);
   if (2 * v->known_count >= v->known_slots && !grow_known(v)) return qmat_usd_layer_fail_memory(layer);
   qmat_usdc_known *known = find_known(v, rep);
   if (known->rep == rep) {
     *value = known->value;
-    return known->value ? QMAT_OK : fail(v, "a value contains itself");
+    return known->value ? QMAT_OK : fail(v->crate, "a value contains itself");
   }
-  if (v->depth >= QMAT_USD_DEEPEST) return fail(v, "values are nested too deep");
+  if (v->depth >= QMAT_USD_DEEPEST) return fail(v->crate, "values are nested too deep");
   *known = (qmat_usdc_known){.rep = rep};
   v->known_count++;
   qmat_usd_value *made = qmat_usd_alloc(layer, 1, sizeof *made);

@@ -4,8 +4,8 @@
 
 #include "io/usd/usdc_tables.h"
 
-/* The values of a crate. A value is represented by 64 bits: flags, its type, and the value itself or its offset in the
- * file. */
+/* The values of a crate. Each is represented by 64 bits: flags, its type, and the value itself or its offset in the
+ * file. Source: OpenUSD, pxr/usd/sdf/crateFile and crateDataTypes. */
 
 /* A value that was read, or (NULL) is being read. */
 typedef struct qmat_usdc_known {

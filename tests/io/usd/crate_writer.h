@@ -141,9 +141,63 @@ static inline void crate_put_integers(qmat_writer *to, const int64_t *integers, 
 }
 
 static inline void crate_put_u32s(qmat_writer *to, const uint32_t *numbers, size_t count) {
-  int64_t wide[8 * CRATE_MOST];
+  int64_t *wide = calloc(count + 1, sizeof *wide);
+  assert_non_null(wide);
   for (size_t i = 0; i < count; i++) wide[i] = (int32_t)numbers[i];
   crate_put_integers(to, wide, count, 4);
+  free(wide);
+}
+
+/* The tables of a crate. */
+typedef struct crate_tables {
+  size_t token_count, token_bytes, string_count, field_count, set_length, path_count, spec_count;
+  const char *tokens; /* each with a zero byte */
+  const uint32_t *strings, *field_names, *sets, *indices, *elements, *jumps, *spec_paths, *spec_sets, *spec_types;
+  const uint64_t *field_reps;
+} crate_tables;
+
+/* Writes the tables after the values in `body`, which begins with CRATE_HEADER bytes of room, and the header. */
+static inline void crate_put_tables(qmat_writer *body, int version, const crate_tables *t) {
+  static const char *const names[] = {"TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"};
+  size_t starts[7];
+  starts[0] = body->size;
+  crate_put_u64(body, t->token_count);
+  crate_put_u64(body, t->token_bytes);
+  crate_put_lz4(body, t->tokens, t->token_bytes, true);
+  starts[1] = body->size;
+  crate_put_u64(body, t->string_count);
+  for (size_t i = 0; i < t->string_count; i++) qmat_put_u32(body, t->strings[i]);
+  starts[2] = body->size;
+  crate_put_u64(body, t->field_count);
+  crate_put_u32s(body, t->field_names, t->field_count);
+  crate_put_lz4(body, t->field_reps, t->field_count * 8, true);
+  starts[3] = body->size;
+  crate_put_u64(body, t->set_length);
+  crate_put_u32s(body, t->sets, t->set_length);
+  starts[4] = body->size;
+  crate_put_u64(body, t->path_count);
+  crate_put_u64(body, t->path_count);
+  crate_put_u32s(body, t->indices, t->path_count);
+  crate_put_u32s(body, t->elements, t->path_count);
+  crate_put_u32s(body, t->jumps, t->path_count);
+  starts[5] = body->size;
+  crate_put_u64(body, t->spec_count);
+  crate_put_u32s(body, t->spec_paths, t->spec_count);
+  crate_put_u32s(body, t->spec_sets, t->spec_count);
+  crate_put_u32s(body, t->spec_types, t->spec_count);
+  starts[6] = body->size;
+  crate_put_u64(body, 6);
+  for (size_t i = 0; i < 6; i++) {
+    char name[16] = "";
+    strcpy(name, names[i]);
+    qmat_put_bytes(body, name, sizeof name);
+    crate_put_u64(body, starts[i]);
+    crate_put_u64(body, starts[i + 1] - starts[i]);
+  }
+  assert_false(body->failed);
+  memcpy(body->bytes, "PXR-USDC", 8);
+  body->bytes[9] = (uint8_t)version;
+  for (int i = 0; i < 8; i++) body->bytes[16 + i] = (uint8_t)(starts[6] >> (8 * i));
 }
 
 static inline uint16_t crate_half(double number) {
@@ -519,7 +573,6 @@ static inline void crate_damage(uint64_t seed, uint64_t table, uint32_t *numbers
 /* The layer as a crate of version 0.`version`. With a seed other than 0 some
  * numbers in its tables are wrong. The caller frees the writer. */
 static inline qmat_writer write_damaged_crate(const qmat_usd_layer *layer, int version, uint64_t seed) {
-  static const char *const names[] = {"TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"};
   crate_writer *w = calloc(1, sizeof *w);
   assert_non_null(w);
   w->version = version;
@@ -529,7 +582,7 @@ static inline qmat_writer write_damaged_crate(const qmat_usd_layer *layer, int v
   crate_add_spec(w, layer->root, 0);
 
   static uint32_t indices[CRATE_MOST], elements[CRATE_MOST], jumps[CRATE_MOST];
-  size_t path_count = 0, starts[7];
+  size_t path_count = 0;
   crate_order_paths(w, 0, indices, elements, jumps, &path_count);
   if (seed != 0) {
     crate_damage(seed, 0, w->strings, w->string_count);
@@ -545,44 +598,25 @@ static inline qmat_writer write_damaged_crate(const qmat_usd_layer *layer, int v
   }
   qmat_writer text = {0};
   for (size_t i = 0; i < w->token_count; i++) qmat_put_bytes(&text, w->tokens[i], strlen(w->tokens[i]) + 1);
-  starts[0] = w->body.size;
-  crate_put_u64(&w->body, w->token_count);
-  crate_put_u64(&w->body, text.size);
-  crate_put_lz4(&w->body, text.bytes, text.size, true);
-  starts[1] = w->body.size;
-  crate_put_u64(&w->body, w->string_count);
-  for (size_t i = 0; i < w->string_count; i++) qmat_put_u32(&w->body, w->strings[i]);
-  starts[2] = w->body.size;
-  crate_put_u64(&w->body, w->field_count);
-  crate_put_u32s(&w->body, w->field_names, w->field_count);
-  crate_put_lz4(&w->body, w->field_reps, w->field_count * 8, true);
-  starts[3] = w->body.size;
-  crate_put_u64(&w->body, w->set_length);
-  crate_put_u32s(&w->body, w->sets, w->set_length);
-  starts[4] = w->body.size;
-  crate_put_u64(&w->body, path_count);
-  crate_put_u64(&w->body, path_count);
-  crate_put_u32s(&w->body, indices, path_count);
-  crate_put_u32s(&w->body, elements, path_count);
-  crate_put_u32s(&w->body, jumps, path_count);
-  starts[5] = w->body.size;
-  crate_put_u64(&w->body, w->spec_count);
-  crate_put_u32s(&w->body, w->spec_paths, w->spec_count);
-  crate_put_u32s(&w->body, w->spec_sets, w->spec_count);
-  crate_put_u32s(&w->body, w->spec_types, w->spec_count);
-  starts[6] = w->body.size;
-  crate_put_u64(&w->body, 6);
-  for (size_t i = 0; i < 6; i++) {
-    char name[16] = "";
-    strcpy(name, names[i]);
-    qmat_put_bytes(&w->body, name, sizeof name);
-    crate_put_u64(&w->body, starts[i]);
-    crate_put_u64(&w->body, starts[i + 1] - starts[i]);
-  }
-  assert_false(w->body.failed);
-  memcpy(w->body.bytes, "PXR-USDC", 8);
-  w->body.bytes[9] = (uint8_t)version;
-  for (int i = 0; i < 8; i++) w->body.bytes[16 + i] = (uint8_t)(starts[6] >> (8 * i));
+  const crate_tables tables = {.token_count = w->token_count,
+                               .token_bytes = text.size,
+                               .string_count = w->string_count,
+                               .field_count = w->field_count,
+                               .set_length = w->set_length,
+                               .path_count = path_count,
+                               .spec_count = w->spec_count,
+                               .tokens = (const char *)text.bytes,
+                               .strings = w->strings,
+                               .field_names = w->field_names,
+                               .sets = w->sets,
+                               .indices = indices,
+                               .elements = elements,
+                               .jumps = jumps,
+                               .spec_paths = w->spec_paths,
+                               .spec_sets = w->spec_sets,
+                               .spec_types = w->spec_types,
+                               .field_reps = w->field_reps};
+  crate_put_tables(&w->body, version, &tables);
   qmat_writer made = w->body;
   for (size_t i = 0; i < w->token_count; i++) free(w->tokens[i]);
   qmat_writer_uninit(&text);

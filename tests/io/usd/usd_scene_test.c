@@ -461,6 +461,16 @@ static void test_a_package_is_read_and_its_members_refer_to_each_other(void **st
   assert_int_equal(qmat_usd_read(&context, &bytes, in_folder("a.usdz"), &soup, NULL), QMAT_OK);
   assert_int_equal(soup.facet_count, 1);
   qmat_soup_uninit(&soup);
+  /* A package that two prims refer to is read once. */
+  json_t *report;
+  write_file(in_folder("b.usdz"), writer.bytes, writer.size);
+  soup = good_scene(
+      "#usda 1.0\ndef \"x\" ( references = @b.usdz@</m> ) {}\ndef \"y\" ( references = @./b.usdz@</m> ) {}\n", &report);
+  assert_int_equal(soup.facet_count, 2);
+  assert_int_equal(count_of(report, "layers_read"), 2);
+  json_decref(report);
+  qmat_soup_uninit(&soup);
+  unlink(in_folder("b.usdz"));
   qmat_usdz package;
   assert_int_equal(qmat_usdz_open(&context, &bytes, "a.usdz", &package), QMAT_OK);
   assert_int_equal(package.member_count, 1);

@@ -160,6 +160,15 @@ static void test_what_single_precision_cannot_hold_is_refused_by_its_element(voi
   assert_null(file);
   assert_string_equal(context.error.message, "1e+39 does not fit into single precision");
   assert_int_equal(context.error.element, 1);
+  /* The diameter and the box do not fit either. */
+  medial->spheres[5] = 0;
+  medial->spheres[7] = 2e38;
+  assert_int_equal(qmat_usd_write(&context, medial, NULL, &options, &file), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "2e+38 does not fit into single precision");
+  medial->spheres[4] = -3e38;
+  medial->spheres[7] = 1e38;
+  assert_int_equal(qmat_usd_write(&context, medial, NULL, &options, &file), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "-3e+38 does not fit into single precision");
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);
 }
@@ -178,6 +187,8 @@ static void test_broken_medial_meshes_are_errors_that_name_the_prim(void **state
        "/a/m/cones: primvars:qmat:sphere refers to sphere 1, but there are 1"},
       {CARRIER(SPHERES "def BasisCurves \"cones\" { int[] primvars:qmat:sphere = [0] }"),
        "/a/m/cones: primvars:qmat:sphere must be an array of integers, 2 for each simplex"},
+      {CARRIER(SPHERES "def BasisCurves \"cones\" { int2[] primvars:qmat:sphere = [(0, 0), (0, 0)] }"),
+       "/a/m/cones: primvars:qmat:sphere must be an array of integers, 2 for each simplex"},
       {CARRIER(SPHERES) "def \"b\" ( references = </a/m> ) {}", "2 prims have a medial mesh: name one of them"},
       {CARRIER(SPHERES "def Mesh \"slabs\" {}"),
        "/a/m/slabs: faceVertexIndices must be an array of integers, 3 for each simplex"},
@@ -195,6 +206,27 @@ static void test_broken_medial_meshes_are_errors_that_name_the_prim(void **state
   }
 }
 
+static void test_facts_keep_whole_numbers_and_skip_what_json_has_not(void **state) {
+  (void)state;
+  static const char text[] =
+      "#usda 1.0\ndef Xform \"m\" ( customData = { string qmat_version = \"1\" int64 large = 9223372036854775807 "
+      "double none = nan int[] array = [1] int2 pair = (1, 2) bool yes = true string \"\\xff\" = \"x\" "
+      "string bad = \"\\xff\" } ) {" SPHERES "}";
+  qmat_context context = {0};
+  qmat_medial *medial;
+  json_t *facts = json_object();
+  qmat_bytes bytes = memory_file(text, strlen(text));
+  assert_int_equal(qmat_usd_read_medial(&context, &bytes, "file", NULL, &medial, facts), QMAT_OK);
+  assert_int_equal(json_object_size(facts), 3);
+  assert_string_equal(json_string_value(json_object_get(facts, "qmat_version")), "1");
+  assert_int_equal(json_integer_value(json_object_get(facts, "large")), INT64_MAX);
+  assert_true(json_is_true(json_object_get(facts, "yes")));
+  json_decref(facts);
+  qmat_value_release(&medial->base);
+  free(bytes.data);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_medial_mesh_comes_back_as_it_was_within_what_the_file_states),
@@ -202,6 +234,7 @@ int main(void) {
       cmocka_unit_test(test_a_scene_reader_sees_the_skin_only),
       cmocka_unit_test(test_what_single_precision_cannot_hold_is_refused_by_its_element),
       cmocka_unit_test(test_broken_medial_meshes_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_facts_keep_whole_numbers_and_skip_what_json_has_not),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@ static void test_metadata_of_the_layer(void **state) {
   (void)state;
   qmat_usd_layer layer = good_layer(
       "#usda 1.0\n( # a remark\n  \"for people\"\n  doc = '''two\nlines'''\n  defaultPrim = \"World\";"
-      "metersPerUnit = 0.01\n  upAxis = \"Z\" // and another\n  /* one\n more */ timeCodesPerSecond = 24\n"
+      "metersPerUnit = 0.01\n  upAxis = \"Z\" /*/ one */ // and another\n  /* one\n more */ timeCodesPerSecond = 24\n"
       "  customLayerData = { string by = \"me\"; dictionary deep = { int[] n = [1, 2] } }\n"
       "  subLayers = [@a.usda@ (offset = 2; scale = 0.5), @b.usda@]\n)\n");
   assert_string_equal(qmat_usd_text(value_at(&layer, "", "comment")), "for people");

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <time.h>
+
 #include "tests/io/usd/crate_writer.h"
 #include "tests/io/usd/usd_examples.h"
 #include "tests/io/usd/usd_layers.h"
@@ -167,6 +169,111 @@ static void test_wrong_numbers_in_the_tables_are_refused_by_the_table(void **sta
     if (found[i] == 0) fail_msg("never found: %s", complaints[i]);
 }
 
+/* A crate of `count` paths, each with a spec of the type (the first one is the root) and the fields in `sets`. The
+ * jumps of all but the last are alike; the element of path i is token `first_token` + i * `step`. Frees the tokens. */
+static qmat_writer write_rows(qmat_writer *tokens, size_t token_count, uint32_t first_token, uint32_t step,
+                              uint32_t spec_type, int32_t jump, const uint32_t *sets, size_t set_length, size_t count,
+                              size_t names) {
+  enum { ROWS = 6 };
+  qmat_writer body = {0};
+  uint32_t *rows[ROWS];
+  for (int r = 0; r < ROWS; r++) {
+    rows[r] = calloc(count, sizeof *rows[r]);
+    assert_non_null(rows[r]);
+  }
+  for (uint32_t i = 0; i < count; i++) {
+    rows[0][i] = i;
+    rows[1][i] = first_token + i * step;
+    rows[2][i] = (uint32_t)(i + 1 == count ? -2 : i == 0 ? -1 : jump);
+    rows[3][i] = i;
+    rows[5][i] = i == 0 ? 7 : spec_type;
+  }
+  for (int i = 0; i < CRATE_HEADER; i++) qmat_put_u8(&body, 0);
+  crate_put_u64(&body, names); /* a list of the same name */
+  for (size_t i = 0; i < names; i++) qmat_put_u32(&body, 1);
+  const uint32_t field_name = 0;
+  const uint64_t rep = crate_rep(41, 0, CRATE_HEADER);
+  const crate_tables tables = {.token_count = token_count,
+                               .token_bytes = tokens->size,
+                               .field_count = 1,
+                               .set_length = set_length,
+                               .path_count = count,
+                               .spec_count = count,
+                               .tokens = (const char *)tokens->bytes,
+                               .field_names = &field_name,
+                               .sets = sets,
+                               .indices = rows[0],
+                               .elements = rows[1],
+                               .jumps = rows[2],
+                               .spec_paths = rows[3],
+                               .spec_sets = rows[4],
+                               .spec_types = rows[5],
+                               .field_reps = &rep};
+  crate_put_tables(&body, 8, &tables);
+  for (int r = 0; r < ROWS; r++) free(rows[r]);
+  qmat_writer_uninit(tokens);
+  return body;
+}
+
+/* Reads a crate that a reader of quadratic cost would need minutes for. */
+static size_t read_quickly(qmat_writer *crate) {
+  qmat_usd_layer layer = {0};
+  const clock_t start = clock();
+  read_crate(crate, &layer);
+  assert_true(clock() - start < 5 * CLOCKS_PER_SEC);
+  const size_t count = layer.spec_count;
+  qmat_usd_layer_uninit(&layer);
+  qmat_writer_uninit(crate);
+  return count;
+}
+
+static void test_a_million_levels_below_a_target_take_linear_time(void **state) {
+  (void)state;
+  static const uint32_t no_fields[] = {UINT32_MAX};
+  qmat_writer tokens = {0};
+  qmat_put_bytes(&tokens, "-\0[x]", 6);
+  qmat_writer crate = write_rows(&tokens, 2, 1, 0, 6, -1, no_fields, 1, 1000000, 0);
+  assert_int_equal(read_quickly(&crate), 0);
+}
+
+static void test_a_list_of_children_that_all_prims_share_takes_linear_time(void **state) {
+  (void)state;
+  enum { COUNT = 100000 };
+  static const uint32_t one_field[] = {0, UINT32_MAX};
+  qmat_writer tokens = {0};
+  qmat_put_bytes(&tokens, "primChildren", 13);
+  for (int64_t i = 1; i <= COUNT; i++) {
+    qmat_put_integer(&tokens, i);
+    qmat_put_u8(&tokens, 0);
+  }
+  qmat_writer crate = write_rows(&tokens, COUNT + 1, 1, 1, 6, 0, one_field, 2, COUNT, COUNT);
+  assert_int_equal(read_quickly(&crate), COUNT - 1);
+}
+
+static void test_more_fields_than_a_spec_may_have_are_refused(void **state) {
+  (void)state;
+  static uint32_t fields[QMAT_USD_MOST_FIELDS + 2]; /* of the same field */
+  qmat_writer tokens = {0};
+  fields[QMAT_USD_MOST_FIELDS + 1] = UINT32_MAX;
+  qmat_put_bytes(&tokens, "properties", 11);
+  qmat_writer crate = write_rows(&tokens, 1, 0, 0, 6, -2, fields, QMAT_USD_MOST_FIELDS + 2, 1, 0);
+  assert_crate_refused(&crate, crate.size, "a spec has too many fields");
+  qmat_writer_uninit(&crate);
+  qmat_put_bytes(&tokens, "properties", 11);
+  crate = write_rows(&tokens, 1, 0, 0, 6, -2, fields + 1, QMAT_USD_MOST_FIELDS + 1, 1, 0);
+  assert_int_equal(read_quickly(&crate), 0);
+}
+
+static void test_a_variant_that_is_there_twice_is_refused(void **state) {
+  (void)state;
+  static const uint32_t no_fields[] = {UINT32_MAX};
+  qmat_writer tokens = {0};
+  qmat_put_bytes(&tokens, "-\0{s=v}", 8);
+  qmat_writer crate = write_rows(&tokens, 2, 1, 0, 10, 0, no_fields, 1, 3, 0);
+  assert_crate_refused(&crate, crate.size, "two specs have the same path");
+  qmat_writer_uninit(&crate);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_kind_of_value_comes_through_a_crate_of_every_version),
@@ -174,6 +281,12 @@ int main(void) {
       cmocka_unit_test(test_every_beginning_of_a_crate_is_refused),
       cmocka_unit_test(test_counts_beyond_the_file_are_refused),
       cmocka_unit_test(test_wrong_numbers_in_the_tables_are_refused_by_the_table),
+=======
+      cmocka_unit_test(test_a_million_levels_below_a_target_take_linear_time),
+      cmocka_unit_test(test_a_list_of_children_that_all_prims_share_takes_linear_time),
+      cmocka_unit_test(test_more_fields_than_a_spec_may_have_are_refused),
+      cmocka_unit_test(test_a_variant_that_is_there_twice_is_refused),
+>>>>>>> 33bdf69 (io/usd: no quadratic crates, packages read once, facts without loss, diameters and boxes checked; values of crates in one file)
       cmocka_unit_test(test_crates_of_real_assets_say_what_their_texts_say),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
