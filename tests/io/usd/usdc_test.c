@@ -281,12 +281,10 @@ int main(void) {
       cmocka_unit_test(test_every_beginning_of_a_crate_is_refused),
       cmocka_unit_test(test_counts_beyond_the_file_are_refused),
       cmocka_unit_test(test_wrong_numbers_in_the_tables_are_refused_by_the_table),
-=======
       cmocka_unit_test(test_a_million_levels_below_a_target_take_linear_time),
       cmocka_unit_test(test_a_list_of_children_that_all_prims_share_takes_linear_time),
       cmocka_unit_test(test_more_fields_than_a_spec_may_have_are_refused),
       cmocka_unit_test(test_a_variant_that_is_there_twice_is_refused),
->>>>>>> 33bdf69 (io/usd: no quadratic crates, packages read once, facts without loss, diameters and boxes checked; values of crates in one file)
       cmocka_unit_test(test_crates_of_real_assets_say_what_their_texts_say),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
