@@ -7,9 +7,9 @@
 #include "core/arena.h"
 #include "core/hash.h"
 
-/* A hash table from 64-bit keys to an id or a number: open addressing with linear probing, at most half full. Its users
- * look keys up and never walk it, so results do not depend on the order of its slots. Any number of threads may look
- * keys up while none adds one. */
+/* A hash table from 64-bit keys to an id, a number or a pointer: open addressing with linear probing, at most half
+ * full. Its users look keys up and never walk it, so results do not depend on the order of its slots. Any number of
+ * threads may look keys up while none adds one. */
 
 #define QMAT_NO_ID UINT32_MAX
 #define QMAT_NO_KEY UINT64_MAX /* no key may be this */
@@ -19,6 +19,7 @@ typedef struct qmat_key_slot {
   union {
     uint32_t id;
     double number;
+    void *pointer;
   };
 } qmat_key_slot;
 
@@ -55,7 +56,7 @@ static inline uint32_t qmat_key_table_id(const qmat_key_table *table, uint64_t k
   return slot->key == key ? slot->id : QMAT_NO_ID;
 }
 
-/* The slot of a key that is not in the table yet; the caller sets its id or number. NULL when memory is short. Slots
+/* The slot of a key that is not in the table yet; the caller sets its value. NULL when memory is short. Slots
  * move when a key is added. */
 static inline qmat_key_slot *qmat_key_table_add(qmat_key_table *table, uint64_t key) {
   if (2 * (table->count + 1) > table->mask + 1) {

@@ -97,8 +97,7 @@ static void edge_prepare(qmat_slab_edge *edge, const double a[2], double ra, con
 static void any_perpendicular(const double u[3], double v[3]) {
   int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2) : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
   for (int i = 0; i < 3; i++) v[i] = (i == k) - u[k] * u[i];
-  double length = sqrt(qmat_dot(v, v));
-  for (int i = 0; i < 3; i++) v[i] /= length;
+  qmat_normalize(v);
 }
 
 void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], const double c[4]) {

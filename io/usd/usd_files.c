@@ -102,7 +102,7 @@ static qmat_status read_layer(qmat_usd_files *files, const qmat_usd_prim *prim, 
   qmat_status status = qmat_usdc_is_crate(bytes) ? qmat_usdc_read(prim->log->context, bytes, path, &into->layer)
                                                  : qmat_usda_read(prim->log->context, bytes, path, &into->layer);
   files->layers_read++;
-  files->specs_read += into->layer.spec_count;
+  files->specs_read += into->layer.specs.count;
   return status;
 }
 

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
 #include "io/bytes.h"
 
 #define FREE_BYTES ((size_t)1 << 24)
@@ -36,7 +35,7 @@ qmat_status qmat_usd_layer_error(const qmat_usd_layer *layer) {
 }
 
 void qmat_usd_layer_uninit(qmat_usd_layer *layer) {
-  qmat_free(layer->slots);
+  qmat_key_table_uninit(&layer->specs);
   qmat_arena_uninit(&layer->arena);
   *layer = (qmat_usd_layer){0};
 }
@@ -78,41 +77,24 @@ const char *qmat_usd_copy(qmat_usd_layer *layer, const char *text, size_t length
 
 /* ---- specs ---- */
 
-static size_t slot_of(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind, const char *name) {
+/* The spec, or NULL. `*key` receives its key, or the key under which it has to be added. The key is a hash of the
+ * arguments; where another spec has the same hash, it counts up. */
+static qmat_usd_spec *find_spec(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
+                                const char *name, uint64_t *key) {
   uint64_t hash = qmat_hash_mix((uint64_t)(uintptr_t)parent + (uint64_t)kind);
-  for (; *name; name++) hash = (hash ^ (uint8_t)*name) * UINT64_C(0x100000001b3);
-  return qmat_hash_mix(hash) & (layer->slot_count - 1);
-}
-
-/* The slot of the spec, or the free slot for it. */
-static size_t find_slot(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
-                        const char *name) {
-  size_t slot = slot_of(layer, parent, kind, name);
-  for (; layer->slots[slot]; slot = (slot + 1) & (layer->slot_count - 1)) {
-    const qmat_usd_spec *spec = layer->slots[slot];
-    if (spec->parent == parent && spec->kind == kind && strcmp(spec->name, name) == 0) break;
+  for (const char *c = name; *c; c++) hash = (hash ^ (uint8_t)*c) * UINT64_C(0x100000001b3);
+  for (*key = hash >> 1;; ++*key) {
+    const qmat_key_slot *slot = qmat_key_table_find(&layer->specs, *key);
+    if (slot->key != *key) return NULL;
+    qmat_usd_spec *spec = slot->pointer;
+    if (spec->parent == parent && spec->kind == kind && strcmp(spec->name, name) == 0) return spec;
   }
-  return slot;
-}
-
-static bool grow_slots(qmat_usd_layer *layer) {
-  size_t count = layer->slot_count ? 2 * layer->slot_count : 64;
-  qmat_usd_spec **older = layer->slots, **slots = qmat_calloc(count, sizeof(qmat_usd_spec *));
-  size_t older_count = layer->slot_count;
-  if (!slots) return false;
-  layer->slots = slots;
-  layer->slot_count = count;
-  for (size_t i = 0; i < older_count; i++) {
-    qmat_usd_spec *spec = older[i];
-    if (spec) slots[find_slot(layer, spec->parent, spec->kind, spec->name)] = spec;
-  }
-  qmat_free(older);
-  return true;
 }
 
 qmat_usd_spec *qmat_usd_child(const qmat_usd_layer *layer, const qmat_usd_spec *parent, qmat_usd_kind kind,
                               const char *name) {
-  return layer->slot_count ? layer->slots[find_slot(layer, parent, kind, name)] : NULL;
+  uint64_t key;
+  return layer->specs.slots ? find_spec(layer, parent, kind, name, &key) : NULL;
 }
 
 qmat_usd_spec *qmat_usd_add_child(qmat_usd_layer *layer, qmat_usd_spec *parent, qmat_usd_kind kind, const char *name) {
@@ -121,12 +103,19 @@ qmat_usd_spec *qmat_usd_add_child(qmat_usd_layer *layer, qmat_usd_spec *parent, 
                    QMAT_USD_DEEPEST);
     return NULL;
   }
-  if (2 * layer->spec_count >= layer->slot_count && !grow_slots(layer)) {
+  qmat_usd_spec *spec = qmat_usd_alloc(layer, 1, sizeof *spec);
+  if (!spec) return NULL;
+  uint64_t key;
+  qmat_key_slot *slot = NULL;
+  if (layer->specs.slots || !qmat_key_table_init(&layer->specs, 0)) {
+    find_spec(layer, parent, kind, name, &key);
+    slot = qmat_key_table_add(&layer->specs, key);
+  }
+  if (!slot) {
     qmat_usd_layer_fail_memory(layer);
     return NULL;
   }
-  qmat_usd_spec *spec = qmat_usd_alloc(layer, 1, sizeof *spec);
-  if (!spec) return NULL;
+  slot->pointer = spec;
   spec->kind = kind;
   spec->name = name;
   spec->parent = parent;
@@ -137,8 +126,6 @@ qmat_usd_spec *qmat_usd_add_child(qmat_usd_layer *layer, qmat_usd_spec *parent, 
     parent->first_child = spec;
   }
   parent->last_child = spec;
-  layer->slots[find_slot(layer, parent, kind, name)] = spec;
-  layer->spec_count++;
   return spec;
 }
 

@@ -3,6 +3,7 @@
 #define QMAT_IO_USD_USD_LAYER_H
 
 #include "core/arena.h"
+#include "core/key_table.h"
 #include "io/bytes.h"
 
 /* One file of Universal Scene Description in memory: a layer, which is a tree of specs with named fields. io/usd/usda.h
@@ -120,9 +121,8 @@ typedef struct qmat_usd_layer {
   qmat_context *context; /* for errors while it is read */
   const char *path;      /* for errors */
   qmat_usd_spec *root;
-  size_t spec_count, slot_count;
-  qmat_usd_spec **slots; /* by parent, kind and name */
-  uint8_t *chunk;        /* where small allocations come from */
+  qmat_key_table specs; /* by parent, kind and name */
+  uint8_t *chunk;       /* where small allocations come from */
   size_t chunk_left;
   size_t allowance; /* bytes that may still be allocated: 2^24, and 256 for each byte of the file */
   qmat_arena arena;

@@ -48,7 +48,7 @@ static void test_crates_of_real_assets_say_what_their_texts_say(void **state) {
     print_message("%s: %zu values\n", twins[i].crate, compared);
     assert_string_equal(differences, twins[i].differences);
     assert_true(compared >= twins[i].least);
-    assert_int_equal(text.spec_count, crate.spec_count);
+    assert_int_equal(text.specs.count, crate.specs.count);
     qmat_usd_layer_uninit(&text);
     qmat_usd_layer_uninit(&crate);
   }
@@ -72,7 +72,7 @@ static void test_every_kind_of_value_comes_through_a_crate_of_every_version(void
     char differences[1024] = "";
     assert_true(compare_specs(&text, text.root, &crate, crate.root, differences) > 80);
     assert_string_equal(differences, "");
-    assert_int_equal(text.spec_count, crate.spec_count);
+    assert_int_equal(text.specs.count, crate.specs.count);
     const qmat_usd_spec *a = text.root->first_child, *b = crate.root->first_child;
     for (; a; a = a->next, b = b->next) assert_string_equal(a->name, b->name);
     assert_null(b);
