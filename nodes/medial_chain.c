@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.chain: every collapse of one run, for medial meshes of any number of spheres or any error. */
+/* medial.chain: records every collapse of one run, for medial meshes of any number of spheres or any error. */
 #include <string.h>
 
 #include "core/json_text.h"
@@ -32,15 +32,15 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->triangle_count = medial->triangle_count;
   chain->sample_count = o->constraints.sample_count;
   chain->collapse_count = log->count;
-  /* What takes part of an epsilon here, leaves that part there. */
+  /* medial.lod compares these errors with epsilon; medial.simplify subtracts the deviation from epsilon instead. */
   for (size_t i = 0; i < log->count; i++) chain->errors[i] += qmat_constraint_share * deviation;
-  /* From the unit frame, as medial.simplify does it: to the same bytes. */
+  /* Mapped from the unit frame as in medial.simplify, for the same bytes. */
   qmat_frame_spheres_to_model(frame, o->initial.spheres, medial->sphere_count, chain->spheres);
   qmat_frame_spheres_to_model(frame, log->merged, log->count, chain->merged);
   return qmat_value_seal(context, &chain->base);
 }
 
-/* How many spheres are left at a few errors. */
+/* The number of spheres at a few errors. */
 static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, qmat_report *report) {
   static const struct {
     const char *key;
@@ -64,7 +64,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_ordered_collapses o = {.surface = NULL};
   qmat_chain *chain = qmat_chain_new();
   qmat_report *report = qmat_report_new();
-  params.on_exceed += QMAT_EXCEED_STOP; /* the choices here start there */
+  params.on_exceed += QMAT_EXCEED_STOP; /* the choices of this node start at stop */
   qmat_status status = chain && report ? QMAT_OK : qmat_fail_memory(context, "the chain");
   double deviation = 0;
   if (status == QMAT_OK)
@@ -89,8 +89,8 @@ static const qmat_param params[] = {
     QMAT_ERROR_PARAM,
     {.name = "on_exceed",
      .unit = "",
-     .doc =
-         "When what is held rises: at the cheapest collapse that asks for it as in the paper, or when no other is left",
+     .doc = "When the threshold rises: for the cheapest collapse that exceeds it (as in the paper), or when no other "
+            "is left",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_EXCEED_RAISE - QMAT_EXCEED_STOP,
      .choices = exceed_choices,
@@ -103,7 +103,7 @@ static const qmat_port inputs[] = {QMAT_SIMPLIFY_INPUTS, {0}};
 
 static const qmat_port outputs[] = {
     {.name = "chain", .type = QMAT_CHAIN, .doc = "The initial medial mesh and its collapses, for medial.lod"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Spheres left at a few errors"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "The number of spheres at a few errors"},
     {0},
 };
 
@@ -112,13 +112,15 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 const qmat_node qmat_node_medial_chain = {
     .name = "medial.chain",
     .version = 3,
-    .summary = "Collapses medial edges to the last and records how, for any level of detail",
+    .summary = "Collapses all medial edges and records the collapses, for any level of detail",
     .doc =
-        "Does what medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left, "
-        "and records for each collapse its edge, its sphere, and what both errors were held to, finest at the "
-        "start. medial.lod takes medial meshes of any number of spheres or any error out of it in milliseconds, "
-        "the same that medial.simplify makes with that bound. With compat=qmat nothing is held; the errors say "
-        "what would have had to be. With error=one_sided they are those from the surface to the envelope.",
+        "Collapses as medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left. "
+        "For each collapse it records the edge, the merged sphere and the threshold of both errors, which starts at "
+        "finest.\n\n"
+        "medial.lod extracts medial meshes of any number of spheres or any error from the chain in milliseconds. "
+        "They are the ones that medial.simplify makes with that bound.\n\n"
+        "With compat=qmat no threshold applies; the recorded errors are those that would have been needed. With "
+        "error=one_sided they are surface-to-envelope errors.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(qmat_simplify_params),
     .params = params,

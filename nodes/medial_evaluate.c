@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.evaluate: how far a medial mesh and a surface are apart, as bounds that are proved, and whether the one has
- * the topology of the other. */
+/* medial.evaluate: proved bounds of the distances between a medial mesh and a surface, and the topology of both. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,29 +18,29 @@
 #include "nodes/measure/unit_spheres.h"
 
 typedef struct medial_evaluate_params {
-  double epsilon;   /* 0: nothing is to be certified */
-  double tolerance; /* share of epsilon */
+  double epsilon;   /* 0: no bound to certify */
+  double tolerance; /* as a share of epsilon */
   int64_t samples;
 } medial_evaluate_params;
 
-/* A centre this close to the surface is not outside. */
+/* Centres this close to the surface count as inside. */
 static const double beside_surface = 1e-5;
 
-/* Searches of the surface, each from what the one before has found; those from the third on leave only a sixteenth of
- * what is left to epsilon undecided, lest they creep up to it. */
-enum { MOST_SEARCHES = 4, CREEPING = 2 };
+/* The surface is searched up to four times, each time from the F found before. A search may find an F so close to
+ * epsilon that its tolerance crosses it; the third and fourth resolve a sixteenth of the remaining interval. */
+enum { MOST_SEARCHES = 4, FIRST_CLOSE_SEARCH = 2 };
 
 typedef struct evaluation {
   qmat_context *context;
   const medial_evaluate_params *params;
-  double epsilon;   /* what the bounds are refined to: below that of the parameters, never 0 */
-  double deviation; /* of the mesh, in diagonals */
+  double epsilon;   /* of the bounds: below the parameter's, never 0 */
+  double deviation; /* of the mesh from the surface that it approximates, in diagonals */
   qmat_surface *surface;
   qmat_envelope *envelope;
-  qmat_medial unit; /* the medial mesh in the unit frame; the spheres are in the arena */
+  qmat_medial unit; /* the medial mesh in the unit frame; its spheres are in the arena */
   qmat_bounds surface_to_envelope;
-  double largest_gap, mean_gap; /* of max(0, F) over the samples of the surface */
-  double deepest, mean_offset;  /* of -F and |F| */
+  double largest_gap, mean_gap; /* max(0, F) over the samples of the surface */
+  double deepest, mean_offset;  /* -F and |F| over the same samples */
   qmat_boundary_distance boundary;
   size_t spheres_outside, degenerate_cones, degenerate_slabs, duplicate_spheres;
 } evaluation;
@@ -101,13 +100,13 @@ static qmat_status sample_surface(evaluation *e) {
   return status;
 }
 
-/* Bounds max(0, F) over the surface; again from a larger F where that asks for less tolerance. */
+/* Bounds max(0, F) over the surface. */
 static qmat_status bound_surface_to_envelope(evaluation *e) {
   double known = e->largest_gap;
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
-    const double left = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
-    const double tolerance = search < CREEPING ? left : left / 16;
+    const double interval = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    const double tolerance = search < FIRST_CLOSE_SEARCH ? interval : interval / 16;
     qmat_hausdorff_bound bound;
     status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance,
                                           INFINITY, &bound);
@@ -118,7 +117,7 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
   return status;
 }
 
-/* ---- what is odd about the medial mesh ---- */
+/* ---- defects of the medial mesh ---- */
 
 static qmat_status count_spheres_outside(evaluation *e) {
   const size_t count = e->unit.sphere_count;
@@ -243,7 +242,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 static const qmat_param params[] = {
     {.name = "epsilon",
      .unit = "diagonal",
-     .doc = "The distance that is certified where both errors are at most that; 0: none",
+     .doc = "Both errors must be at most this for the result to be certified; 0: nothing is certified",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.01,
      .min = 0,
@@ -252,7 +251,7 @@ static const qmat_param params[] = {
      .offset = offsetof(medial_evaluate_params, epsilon)},
     {.name = "tolerance",
      .unit = "epsilon",
-     .doc = "How far the bounds of an error may be apart, as a share of epsilon or of the error if that is larger",
+     .doc = "The largest gap between the bounds of an error, relative to epsilon or to the error, the larger",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.05,
      .min = 0.001,
@@ -260,7 +259,7 @@ static const qmat_param params[] = {
      .offset = offsetof(medial_evaluate_params, tolerance)},
     {.name = "samples",
      .unit = "points",
-     .doc = "Points on the surface, and as many on the primitives, for the sampled figures and the means",
+     .doc = "Points on the surface, and as many on the primitives, for sampled figures and means",
      .type = QMAT_PARAM_INT,
      .default_number = 20000,
      .min = 1,
@@ -271,36 +270,35 @@ static const qmat_param params[] = {
 
 static const qmat_port inputs[] = {
     {.name = "mesh", .type = QMAT_MESH, .doc = "The surface"},
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh that describes it"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh that approximates it"},
     {0},
 };
 
 static const qmat_port outputs[] = {
-    {.name = "report", .type = QMAT_REPORT, .doc = "Errors with their bounds, certified or not, and topology"},
+    {.name = "report",
+     .type = QMAT_REPORT,
+     .doc = "Both errors with bounds, whether they are certified, and the topology"},
     {0},
 };
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
     .version = 5,
-    .summary = "Proves how far a medial mesh and a surface are apart",
+    .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
-        "Every length of the report is a fraction of the diagonal. surface_to_envelope is an upper bound of the "
-        "distance from any point of the surface to the solid that spheres, cones and slabs sweep (eq. 9 over all "
-        "of the surface); envelope_to_surface one of the distance from any point of that solid's boundary to the "
-        "surface, on either side of it; envelope_out_of_solid of the same over what lies outside of the model. "
-        "Names with _at_least are lower bounds, found at a point. The bounds come from branch and bound and hold "
-        "between samples; the figures that are sampled or means do not. The last two may be five tolerances where"
-        " the truth is less, and more of a medial mesh of ten thousand simplices and more. surface_to_envelope "
-        "and envelope_to_surface together bound the two-sided distance between the surface and the envelope's "
-        "boundary but for surface that lies deep within the envelope, in a gap that it fills: "
-        "surface_depth_in_envelope_sampled shows how deep. certified says that the surface is closed and oriented and "
-        "that "
-        "both are at most epsilon; of other surfaces all is an estimate. The deviation of a mesh that stands for a "
-        "subdivision surface (mesh.subdivide) is part of all bounds, which then are towards the limit surface, as sure "
-        "as the deviation is. Loops and voids are Betti numbers over "
-        "Z/2 of the medial mesh and of the solid; they are missing where the surface has no inside or an edge of "
-        "more than two triangles.",
+        "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "
+        "and slabs sweep (eq. 9 over all of the surface). envelope_to_surface bounds the distance from any point of "
+        "that solid's boundary to the surface, on either side. envelope_out_of_solid does so for the points outside "
+        "of the model. All lengths are fractions of the diagonal.\n\n"
+        "Bounds come from branch and bound and hold between samples. Keys with _at_least are lower bounds, attained "
+        "at a point. Keys with _sampled or _mean come from samples and bound nothing. The upper bounds of the "
+        "envelope's errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
+        "certified means: the surface is closed and oriented, and both errors are at most epsilon. For an open "
+        "surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope fills, is "
+        "not bounded; surface_depth_in_envelope_sampled shows it.\n\n"
+        "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
+        "are Betti numbers over Z/2; those of the solid (_of_solid) are missing where the surface is open or has "
+        "an edge of more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),
     .params = params,

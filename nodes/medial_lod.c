@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.lod: one level of detail of a chain of collapses. */
+/* medial.lod: extracts one level of detail from a chain of collapses. */
 #include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/simplify/collapse_chain.h"
@@ -30,7 +30,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   const medial_lod_params *params = data;
   const qmat_chain *chain = (const qmat_chain *)inputs[0];
   if (chain->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the chain has no sphere");
     return qmat_fail_field(context, "chain");
   }
   qmat_medial *medial = qmat_medial_new();
@@ -53,7 +53,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 static const qmat_param params[] = {
     {.name = "vertices",
      .unit = "spheres",
-     .doc = "How many medial spheres are left at least; 0: any number",
+     .doc = "The least number of medial spheres; 0: any number",
      .type = QMAT_PARAM_INT,
      .default_number = 0,
      .min = 0,
@@ -78,21 +78,21 @@ static const qmat_port inputs[] = {
 
 static const qmat_port outputs[] = {
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh of that level"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Its counts, and what both errors were held to"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Its counts, and the threshold of both errors"},
     {0},
 };
 
 const qmat_node qmat_node_medial_lod = {
     .name = "medial.lod",
     .version = 2,
-    .summary = "Takes a medial mesh of any number of spheres or any error out of a chain",
+    .summary = "Extracts a medial mesh of any number of spheres or any error from a chain",
     .doc =
-        "The collapses of the chain are done up to the wanted number of spheres, or as long as both errors are "
-        "held to epsilon at the constraint points, of which 2.5 % are left to the surface between them; with both "
-        "parameters, what comes first. The medial mesh, with its responsible regions, is the one that "
-        "medial.simplify makes with the chain's parameters and that bound, to the byte. Epsilon below the "
-        "chain's finest gives the initial medial mesh. Takes milliseconds: time grows with the initial medial "
-        "mesh.",
+        "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at "
+        "the constraint points (2.5 % of it are a margin for the surface between them). With both parameters the "
+        "first limit that is reached ends it.\n\n"
+        "The medial mesh and its responsible regions are, byte for byte, those that medial.simplify makes with the "
+        "parameters of the chain and that bound. An epsilon below the chain's finest gives the initial medial mesh. "
+        "The time is milliseconds and grows with the initial medial mesh.",
     .citation = "Section 3.3",
     .params_size = sizeof(medial_lod_params),
     .params = params,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.simplify: edge collapses by slab quadratic error and stability ratio, with the error own on both sides. */
+/* medial.simplify: edge collapses by slab quadratic error and stability ratio, with both errors bounded. */
 #include <math.h>
 #include <string.h>
 
@@ -19,28 +19,28 @@
 
 typedef qmat_simplify_params medial_simplify_params;
 
-/* Of the wanted error the constraint points leave the rest to the surface between them. Where that is not enough the
- * run is repeated, at most this often, with constraint points in the places found. Notches and voids of the envelope
- * are filled by spheres of their own, at most this often one behind the other: a filled place may show another. */
+/* Constraint points are held to 0.975 epsilon; the margin covers the surface between them. Where that is not enough,
+ * the round is repeated with constraint points at the places found, in at most 8 rounds. Uncovered interior is filled
+ * by extra spheres; filling one cavity can expose another: at most 6 passes. */
 enum { MOST_ROUNDS = 8, MOST_JOINT_REFITS = 3, MOST_FILLINGS = 6 };
 
 typedef struct {
   qmat_context *context;
-  const medial_simplify_params *params; /* with what the mesh's deviation leaves of epsilon */
-  double epsilon, deviation;            /* what is asked for, and the deviation, in diagonals */
+  const medial_simplify_params *params; /* with epsilon less the mesh's deviation */
+  double epsilon, deviation;            /* epsilon as given, and the deviation, in diagonals */
   qmat_surface *surface;
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
-  qmat_decimation dense;              /* where each round starts */
+  qmat_decimation dense;              /* the start of each round */
   size_t initial_count;               /* spheres before the first collapse */
-  /* Of the newest round, and of the one that it went on from. */
+  /* Of the newest round, and of the round that it continues. */
   qmat_constraint_points round_constraints[2];
   qmat_decimation rounds[2];
   int newest;
 } simplifier;
 
-/* The reported distance from surface to envelope is at most this share of epsilon above the true one, but never below
- * the second share; that from envelope to surface is a bound that is only as close as it has to be. */
+/* The reported surface-to-envelope error exceeds the true one by at most the first share of epsilon, but is never below
+ * the second. The envelope-to-surface error is a bound, refined only where it exceeds epsilon. */
 static const double error_tolerance = 0.01, least_reported = 0.5;
 
 static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_medial_errors *errors) {
@@ -62,8 +62,8 @@ static qmat_status measure(const simplifier *s, const qmat_medial *unit, qmat_me
                                         : status;
 }
 
-/* Fills notches and voids of the envelope; `left` gets what is still found afterwards, `filled` how many spheres that
- * took. */
+/* Fills uncovered interior of the envelope with spheres. `left` gets the errors afterwards, `filled` the number of
+ * spheres. */
 static qmat_status fill_cavities(const simplifier *s, const qmat_medial_errors *found, qmat_medial *unit,
                                  qmat_medial_errors *left, size_t *filled) {
   const double epsilon = s->params->epsilon;
@@ -77,7 +77,7 @@ static qmat_status fill_cavities(const simplifier *s, const qmat_medial_errors *
     *filled += added;
     left->envelope_to_surface = epsilon;
     if (i > 0) qmat_medial_errors_uninit(left);
-    left->uncovered = left->undecided = NULL; /* those of `found` stay its own */
+    left->uncovered = left->undecided = NULL; /* `found` keeps its own */
     left->uncovered_count = left->undecided_count = 0;
     status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
   }
@@ -90,8 +90,8 @@ static void swap_lattices(qmat_decimation *a, qmat_decimation *b) {
   b->envelope_tracker.lattice = lattice;
 }
 
-/* Collapses that keep to this share of the error are done once for all rounds, so that places found later are still
- * within it, and so deep do those inside have to be in the envelope, as a share of epsilon. */
+/* The dense collapse uses only the first share of the error and is done once for all rounds, so that points found later
+ * still fit. Points inside the solid must be as deep in the envelope as the second share of epsilon. */
 static const double dense_share = 0.9, required_depth_share = 0.05;
 
 static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
@@ -124,7 +124,7 @@ static qmat_status collapse_dense(simplifier *s, const qmat_initial_medial *stat
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;
 }
 
-/* Collapses on from where `from` ended, of which `left` is what is left; `patches` and `polish` as in the rules. */
+/* Continues the collapses of `from`, whose extract is `left`; `neighbourhoods` and `final_refit` as in the rules. */
 static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, const qmat_decimation *from,
                              const qmat_medial *left, const qmat_extra_points *extra, bool neighbourhoods,
                              bool final_refit) {
@@ -137,7 +137,7 @@ static qmat_status run_round(simplifier *s, const qmat_initial_medial *state, co
   round->rules.final_refit = final_refit;
   if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
   if (status != QMAT_OK) return status;
-  /* What is known of depths is true in every round. */
+  /* Known depths hold in every round. */
   swap_lattices(&s->dense, round);
   status = qmat_decimation_run(round);
   swap_lattices(&s->dense, round);
@@ -152,7 +152,7 @@ static int report_features(const qmat_decimation *run, json_t *root) {
   return bad;
 }
 
-/* Errors towards the surface that the mesh stands for. */
+/* Errors with respect to the surface that the mesh approximates. */
 static int report_errors(json_t *root, double epsilon, double deviation, const qmat_medial_errors *errors) {
   int bad = json_object_set_new(root, "epsilon", json_real(epsilon));
   bad |= json_object_set_new(root, "surface_to_envelope", json_real(errors->surface_to_envelope + deviation));
@@ -160,7 +160,7 @@ static int report_errors(json_t *root, double epsilon, double deviation, const q
   return bad;
 }
 
-/* What is reported of any run, and of what it has left. */
+/* The part of the report that every run has. */
 static int report_run(json_t *root, const qmat_decimation *run, size_t initial_spheres, const qmat_medial *unit) {
   int bad = qmat_json_set_count(root, "initial_spheres", initial_spheres);
   bad |= qmat_json_set_count(root, "spheres", unit->sphere_count);
@@ -189,7 +189,7 @@ static qmat_status make_report(const simplifier *s, const qmat_medial *unit, con
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
-/* `added` points behind those known. */
+/* Appends `added` points. */
 static qmat_status append(simplifier *s, const double **points, size_t *count, const double *added,
                           size_t added_count) {
   double *all = qmat_arena_alloc(&s->context->arena, *count + added_count, 3 * sizeof *all);
@@ -201,15 +201,14 @@ static qmat_status append(simplifier *s, const double **points, size_t *count, c
   return QMAT_OK;
 }
 
-/* Whether the initial medial mesh itself keeps within epsilon at all constraint points: what it leaves too far away, no
- * round brings closer. */
+/* Whether the initial medial mesh is within epsilon at all constraint points. If not, no round can repair it. */
 static bool starts_within(const simplifier *s, double epsilon) {
   for (size_t i = 0; i < s->constraints.surface_count; i++)
     if (!(s->constraints.distances[i] <= epsilon)) return false;
   return true;
 }
 
-/* Whether the dense part keeps to the places of a round as well as is wanted of the result. */
+/* Whether the dense collapse satisfies the constraints of a round as well as the result has to. */
 static bool dense_satisfies(const simplifier *s, const qmat_extra_points *extra) {
   const qmat_constraint_points *base = &s->constraints, *all = &s->round_constraints[s->newest];
   for (size_t i = base->surface_count; i < all->surface_count; i++)
@@ -224,8 +223,8 @@ typedef struct {
   qmat_report *report;
   double fault;
   size_t topology_faults; /* components, loops and voids too many or too few */
-  bool within_epsilon;    /* whether surface and envelope keep within epsilon of each other, as far as it was found */
-  size_t filled;          /* how many spheres were added to fill notches and voids */
+  bool within_epsilon;    /* whether both errors are within epsilon, as far as measured */
+  size_t filled;          /* spheres added to fill uncovered interior */
 } attempt;
 
 static const double topology_fault = 0.05;
@@ -255,8 +254,8 @@ static bool is_better(const attempt *a, const attempt *best) {
   return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
 }
 
-/* What the newest round has left, with its cavities filled, and what is wrong with it. `found` are the errors before
- * cavities are filled; `a->filled` tells how many spheres filled some before the round. */
+/* Extracts the newest round, fills its cavities, and measures the fault. `found` are the errors before the filling;
+ * `a->filled` starts with the spheres that were added before the round. */
 static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_medial_errors *found) {
   const qmat_decimation *done = &s->rounds[s->newest];
   qmat_status status = qmat_decimation_extract(done, a->medial);
@@ -269,7 +268,7 @@ static qmat_status finish_attempt(simplifier *s, int round, attempt *a, qmat_med
   const double epsilon = s->params->epsilon;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
   a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
-  if (filled > 0) { /* what is undecided by now joins the constraints, too */
+  if (filled > 0) { /* the points that are undecided now become constraints too */
     double *const undecided = found->undecided;
     found->undecided = after.undecided;
     found->undecided_count = after.undecided_count;
@@ -287,7 +286,7 @@ static qmat_status start_attempt(const simplifier *s, size_t filled, attempt *a,
   return a->medial && a->report ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
 }
 
-/* A round from where the dense part ended. `found` are the errors before cavities are filled. */
+/* Runs a round from the end of the dense collapse. `found` are the errors before cavities are filled. */
 static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, const qmat_extra_points *extra,
                                int round, bool is_last, attempt *a, qmat_medial_errors *found) {
   qmat_medial *left = qmat_medial_new();
@@ -299,7 +298,7 @@ static qmat_status run_attempt(simplifier *s, const qmat_initial_medial *state, 
   return status == QMAT_OK ? finish_attempt(s, round, a, found) : status;
 }
 
-/* Places that were found between the constraint points are own in the next try. */
+/* Adds the points found between the constraint points to the constraints of the next round. */
 static qmat_status constrain_found_points(simplifier *s, const qmat_medial_errors *found, qmat_extra_points *extra) {
   qmat_status status = QMAT_OK;
   if (found->surface_to_envelope > s->params->epsilon)
@@ -310,10 +309,9 @@ static qmat_status constrain_found_points(simplifier *s, const qmat_medial_error
                            : status;
 }
 
-/* Goes on from the result of the newest round with the spheres around each edge fitted at once. Where cavities were
- * filled, of those in `found`, their places are own: what fills them may be a part of what was there before. What
- * does not keep within epsilon is tried again with the places own that were found. The result changes only where that
- * makes it no worse. */
+/* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
+ * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
+ * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
 static qmat_status refit_jointly(simplifier *s, const qmat_initial_medial *state, int round,
                                  const qmat_medial_errors *found, attempt *best) {
   if (s->params->refits == 0 || best->medial->sphere_count <= (size_t)s->params->vertices) return QMAT_OK;
@@ -343,7 +341,7 @@ static qmat_status refit_jointly(simplifier *s, const qmat_initial_medial *state
   return status;
 }
 
-/* Takes a triangle away, not its edges; the order of the others stays. */
+/* Removes a triangle, not its edges; the order of the others stays. */
 static void remove_triangle(qmat_medial *medial, size_t triangle) {
   uint32_t *row = &medial->triangles[3 * triangle];
   memmove(row, row + 3, 3 * (--medial->triangle_count - triangle) * sizeof *row);
@@ -355,11 +353,11 @@ static void restore_triangle(qmat_medial *medial, size_t triangle, const uint32_
   memcpy(row, corners, 3 * sizeof *row);
 }
 
-/* At most so many walls of a void are tried. */
+/* The limit of walls tried per void. */
 enum { MOST_WALLS = 12 };
 
-/* Opens a void of the medial mesh that the solid has not: takes the first wall away without which the errors still
- * keep within epsilon. `*opened`: whether there was one; `*errors` are then those without it. */
+/* Opens a void that the solid does not have: removes the first wall without which both errors stay within epsilon.
+ * `*opened`: whether there was one; `*errors` are then those without it. */
 static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qmat_medial_errors *errors) {
   const double epsilon = s->params->epsilon;
   uint32_t *walls;
@@ -379,8 +377,8 @@ static qmat_status open_void(simplifier *s, qmat_medial *unit, bool *opened, qma
   return status;
 }
 
-/* Opens voids of a result that keeps within epsilon until there is none that the solid has not. A slab less leaves the
- * solid by no more, but the surface may be farther away. */
+/* Opens voids of a result within epsilon until it has no more than the solid. Without a slab the envelope leaves the
+ * solid by no more, but the surface may be farther from it. */
 static qmat_status open_voids(simplifier *s, attempt *a) {
   if (!a->within_epsilon || !s->solid.known) return QMAT_OK;
   json_t *root = a->report->root;
@@ -399,7 +397,7 @@ static qmat_status open_voids(simplifier *s, attempt *a) {
   return QMAT_OK;
 }
 
-/* Puts a triangle into its place. */
+/* Inserts a triangle in its sorted place. */
 static qmat_status insert_triangle(qmat_context *context, qmat_medial *medial, const uint32_t corners[3],
                                    size_t *place) {
   size_t capacity = 3 * medial->triangle_count;
@@ -414,9 +412,9 @@ static qmat_status insert_triangle(qmat_context *context, qmat_medial *medial, c
   return QMAT_OK;
 }
 
-/* Closes a loop of the medial mesh that the solid has not: fills the first three edges without a slab that are such a
- * loop, where the slab leaves the solid by no more than epsilon. `*closed`: whether there were any; `*protrusion` is
- * then what the slab leaves it by. One that closes no loop would make a void. */
+/* Closes a loop that the solid does not have: fills the first three edges without a slab that form such a loop, where
+ * the slab leaves the solid by at most epsilon. `*closed`: whether there were any; `*slab_error` is then how far the
+ * slab leaves the solid. A slab that closes no loop would make a void. */
 static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bool *closed, double *slab_error) {
   const double epsilon = s->params->epsilon;
   uint32_t *triangles;
@@ -446,8 +444,8 @@ static qmat_status close_loop(simplifier *s, qmat_medial *unit, size_t loops, bo
   return status;
 }
 
-/* Closes loops of a result that keeps within epsilon while it has more than the solid. A slab more brings the surface
- * no farther away, but may leave the solid. */
+/* Closes loops of a result within epsilon while it has more than the solid. A further slab brings the surface no
+ * farther from the envelope, but may leave the solid. */
 static qmat_status close_loops(simplifier *s, attempt *a) {
   if (!a->within_epsilon || !s->solid.known) return QMAT_OK;
   json_t *root = a->report->root;
@@ -466,9 +464,9 @@ static qmat_status close_loops(simplifier *s, attempt *a) {
   }
 }
 
-/* Rounds of collapses until surface and envelope keep within epsilon of each other between the constraint points as
- * they do at them: places where the surface is farther from the envelope, or the envelope has a notch or is cavity,
- * join them. Where the dense part is too far from these itself, it is made anew with them. The best round counts. */
+/* Runs rounds of collapses until both errors are within epsilon between the constraint points too. Places where the
+ * surface is too far from the envelope, or the interior is uncovered, become constraint points. Where the dense
+ * collapse violates these, it is done again with them. The best round counts. */
 static qmat_status simplify(simplifier *s, const qmat_initial_medial *state, const qmat_samples *samples,
                             const qmat_medial *initial, attempt *best) {
   const double epsilon = s->params->epsilon;
@@ -546,7 +544,7 @@ static qmat_status report_in_order(qmat_context *context, const qmat_ordered_col
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
-/* Collapses that are the same for every epsilon: in a single round, without fitting spheres. */
+/* Collapses that do not depend on epsilon: a single round, without fits. */
 static qmat_status run_in_order(qmat_context *context, const medial_simplify_params *params, double epsilon,
                                 double deviation, const qmat_value *const inputs[], qmat_value *outputs[]) {
   qmat_ordered_collapses o = {.surface = NULL};
@@ -624,7 +622,7 @@ static const char *const exceed_rules[] = {"skip", "stop", "raise", NULL};
 static const qmat_param params[] = {
     {.name = "epsilon",
      .unit = "diagonal",
-     .doc = "The largest distance between surface and envelope; 0: no bound",
+     .doc = "The largest distance between the surface and the envelope, either way; 0: no bound",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.01,
      .min = 0,
@@ -633,7 +631,7 @@ static const qmat_param params[] = {
      .offset = AT(epsilon)},
     {.name = "vertices",
      .unit = "spheres",
-     .doc = "Stop when this many medial spheres are left; 0: no such stop",
+     .doc = "Stop at this number of medial spheres; 0: no such stop",
      .type = QMAT_PARAM_INT,
      .default_number = 0,
      .min = 0,
@@ -651,7 +649,7 @@ static const qmat_param params[] = {
     QMAT_COLLAPSE_PARAMS,
     {.name = "refits",
      .unit = "passes",
-     .doc = "How often, when no edge is left to collapse, spheres are fitted to the surface to make room for more",
+     .doc = "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses",
      .type = QMAT_PARAM_INT,
      .default_number = 8,
      .min = 0,
@@ -664,7 +662,7 @@ static const qmat_port inputs[] = {QMAT_SIMPLIFY_INPUTS, {0}};
 
 static const qmat_port outputs[] = {
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The simplified medial mesh"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Spheres, errors, collapses done and refused"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts of spheres and collapses, both errors, and the topology"},
     {0},
 };
 
@@ -677,39 +675,16 @@ const qmat_node qmat_node_medial_simplify = {
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
         "the edge. A collapse is done when its sphere and the midpoints of its edges lie inside the model and both "
-        "errors stay below epsilon: from the surface to the envelope at the samples and a grid of constraint points, "
-        "and "
-        "from the envelope of spheres, cones and slabs to the surface; and places inside the solid that are epsilon "
-        "deep "
-        "stay inside the envelope, so that it has no cavity. The first collapses of a large medial mesh are done in "
-        "parts, "
-        "side by side, as long as each has a quarter of its spheres left. Spheres of radius zero are sharp features: "
-        "corners stay, "
-        "creases between them are thinned as polylines that keep within a share of epsilon. When no edge is left, each "
-        "is tried "
-        "with a sphere that is "
-        "fitted to the surface, and all spheres are fitted, until nothing gains. Afterwards branch and bound looks for "
-        "places between where the surface is too far from the envelope, and the collapses are repeated with these, and "
-        "for "
-        "notches and voids of the envelope, which are filled by spheres joined to the nearest ones. From there "
-        "collapses "
-        "go on, each edge with the spheres around it fitted at once; the result counts where it is better. Of a mesh "
-        "that only stands for a surface (mesh.subdivide), the "
-        "deviation is taken from epsilon and added "
-        "to "
-        "the errors of the report. "
-        "With on_exceed=raise both errors are own to finest first, "
-        "and to six percent more whenever no edge is left, until that would be more than epsilon. The collapses are "
-        "then the same for every epsilon and number of spheres, which only say where they end: medial.chain records "
-        "them, and medial.lod gives what this node gives. With on_exceed=stop it is likewise, but the threshold rises "
-        "as soon as the cheapest collapse asks for it, as in the paper. Both have constraint points of their own, "
-        "whatever epsilon is, and fit no spheres. Other costs: hausdorff takes the end of the edge to which a collapse "
-        "leaves the surface around it nearest to the envelope, and that distance for the cost; pmat keeps the "
-        "larger end, and the cost is the distance of the centres over the difference of the radii. With compat=qmat "
-        "new spheres are the optimum wherever it lies, else the middle; its boundary terms are those of the public "
-        "code (the virtual sphere of edges without slabs, which depends on the origin, is taken about the centre of "
-        "the bounding box), k is 1e-5, the topology is free, no feature is kept, and there is no inside test and no "
-        "bound.",
+        "errors stay within epsilon: surface to envelope at constraint points, and the envelope of spheres, cones and "
+        "slabs to the surface. Interior points must stay covered.\n\n"
+        "When no edge is left, spheres are fitted to the surface and edges tried again. Branch and bound then finds "
+        "places beyond epsilon between the constraint points, and the collapses are repeated with these. Uncovered "
+        "interior is filled with extra spheres. Spheres of radius zero are sharp features and stay on their creases. "
+        "The deviation of a subdivision surface (mesh.subdivide) is subtracted from epsilon.\n\n"
+        "With on_exceed=stop or raise the threshold of both errors starts at finest and rises to epsilon; collapses "
+        "do not depend on epsilon, no sphere is fitted, and medial.chain records them. cost=hausdorff keeps the end "
+        "of the edge that leaves the surface nearest to the envelope; cost=pmat keeps the larger end. compat=qmat "
+        "follows the public Q-MAT code: its boundary terms, free topology, no inside test and no bound.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(medial_simplify_params),
     .params = params,

@@ -11,10 +11,10 @@
 #include "nodes/skin/envelope_surface.h"
 #include "nodes/skin/skin_surface_cgal.h"
 
-/* What CGAL's skin surface is given at most: it may take 45 seconds for as many. */
+/* The limit of balls for CGAL: so many may take 45 seconds. */
 static const size_t MOST_BALLS = 3000;
-/* In the unit frame: no two balls along a primitive are closer than `spacing` of this radius, and smaller ones than the
- * second enclose nothing worth a ball. */
+/* In the unit frame: the spacing of balls is relative to their radius, but at least to the first. Balls smaller than
+ * the second are left out. */
 static const double SPACING_RADIUS = 2e-3, LEAST_BALL = 1e-6;
 
 enum { METHOD_ENVELOPE, METHOD_SKIN_SURFACE };
@@ -48,7 +48,7 @@ static bool *joined_spheres(const qmat_medial *medial, qmat_arena *arena) {
 static qmat_status find_frame(skin *s) {
   const qmat_medial *medial = s->medial;
   if (medial->sphere_count == 0) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     return qmat_fail_field(s->context, "medial");
   }
   const bool *joined = joined_spheres(medial, &s->context->arena);
@@ -64,13 +64,13 @@ static qmat_status find_frame(skin *s) {
     }
   }
   if (!(largest > 0)) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "every sphere has radius 0: they enclose nothing");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "every sphere has radius 0, so the medial mesh encloses nothing");
     return qmat_fail_field(s->context, "medial");
   }
   for (int k = 0; k < 3; k++) s->frame.centre[k] = 0.5 * low[k] + 0.5 * high[k];
   s->frame.diagonal = hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
   if (!isfinite(s->frame.diagonal) || !isnormal(s->frame.diagonal)) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "it is too large or too small to be measured");
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "the medial mesh is too large or too small for double precision");
     return qmat_fail_field(s->context, "medial");
   }
   s->spheres = qmat_arena_alloc(&s->context->arena, 4 * medial->sphere_count, sizeof *s->spheres);
@@ -86,7 +86,7 @@ typedef struct ball_list {
   bool short_of_memory;
 } ball_list;
 
-/* More than this before doubles and hidden balls are taken out is hopeless. */
+/* Beyond this, removing duplicates and hidden balls cannot help. */
 static bool full(const ball_list *list) {
   return list->short_of_memory || list->count > 16 * MOST_BALLS;
 }
@@ -105,13 +105,13 @@ static double squared_length(const double a[4], const double b[4]) {
   return x * x + y * y + z * z;
 }
 
-/* Whether two balls on a primitive are close enough for their union to look like what lies between them. */
+/* Whether two balls on a primitive are so close that their union approximates the primitive between them. */
 static bool close_enough(const ball_list *list, const double a[4], const double b[4]) {
   double step = list->spacing * fmax(fmin(a[3], b[3]), SPACING_RADIUS);
   return squared_length(a, b) <= step * step;
 }
 
-/* The same for both orders of the ends, so that neighbours share their balls. */
+/* Independent of the order of the ends, so that neighbours share their balls. */
 static void middle(const double a[4], const double b[4], double m[4]) {
   for (int k = 0; k < 4; k++) m[k] = 0.5 * (a[k] + b[k]);
 }
@@ -155,7 +155,7 @@ static int by_place(const void *left, const void *right) {
   return 0;
 }
 
-/* Takes out doubles, and balls inside others. */
+/* Removes duplicates and balls inside others. */
 static qmat_status remove_hidden(skin *s, ball_list *list) {
   qsort(list->balls, list->count, 4 * sizeof *list->balls, by_place);
   size_t kept = 0;
@@ -164,7 +164,7 @@ static qmat_status remove_hidden(skin *s, ball_list *list) {
     memmove(list->balls + 4 * kept++, list->balls + 4 * i, 4 * sizeof *list->balls);
   }
   list->count = kept;
-  if (list->count > 4 * MOST_BALLS) return QMAT_OK; /* too many anyhow */
+  if (list->count > 4 * MOST_BALLS) return QMAT_OK; /* too many in any case */
   qmat_envelope *all;
   qmat_status status = qmat_envelope_new(s->context, list->balls, list->count, NULL, 0, NULL, 0, &all);
   if (status != QMAT_OK) return status;
@@ -172,7 +172,7 @@ static qmat_status remove_hidden(skin *s, ball_list *list) {
   for (size_t i = 0; i < list->count && status == QMAT_OK; i++) {
     double *ball = list->balls + 4 * i;
     if (i % 256 == 0) status = qmat_progress(s->context, i, list->count, "balls");
-    /* No ball reaches deeper at its centre than itself, unless it lies within that other one. */
+    /* At its own centre a ball is the deepest, unless another ball contains it. */
     if (qmat_envelope_distance(all, ball, NULL) < -ball[3] * (1 + 1e-12)) continue;
     memmove(list->balls + 4 * kept++, ball, 4 * sizeof *ball);
   }
@@ -181,7 +181,7 @@ static qmat_status remove_hidden(skin *s, ball_list *list) {
   return status;
 }
 
-/* The paper's choice. CGAL's skin knows balls only: the cones and slabs are filled with them. */
+/* The paper's method. CGAL's skin surface takes balls only, so cones and slabs are filled with balls. */
 static qmat_status make_skin_surface(skin *s) {
   ball_list list = {.spacing = s->params->spacing};
   qmat_status status = QMAT_OK;
@@ -199,8 +199,8 @@ static qmat_status make_skin_surface(skin *s) {
   if (status == QMAT_OK && list.count > MOST_BALLS) {
     char spacing[32];
     qmat_format_number(list.spacing, spacing, sizeof spacing);
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
-              "at spacing %s it takes more than %zu balls, too many for a skin surface", spacing, MOST_BALLS);
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "spacing %s needs more than %zu balls, too many for a skin surface",
+              spacing, MOST_BALLS);
     qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
     status = qmat_fail_field(s->context, "spacing");
   }
@@ -224,7 +224,7 @@ static qmat_status count_components(skin *s, size_t *components) {
   return QMAT_OK;
 }
 
-/* The largest |F| at the vertices and at the triangles' centroids: how far the mesh strays from the envelope there. */
+/* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
 static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
   const qmat_skin_triangles *surface = &s->surface;
   const int threads = qmat_threads(s->context);
@@ -329,14 +329,14 @@ static const char *const methods[] = {"envelope", "skin_surface", NULL};
 static const qmat_param params[] = {
     {.name = "method",
      .unit = "",
-     .doc = "The envelope of spheres, cones and slabs itself, or CGAL's skin surface of balls filled into it",
+     .doc = "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it",
      .type = QMAT_PARAM_ENUM,
      .default_number = METHOD_ENVELOPE,
      .choices = methods,
      .offset = offsetof(medial_skin_params, method)},
     {.name = "resolution",
      .unit = "cells",
-     .doc = "envelope: the largest cells along the diagonal of the envelope's bounding box",
+     .doc = "envelope: largest cells along the diagonal of the envelope's bounding box",
      .type = QMAT_PARAM_INT,
      .default_number = 128,
      .min = 8,
@@ -344,7 +344,7 @@ static const qmat_param params[] = {
      .offset = offsetof(medial_skin_params, resolution)},
     {.name = "detail",
      .unit = "halvings",
-     .doc = "envelope: how many times a cell may be halved where the medial radii are small",
+     .doc = "envelope: cells are halved up to this many times where medial radii are small",
      .type = QMAT_PARAM_INT,
      .default_number = 3,
      .min = 0,
@@ -352,7 +352,7 @@ static const qmat_param params[] = {
      .offset = offsetof(medial_skin_params, detail)},
     {.name = "shrink",
      .unit = "1",
-     .doc = "skin_surface: towards 1 the union of the balls, towards 0 smoother and fuller between them",
+     .doc = "skin_surface: near 1 the union of the balls, near 0 smoother and fuller between them",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.5,
      .min = 0.05,
@@ -368,7 +368,7 @@ static const qmat_param params[] = {
      .offset = offsetof(medial_skin_params, spacing)},
     {.name = "subdivisions",
      .unit = "steps",
-     .doc = "skin_surface: how often the mesh is refined, each time to four times as many triangles",
+     .doc = "skin_surface: refinement steps of the mesh; each makes four times as many triangles",
      .type = QMAT_PARAM_INT,
      .default_number = 0,
      .min = 0,
@@ -383,8 +383,8 @@ static const qmat_port inputs[] = {
 };
 
 static const qmat_port outputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "Its surface: closed, oriented, normals outwards"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Counts, topology, and how far the mesh strays from the envelope"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "Its surface: closed and oriented, with normals outwards"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts, topology, and the distance from the mesh to the envelope"},
     {0},
 };
 
@@ -395,14 +395,14 @@ const qmat_node qmat_node_medial_skin = {
     .version = 1,
     .summary = "Gives a medial mesh a surface",
     .doc =
-        "The method envelope meshes the enveloping volume of the medial spheres, cones and slabs by dual contouring of "
-        "its exact signed distance. Only cells that the surface passes through are looked at; they are halved where "
-        "the "
-        "medial radii are small, so that thin parts neither vanish nor break, and radii below 0.9 of the finest cell "
-        "are raised to it (the report says how many). The mesh is always a closed 2-manifold. The method skin_surface "
-        "is the paper's choice: CGAL's skin surface, which knows balls only, so cones and slabs are filled with balls "
-        "first; it takes 3 to 15 milliseconds a ball. The report gives the largest distance from the envelope at "
-        "vertices and at triangle centroids, as a fraction of the diagonal of the envelope's bounding box.",
+        "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
+        "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
+        "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
+        "the report counts them. The mesh is always a closed 2-manifold.\n\n"
+        "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
+        "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
+        "The report has the largest distance from the envelope at vertices and at triangle centroids, as a fraction "
+        "of the diagonal of the envelope's bounding box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",

@@ -144,15 +144,15 @@ static void raise_lower_bound(const search *s, bool is_cell, double middle[3], u
  * off the boundary counts for nothing. */
 static finding evaluate_ball(const search *s, bool is_cell, double middle[3], double reach, uint8_t *wanted) {
   finding result = {.children = 0};
-  const uint8_t asked = *wanted;
+  const uint8_t before = *wanted;
   /* With one bound to prove, a distance beyond the target need not be exact. */
-  const bool is_short = !s->last && asked == WANT_EITHER_SIDE;
+  const bool is_short = !s->last && before == WANT_EITHER_SIDE;
   double d = qmat_surface_distance(s->surface, middle, is_short ? s->target[0] - reach : INFINITY, NULL, NULL);
   const double bound = d + reach;
   result.undecided =
-      bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (asked & WANT_EITHER_SIDE);
+      bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (before & WANT_EITHER_SIDE);
   for (int i = 0; i < BOUND_COUNT; i++)
-    if ((asked >> i & 1) && bound <= s->target[i]) {
+    if ((before >> i & 1) && bound <= s->target[i]) {
       result.bound[i] = bound;
       *wanted &= (uint8_t) ~(1 << i);
     }

@@ -13,10 +13,10 @@ typedef struct qmat_bounds {
 /* The distance from the boundary of an envelope to a surface. */
 typedef struct qmat_boundary_distance {
   qmat_bounds either_side; /* over all points of the boundary */
-  qmat_bounds outside;     /* over the points that lie out of the solid; 0 where there is none, or unasked */
-  double largest, mean;    /* over the sampled points, to either side; 0 without one */
-  size_t sample_count;     /* of the samples that lie on the boundary */
-  size_t query_count;      /* of the pieces of the boundary that were evaluated */
+  qmat_bounds outside;  /* over the points that lie out of the solid; 0 where there is none, or where not requested */
+  double largest, mean; /* over the sampled points, to either side; 0 without one */
+  size_t sample_count;  /* of the samples that lie on the boundary */
+  size_t query_count;   /* of the pieces of the boundary that were evaluated */
   size_t far_count, far_capacity, undecided_count, undecided_capacity;
   double *far_points;       /* 3 each: places farther than epsilon from the surface, on the boundary or perhaps so */
   double *undecided_points; /* 3 each: places where the distance may exceed epsilon although none was found to */

@@ -14,22 +14,22 @@
 
 enum { FINEST_GRID = 256 };
 
-/* The grid's spacing as a share of epsilon. What happens between is bounded afterwards (nodes/measure/medial_errors.h).
- */
+/* The grid's spacing as a share of epsilon. The error between the points is bounded afterwards
+ * (nodes/measure/medial_errors.h). */
 static const double spacing_share = 0.4;
 
-/* Into how many divisions a length is divided. */
+/* The number of equal divisions of a length. */
 static uint32_t divisions_of(double length, double spacing) {
   const double divisions = ceil(length / spacing);
   return divisions < 1 ? 1 : divisions > FINEST_GRID ? FINEST_GRID : (uint32_t)divisions;
 }
 
-/* A facet's grid: points on those of its sides that run from a smaller to a larger vertex, so that the facet across has
- * the others, and inside on rows along the longest side. */
+/* A facet's grid: points on the sides that run from the smaller to the larger vertex, so that the neighbour has the
+ * others, and points inside on rows along the longest side. */
 typedef struct {
   const double *corners[3]; /* the longest side first, from corner 0 to corner 1 */
   double longest;
-  bool own[3];           /* whether side k, from corner k on, is this facet's to divide */
+  bool own[3];           /* whether this facet divides side k, which starts at corner k */
   uint32_t divisions[3]; /* of the sides */
   uint32_t rows;
 } grid;
@@ -93,7 +93,7 @@ static void fill_grid(const grid *g, double spacing, double *points) {
   }
 }
 
-/* Which spheres answer for each sample, and where the samples are. */
+/* The spheres that are responsible for each sample, and the places of the samples. */
 typedef struct {
   const qmat_mesh *mesh;
   const qmat_complex *complex;
@@ -103,8 +103,7 @@ typedef struct {
   qmat_point_grid samples;
 } regions;
 
-/* Per sphere, by how much the envelope may be nearer to a point than the sphere is, anywhere on the primitives at it.
- */
+/* Per sphere, an upper bound of how much nearer to a point than the sphere any primitive at it may be. */
 static double *find_reaches(qmat_context *context, const qmat_complex *complex) {
   double *reaches = qmat_arena_calloc(&context->arena, complex->vertex_count, sizeof *reaches);
   for (size_t e = 0; e < complex->edge_count && reaches; e++) {
@@ -177,11 +176,11 @@ static void take_star(const qmat_complex *complex, const double *point, uint32_t
   }
 }
 
-/* A point is accepted with a sphere that comes this close, as a part of epsilon; else it looks at the primitives
- * around, and when those are farther than the second part it asks the whole medial mesh. */
+/* A point accepts a sphere up to the first share of epsilon. Beyond, the primitives around are searched; where these
+ * are farther than the second share, all of the medial mesh is. */
 static const double accepted_with_sphere = 0.5, accepted_with_star = 0.9;
 
-/* About a tenth of a second of looks at single spheres: more far points than that are worth a search structure. */
+/* The work of about a tenth of a second. More far points than that are worth a search structure. */
 static const size_t most_sphere_queries = 100000000;
 
 static void store(qmat_constraint_points *constraints, size_t i, const witness *w) {
@@ -190,8 +189,8 @@ static void store(qmat_constraint_points *constraints, size_t i, const witness *
   constraints->distances[i] = w->distance;
 }
 
-/* The best witness among what answers for `count` samples; the primitives around are only looked at where no sphere
- * comes as close as is `accepted`. */
+/* The best witness among the regions of `count` samples. The primitives around are searched only where no sphere is as
+ * near as `accepted`. */
 static void search_regions(const regions *a, const double *point, const uint32_t *samples, size_t count,
                            double accepted, witness *best) {
   *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
@@ -205,8 +204,8 @@ static void search_regions(const regions *a, const double *point, const uint32_t
     }
 }
 
-/* The same for a point on or below a facet: by its corners, which are far from most of a large facet, so that where
- * they leave the point farther than `enough` the sample nearest to it is asked. */
+/* The same for a point on or below a facet, in the regions of its corners. These are far from most of a large facet:
+ * beyond `enough` the region of the nearest sample is searched too. */
 static void search_near_facet(const regions *a, const double *point, size_t facet, double accepted, double enough,
                               witness *best) {
   search_regions(a, point, &a->mesh->triangles[3 * facet], 3, accepted, best);
@@ -217,12 +216,12 @@ static void search_near_facet(const regions *a, const double *point, size_t face
   if (other.distance < best->distance) *best = other;
 }
 
-/* Also without a bound every point needs some witness. */
+/* Without a bound too, every point needs a witness. */
 static bool is_far(const qmat_constraint_points *constraints, size_t i, double enough) {
   return constraints->witnesses[3 * i] == QMAT_NONE || !(constraints->distances[i] <= enough);
 }
 
-/* So many points or facets are done between two calls of the progress function. */
+/* Points or facets between two calls of the progress function. */
 enum { SLICE = 1 << 11 };
 
 /* The end of the slice that starts at `first`, of `count`; QMAT_CANCELLED. */
@@ -237,8 +236,8 @@ static size_t count_far(const qmat_constraint_points *constraints, double enough
   return far;
 }
 
-/* For the points that the regions leave far from their spheres: the nearest primitive of all, among those at spheres
- * that are near enough. Cheaper than a search structure over a dense medial mesh while the points are few. */
+/* Finds the nearest primitive of all for the points that are far from their regions, among the primitives at the
+ * spheres that are near enough. For few points this is cheaper than a search structure over a dense medial mesh. */
 static qmat_status search_all_spheres(qmat_context *context, const regions *a, double enough,
                                       qmat_constraint_points *constraints) {
   const qmat_complex *complex = a->complex;
@@ -294,7 +293,7 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
                            complex->triangles, complex->triangle_count, envelope);
 }
 
-/* The same for many points: the nearest primitive of all. */
+/* The same for many points. */
 static qmat_status search_envelope(qmat_context *context, const qmat_complex *complex, double enough,
                                    qmat_constraint_points *constraints) {
   qmat_envelope *envelope;
@@ -329,7 +328,7 @@ static qmat_status allocate(qmat_context *context, qmat_constraint_points *const
   return QMAT_OK;
 }
 
-/* A place below the surface as deep as the wanted error, and the cube of a lattice that it lies in. */
+/* A point almost epsilon below the surface, and the cube of a lattice that it lies in. */
 typedef struct {
   uint64_t cube;
   uint32_t facet;
@@ -342,10 +341,10 @@ typedef struct {
   shell_place *places;
 } shell_points;
 
-/* Of each cube with this share of epsilon for a side one place is taken. */
+/* One point is kept in each cube whose side is this share of epsilon. */
 static const double shell_share = 0.6;
 
-/* The shell's depth as a share of epsilon: the rest is for the envelope between its places. */
+/* The depth of the shell as a share of epsilon; the margin covers the envelope between its points. */
 static const double shell_depth = 0.98;
 
 static int by_cube_and_facet(const void *left, const void *right) {
@@ -364,8 +363,8 @@ static shell_place shell_place_below(const double *corners, const double *normal
   return place;
 }
 
-/* Places nearly epsilon below the surface, all over it: where the envelope reaches them, it has no notch deeper than
- * epsilon. Only where the solid is so thick and the initial medial mesh holds them. */
+/* Spreads points almost epsilon below the surface, wherever the solid is thick enough and the initial medial mesh
+ * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. */
 static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
                               shell_points *shell) {
   qmat_arena *arena = &context->arena;
@@ -419,7 +418,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   return QMAT_OK;
 }
 
-/* The samples and what answers for them; `unit_samples` are in the unit frame. */
+/* Finds the regions; `unit_samples` are in the unit frame. */
 static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
                                   const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
                                   regions *a) {
@@ -428,7 +427,8 @@ static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, 
   return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
 }
 
-/* Where each facet's grid starts behind the samples. The spacing grows until no more than `most` points are added. */
+/* Finds where the points of each facet's grid start, after the samples. The spacing grows until at most `most` points
+ * are added. */
 static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
                                size_t *starts, qmat_constraint_points *constraints) {
   for (;; constraints->spacing *= 1.25) {
@@ -445,7 +445,7 @@ static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, con
   }
 }
 
-/* The places on the surface, with witnesses of what answers around them. */
+/* Makes the points on the surface, with witnesses from the regions around them. */
 static qmat_status make_surface_points(qmat_context *context, const regions *a, const double *positions,
                                        const double *unit_samples, const size_t *starts, double accepted, double enough,
                                        qmat_constraint_points *constraints) {

@@ -12,15 +12,15 @@ typedef struct piece {
   int count;
 } piece;
 
-/* The least bound of h over a piece by the Lipschitz constant from a corner, where its depth is known: convex, so
- * largest at a corner. For an edge the crossing of the bounds from both ends is tighter. */
+/* The least bound of h over a piece that follows from the depth at one corner by the Lipschitz constant. It is convex,
+ * so its maximum is at a corner. For an edge the crossing of the bounds from both ends is tighter. */
 static double bound_from_corners(const piece *p) {
   if (p->count == 2) {
     const double length = qmat_point_distance(p->spheres[0], p->spheres[1]),
                  change = p->spheres[1][3] - p->spheres[0][3];
     const double a = p->spheres[0][3] - p->depths[0], b = p->spheres[1][3] - p->depths[1];
-    /* a + t (length + change) and b + (1 - t) (length - change): the largest of their qmat_smaller is at an end or
-     * where they meet. */
+    /* The maximum of the minimum of a + t (length + change) and b + (1 - t) (length - change) is at an end or where
+     * they cross. */
     const double ends = qmat_larger(qmat_smaller(a, b + length - change), qmat_smaller(b, a + length + change));
     const double t = length > 0 ? (b - a + length - change) / (2 * length) : 0;
     return t > 0 && t < 1 ? qmat_larger(ends, a + t * (length + change)) : ends;
@@ -37,8 +37,8 @@ static double bound_from_corners(const piece *p) {
   return bound;
 }
 
-/* Halves a piece across its longest side. What is known of the depth at its corners is not carried on: the centres of
- * the halves say more. */
+/* Halves a piece across its longest side. The depths at the corners are not carried on: the centres of the halves give
+ * better bounds. */
 static void split(const piece *p, piece *low, piece *high) {
   int a = 0, b = 1;
   if (p->count == 3) {
@@ -63,20 +63,20 @@ static void split(const piece *p, piece *low, piece *high) {
   memcpy(high->spheres[a], middle, sizeof middle);
 }
 
-/* Branch and bound over one primitive: depth first, at most this deep. */
+/* Branch and bound over one primitive, depth first, to at most this level. */
 enum { DEEPEST = 40 };
 
 typedef struct search {
   const qmat_surface *surface;
-  qmat_depth_lattice *lattice; /* NULL: every depth is asked of the surface */
-  double accepted;             /* a piece with a bound up to this is done */
+  qmat_depth_lattice *lattice; /* NULL: every depth is a query to the surface */
+  double accepted;             /* a piece with a bound up to this is finished */
   double limit;                /* an h above this ends the search */
-  double smallest;             /* pieces no larger than this are not split for a better bound; larger ones are not worth
-                                  a question to the surface where there is a lattice */
-  double found;                /* the largest h found */
-  double bound;                /* the largest bound of a finished piece */
-  double place[4];             /* the centre of the piece that was looked at last */
-  double tolerance;            /* a piece whose bound is this close above `found` is done too */
+  double smallest;  /* pieces up to this size are not split for a better bound; with a lattice, larger pieces are not
+                       worth a query */
+  double found;     /* the largest h found */
+  double bound;     /* the largest bound of a finished piece */
+  double place[4];  /* the centre of the piece evaluated last */
+  double tolerance; /* a piece whose bound exceeds `found` by less is finished too */
 } search;
 
 static bool is_done(search *s, double bound, double size, bool last) {
@@ -116,7 +116,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     const double depth = s->lattice
                              ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->accepted)
                              : -qmat_surface_signed_distance(s->surface, centre);
-    if (depth == INFINITY) { /* deeper than that */
+    if (depth == INFINITY) { /* the depth is larger: accepted */
       s->bound = qmat_larger(s->bound, s->accepted);
       return true;
     }
@@ -125,7 +125,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     memcpy(s->place, centre, sizeof centre);
     if (h > s->limit) return false;
     if (is_done(s, farthest - depth, size, last)) return true;
-    if (last || size <= 0.1 * s->smallest) { /* undecided down to here: taken for the worst */
+    if (last || size <= 0.1 * s->smallest) { /* undecided at this size: the bound counts */
       s->bound = qmat_larger(s->bound, farthest - depth);
       return farthest - depth <= s->limit;
     }
@@ -158,8 +158,8 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
   return qmat_larger(s.bound, s.found);
 }
 
-/* The lattice's spacing as a share of the limit, and no wider than this. A node is then at most 0.44 of the limit away.
- */
+/* The lattice's spacing as a share of the limit, and the largest spacing. A node is then at most 0.44 of the limit
+ * away. */
 static const double lattice_share = 0.5, widest_spacing = 0.005;
 
 qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_to_surface *tracker,
@@ -174,7 +174,7 @@ qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_t
   tracker->edge_bounds = qmat_alloc(complex->edge_count, sizeof(double));
   tracker->triangle_bounds = qmat_alloc(complex->triangle_count, sizeof(double));
   if (!tracker->depths || !tracker->edge_bounds || !tracker->triangle_bounds)
-    return qmat_fail_memory(context, "protrusion bounds");
+    return qmat_fail_memory(context, "envelope-to-surface bounds");
   memcpy(tracker->depths, depths, complex->vertex_count * sizeof *depths);
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads)
@@ -202,7 +202,7 @@ void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *tracker) {
   *tracker = (qmat_envelope_to_surface){0};
 }
 
-/* Asks for what the tests of a star read, all at once. */
+/* Prefetches what the tests of a star read, all at once. */
 static void fetch_bounds(const qmat_envelope_to_surface *tracker, const qmat_complex *complex, const qmat_collapse *c) {
   for (size_t t = 0; t < c->triangle_count; t++) {
     if (c->kept_triangles[t] != QMAT_NONE) __builtin_prefetch(&tracker->triangle_bounds[c->kept_triangles[t]]);
@@ -238,7 +238,7 @@ bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, 
                                              const qmat_collapse *collapse, const double sphere[4]) {
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
-    if (sphere[3] == 0 && other[3] == 0) continue; /* a crease, which lies on the surface */
+    if (sphere[3] == 0 && other[3] == 0) continue; /* a crease lies on the surface */
     const double half = 0.5 * qmat_point_distance(sphere, other);
     if (half < tracker->sphere_depth || half < tracker->depths[collapse->neighbours[n]]) continue;
     double middle[3], gap;
@@ -250,12 +250,13 @@ bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, 
   return true;
 }
 
-/* By how much h grows at most over a primitive of which a corner moves to another sphere. */
+/* An upper bound of the growth of h over a primitive when a corner moves to another sphere. */
 static double growth(const double *from, const double *to) {
   return qmat_larger(0, qmat_point_distance(from, to) + to[3] - from[3]);
 }
 
-/* A search goes on to this share of the limit while pieces are larger than that share of it: slack for later moves. */
+/* A search aims at this share of the limit while pieces are larger than the second share: the margin is slack for later
+ * moves. */
 static const double accepted_share = 0.8, smallest_share = 0.15;
 
 qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_to_surface *tracker,
@@ -265,7 +266,7 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
                 sizeof(double)) ||
       qmat_grow((void **)&tracker->new_triangle_bounds, &tracker->new_triangle_capacity, collapse->triangle_count,
                 sizeof(double)))
-    return qmat_fail_memory(context, "protrusion bounds");
+    return qmat_fail_memory(context, "envelope-to-surface bounds");
   const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
   const double removed_growth =
       collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
@@ -295,7 +296,7 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
       p.depths[k] = tracker->depths[v];
     }
     bound = qmat_smaller(bound, bound_from_corners(&p));
-    if (is_edge) /* an edge of a triangle is as good as the triangle */
+    if (is_edge) /* a bound of the triangle is a bound of its edge */
       for (size_t i = 0; i < 2 * collapse->triangle_count && bound > tracker->limit; i++)
         if (collapse->triangle_pairs[i] == collapse->neighbours[id])
           bound = qmat_smaller(bound, tracker->new_triangle_bounds[i / 2]);

@@ -7,7 +7,7 @@
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/vector.h"
 
-/* Pieces are not split beyond what rounding leaves of F. */
+/* Below this, rounding of F exceeds the tolerance. */
 static const double least_tolerance = 1e-6;
 
 typedef struct facet_search {
@@ -18,7 +18,7 @@ typedef struct facet_search {
   double worst, worst_point[3]; /* the largest F found on this facet */
 } facet_search;
 
-/* The signed distance to one primitive at the farthest of three corners: an upper bound of F over their triangle. */
+/* An upper bound of F over a triangle: the distance to one primitive is convex, so its maximum is at a corner. */
 static double convex_bound(const facet_search *search, size_t primitive, double corners[3][3]) {
   uint32_t ids[3];
   const int count = qmat_envelope_primitive(search->envelope, primitive, ids);

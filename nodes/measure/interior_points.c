@@ -10,8 +10,8 @@
 enum { MOST_NODES_ALONG = 128 };
 static const double spacing_share = 2, cube_share = 0.5;
 
-/* The share of a sphere's depth beyond what is asked for that the envelope has to hold around its centre within one of
- * its spheres. All of it would refuse joints that the envelope fills by several. */
+/* A centre needs this share of its sphere's depth beyond `depth`. The whole depth would refuse joints that several
+ * spheres fill together. */
 static const double covered_share = 0.5;
 
 typedef struct {
@@ -27,7 +27,7 @@ static int by_cube(const void *left, const void *right) {
   return a->vertex < b->vertex ? -1 : a->vertex > b->vertex;
 }
 
-/* The spheres deeper than `depth`, of each cube the largest, in the order of the cubes. */
+/* The spheres larger than `depth`, the largest of each cube, in the order of the cubes. */
 static placed_sphere *place_spheres(qmat_context *context, const qmat_complex *complex, double depth, double low,
                                     double extent, size_t *count) {
   placed_sphere *placed = qmat_arena_alloc(&context->arena, complex->vertex_count, sizeof *placed);
@@ -49,7 +49,7 @@ static placed_sphere *place_spheres(qmat_context *context, const qmat_complex *c
   return placed;
 }
 
-/* Enters a sphere at the nodes that it contains to the depth and deeper than those before. */
+/* Records a sphere at the nodes that it contains to the depth, where it contains them deepest so far. */
 static void enter_sphere(const double *sphere, uint32_t vertex, double depth, double low, double spacing, size_t along,
                          float *depths, uint32_t *owners) {
   const double reach = sphere[3] - depth;

@@ -7,8 +7,8 @@
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/envelope_to_surface.h"
 
-/* The largest protrusion of a sphere or a primitive's middle: most primitives are then known to matter no more after
- * one look. */
+/* The largest r - depth at the spheres and at the middles of the primitives: a lower bound, after which most primitives
+ * need a single query. */
 static double sampled_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
                                  int threads) {
   const size_t primitives = qmat_envelope_primitive_count(envelope);
@@ -71,7 +71,7 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
   return qmat_progress(context, 0, 0, "primitives measured");
 }
 
-/* Leaves the points that lie in the solid; how many they are. */
+/* Keeps the points that lie in the solid; returns their number. */
 static size_t keep_inside(const qmat_surface *surface, double *points, size_t count) {
   size_t kept = 0;
   for (size_t i = 0; i < count; i++)
@@ -79,7 +79,7 @@ static size_t keep_inside(const qmat_surface *surface, double *points, size_t co
   return kept;
 }
 
-/* How closely the boundary is looked at, as a share of epsilon. */
+/* The tolerance of the bound on the boundary, as a share of epsilon. */
 static const double boundary_tolerance = 0.15;
 
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,

@@ -4,7 +4,7 @@
 #include <math.h>
 
 enum { MOST_ALONG = 128 };
-/* Points spread evenly over a cube's six sides come about so many to a cell that has any. */
+/* The mean number of points in a cell that has any, for points spread evenly over the six sides of a cube. */
 static const double points_to_a_cell = 2;
 
 static size_t cell_along(const qmat_point_grid *grid, size_t axis, double x) {
@@ -47,7 +47,7 @@ qmat_status qmat_point_grid_init(qmat_context *context, const double *points, si
   return QMAT_OK;
 }
 
-/* The nearest point so far, and the square of its distance. */
+/* The nearest point so far, and its squared distance. */
 typedef struct {
   double square;
   uint32_t point;
@@ -66,7 +66,7 @@ static void search_cell(const qmat_point_grid *grid, size_t cell, const double *
   }
 }
 
-/* Looks into the cells that are `ring` cells away from `middle` along the axis along which they are farthest. */
+/* Searches the cells whose largest offset from `middle` along an axis is `ring`. */
 static void search_ring(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
                         nearest_point *best) {
   size_t first[3], last[3], cell[3];
@@ -93,7 +93,7 @@ uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place
   nearest_point best = {INFINITY, UINT32_MAX};
   for (size_t ring = 0; ring < rings; ring++) {
     search_ring(grid, middle, ring, place, &best);
-    /* All that was not looked at is beyond so many whole cells. */
+    /* All other cells are at least so many cells away. */
     const double beyond = (double)ring * grid->width;
     if (best.square < beyond * beyond) break;
   }

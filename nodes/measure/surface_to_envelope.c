@@ -104,7 +104,7 @@ static qmat_status add_primitive(qmat_context *context, qmat_star_primitives *li
   return QMAT_OK;
 }
 
-/* Collapses leave the vertices of the link where they are, so that `sphere` stands for both ends of the edge. */
+/* The link stays in place; `sphere` replaces both ends of the edge. */
 static const double *corner(const qmat_complex *complex, const qmat_collapse *collapse, const double *sphere,
                             uint32_t vertex) {
   return vertex == collapse->kept || vertex == collapse->removed ? sphere : &complex->spheres[4 * (size_t)vertex];
@@ -146,7 +146,7 @@ static bool is_touched(const qmat_collapse *collapse, const uint32_t *vertices, 
   return false;
 }
 
-/* Prepares the primitives of the link's vertices that the collapse does not touch. */
+/* Prepares the primitives at the link's vertices that the collapse does not touch. */
 static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                 const qmat_collapse *collapse) {
   qmat_status status = QMAT_OK;
@@ -188,7 +188,7 @@ static double search_star(const qmat_surface_to_envelope *tracker, const qmat_co
   return best;
 }
 
-/* The nearest primitive of the link, or the first that comes as close as `enough`. */
+/* The nearest primitive of the link, or the first within `enough`. */
 static double search_link(const qmat_surface_to_envelope *tracker, const double *point, double enough,
                           new_witness *witness) {
   double best = INFINITY;
@@ -254,7 +254,7 @@ double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *tracke
   return distance;
 }
 
-/* Every point is looked at once in a walk over several lists: a new stamp marks those that were. */
+/* A point that is in several lists is tested once: a new stamp marks the points that were. */
 static void start_marks(qmat_surface_to_envelope *tracker) {
   if (++tracker->stamp > 0) return;
   memset(tracker->marks, 0, tracker->point_count * sizeof *tracker->marks);
@@ -285,9 +285,8 @@ qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_sur
   return QMAT_OK;
 }
 
-/* What a look at the slot will read: the lists run through memory at random, and waiting for it takes longer than the
- * look.
- */
+/* Prefetches what the test of a slot reads. The lists run through memory at random, and waiting takes longer than the
+ * test. */
 static inline void fetch_ahead(const qmat_surface_to_envelope *tracker, uint32_t slot) {
   if (slot == QMAT_NONE) return;
   const size_t point = slot / 3;
@@ -327,7 +326,7 @@ qmat_status qmat_surface_to_envelope_test(qmat_context *context, qmat_surface_to
   return status;
 }
 
-/* Drops a witness slot, which is linked at `vertex`; the last used slot of the point takes its place. */
+/* Drops a witness slot of `vertex`; the last used slot of the point takes its place. */
 static void drop_corner(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t vertex) {
   unlink_slot(tracker, slot, vertex);
   uint32_t last = slot;
@@ -343,7 +342,7 @@ static void drop_corner(qmat_surface_to_envelope *tracker, uint32_t slot, uint32
   tracker->weights[last] = 0;
 }
 
-/* The witnesses of `removed` become those of `kept`. */
+/* Moves the witnesses of `removed` to `kept`. */
 static void merge_lists(qmat_surface_to_envelope *tracker, uint32_t kept, uint32_t removed) {
   uint32_t tail = QMAT_NONE;
   for (uint32_t slot = tracker->heads[removed]; slot != QMAT_NONE;) {

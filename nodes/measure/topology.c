@@ -9,15 +9,15 @@
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
-/* Entries that the reduction of a matrix may go through. */
+/* The limit of the entries that the reduction of the matrix visits. */
 static const size_t most_entries = 100000000;
 
-/* How far from a shell its sides are asked, in diagonals. */
+/* The distance from a shell of the points that test its sides, in diagonals. */
 static const double beside = 1e-5;
 
 /* ---- the medial mesh ---- */
 
-/* The triangles at each edge, in compressed rows, and how many of them are left. */
+/* The triangles at each edge, in compressed rows, and the number of those not removed. */
 typedef struct sides {
   size_t triangle_count, edge_count;
   uint32_t *edges_of; /* 3 a triangle */
@@ -55,7 +55,7 @@ static qmat_status find_sides(qmat_context *context, const qmat_medial *medial, 
   return QMAT_OK;
 }
 
-/* Removes triangles at edges of one triangle until there is none: no cycle holds such a triangle. */
+/* Removes triangles at edges of one triangle until there is none: no cycle contains such a triangle. */
 static qmat_status remove_free(qmat_context *context, sides *s, size_t *left) {
   uint32_t *stack = qmat_arena_alloc(&context->arena, 3 * s->triangle_count + s->edge_count, sizeof *stack);
   if (!stack) return qmat_fail_memory(context, "the topology");
@@ -84,7 +84,7 @@ static int compare_ids(const void *left, const void *right) {
   return (a > b) - (a < b);
 }
 
-/* Sorts ids and leaves those that come an odd number of times. */
+/* Sorts ids and keeps those that occur an odd number of times. */
 static size_t keep_odd(uint32_t *ids, size_t count) {
   qsort(ids, count, sizeof *ids, compare_ids);
   size_t kept = 0;
@@ -95,7 +95,7 @@ static size_t keep_odd(uint32_t *ids, size_t count) {
   return kept;
 }
 
-/* What is in one of two rising lists but not in both. */
+/* The symmetric difference of two rising lists. */
 static size_t add_rows(const uint32_t *a, size_t a_count, const uint32_t *b, size_t b_count, uint32_t *sum) {
   size_t count = 0, i = 0, j = 0;
   while (i < a_count || j < b_count) {
@@ -114,8 +114,8 @@ typedef struct sparse_row {
   size_t count;
 } sparse_row;
 
-/* The rank of the matrix whose rows are the edges of three triangles and more, and whose columns are sheets: triangles
- * that hang together over edges of two. `*known` becomes false when it takes too long. */
+/* The rank of the matrix whose rows are the edges of three or more triangles, and whose columns are sheets: triangles
+ * joined by edges of two. `*known` becomes false when it takes too long. */
 static qmat_status rank_of_branches(qmat_context *context, const sides *s, uint32_t *sheets, size_t *rank,
                                     bool *known) {
   qmat_arena *arena = &context->arena;
@@ -210,7 +210,7 @@ static int compare_rows(const uint32_t *a, const uint32_t *b, size_t length) {
   return 0;
 }
 
-/* The first of `count` sorted rows of `length` ids that is no less than `row`. */
+/* The first of `count` sorted rows of `length` ids that is not less than `row`. */
 static size_t first_row(const uint32_t *rows, size_t count, size_t length, const uint32_t *row) {
   size_t first = 0, last = count;
   while (first < last) {
@@ -279,8 +279,8 @@ static int compare_keys(const void *left, const void *right) {
   return (a > b) - (a < b);
 }
 
-/* Joins the triangles at every edge into shells, and their corners there into fans. `*paired` becomes false at an edge
- * that has not two triangles. */
+/* Joins the triangles at every edge into shells, and their corners into fans. `*paired` becomes false at an edge that
+ * does not have two triangles. */
 static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, uint32_t *shells, uint32_t *fans,
                                  bool *paired) {
   const size_t corners = 3 * mesh->triangle_count;
@@ -317,7 +317,7 @@ static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, u
   return QMAT_OK;
 }
 
-/* What is added up over a shell, at its root. */
+/* The sums over a shell, at its root. */
 typedef struct shell {
   size_t fan_count, triangle_count;
   double volume, largest_area;
@@ -332,7 +332,7 @@ static void triangle_vectors(const qmat_surface *surface, size_t triangle, doubl
   for (int k = 0; k < 3; k++) centre[k] = (a[k] + b[k] + c[k]) / 3;
 }
 
-/* Whether the inside lies behind the shell and the outside before it, or one of them on either side. */
+/* Whether the inside is behind the shell and the outside in front of it; false where both sides are alike. */
 static bool separates(const qmat_surface *surface, const shell *s) {
   if (!(s->largest_area > 0)) return false;
   double normal[3], centre[3], behind[3], before[3];
@@ -370,7 +370,7 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const shell *sum = &sums[t];
     if (sum->triangle_count == 0 || !separates(surface, sum)) continue;
-    /* Vertices - edges + triangles, every triangle having three halves of an edge, is 2 - 2 genus. */
+    /* Vertices - edges + triangles = 2 - 2 genus, and a triangle has three halves of an edge. */
     topology->loops += (2 + sum->triangle_count / 2 - sum->fan_count) / 2;
     if (sum->volume > 0)
       topology->components++;

@@ -9,14 +9,14 @@
 #include "core/geometry/medial_distance.h"
 #include "nodes/measure/envelope_to_surface.h"
 
-/* How far a new sphere leaves the solid, as a share of epsilon: the first with which a cone keeps within epsilon. */
+/* How far a new sphere may leave the solid, as shares of epsilon: the first that gives a cone within epsilon counts. */
 static const double protruding_shares[] = {0.9, 0.6, 0.3, 0};
 enum { SHARES = sizeof protruding_shares / sizeof *protruding_shares };
 
-/* Cones to so many of the nearest spheres are tried. */
+/* Cones to this many of the nearest spheres are tried. */
 enum { MOST_NEIGHBOURS = 8 };
 
-/* Of what the cones leave the solid by, as a share of epsilon. */
+/* Tolerance and floor of the bound of a cone, as shares of epsilon. */
 static const double tolerance_share = 0.01, enough_share = 0.5;
 
 typedef struct {
@@ -30,7 +30,7 @@ static int compare_depths(const void *a, const void *b) {
   return x->place < y->place ? -1 : x->place > y->place;
 }
 
-/* The spheres that a cone from a place would be shortest to, nearest first. */
+/* The nearest spheres to a point, nearest first. */
 static size_t find_nearest(const double *spheres, size_t count, const double *place,
                            uint32_t nearest[MOST_NEIGHBOURS]) {
   double distances[MOST_NEIGHBOURS];
@@ -57,7 +57,7 @@ static bool is_covered(const double *spheres, size_t count, const double *place)
   return false;
 }
 
-/* Finds the sphere at a place and what to join it to. False: none keeps within epsilon. */
+/* Finds the sphere at a point and the sphere to join it to. False: none is within epsilon. */
 static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_t count, const double *place,
                        double depth, double epsilon, double sphere[4], uint32_t *neighbour) {
   uint32_t nearest[MOST_NEIGHBOURS];
@@ -76,7 +76,7 @@ static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_
   return false;
 }
 
-/* The medial mesh with `more` spheres, each joined to one of the others. */
+/* Appends `more` spheres, each joined to one of the others. */
 static qmat_status extend(qmat_context *context, qmat_medial *medial, const double *spheres, const uint32_t *neighbours,
                           size_t more) {
   const size_t before = medial->sphere_count, count = before + more;

@@ -4,13 +4,12 @@
 
 #include "core/geometry/surface.h"
 
-/* Adds medial spheres to an unsealed medial mesh in the unit frame so that places inside the solid that its envelope
- * leaves out lie in the envelope: one at each place that no added sphere holds yet, the deepest places first, about as
- * large as `epsilon` beyond the surface allows, joined to the nearest sphere by a medial cone that keeps within
- * epsilon. Components and loops stay as they are. The new spheres come behind the others and answer for no samples.
- * `places`: 3 * count, unit frame, inside the solid; those that no such sphere fits are left. `*added`: how many
- * spheres, 0 after a failure. QMAT_ERROR_MEMORY, which leaves the medial mesh as it was. One thread. Cost: places by
- * spheres, and for each place up to 32 bounds of how far a cone protrudes. */
+/* Adds medial spheres to an unsealed medial mesh (unit frame) so that its envelope covers uncovered points inside the
+ * solid. Each point that no added sphere covers yet gets a sphere, the deepest first. The sphere is about as large as
+ * `epsilon` allows and is joined to the nearest sphere by a medial cone within epsilon. Components and loops do not
+ * change. The new spheres come last and have no samples. `places`: 3 * count, unit frame, inside the solid; points that
+ * no such sphere fits are skipped. `*added`: the number of spheres, 0 after a failure. QMAT_ERROR_MEMORY, which leaves
+ * the medial mesh unchanged. One thread. Cost: points times spheres, and up to 32 bounds of a cone for each point. */
 qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surface, const double *places, size_t count,
                                double epsilon, qmat_medial *medial, size_t *added);
 

@@ -16,7 +16,7 @@ typedef struct qmat_candidates {
 /* The sum of the quadrics (one per vertex) of the ends of an edge. */
 qmat_quadric qmat_merged_quadric(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge);
 
-/* Puts a sphere in its place by its error; equals keep their order. There are at most QMAT_MOST_CANDIDATES. */
+/* Inserts a sphere by its error; equal errors keep their order. There are at most QMAT_MOST_CANDIDATES. */
 void qmat_candidates_insert(qmat_candidates *candidates, const double sphere[4], double error);
 /* The same with its slab quadratic error. */
 void qmat_candidates_add(qmat_candidates *candidates, const qmat_quadric *quadric, const double sphere[4]);
@@ -26,9 +26,9 @@ void qmat_candidates_add(qmat_candidates *candidates, const qmat_quadric *quadri
 void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
                           qmat_candidates *candidates);
 
-/* The one that the public Q-MAT code takes: the sphere of least error, inside the model or not, or the middle where its
- * radius is negative or where it is more than a diagonal away. Where there is no sphere of least error, the best of
- * both ends and the middle, or the middle alone for an edge without slabs. */
+/* The candidate of the public Q-MAT code: the sphere of least error, inside the model or not; the middle where its
+ * radius is negative or it is more than a diagonal away. Without a sphere of least error: the best of both ends and the
+ * middle, or the middle for an edge without slabs. */
 void qmat_candidates_find_published(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
                                     qmat_candidates *candidates);
 

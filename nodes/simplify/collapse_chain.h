@@ -13,12 +13,12 @@ typedef struct qmat_collapse_log {
   uint32_t *owners; /* per sample */
 } qmat_collapse_log;
 
-/* Of an error that is asked for, collapses may reach this share at the constraint points: the rest is left to the
- * surface between them. */
+/* The share of an error limit that collapses may use at the constraint points; the margin covers the surface between
+ * them. */
 extern const double qmat_constraint_share;
 
-/* The sphere that each of `sphere_count` initial spheres has become part of after `count` collapses (`ends`: 2 per
- * collapse, as in qmat_chain), itself where it went into none. `roots`: sphere_count. Cost: linear. */
+/* The sphere that each of `sphere_count` initial spheres is merged into after `count` collapses (`ends`: 2 per
+ * collapse, as in qmat_chain); itself where it is not merged. `roots`: sphere_count. Cost: linear. */
 void qmat_collapse_roots(const uint32_t *ends, size_t count, size_t sphere_count, uint32_t *roots);
 
 /* Gives an unsealed medial mesh, whose spheres are counted, its responsible regions: `owners` (per sample) is a sphere,

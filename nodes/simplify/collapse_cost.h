@@ -5,7 +5,7 @@
 #include "nodes/measure/surface_to_envelope.h"
 #include "nodes/simplify/collapse_candidates.h"
 
-/* What the order of collapses goes by. */
+/* The cost that orders collapses. */
 typedef enum qmat_cost_kind {
   QMAT_COST_SLAB,      /* Q-MAT: slab quadratic error and stability ratio (eq. 6) */
   QMAT_COST_HAUSDORFF, /* HEM (Sun et al. 2016): the distance from the surface to the envelope */
@@ -16,13 +16,13 @@ typedef enum qmat_cost_kind {
  * each). 0 for a pure spike, whatever the error is. */
 double qmat_slab_cost(double error, double k, const double a[4], const double b[4]);
 
-/* The distance of the centres over the difference of the radii: below 1 where one sphere holds the other, INFINITY for
- * equal radii, 0 for equal centres. */
+/* The distance of the centres over the difference of the radii: below 1 where one sphere contains the other, INFINITY
+ * for equal radii, 0 for equal centres. */
 double qmat_pmat_cost(const double a[4], const double b[4]);
 
-/* The end of the edge of the newest preview to which a collapse leaves the least F at the points that both ends answer
- * for, of the first `point_count` constraint points, with that F: the largest. -INFINITY where there are none; of
- * equals the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
+/* The candidate of the newest preview in HEM: the end of the edge for which the collapse leaves the least F, with that
+ * F. F is the largest over the points of both ends, among the first `point_count` constraint points; -INFINITY where
+ * there are none. Of equal ends the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
 qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *tracker,
                                       const qmat_complex *complex, const qmat_collapse *collapse, size_t point_count,
                                       qmat_candidates *candidates);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A loose edge all of whose responsible region is thin: a tubular feature (section 3.4). */
+/* A tubular feature: an edge without slabs whose responsible region is all thin (section 3.4). */
 static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   if (s->complex.edge_triangles[edge]) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
@@ -28,7 +28,6 @@ bool qmat_decimation_is_protected(const qmat_decimation *s, uint32_t vertex) {
   return false;
 }
 
-/* Leaves of the candidates what protection allows: a protected end keeps its sphere. */
 bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, qmat_candidates *c, bool *bound) {
   if (is_tubular(s, edge)) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
@@ -42,8 +41,8 @@ bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, q
   return true;
 }
 
-/* How the newest preview would change the Euler characteristic, and whether it satisfies the link condition (Attali et
- * al. 2011), which keeps the homotopy type: neighbours that both ends share span a slab with the edge, and the ends
+/* The change of the Euler characteristic by the newest preview, and whether it satisfies the link condition (Attali et
+ * al. 2011), which preserves the homotopy type: neighbours shared by both ends span a slab with the edge, and the ends
  * span no slab with a common edge. */
 static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
   int64_t shared_neighbours = 0, shared_edges = 0;
@@ -56,9 +55,8 @@ static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
   return shared_neighbours - vanishing - shared_edges;
 }
 
-/* A guarded medial mesh's Euler characteristic may be off by one for every so many spheres: tears and voids of the
- * dense initial one come in pairs, which could never close one by one, and the fewer spheres are left the less is
- * forgiven. Sharp features are left however few the others are. */
+/* The Euler characteristic may be off by one per 128 spheres: tears and voids of the dense initial mesh cancel only in
+ * pairs. Sharp features do not count as spheres here. */
 enum { SPHERES_PER_FAULT = 128 };
 
 bool qmat_decimation_keeps_topology(const qmat_decimation *s, int64_t *change) {
@@ -81,9 +79,8 @@ static bool merges_feature(const qmat_decimation *s) {
          qmat_crease_guard_is_feature(&s->creases, s->collapse.removed);
 }
 
-/* Whether the merged sphere and its edges lie inside the model; and whether the sphere protrudes no more than it may. A
- * sharp feature lies on the surface.
- */
+/* Whether the merged sphere and its edges lie inside the model, and whether the sphere is within the threshold. A sharp
+ * feature lies on the surface. */
 static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *sphere) {
   const bool on_surface = merges_feature(s);
   const bool kept =
@@ -99,8 +96,6 @@ static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *spher
                                                                                              : QMAT_COLLAPSE_EXCEEDS;
 }
 
-/* Whether the newest preview may be done with this sphere: inside the model, and both errors within their limit. Where
- * they exceed it, `*needed` is no more than what would have to be threshold. */
 qmat_status qmat_decimation_test_sphere(qmat_decimation *s, const double *sphere, uint32_t first,
                                         qmat_collapse_outcome *result, double *needed) {
   bool kept;
@@ -140,7 +135,7 @@ qmat_status qmat_decimation_test_sphere(qmat_decimation *s, const double *sphere
   return QMAT_OK;
 }
 
-/* The largest error that is recorded: more than the whole model. */
+/* The largest error recorded: more than the whole model. */
 static const double most_error = 2;
 
 static void record(qmat_decimation *s, const double *sphere) {
@@ -151,7 +146,6 @@ static void record(qmat_decimation *s, const double *sphere) {
   s->log.errors[i] = fmin(s->threshold, most_error);
 }
 
-/* Does what the newest preview and the newest test allow. */
 qmat_status qmat_decimation_commit(qmat_decimation *s, const double *sphere) {
   if (qmat_decimation_in_order(s)) record(s, sphere);
   if (bounds_envelope(s))

@@ -110,7 +110,7 @@ static double distance_to_segment(const double *p, const double *a, const double
   return qmat_point_distance(p, foot);
 }
 
-/* How far the initial points of a crease between two places are from the segment between these. */
+/* The largest distance of the initial points of a crease between two places from the segment between these. */
 static double deviation(const qmat_crease_guard *g, uint32_t from, uint32_t to) {
   const double *a = point_at(g, from), *b = point_at(g, to);
   double most = 0;
@@ -123,8 +123,8 @@ static uint32_t feature_at(const qmat_crease_guard *g, uint32_t place) {
   return place == QMAT_NONE ? QMAT_NONE : g->creases.points[place];
 }
 
-/* How far a crease is from what is left of it when `feature` goes into `into`: INFINITY when it may not, because it is
- * a corner, the two do not follow each other, or what is left would fall together. */
+/* The distance of a crease from its remaining points when `feature` merges into `into`. INFINITY where it may not: it
+ * is a corner, the two do not follow each other, or the crease would degenerate. */
 static double error_without(const qmat_crease_guard *g, uint32_t feature, uint32_t into) {
   const uint32_t place = g->places[feature];
   if (place == QMAT_NONE) return INFINITY;

@@ -6,11 +6,11 @@
 #include "nodes/initial/creases.h"
 #include "nodes/simplify/collapse_candidates.h"
 
-/* Keeps the sharp features of a medial mesh while it is simplified: its spheres of radius zero, as medial.features
- * makes them. They stay where they are, and so does the cone between two that follow each other on a crease. An inner
- * sphere may go into a feature, but for the last of all, never the other way; of a crease only points between its
- * corners may go, into one of the two next to them, and only where all points of the initial crease stay close to the
- * cones that are left.
+/* Preserves the sharp features of a medial mesh while it is simplified: its spheres of radius zero, as medial.features
+ * makes them. They stay in place, and so does the cone between two that follow each other on a crease. An inner sphere
+ * may merge into a feature, except the last inner sphere; a feature never merges into an inner sphere. On a crease,
+ * only points between its corners may merge, into one of their two neighbours, and only where all points of the initial
+ * crease stay close to the remaining cones.
  *
  * The arrays live in the context's arena. Zeroed, it guards nothing. */
 typedef struct qmat_crease_guard {
@@ -19,7 +19,7 @@ typedef struct qmat_crease_guard {
   uint32_t *vertices;           /* per feature: the vertex whose sphere it is, or QMAT_NONE when it is gone */
   const double *points;         /* 3 per feature */
   const uint32_t *places;       /* per feature: its place along the creases, or QMAT_NONE for a corner */
-  qmat_creases creases;         /* their points are features; each stands at a place */
+  qmat_creases creases;         /* their points are features */
   const uint32_t *initial_next; /* per place: the one that follows on its crease, QMAT_NONE beyond a corner */
   uint32_t *next, *previous;    /* per place: that of the next feature which is left, QMAT_NONE beyond a corner */
 } qmat_crease_guard;
@@ -37,9 +37,10 @@ static inline bool qmat_crease_guard_is_feature(const qmat_crease_guard *guard, 
   return guard->features && vertex != QMAT_NONE && guard->features[vertex] != QMAT_NONE;
 }
 
-/* Leaves of the candidates of an edge what keeps features, with their slab quadratic errors: none or some of its ends.
- * False, and nothing changed, where neither end is a feature. `tolerance` is how far points of a crease may be from it;
- * `*needed` gets the least for which there would be a candidate more (INFINITY: none). Safe from any thread. */
+/* Restricts the candidates of an edge to its ends that preserve features, with their slab quadratic errors: none, one
+ * or two. False, and nothing changed, where neither end is a feature. `tolerance` is the largest distance of crease
+ * points from their crease; `*needed` gets the least tolerance that allows another candidate (INFINITY: none). Safe
+ * from any thread. */
 bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_complex *complex,
                                 const qmat_quadric *quadrics, uint32_t edge, double tolerance,
                                 qmat_candidates *candidates, double *needed);
@@ -48,8 +49,8 @@ bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_compl
 void qmat_crease_guard_commit(qmat_crease_guard *guard, const qmat_complex *complex, const qmat_collapse *collapse,
                               const double sphere[4]);
 
-/* The largest distance of a point of the initial creases to the cones that are left of its crease, in the complex's
- * frame; 0 without creases. Cost: linear in the initial creases. */
+/* The largest distance of a point of the initial creases to the remaining cones of its crease, in the complex's frame;
+ * 0 without creases. Cost: linear in the initial creases. */
 double qmat_crease_guard_error(const qmat_crease_guard *guard);
 
 #endif

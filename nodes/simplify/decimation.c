@@ -8,17 +8,15 @@
 #include "nodes/simplify/collapse_test.h"
 #include "nodes/simplify/fitted_collapse.h"
 
-/* So many costs are found, or collapses tried, between two calls of the progress function: of the last collapses each
- * looks at thousands of points. */
+/* Progress interval, in cost evaluations and in attempts. The last attempts test thousands of points each. */
 enum { COSTS_A_REPORT = 256, ATTEMPTS_A_REPORT = 16 };
 
-/* Late protection starts when so few spheres are left (section 3.4, "a later stage"). */
+/* Late protection starts at this number of spheres (section 3.4, "a later stage"). */
 static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
 }
 
-/* Levels by which what is threshold rises: twelve to each doubling of the finest. Beyond the whole model nothing is
- * threshold. */
+/* Twelve levels of the threshold to each doubling of the finest. Beyond the size of the model there is none. */
 enum { LEVELS_TO_A_DOUBLING = 12 };
 
 static double threshold_at(const qmat_decimation *s, int level) {
@@ -27,8 +25,8 @@ static double threshold_at(const qmat_decimation *s, int level) {
   return error <= 1 ? qmat_constraint_share * error : INFINITY;
 }
 
-/* Points that the initial medial mesh leaves farther away are kept from getting worse. An interior point that is deeper
- * than what is threshold has to stay inside the envelope, lest it be cavity. */
+/* Sets the threshold of a level. Points that the initial medial mesh leaves farther away must not get worse. Interior
+ * points deeper than the threshold must stay covered. */
 static void set_threshold(qmat_decimation *s, int level) {
   const qmat_constraint_points *constraints = s->constraints;
   s->level = level;
@@ -40,7 +38,7 @@ static void set_threshold(qmat_decimation *s, int level) {
   s->envelope_tracker.limit = qmat_decimation_is_two_sided(s) ? s->threshold : INFINITY;
 }
 
-/* False where the next level is above the limit, or there is none. */
+/* Raises the threshold by a level. False where that is above the limit, or where there is no threshold. */
 static bool raise_threshold(qmat_decimation *s) {
   if (!(s->threshold < INFINITY) || threshold_at(s, s->level + 1) > s->rules.limit) return false;
   set_threshold(s, s->level + 1);
@@ -63,7 +61,7 @@ static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candi
   return QMAT_OK;
 }
 
-/* What an edge at sharp features may collapse to, whatever is threshold; where there is nothing the candidates stay. */
+/* Restricts the candidates of an edge at sharp features, for any threshold; without an allowed one they stay. */
 static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
   double needed;
@@ -105,7 +103,7 @@ static qmat_status fill_heap(qmat_decimation *s) {
     s->failed_points[e] = QMAT_NONE;
     s->needed[e] = 0;
   }
-  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* looks at stars, one at a time */
+  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* uses the one preview */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
       if (e % COSTS_A_REPORT == 0) status = qmat_progress(s->context, e, count, "costs");
       if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
@@ -119,7 +117,7 @@ static qmat_status fill_heap(qmat_decimation *s) {
   return status;
 }
 
-/* Room for every collapse, and who answers for the samples before the first. */
+/* Makes room for every collapse, and records the owners of the samples before the first. */
 static qmat_status start_log(qmat_decimation *s) {
   const size_t most = s->complex.vertex_count, samples = s->constraints->sample_count;
   qmat_arena *arena = &s->context->arena;
@@ -152,7 +150,7 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
       if (status != QMAT_OK) return status;
     }
   }
-  /* A point that the initial medial mesh leaves farther away can only be kept from getting worse. */
+  /* Points that the initial medial mesh leaves farther away must not get worse. */
   const double limit = s->rules.share * s->rules.limit;
   for (size_t i = 0; i < constraints->count; i++)
     limits[i] = i < constraints->surface_count ? fmax(limit, constraints->distances[i])
@@ -183,7 +181,7 @@ void qmat_decimation_uninit(qmat_decimation *s) {
   qmat_complex_uninit(&s->complex);
 }
 
-/* The best candidate that stays inside the model and keeps both errors; then the collapse itself. */
+/* Tries the candidates of an edge, best first, and does the collapse with the first that passes all tests. */
 static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
   qmat_candidates c;
   *result = QMAT_COLLAPSE_REFUSED;
@@ -241,8 +239,8 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse
   return status;
 }
 
-/* An edge whose fitted sphere had this many times the error that is threshold is not tried again for a sphere nearby
- * that moves, only for one that goes. */
+/* An edge whose fitted sphere has an error above this many times the threshold is tried again only when a sphere nearby
+ * disappears, not when one moves. */
 static const double retry_ratio = 2;
 
 static bool is_locked(const qmat_decimation *s, uint32_t edge) {
@@ -256,7 +254,7 @@ static void queue_again(qmat_decimation *s, uint32_t edge) {
   qmat_edge_heap_update(&s->heap, edge);
 }
 
-/* New costs around the merged vertex, and another chance for the refused edges of its neighbours. */
+/* Marks the costs around the merged vertex as stale, and queues the refused edges of its neighbours again. */
 static void update_neighbourhood(qmat_decimation *s) {
   const qmat_collapse *c = &s->collapse;
   if (c->removed != QMAT_NONE) {
@@ -273,7 +271,7 @@ static void update_neighbourhood(qmat_decimation *s) {
     queue_again(s, at[i]);
   }
   s->converged[c->kept] = 0;
-  if (!s->fitting) return; /* all get another chance then */
+  if (!s->fitting) return; /* all edges are queued again when the fits start */
   for (size_t n = 0; n < c->neighbour_count; n++) {
     s->converged[c->neighbours[n]] = 0;
     at = qmat_complex_edges_at(&s->complex, c->neighbours[n], &count);
@@ -291,7 +289,7 @@ static qmat_status report_progress(const qmat_decimation *s) {
   return qmat_progress(s->context, initial - s->complex.live_vertices, initial, "collapses");
 }
 
-/* Takes over what a test finds of a sphere of the patch that has been placed. */
+/* Tests and commits a sphere of the neighbourhood that is in place already, for its bounds and witnesses. */
 static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   double sphere[4], needed;
   qmat_collapse_outcome result;
@@ -304,7 +302,7 @@ static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   return status;
 }
 
-/* Collapses until the heap is empty; `*ended` when the rules want no more. */
+/* Collapses until the heap is empty; `*ended` when the rules end it. */
 static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
@@ -341,11 +339,11 @@ static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
 /* The constraint points that each sphere is fitted to in the final refits. */
 enum { FINAL_REFIT_POINTS = 1024 };
 
-/* A move has to gain at least this share of the error. */
+/* A move has to lower the error by at least this share. */
 static const double least_gain = 0.02;
 
-/* Fits every sphere to the surface where that lowers its largest error; not those that did not move and whose
- * neighbours have not moved since. Each looks at `most` constraint points. */
+/* Fits every sphere to the surface where that lowers its largest error. Converged spheres, which did not move in their
+ * last fit and whose neighbours have not moved since, are skipped. A fit uses at most `most` constraint points. */
 static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
@@ -387,7 +385,7 @@ static void queue_all(qmat_decimation *s) {
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
 }
 
-/* The edges that may collapse with what is threshold now. */
+/* Queues the edges that the raised threshold may allow. */
 static void queue_raised(qmat_decimation *s) {
   for (uint32_t e = 0; e < s->complex.edge_count; e++)
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->needed[e] <= s->threshold)
@@ -395,7 +393,7 @@ static void queue_raised(qmat_decimation *s) {
 }
 
 qmat_status qmat_decimation_run(qmat_decimation *s) {
-  bool ended = s->threshold > s->rules.limit; /* where even the lowest level is above it */
+  bool ended = s->threshold > s->rules.limit; /* even the lowest level is above it */
   qmat_status status = s->rules.neighbourhoods ? QMAT_OK : collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
          raise_threshold(s)) {
@@ -413,7 +411,7 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
     if ((i > 0 || s->rules.neighbourhoods) && s->counts.collapses == collapses) break;
     if ((status = refit(s, QMAT_FITTED_POINTS, &moved)) != QMAT_OK) return status;
   }
-  /* What is left of the error is made small for its own sake. */
+  /* The final refits lower the error itself. */
   size_t moved = s->rules.final_refit;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
     status = refit(s, FINAL_REFIT_POINTS, &moved);

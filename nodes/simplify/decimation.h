@@ -4,15 +4,15 @@
 
 #include "nodes/simplify/decimation_state.h"
 
-/* Sets the quadrics, the heap, the coverage and the protrusion of a complex up. The caller has made `complex` (unit
- * frame) and given context, rules and surface; `constraints` stays the caller's, its distances may be lowered limits of
- * points that the initial medial mesh leaves farther away. `depths`: per vertex. All in the context's arena but what
+/* Sets up the quadrics, the heap and both error trackers of a complex. The caller has made `complex` (unit frame) and
+ * given context, rules and surface. `constraints` stays the caller's; its distances are limits for points that the
+ * initial medial mesh leaves farther away. `depths`: per vertex. All memory is in the context's arena, except what
  * qmat_decimation_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                  const double *depths);
 void qmat_decimation_uninit(qmat_decimation *decimation);
 
-/* Collapses edges until none is left that the rules allow. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
+/* Collapses edges until the rules allow no more. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
 qmat_status qmat_decimation_run(qmat_decimation *decimation);
 
 #endif

@@ -6,8 +6,8 @@
 #include "core/geometry/medial_build.h"
 #include "nodes/simplify/decimation.h"
 
-/* Where collapses come in order the merged sphere inherits the regions of both ends (section 3.3): who answers does not
- * depend on the limits that were tested. */
+/* Where collapses come in order, the merged sphere inherits the regions of both ends (section 3.3), so that they do not
+ * depend on the limits tested. */
 static qmat_status set_regions(const qmat_decimation *s, const uint32_t *ids, qmat_medial *medial) {
   const size_t samples = s->constraints->sample_count;
   uint32_t *owners = qmat_arena_alloc(&s->context->arena, samples, sizeof *owners);
@@ -55,7 +55,7 @@ qmat_status qmat_decimation_extract(const qmat_decimation *s, qmat_medial *media
   return status == QMAT_OK ? set_regions(s, ids, medial) : status;
 }
 
-/* The bounds of the protrusion of edges and triangles, where they say more than their corners do. */
+/* Carries over the bounds of edges and triangles, where they are tighter than those of the corners. */
 static void carry_bounds(const qmat_decimation *from, const uint32_t *ids, qmat_decimation *to) {
   for (size_t e = 0; e < from->complex.edge_count; e++) {
     if (!from->complex.edge_alive[e]) continue;

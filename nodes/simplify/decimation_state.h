@@ -20,20 +20,19 @@ typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_p
 typedef enum { QMAT_FEATURES_NONE, QMAT_FEATURES_SHARP } qmat_feature_rule;
 typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
 
-/* What was done, and what was refused by which test. */
+/* Collapses done, and refused by each test. */
 typedef struct qmat_collapse_counts {
   size_t collapses, refused_by_inside_test, refused_by_surface_to_envelope, refused_by_envelope_to_surface,
       refused_by_protection, refused_by_topology;
 } qmat_collapse_counts;
 
-/* What collapses are allowed, and when they end. */
+/* The collapses that are allowed, and when they end. */
 typedef struct qmat_decimation_rules {
-  double limit;     /* what both errors are threshold to at the constraint points, unit frame; INFINITY: nothing is
-                       threshold */
-  double share;     /* of the limit, how much of it collapses may use up: above 0, at most 1 */
-  double finest;    /* what is threshold first where that rises, unit frame */
-  size_t vertices;  /* collapses end when so few are left; 0: never */
-  double most_cost; /* or when the cheapest costs more; 0: never */
+  double limit;     /* limit of both errors at the constraint points, unit frame; INFINITY: none */
+  double share;     /* share of the limit that collapses may use: above 0, at most 1 */
+  double finest;    /* the first threshold where it rises, unit frame */
+  size_t vertices;  /* collapses end at this number of spheres; 0: never */
+  double most_cost; /* or when the cheapest collapse costs more; 0: never */
   double k;         /* of eq. 6 */
   qmat_cost_kind cost;
   bool published; /* quadrics and candidates of the public Q-MAT code, inside the model or not */
@@ -42,23 +41,22 @@ typedef struct qmat_decimation_rules {
   qmat_topology_policy topology;
   qmat_protection protect;
   qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
-  double crease_share; /* of what is threshold, how far points of a crease may be from what is left of it: above 0 */
-  int refits;          /* how often spheres are fitted to the surface after the last collapse, to make room for more */
-  bool neighbourhoods; /* edges are tried with the spheres around them fitted at once, where an earlier run was left
-                          without */
-  bool final_refit;    /* at the end spheres are fitted for the sake of a smaller error, too */
-  const uint8_t *thin; /* per sample: whether it lies on a thin part; read only with protection */
+  double crease_share; /* of the threshold: the largest distance of a crease from its remaining points; above 0 */
+  int refits;          /* passes that fit spheres to the surface after the last collapse, to make room for more */
+  bool neighbourhoods; /* edges are tried with the spheres around them fitted jointly, from the end of an earlier run */
+  bool final_refit;    /* spheres are fitted at the end to lower the error itself */
+  const uint8_t *thin; /* per sample: whether it lies on a thin feature; read only with protection */
   bool has_target;     /* whether the solid's Euler characteristic is known */
   int64_t target_euler;
 } qmat_decimation_rules;
 
 /* A medial mesh while its edges collapse, the cheapest first, each to the best candidate that lies inside the model and
- * keeps both errors (sections 3.1.2, 3.3 and 3.4).
+ * keeps both errors within the threshold (sections 3.1.2, 3.3 and 3.4).
  *
- * With QMAT_EXCEED_SKIP the limit is what is threshold from the first collapse on. With the others the collapses are
- * the same for any limit and number of vertices, which only say where they end: what is threshold starts at the finest
- * and rises, by twelve levels to each doubling, when the next collapse in the order of costs would exceed it (STOP), or
- * when every one would (RAISE). */
+ * With QMAT_EXCEED_SKIP the threshold is the limit from the first collapse on. With the others the collapses are the
+ * same for any limit and number of vertices, which only end them: the threshold starts at the finest and rises by
+ * levels, twelve to each doubling. It rises when the next collapse in the order of costs exceeds it (STOP), or when all
+ * remaining ones do (RAISE). */
 typedef struct qmat_decimation {
   qmat_context *context;
   qmat_decimation_rules rules;
@@ -71,20 +69,20 @@ typedef struct qmat_decimation {
   qmat_envelope_to_surface envelope_tracker;
   qmat_collapse collapse;
   qmat_sphere_fit fit;
-  double fitted[4]; /* what the newest fit of it has made of a collapse's sphere */
+  double fitted[4]; /* the result of the newest fit of one sphere */
   qmat_neighbourhood_fit neighbourhood;
-  struct qmat_neighbourhood_state *saved; /* what a patch was before it was tried */
+  struct qmat_neighbourhood_state *saved; /* the spheres and bounds of a neighbourhood before it was tried */
   size_t saved_count, saved_capacity;
   qmat_crease_guard creases;
-  double threshold;        /* what both errors are threshold to now; INFINITY: nothing is threshold */
-  int level;               /* of it, where it rises */
-  qmat_collapse_log log;   /* every collapse, where what is threshold rises */
-  uint32_t *failed_points; /* per edge: the constraint point that refused it, or QMAT_NONE */
-  double *needed;          /* per edge: no less has to be threshold for it to collapse, as far as is known */
-  uint8_t *stale;          /* per edge: whether its cost is older than its neighbourhood */
-  double *fitted_errors;   /* per edge: of the sphere that was fitted last */
-  uint8_t *converged;      /* per vertex: whether a fit did not move it, and nothing has moved around it since */
-  const uint8_t *locked;   /* per vertex: whether its edges stay, in a part of a larger medial mesh; NULL: none do */
+  double threshold;        /* of both errors, now; INFINITY: none */
+  int level;               /* of the threshold, where it rises */
+  qmat_collapse_log log;   /* every collapse, where the threshold rises */
+  uint32_t *failed_points; /* per edge: the constraint point where it failed, or QMAT_NONE */
+  double *needed;          /* per edge: a lower bound of the threshold that allows it */
+  uint8_t *stale;          /* per edge: whether its neighbourhood changed after its cost */
+  double *fitted_errors;   /* per edge: the error of its newest fitted sphere */
+  uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
+  const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
   bool protecting, fitting;
   int refusal;   /* why the newest test of a sphere failed */
   int64_t euler; /* of the medial mesh */

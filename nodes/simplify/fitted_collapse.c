@@ -6,14 +6,12 @@
 
 #include "nodes/simplify/collapse_test.h"
 
-/* A sphere whose sampled error is this many times what is threshold is not worth a test. */
+/* A sphere is tested up to this multiple of the threshold in its sampled error. */
 static const double test_ratio = 1.1;
 
-/* Where the spheres were fitted before, a fit that starts badly is left sooner, at this share of what is threshold. */
+/* In joint refits the spheres have been fitted before: a fit that starts badly ends at this share of the threshold. */
 static const double early_exit_share = 0.6;
 
-/* The sphere of least error at the surface among the candidates, fitted to it; where that cannot be, one of those that
- * look good as they are. */
 qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
                                        qmat_collapse_outcome *result) {
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
@@ -49,12 +47,12 @@ typedef struct qmat_neighbourhood_state {
 
 static qmat_status save(qmat_decimation *s, double *values, size_t count) {
   if (qmat_grow((void **)&s->saved, &s->saved_capacity, s->saved_count + count, sizeof *s->saved))
-    return qmat_fail_memory(s->context, "a patch");
+    return qmat_fail_memory(s->context, "the fit of a neighbourhood");
   for (size_t i = 0; i < count; i++) s->saved[s->saved_count++] = (neighbourhood_state){&values[i], values[i]};
   return QMAT_OK;
 }
 
-/* Remembers a sphere and the bounds of what hangs on it. */
+/* Saves a sphere and the bounds of its star. */
 static qmat_status save_star(qmat_decimation *s, uint32_t vertex) {
   qmat_status status = save(s, &s->complex.spheres[4 * (size_t)vertex], 4);
   if (status == QMAT_OK) status = save(s, &s->envelope_tracker.depths[vertex], 1);
@@ -71,7 +69,7 @@ static void restore(qmat_decimation *s) {
   for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
 }
 
-/* Moves a sphere whatever is threshold; what is known of its protrusion stays true. */
+/* Moves a sphere regardless of the threshold; its bounds stay valid. */
 static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphere, bool *inside) {
   qmat_envelope_to_surface *envelope_tracker = &s->envelope_tracker;
   const double limit = envelope_tracker->limit;
@@ -89,10 +87,10 @@ static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphe
   return status;
 }
 
-/* What has been refused is needed for with this share of what is threshold to spare. */
+/* A refused point becomes a target of the fit with this share of the threshold to spare. */
 static const double margin = 0.02;
 
-/* Asks for what the newest test has refused. */
+/* Adds the place where the newest test failed to the targets of the fit. */
 static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
   const double *centre = s->refusal == QMAT_REFUSED_BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
   *needed = true;
@@ -111,7 +109,7 @@ static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, 
                                     (1 - margin) * s->threshold);
 }
 
-/* Tests a sphere of the patch, which is placed; number 0 is the collapse's. */
+/* Tests a sphere of the neighbourhood, which is in place; number 0 is the sphere of the collapse. */
 static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int number, qmat_collapse_outcome *result) {
   double needed;
   const qmat_status status =
@@ -122,8 +120,8 @@ static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int 
              : status;
 }
 
-/* Tests the spheres of the patch: `*last_refused` first, which becomes the one that is refused, and the collapse last,
- * which is then the newest preview. */
+/* Places and tests the spheres of the neighbourhood: `*last_refused` first, which becomes the one that fails, and the
+ * collapse last, which is then the newest preview. */
 static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *last_refused,
                                       qmat_collapse_outcome *result, bool *again) {
   qmat_neighbourhood_fit *neighbourhood = &s->neighbourhood;
@@ -147,16 +145,16 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
   return status;
 }
 
-/* At most so often what a test refuses is needed for and the patch fitted again. */
+/* A neighbourhood is fitted at most this often, each time with the newest failure as a target. */
 enum { MOST_FITS = 6 };
 
-/* Up to this error (of its own fit) a sphere is worth a fit of the patch, and up to that error a fit of the patch is
- * worth a test, as shares of what is threshold. */
+/* The largest error of a sphere's own fit for which its neighbourhood is fitted, and the largest error of that fit for
+ * which it is tested, as multiples of the threshold. */
 static const double neighbourhood_ratio = 1.3, placement_ratio = 1.02;
 
-/* The collapse of the newest preview with the sphere around which its own fit ended, and with its neighbours fitted too
- * unless it is left `alone`. Where it can be done they are placed, and it is the newest preview and test; else nothing
- * has changed. */
+/* Tries the newest preview with the sphere of its own fit, and unless `alone` with its neighbours fitted too. Where
+ * `*result` allows it the spheres are in place, and the collapse is the newest preview and test; else nothing has
+ * changed. */
 static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
   const qmat_collapse *c = &s->collapse;
   uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];
@@ -187,7 +185,6 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
   return status;
 }
 
-/* A cone that leaves the solid in its middle does so wherever the spheres move that little. */
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
   qmat_status status = QMAT_OK;
   if (s->refusal == QMAT_REFUSED_BY_MIDPOINT) return status;

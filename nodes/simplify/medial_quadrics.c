@@ -6,7 +6,7 @@
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
-/* Rims and tips hold on to their place by this share of a slab's weight. */
+/* The weight of the planes that keep rims and tips in place, as a share of the weight of a slab. */
 static const double boundary_weight = 0.01;
 
 double qmat_stability_ratio(const double a[4], const double b[4]) {
@@ -50,7 +50,7 @@ static void add_tip(const qmat_complex *c, uint32_t vertex, uint32_t edge, qmat_
   qmat_quadric_add_plane(&quadrics[vertex], n, tip, boundary_weight * gamma * gamma);
 }
 
-/* The slabs at each of their corners, and the rims, each with the corner that it stands opposite to. */
+/* Adds the slabs to each of their corners, and the rims, each with the opposite corner. */
 static void add_slabs(const qmat_complex *c, qmat_quadric *quadrics,
                       void (*add_rim_of)(const qmat_complex *c, uint32_t edge, const double *inner,
                                          qmat_quadric *quadrics)) {
@@ -81,7 +81,7 @@ void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
     if (c->vertex_edges.counts[v] == 1) add_tip(c, v, c->vertex_edges.items[c->vertex_edges.starts[v]], quadrics);
 }
 
-/* The plane through a rim that stands on its triangle; `n` is as long as the rim. */
+/* The plane through a rim at right angles to its triangle; `n` is as long as the rim. */
 static void add_published_rim(const qmat_complex *c, uint32_t edge, const double *inner, qmat_quadric *quadrics) {
   const uint32_t *ends = &c->edges[2 * (size_t)edge];
   const double *a = &c->spheres[4 * (size_t)ends[0]], *b = &c->spheres[4 * (size_t)ends[1]];

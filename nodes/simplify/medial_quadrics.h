@@ -10,14 +10,14 @@
 double qmat_stability_ratio(const double a[4], const double b[4]);
 
 /* Adds to the quadric of each vertex (`quadrics`, one per vertex of the complex) its medial slabs (eq. 2), the cones of
- * its edges without slabs, and its boundary: planes that hold rims and tips in their place, each entered once, with a
- * hundredth of a slab's weight (section 3.1.2, boundary preservation). Cost: linear. */
+ * its edges without slabs, and its boundary: planes that keep rims and tips in place, each added once, with a hundredth
+ * of a slab's weight (section 3.1.2, boundary preservation). Cost: linear. */
 void qmat_medial_quadrics_add(const qmat_complex *complex, qmat_quadric *quadrics);
 
-/* What the public Q-MAT code has in their place (compat: qmat): the same slabs, and its fourth method of preserving
- * boundaries. The rim's plane stands on the triangle with a normal as long as the edge; an edge without slabs takes two
- * tangent planes of a slab with a third sphere at the sum of both centres, which depends on the origin, and two planes
- * across them; a tip's normal is as long as its edge. */
+/* The same for compat=qmat, as in the public Q-MAT code: the same slabs, and its fourth method of boundary
+ * preservation. The plane of a rim is at right angles to its triangle, with a normal as long as the edge. An edge
+ * without slabs gets two tangent planes of a slab with a third sphere at the sum of both centres, which depends on the
+ * origin, and two planes across them. The normal of a tip is as long as its edge. */
 void qmat_medial_quadrics_add_published(const qmat_complex *complex, qmat_quadric *quadrics);
 
 #endif

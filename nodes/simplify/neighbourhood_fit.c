@@ -8,7 +8,7 @@
 
 enum { MOST_TARGETS = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 
-/* A slab or loose cone of the patch, prepared with the spheres of the newest step, and the ball that holds it. */
+/* A slab or loose cone of the neighbourhood, prepared with the spheres of the newest step, and a ball around it. */
 typedef struct qmat_fit_primitive {
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
   int moving[3];        /* which sphere of the fit each corner is, or -1 */
@@ -18,9 +18,10 @@ typedef struct qmat_fit_primitive {
 
 typedef struct qmat_fit_target {
   double point[3];
-  double slack; /* how much more than `threshold` F may be; of a border, how much less it may be below 0 */
+  double slack; /* the excess of the largest allowed F over `threshold`; for a border, of `threshold` over the allowed
+                   depth */
   qmat_target_kind kind;
-  uint32_t nearest; /* the nearest one, of the newest step */
+  uint32_t nearest; /* the nearest primitive, of the newest step */
 } fit_target;
 
 void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit) {
@@ -39,7 +40,7 @@ static bool has_corner(const fit_primitive *item, uint32_t vertex) {
   return item->vertices[0] == vertex || item->vertices[1] == vertex || item->vertices[2] == vertex;
 }
 
-/* Adds a simplex of the complex as the collapse leaves it, unless it vanishes or is there already. */
+/* Adds a simplex as it is after the collapse, unless it vanishes or is there already. */
 static qmat_status add_primitive(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_collapse *collapse,
                                  const uint32_t *vertices, int count) {
   uint32_t corners[3] = {QMAT_NONE, QMAT_NONE, QMAT_NONE};
@@ -54,7 +55,7 @@ static qmat_status add_primitive(qmat_context *context, qmat_neighbourhood_fit *
     if (shared == count) return QMAT_OK; /* the same, or an edge of a slab */
   }
   if (qmat_grow((void **)&fit->primitives, &fit->primitive_capacity, fit->primitive_count + 1, sizeof *fit->primitives))
-    return qmat_fail_memory(context, "the fit of a patch");
+    return qmat_fail_memory(context, "the fit of a neighbourhood");
   fit_primitive *item = &fit->primitives[fit->primitive_count++];
   for (int k = 0; k < 3; k++) {
     item->vertices[k] = corners[k];
@@ -78,7 +79,7 @@ static qmat_status add_star(qmat_context *context, qmat_neighbourhood_fit *fit, 
 qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood_fit *fit, const double *point,
                                        qmat_target_kind kind, double limit) {
   if (qmat_grow((void **)&fit->targets, &fit->target_capacity, fit->target_count + 1, sizeof *fit->targets))
-    return qmat_fail_memory(context, "the fit of a patch");
+    return qmat_fail_memory(context, "the fit of a neighbourhood");
   fit_target *target = &fit->targets[fit->target_count++];
   *target =
       (fit_target){.kind = kind, .slack = kind == QMAT_TARGET_BORDER ? fit->threshold - limit : limit - fit->threshold};
@@ -86,7 +87,7 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
   return QMAT_OK;
 }
 
-/* Whether this slot is the first by which its point hangs on the patch. */
+/* Whether this slot is the first of its point in the neighbourhood. */
 static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
                           uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
@@ -138,7 +139,7 @@ static void prepare(qmat_neighbourhood_fit *fit, const qmat_complex *complex, do
   }
 }
 
-/* F at a target, and the weights of the corners of its nearest item, which is looked for from the last one on. */
+/* F at a target, and the weights of the corners of its nearest primitive. The search starts with the last one. */
 static double find_foot(const qmat_neighbourhood_fit *fit, fit_target *target, double weights[3]) {
   uint32_t nearest = target->nearest;
   double best = qmat_primitive_foot(&fit->primitives[nearest].primitive, target->point, weights);
@@ -157,7 +158,7 @@ static double find_foot(const qmat_neighbourhood_fit *fit, fit_target *target, d
   return best;
 }
 
-/* By how much F is wrong; above `threshold` in size where it is not what is asked. */
+/* The error of F at a target; above `threshold` in size where its condition fails. */
 static double error_at(const fit_target *target, double f) {
   switch (target->kind) {
     case QMAT_TARGET_INSIDE:
@@ -230,12 +231,12 @@ static bool solve(equations *e) {
   return true;
 }
 
-/* The order of the norm in each step: the weight of a square is the error to this power. A full step to the least of
- * the weighted squares would go too far, as the weights fall on the way; half of the power is taken off. */
+/* The order of the norm in each step: the weight of a square is the error to this power. A full step would overshoot,
+ * since the weights fall on the way; it is shortened by half of the power. */
 static const int powers[] = {0, 2, 2, 4, 4, 6, 6, 6};
 enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
 
-/* A fit whose error is still this many times what is threshold after this many steps is left. */
+/* A fit ends early when its error exceeds this multiple of the threshold after this many steps. */
 enum { EARLY_EXIT_STEP = 3 };
 static const double early_exit_ratio = 2;
 

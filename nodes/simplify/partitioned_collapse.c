@@ -7,10 +7,10 @@
 
 #include "core/geometry/medial_build.h"
 
-/* A piece has no more vertices than this where they do not all lie in one place. */
+/* The largest number of vertices of a piece, unless all lie in one place. */
 enum { MOST_PIECE_VERTICES = 1 << 14 };
 
-/* Of the vertices of a piece this share is left. */
+/* The share of the vertices of a piece that remains. */
 static const double kept_share = 0.25;
 
 static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex) {
@@ -25,14 +25,14 @@ bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qma
          (double)rules->vertices <= kept_share * (double)complex->vertex_count && !has_features(rules, complex);
 }
 
-/* Rows by the piece that they belong to: those of piece p are items[starts[p]] to items[starts[p + 1]]. Behind the last
- * piece come those between pieces. */
+/* Rows sorted by piece: those of piece p are items[starts[p]] to items[starts[p + 1]]. Rows between pieces follow the
+ * last piece. */
 typedef struct piece_rows {
   size_t *starts;
   uint32_t *items;
 } piece_rows;
 
-/* What is left of a piece: its edges and triangles by the numbers of the whole, and their bounds. */
+/* The result of a piece: its edges and triangles by the numbers of the whole, and their bounds. */
 typedef struct piece_result {
   size_t edge_count, triangle_count;
   uint32_t *edges, *triangles;
@@ -49,10 +49,10 @@ typedef struct partition {
   size_t piece_count;
   uint32_t *pieces;       /* per vertex */
   uint32_t *numbers;      /* per vertex: its number within its piece */
-  uint8_t *locked, *gone; /* per vertex: whether it has an edge to another piece, and whether it is no more */
+  uint8_t *locked, *gone; /* per vertex: whether it has an edge to another piece, and whether it was removed */
   piece_rows vertices, edges, triangles, points;
   piece_result *results;
-  _Atomic size_t done; /* vertices of pieces that are done */
+  _Atomic size_t done; /* vertices of finished pieces */
   _Atomic bool ended;  /* the run was cancelled, or a piece has failed */
 } partition;
 
@@ -60,8 +60,8 @@ typedef struct partition {
 
 enum { BINS = 1024 };
 
-/* Moves those of `vertices` that lie in the lower half of the box, by their number, before the others; how many they
- * are. 0: all lie in one place. */
+/* Moves the `vertices` in the lower half of the box, by number, before the others; returns their number. 0: all lie in
+ * one place. */
 static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uint32_t *upper) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < count; i++)
@@ -89,7 +89,7 @@ static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uin
   return kept;
 }
 
-/* Numbers the pieces of `count` vertices. */
+/* Divides `count` vertices into pieces and numbers these. */
 static void divide_vertices(partition *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
   const size_t lower = count > MOST_PIECE_VERTICES ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
   if (lower > 0 && lower < count) {
@@ -166,7 +166,7 @@ static uint32_t *renumber(qmat_arena *arena, const partition *d, const piece_row
   return own;
 }
 
-/* The constraint points that hang on the piece alone. */
+/* The constraint points whose witnesses lie in the piece. */
 static qmat_status take_points(qmat_context *context, const partition *d, size_t piece, qmat_constraint_points *own) {
   const qmat_constraint_points *all = d->constraints;
   const size_t first = d->points.starts[piece];
@@ -192,7 +192,7 @@ static qmat_status take_points(qmat_context *context, const partition *d, size_t
   return QMAT_OK;
 }
 
-/* What of a whole number falls to a piece by its share of the vertices; all pieces together get all of it. */
+/* The part of a whole number for a piece, by its share of the vertices; the parts of all pieces sum to the number. */
 static int64_t share_of(const partition *d, size_t piece, int64_t number) {
   const double all = (double)d->whole->complex.vertex_count;
   const double before = (double)d->vertices.starts[piece] / all, after = (double)d->vertices.starts[piece + 1] / all;
@@ -252,7 +252,7 @@ static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint3
   return 0;
 }
 
-/* Gives back to the whole what is left of a piece: what belongs to one piece is written by it alone. */
+/* Writes the result of a piece back to the whole. Pieces write disjoint entries. */
 static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *own) {
   qmat_complex *all = &d->whole->complex;
   const qmat_complex *c = &own->complex;
@@ -294,7 +294,7 @@ static qmat_status collapse_piece(qmat_context *context, partition *d, size_t pi
   return status;
 }
 
-/* Who asks: only the thread that runs the node may call the progress function of the run. */
+/* Only the thread that runs the node may call the progress function of the run. */
 typedef struct progress_caller {
   partition *partition;
   bool is_outside;
@@ -351,7 +351,7 @@ static qmat_status collapse_pieces(partition *d) {
   return atomic_load(&d->ended) ? QMAT_CANCELLED : QMAT_OK;
 }
 
-/* ---- what is left of all ---- */
+/* ---- the joined result ---- */
 
 static size_t put_rows(const uint32_t *rows, size_t count, size_t size, const uint32_t *ids, uint32_t *out) {
   for (size_t i = 0; i < size * count; i++) out[i] = ids[rows[i]];
@@ -381,7 +381,7 @@ static qmat_status join(const partition *d, const uint32_t *ids, qmat_medial *me
   return qmat_medial_set_simplices(d->context, medial, edges, edge_count, triangles, triangle_count);
 }
 
-/* What the pieces know of the protrusion of their edges and triangles, where it is more than their corners say. */
+/* Carries over the bounds of edges and triangles, where they are tighter than those of the corners. */
 static void carry_bounds(const partition *d, const uint32_t *ids) {
   qmat_decimation *whole = d->whole;
   for (size_t p = 0; p < d->piece_count; p++) {
@@ -412,7 +412,7 @@ static void add_counts(const partition *d) {
   }
 }
 
-/* Puts what is left together in place of the whole. */
+/* Joins the results in place of the whole. */
 static qmat_status put_together(partition *d) {
   qmat_decimation *whole = d->whole;
   qmat_arena *arena = &d->context->arena;

@@ -4,20 +4,20 @@
 
 #include "nodes/simplify/decimation.h"
 
-/* Whether most collapses of a medial mesh can be done in parts: it is large enough for two, and what a collapse may do
- * depends on what is near it alone, not on the order of all. Without spheres of radius zero that have to stay. */
+/* Whether the first collapses of a medial mesh can be done in pieces: it is large enough for two, the rules depend on
+ * the neighbourhood of a collapse only and not on the order of all, and no sphere of radius zero has to stay. */
 bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex);
 
-/* Does the first collapses of a dense medial mesh, those of all but a quarter of its vertices, in parts, each by
- * itself: boxes of space, whose edges collapse in the order of their costs. Vertices with an edge to another part stay
- * as they are. What is left is put together again in `simplification`, which is then as qmat_decimation_init makes
- * it, with the quadrics, bounds and witnesses of the parts; the rest is up to qmat_decimation_run.
+/* Does the first collapses of a dense medial mesh in pieces, down to a quarter of its vertices. The pieces are boxes of
+ * space; in each the edges collapse in the order of their costs. Vertices with an edge to another piece stay.
+ * Afterwards `decimation` is what qmat_decimation_init makes of the joined medial mesh, with the quadrics, bounds and
+ * witnesses of the pieces; qmat_decimation_run does the remaining collapses.
  *
- * The caller has given `simplification` its context, surface and rules (qmat_can_collapse_partitioned), and `complex`
- * (unit frame, unchanged so far), which is replaced. `constraints` are its constraint points; they get the witnesses
- * and weights of what is left, and stay the caller's. `depths`: per vertex of the complex. How the parts are made
- * depends on the medial mesh alone, never on threads. QMAT_ERROR_MEMORY, QMAT_CANCELLED; free with
- * qmat_decimation_uninit in any case. All threads. */
+ * The caller has given `decimation` its context, surface and rules (qmat_can_collapse_partitioned), and `complex` (unit
+ * frame, unchanged so far), which is replaced. `constraints` are its constraint points; they get the witnesses and
+ * weights of the result, and stay the caller's. `depths`: per vertex of the complex. The partition depends on the
+ * medial mesh only, never on threads. QMAT_ERROR_MEMORY, QMAT_CANCELLED; free with qmat_decimation_uninit in any case.
+ * All threads. */
 qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constraint_points *constraints,
                                       const double *depths);
 

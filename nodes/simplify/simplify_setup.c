@@ -14,12 +14,11 @@ const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
 const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
-/* The constraint points of collapses in order, which are there for any epsilon, are those of so many times the finest.
- */
+/* The constraint points of collapses in order, which do not depend on epsilon, are made for this multiple of the finest
+ * threshold. */
 static const double constraint_error = 2;
 
-/* The exact depth at the centre of a medial sphere. Most are inscribed: a look no farther than their radius finds it.
- */
+/* The exact depth at the centre of a medial sphere. Most spheres are inscribed: a query within the radius finds it. */
 static double depth_of(const qmat_surface *surface, const double *sphere) {
   double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
   if (!(depth < INFINITY)) depth = qmat_surface_distance(surface, sphere, INFINITY, NULL, NULL);
@@ -63,10 +62,10 @@ qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh
   if (params->epsilon == 0 || params->compat == QMAT_COMPAT_QMAT) return QMAT_OK;
   params->epsilon -= *deviation;
   if (params->epsilon > 0) return QMAT_OK;
-  qmat_fail(context, QMAT_ERROR_GEOMETRY, "the mesh may be %.2g of the diagonal from the surface that it stands for",
-            *deviation);
+  qmat_fail(context, QMAT_ERROR_GEOMETRY,
+            "epsilon is not larger than the mesh's own deviation of %.2g diagonals from its surface", *deviation);
   qmat_fail_field(context, "epsilon");
-  return qmat_fail_hint(context, "a higher level of mesh.subdivide, or a larger epsilon");
+  return qmat_fail_hint(context, "raise the level of mesh.subdivide, or raise epsilon");
 }
 
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,

@@ -8,8 +8,8 @@
 
 typedef enum { QMAT_COMPAT_OFF, QMAT_COMPAT_QMAT } qmat_compatibility;
 
-/* The parameters of medial.simplify. Those of medial.chain are the ones that change what collapses are done, or in
- * which order; the others stay 0 there. */
+/* The parameters of medial.simplify. medial.chain has those that affect which collapses are done or their order; the
+ * others are 0 there. */
 typedef struct qmat_simplify_params {
   double epsilon; /* 0: no bound */
   int64_t vertices;
@@ -29,94 +29,94 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
                                                                                        *const qmat_feature_choices[];
 
 /* The rows of the parameters that both nodes have. */
-#define QMAT_ERROR_PARAM                                                                                    \
-  {                                                                                                         \
-    .name = "error", .unit = "",                                                                            \
-    .doc = "What is held: surface to envelope and envelope to surface, or the first alone as in the paper", \
-    .type = QMAT_PARAM_ENUM, .default_number = QMAT_ERROR_TWO_SIDED, .choices = qmat_error_choices,         \
-    .offset = offsetof(qmat_simplify_params, error)                                                         \
+#define QMAT_ERROR_PARAM                                                                                              \
+  {                                                                                                                   \
+    .name = "error", .unit = "",                                                                                      \
+    .doc = "The errors that are bounded: both, or surface to envelope only as in the paper", .type = QMAT_PARAM_ENUM, \
+    .default_number = QMAT_ERROR_TWO_SIDED, .choices = qmat_error_choices,                                            \
+    .offset = offsetof(qmat_simplify_params, error)                                                                   \
   }
-#define QMAT_COLLAPSE_PARAMS                                                                                       \
-  {.name = "cost",                                                                                                 \
-   .unit = "",                                                                                                     \
-   .doc =                                                                                                          \
-       "What comes first: the least slab error (eq. 6), the least distance of the surface (HEM), or the nearest "  \
-       "to a sphere within another (PMAT)",                                                                        \
-   .type = QMAT_PARAM_ENUM,                                                                                        \
-   .default_number = QMAT_COST_SLAB,                                                                               \
-   .choices = qmat_cost_choices,                                                                                   \
-   .offset = offsetof(qmat_simplify_params, cost)},                                                                \
-      {.name = "finest",                                                                                           \
-       .unit = "diagonal",                                                                                         \
-       .doc = "What both errors are held to first where that rises; finer levels take longer",                     \
-       .type = QMAT_PARAM_FLOAT,                                                                                   \
-       .default_number = 0.0025,                                                                                   \
-       .min = 1e-5,                                                                                                \
-       .max = 1,                                                                                                   \
-       .flags = QMAT_PARAM_RELATIVE,                                                                               \
-       .offset = offsetof(qmat_simplify_params, finest)},                                                          \
-      {.name = "most_cost",                                                                                        \
-       .unit = "1",                                                                                                \
-       .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                             \
-       .type = QMAT_PARAM_FLOAT,                                                                                   \
-       .default_number = 0,                                                                                        \
-       .min = 0,                                                                                                   \
-       .max = 1e9,                                                                                                 \
-       .offset = offsetof(qmat_simplify_params, most_cost)},                                                       \
-      {.name = "compat",                                                                                           \
-       .unit = "",                                                                                                 \
-       .doc =                                                                                                      \
-           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "      \
-           "features; the stop is vertices",                                                                       \
-       .type = QMAT_PARAM_ENUM,                                                                                    \
-       .default_number = QMAT_COMPAT_OFF,                                                                          \
-       .choices = qmat_compat_choices,                                                                             \
-       .offset = offsetof(qmat_simplify_params, compat)},                                                          \
-      {.name = "topology",                                                                                         \
-       .unit = "",                                                                                                 \
-       .doc =                                                                                                      \
-           "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, loops " \
-           "and voids of the result are made those of the solid. preserve: collapses keep the topology of the "    \
-           "initial mesh (link condition)",                                                                        \
-       .type = QMAT_PARAM_ENUM,                                                                                    \
-       .default_number = QMAT_TOPOLOGY_GUARD,                                                                      \
-       .choices = qmat_topology_choices,                                                                           \
-       .offset = offsetof(qmat_simplify_params, topology)},                                                        \
-      {.name = "protect",                                                                                          \
-       .unit = "",                                                                                                 \
-       .doc = "Keep thin tubular features whatever their cost: never, at the late stage, or from the start",       \
-       .type = QMAT_PARAM_ENUM,                                                                                    \
-       .default_number = QMAT_PROTECT_OFF,                                                                         \
-       .choices = qmat_protect_choices,                                                                            \
-       .offset = offsetof(qmat_simplify_params, protect)},                                                         \
-      {.name = "features",                                                                                         \
-       .unit = "",                                                                                                 \
-       .doc = "Spheres of radius zero, as medial.features makes them, are like others, or stay on their creases",  \
-       .type = QMAT_PARAM_ENUM,                                                                                    \
-       .default_number = QMAT_FEATURES_SHARP,                                                                      \
-       .choices = qmat_feature_choices,                                                                            \
-       .offset = offsetof(qmat_simplify_params, features)},                                                        \
-      {.name = "crease",                                                                                           \
-       .unit = "epsilon",                                                                                          \
-       .doc = "How far the points of a crease may be from what is left of it, as a share of what is held",         \
-       .type = QMAT_PARAM_FLOAT,                                                                                   \
-       .default_number = 0.25,                                                                                     \
-       .min = 0.01,                                                                                                \
-       .max = 1,                                                                                                   \
-       .offset = offsetof(qmat_simplify_params, crease)},                                                          \
-      {.name = "theta",                                                                                            \
-       .unit = "mean thickness",                                                                                   \
-       .doc =                                                                                                      \
-           "A feature is thin when the thickness of its whole responsible region is at most this ratio of the "    \
-           "mean",                                                                                                 \
-       .type = QMAT_PARAM_FLOAT,                                                                                   \
-       .default_number = 0.5,                                                                                      \
-       .min = 0,                                                                                                   \
-       .max = 10,                                                                                                  \
-       .offset = offsetof(qmat_simplify_params, theta)},                                                           \
-  {                                                                                                                \
-    .name = "k", .unit = "1", .doc = "The constant of the collapse cost (eq. 6)", .type = QMAT_PARAM_FLOAT,        \
-    .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                        \
+#define QMAT_COLLAPSE_PARAMS                                                                                           \
+  {.name = "cost",                                                                                                     \
+   .unit = "",                                                                                                         \
+   .doc =                                                                                                              \
+       "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or nearest to a "       \
+       "sphere within another (PMAT)",                                                                                 \
+   .type = QMAT_PARAM_ENUM,                                                                                            \
+   .default_number = QMAT_COST_SLAB,                                                                                   \
+   .choices = qmat_cost_choices,                                                                                       \
+   .offset = offsetof(qmat_simplify_params, cost)},                                                                    \
+      {.name = "finest",                                                                                               \
+       .unit = "diagonal",                                                                                             \
+       .doc = "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer",   \
+       .type = QMAT_PARAM_FLOAT,                                                                                       \
+       .default_number = 0.0025,                                                                                       \
+       .min = 1e-5,                                                                                                    \
+       .max = 1,                                                                                                       \
+       .flags = QMAT_PARAM_RELATIVE,                                                                                   \
+       .offset = offsetof(qmat_simplify_params, finest)},                                                              \
+      {.name = "most_cost",                                                                                            \
+       .unit = "1",                                                                                                    \
+       .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                                 \
+       .type = QMAT_PARAM_FLOAT,                                                                                       \
+       .default_number = 0,                                                                                            \
+       .min = 0,                                                                                                       \
+       .max = 1e9,                                                                                                     \
+       .offset = offsetof(qmat_simplify_params, most_cost)},                                                           \
+      {.name = "compat",                                                                                               \
+       .unit = "",                                                                                                     \
+       .doc =                                                                                                          \
+           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "          \
+           "features; the stop is vertices",                                                                           \
+       .type = QMAT_PARAM_ENUM,                                                                                        \
+       .default_number = QMAT_COMPAT_OFF,                                                                              \
+       .choices = qmat_compat_choices,                                                                                 \
+       .offset = offsetof(qmat_simplify_params, compat)},                                                              \
+      {.name = "topology",                                                                                             \
+       .unit = "",                                                                                                     \
+       .doc =                                                                                                          \
+           "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, loops "     \
+           "and voids of the result are made those of the solid. preserve: collapses keep the topology of the "        \
+           "initial mesh (link condition)",                                                                            \
+       .type = QMAT_PARAM_ENUM,                                                                                        \
+       .default_number = QMAT_TOPOLOGY_GUARD,                                                                          \
+       .choices = qmat_topology_choices,                                                                               \
+       .offset = offsetof(qmat_simplify_params, topology)},                                                            \
+      {.name = "protect",                                                                                              \
+       .unit = "",                                                                                                     \
+       .doc = "Keep thin tubular features at any cost: never, at the late stage, or from the start",                   \
+       .type = QMAT_PARAM_ENUM,                                                                                        \
+       .default_number = QMAT_PROTECT_OFF,                                                                             \
+       .choices = qmat_protect_choices,                                                                                \
+       .offset = offsetof(qmat_simplify_params, protect)},                                                             \
+      {.name = "features",                                                                                             \
+       .unit = "",                                                                                                     \
+       .doc = "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases", \
+       .type = QMAT_PARAM_ENUM,                                                                                        \
+       .default_number = QMAT_FEATURES_SHARP,                                                                          \
+       .choices = qmat_feature_choices,                                                                                \
+       .offset = offsetof(qmat_simplify_params, features)},                                                            \
+      {.name = "crease",                                                                                               \
+       .unit = "epsilon",                                                                                              \
+       .doc = "The largest distance of a crease from its remaining points, as a share of the threshold",               \
+       .type = QMAT_PARAM_FLOAT,                                                                                       \
+       .default_number = 0.25,                                                                                         \
+       .min = 0.01,                                                                                                    \
+       .max = 1,                                                                                                       \
+       .offset = offsetof(qmat_simplify_params, crease)},                                                              \
+      {.name = "theta",                                                                                                \
+       .unit = "mean thickness",                                                                                       \
+       .doc =                                                                                                          \
+           "A feature is thin when all of its responsible region is at most this thick, relative to the "              \
+           "mean",                                                                                                     \
+       .type = QMAT_PARAM_FLOAT,                                                                                       \
+       .default_number = 0.5,                                                                                          \
+       .min = 0,                                                                                                       \
+       .max = 10,                                                                                                      \
+       .offset = offsetof(qmat_simplify_params, theta)},                                                               \
+  {                                                                                                                    \
+    .name = "k", .unit = "1", .doc = "The constant of the collapse cost (eq. 6)", .type = QMAT_PARAM_FLOAT,            \
+    .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                            \
   }
 
 /* The inputs of both nodes. */
@@ -129,29 +129,29 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
 typedef struct qmat_initial_medial {
   double *spheres; /* 4 per sphere */
   double *depths;  /* per sphere: of its centre, negative outside */
-  uint8_t *thin;   /* per sample: whether it lies on a thin part */
+  uint8_t *thin;   /* per sample: whether it lies on a thin feature */
 } qmat_initial_medial;
 
-/* Leaves of `params->epsilon` what the mesh's deviation does not take; `*deviation` gets that, in diagonals.
- * QMAT_ERROR_GEOMETRY names epsilon where nothing is left. */
+/* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY names epsilon
+ * where nothing remains. */
 qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
                                           double *deviation);
 
-/* Reads the inputs of both nodes (QMAT_SIMPLIFY_INPUTS, in that order). `*surface` is new, also after some
- * failures; the caller frees it. QMAT_ERROR_GEOMETRY names what does not belong together; QMAT_ERROR_MEMORY,
- * QMAT_CANCELLED. All threads. */
+/* Reads the inputs of both nodes (QMAT_SIMPLIFY_INPUTS, in that order). `*surface` is new, also after some failures;
+ * the caller frees it. QMAT_ERROR_GEOMETRY names inputs that do not belong together; QMAT_ERROR_MEMORY, QMAT_CANCELLED.
+ * All threads. */
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,
                                   const qmat_value *const inputs[], qmat_surface **surface,
                                   qmat_initial_medial *initial);
 
-/* The rules that the parameters ask for. QMAT_ERROR_MEMORY. */
+/* The rules for the parameters. QMAT_ERROR_MEMORY. */
 qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *params, const qmat_mesh *mesh,
                                 const qmat_initial_medial *initial, qmat_decimation_rules *rules);
 
-/* Whether the parameters ask for collapses that are the same for every epsilon. */
+/* Whether the parameters select collapses that do not depend on epsilon. */
 bool qmat_simplify_in_order(const qmat_simplify_params *params);
 
-/* Such collapses, done. */
+/* Such collapses, and their result. */
 typedef struct qmat_ordered_collapses {
   qmat_simplify_params params; /* with what compat sets */
   qmat_surface *surface;

@@ -12,7 +12,7 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   *fit = (qmat_sphere_fit){0};
 }
 
-/* Whether this slot is the first by which its point hangs on the collapse. */
+/* Whether this slot is the first of its point in the collapse. */
 static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
     if (tracker->witnesses[s] == collapse->kept || tracker->witnesses[s] == collapse->removed) return false;
@@ -60,7 +60,7 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *
 static const int powers[] = {0, 0, 2, 2, 4, 4, 6, 6};
 enum { STEPS = sizeof powers / sizeof *powers };
 
-/* A fit whose error is still this many times give_up_error after this many steps is left. */
+/* A fit ends early when its error exceeds this multiple of `give_up_error` after this many steps. */
 enum { EARLY_EXIT_STEP = 3 };
 static const double early_exit_ratio = 3;
 

@@ -4,11 +4,11 @@
 
 #include "nodes/measure/surface_to_envelope.h"
 
-/* Fits the sphere of one medial vertex to the surface: the surface's constraint points that the vertex answers for
- * shall lie as close as possible to the envelope, whichever side they are on. Quadrics know the tangent planes of the
- * initial medial mesh and add their squares up; a fit looks at the surface itself and at its farthest points. */
+/* Fits the sphere of one medial vertex to the surface: minimises the largest |F| at the constraint points of the
+ * vertex, on either side. Quadrics only know the tangent planes of the initial medial mesh; a fit uses the surface
+ * itself. */
 typedef struct qmat_sphere_fit {
-  uint32_t *points; /* the constraint points that the newest fit looked at */
+  uint32_t *points; /* the constraint points of the newest fit */
   size_t count, capacity;
 } qmat_sphere_fit;
 
@@ -25,9 +25,9 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *
                                   double *error);
 
 /* Moves and resizes `sphere` so that the largest |F| at the chosen points becomes small: least squares with weights
- * that rise with the error from step to step (Gauss-Newton on norms of rising order). Gives up where the error stays
- * above `give_up_error`. `*error` is the largest |F| of the sphere that is given back, which is no worse than what came
- * in. QMAT_ERROR_MEMORY. Cost: ten looks at each point. */
+ * that rise with the error from step to step (Gauss-Newton on norms of rising order). Ends early where the error stays
+ * well above `give_up_error`. `*error` is the largest |F| of the returned sphere, no more than before.
+ * QMAT_ERROR_MEMORY. Cost: ten queries at each point. */
 qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                 const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
                                 double sphere[4], double *error);

@@ -6,20 +6,20 @@
 #include "nodes/skin/envelope_cells.h"
 #include "nodes/skin/skin_triangles.h"
 
-/* Dual contouring in progress, and its steps. envelope_surface.c runs them in the order below. */
+/* Dual contouring in progress. envelope_surface.c runs the steps below in this order. */
 
-/* Where F changes sign between two neighbouring corners, and what lies around that edge. Going around the edge
+/* An edge between two neighbouring corners where F changes sign, and the cells around it. Going around the edge
  * counter-clockwise as seen from its upper end, face i lies between cells i and i + 1. */
 typedef struct qmat_crossing {
   uint32_t lower, upper; /* corner ids; the edge runs along the axis from lower to upper */
   uint8_t axis, count;   /* 3 or 4 cells */
   bool inside_below;     /* the lower corner is inside */
   uint32_t cells[4];
-  uint32_t faces[4];    /* cell * 8 + side: the smaller cell's side, of equal cells the lower one's */
+  uint32_t faces[4];    /* cell * 8 + side: the side of the smaller cell, of equal cells of the lower one */
   uint32_t partners[4]; /* crossing * 4 + face: the other end of the surface's trace on the face */
   uint32_t vertices[4]; /* of the surface, in each cell */
   uint32_t between[4];  /* an extra vertex on the trace, or QMAT_NO_ID */
-  bool shared[4];       /* the face holds more than one trace */
+  bool shared[4];       /* the face has more than one trace */
   double position[3], normal[3];
 } qmat_crossing;
 
@@ -34,19 +34,20 @@ typedef struct qmat_contour {
   double *values;         /* F at each corner */
   uint32_t *cell_corners; /* 8 per cell */
   uint16_t *split_edges;  /* per cell: bit e is set when a corner lies at the middle of edge e */
-  uint16_t *owned_edges;  /* per cell: bit e is set when the cell answers for a crossing there */
+  uint16_t *owned_edges;  /* per cell: bit e is set when the cell owns the crossing there */
   size_t *first_crossing; /* per cell, and the total */
   size_t crossing_count;
   qmat_crossing *crossings;
   uint32_t *crossing_at; /* 3 per corner: the crossing of the edge that starts there along each axis */
   size_t vertex_count, vertex_capacity;
-  size_t sheet_count; /* vertices that are sheets; others were added to keep the surface simple */
+  size_t sheet_count; /* vertices of sheets; the others keep the surface a simplicial complex */
   uint32_t *sheet_cells;
   size_t *sheet_items; /* per sheet its first entry of items, and the total */
   uint32_t *items;     /* crossings */
   double *positions;
 } qmat_contour;
 
+/* Corners and cells as keys: 19 bits a coordinate, in finest cells, and the size of a cell as a power of two. */
 static inline uint64_t qmat_corner_key(const uint32_t at[3]) {
   return (uint64_t)at[0] | (uint64_t)at[1] << 19 | (uint64_t)at[2] << 38;
 }
@@ -67,14 +68,14 @@ static inline bool qmat_contour_inside(const qmat_contour *c, uint32_t corner) {
   return c->values[corner] < 0;
 }
 
-/* Edge e of a cell runs along axis e / 4; bits 0 and 1 of e tell on which side it lies along the two next axes. */
+/* Edge e of a cell runs along axis e / 4; bits 0 and 1 of e are its sides along the two next axes. */
 static inline void qmat_cell_edge_ends(unsigned e, unsigned *lower, unsigned *upper) {
   unsigned a = e / 4, b = (a + 1) % 3, d = (a + 2) % 3;
   *lower = (e & 1) << b | (e >> 1 & 1) << d;
   *upper = *lower | 1u << a;
 }
 
-/* The place of edge e's lower end. */
+/* The lower end of edge e. */
 static inline void qmat_cell_edge_at(const qmat_cell *cell, unsigned e, uint32_t at[3]) {
   unsigned lower, upper;
   qmat_cell_edge_ends(e, &lower, &upper);

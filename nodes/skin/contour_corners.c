@@ -3,7 +3,7 @@
 
 #include "nodes/skin/contour.h"
 
-/* The id of the corner at `at`, new ones with no owner; QMAT_NO_ID when memory is short. */
+/* The id of the corner at `at`; a new corner has no owner. QMAT_NO_ID when memory is short. */
 static uint32_t add_corner(qmat_contour *c, const uint32_t at[3]) {
   uint64_t key = qmat_corner_key(at);
   qmat_key_slot *slot = qmat_key_table_find(&c->corner_table, key);
@@ -19,8 +19,8 @@ static uint32_t add_corner(qmat_contour *c, const uint32_t at[3]) {
   return (uint32_t)c->corner_count++;
 }
 
-/* Cells that were halved have corners too, even where no child on that side holds surface: without them a corner at a
- * quarter of a large cell's edge could stand where there is none at its middle. */
+/* Adds the corners of halved cells, even where no child on that side contains surface. Without them a large cell's edge
+ * could have a corner at a quarter but none at its middle. */
 static qmat_status add_halved_cells(qmat_contour *c) {
   qmat_key_table seen = {0};
   qmat_status status = QMAT_OK;
@@ -77,7 +77,7 @@ qmat_status qmat_contour_number_corners(qmat_contour *c) {
   return c->cells.refined_count > 0 ? add_halved_cells(c) : QMAT_OK;
 }
 
-/* Gives the corners inside an edge of a cell an owner whose list of primitives holds there. */
+/* Gives the corners inside an edge of a cell an owner, whose list of primitives is valid there. */
 static void own_inner_corners(qmat_contour *c, size_t cell, const uint32_t from[3], uint32_t length, unsigned axis) {
   if (length < 2) return;
   uint32_t middle[3] = {from[0], from[1], from[2]};

@@ -29,8 +29,8 @@ static void quarters_around(const qmat_contour *c, const uint32_t at[3], unsigne
   }
 }
 
-/* Which crossings each cell answers for: those on its undivided edges, unless an earlier cell of its size has them. The
- * smallest cell around an edge has it undivided. */
+/* Assigns each crossing to one cell: the first of the smallest cells around its edge. The smallest cell has the edge
+ * undivided. */
 static qmat_status assign_crossings(qmat_contour *c) {
   size_t count = c->cells.count;
   c->owned_edges = qmat_calloc(count, sizeof *c->owned_edges);
@@ -73,7 +73,7 @@ static qmat_status assign_crossings(qmat_contour *c) {
   return QMAT_OK;
 }
 
-/* Where F is zero between two points of opposite sign, by regula falsi with the Illinois weights. */
+/* Finds the zero of F between two points of opposite sign by regula falsi with the Illinois weights. */
 static void find_zero(const qmat_contour *c, const qmat_cell *cell, const double from[3], double f_from,
                       const double to[3], double f_to, double position[3], double normal[3]) {
   double low = 0, high = 1, f_low = f_from, f_high = f_to, tolerance = 1e-6 * c->cells.finest * cell->size;
@@ -204,8 +204,8 @@ static void walk_face(const qmat_contour *c, uint32_t face, face_walk *walk) {
   }
 }
 
-/* The surface's trace on a face cuts off each run of inside corners from the rest: follows the run from the crossing to
- * where it ends, and finds the crossing there. Both cells at the face see the same trace. */
+/* Finds the other end of the surface's trace on a face. A trace separates one run of inside corners from the rest: the
+ * walk follows the run from the crossing to its end. Both cells at the face find the same trace. */
 static bool find_partner(qmat_contour *c, size_t id, int slot) {
   qmat_crossing *x = &c->crossings[id];
   face_walk walk;

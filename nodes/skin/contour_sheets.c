@@ -86,7 +86,7 @@ static void symmetric_eigen(double m[3][3], double v[3][3]) {
   }
 }
 
-/* The part of a cell that its vertices may use. */
+/* The region of a cell where its vertices may lie. */
 static void inner_box(const qmat_contour *c, const qmat_cell *cell, double low[3], double high[3]) {
   for (int k = 0; k < 3; k++) {
     low[k] = c->cells.origin[k] + c->cells.finest * (cell->at[k] + INSET * cell->size);
@@ -104,8 +104,8 @@ static bool into_box(const double low[3], const double high[3], double point[3])
   return moved;
 }
 
-/* The point of the sheet's cell that is nearest to the tangent planes at its crossings; then down the gradient onto the
- * surface. */
+/* Places the vertex of a sheet: the point of its cell nearest to the tangent planes at its crossings, then moved along
+ * the gradient onto the surface. */
 static void place_sheet(qmat_contour *c, size_t sheet) {
   const qmat_cell *cell = &c->cells.cells[c->sheet_cells[sheet]];
   size_t first = c->sheet_items[sheet], end = c->sheet_items[sheet + 1];
@@ -135,8 +135,8 @@ static void place_sheet(qmat_contour *c, size_t sheet) {
     for (int k = 0; k < 3; k++) point[k] += along * v[k][e];
   }
   if (into_box(low, high, point)) {
-    /* The same least squares within the box, by projected Gauss-Seidel; flat directions are held by a weak pull to the
-     * mean. */
+    /* The same least squares within the box, by projected Gauss-Seidel. In flat directions a weak pull keeps the point
+     * at the mean. */
     double pull = 0.5 * FLAT_EIGENVALUE * largest;
     for (int step = 0; step < BOX_STEPS; step++) {
       for (int k = 0; k < 3; k++) {
@@ -167,8 +167,8 @@ static int by_sheets(const void *left, const void *right) {
   return (a->slot > b->slot) - (a->slot < b->slot);
 }
 
-/* Two sheets that meet along more than one trace would share more than one edge. All but the first get a vertex of
- * their own. That happens only on faces that hold several traces. */
+/* Two sheets that meet along several traces would share several edges. All traces but the first get a vertex of their
+ * own. This happens only on faces with several traces. */
 qmat_status qmat_contour_part_doubled_edges(qmat_contour *c) {
   trace *traces = NULL;
   size_t count = 0, capacity = 0, extra = 0;

@@ -9,7 +9,7 @@
 /* Triangles below this shape (area over the square of the longest side) are avoided. */
 static const double POOR_SHAPE = 0.01, DEGENERATE_SHAPE = 1e-6;
 
-/* Area against the square of the longest side; an equilateral triangle has 0.433. */
+/* The area over the square of the longest side; 0.433 for an equilateral triangle. */
 static double triangle_shape(const double *a, const double *b, const double *d) {
   double u[3], v[3], longest = 0, w2 = 0, u2 = 0, v2 = 0;
   for (int k = 0; k < 3; k++) {
@@ -36,8 +36,8 @@ static unsigned polygon_of(const qmat_crossing *x, uint32_t polygon[8]) {
   return n;
 }
 
-/* How to cut the polygon of a crossing: a triangle as it is; a quadrangle along the diagonal that keeps closer to the
- * surface; others, and those that would give a degenerate triangle, from the crossing itself. */
+/* How to cut the polygon of a crossing. A triangle stays. A quadrangle is cut along the diagonal nearer to the surface.
+ * Other polygons, and those that would give a degenerate triangle, become a fan around the crossing. */
 static enum cut choose_cut(const qmat_contour *c, const qmat_crossing *x) {
   uint32_t polygon[8];
   unsigned n = polygon_of(x, polygon);
@@ -53,8 +53,8 @@ static enum cut choose_cut(const qmat_contour *c, const qmat_crossing *x) {
   for (int d = 0; d < 2; d++) {
     const qmat_cell *a = &c->cells.cells[x->cells[d]], *b = &c->cells.cells[x->cells[d + 2]];
     shapes[d] = fmin(triangle_shape(p[d], p[d + 1], p[d + 2]), triangle_shape(p[d], p[d + 2], p[(d + 3) % 4]));
-    /* Two cells that are both longer than the edge may face each other across the next edge too: their diagonal could
-     * come twice. */
+    /* Two cells both longer than the edge may face each other across the next edge too; the diagonal could then occur
+     * twice. */
     if (a->size != length && b->size != length) shapes[d] = -1;
     double middle[3];
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (p[d][k] + p[d + 2][k]);
@@ -64,7 +64,7 @@ static enum cut choose_cut(const qmat_contour *c, const qmat_crossing *x) {
   double better = fmax(shapes[0], shapes[1]), worse = fmin(shapes[0], shapes[1]);
   if (!(better > DEGENERATE_SHAPE)) return CUT_FAN;
   if (worse < POOR_SHAPE) return shapes[0] >= shapes[1] ? CUT_FIRST : CUT_SECOND;
-  /* Where both are as good, the rounder triangles. */
+  /* Of equally near diagonals, the one with rounder triangles. */
   double margin = 0.01 * c->cells.finest * length;
   if (fabs(errors[0] - errors[1]) > margin) return errors[0] < errors[1] ? CUT_FIRST : CUT_SECOND;
   return shapes[0] >= shapes[1] ? CUT_FIRST : CUT_SECOND;
@@ -102,7 +102,7 @@ qmat_status qmat_contour_make_triangles(qmat_contour *c, qmat_skin_triangles *su
     const qmat_crossing *x = &c->crossings[i];
     uint32_t polygon[8], *out = surface->triangles + 3 * first[i];
     unsigned n = polygon_of(x, polygon);
-    /* The polygon turns about the edge's axis: outward where the inside lies below. */
+    /* The polygon turns about the edge's axis: outwards where the inside is below. */
     if (!x->inside_below) {
       for (unsigned j = 0; j < n / 2; j++) {
         uint32_t swap = polygon[j];

@@ -4,16 +4,16 @@
 #include <math.h>
 #include <string.h>
 
-/* A cell may be this large against the medial radius: three cells across a tube. */
+/* The largest cell relative to the medial radius: three cells across a tube ... */
 static const double CELLS_PER_RADIUS = 0.75;
-/* ... plus this share of the distance to it, so that sizes change gradually. */
+/* ... plus this share of the distance to the medial surface, so that sizes change gradually. */
 static const double GRADING = 0.5;
 /* Distances are exact to about 1e-15 of the unit frame. */
 static const double SLACK = 1e-12;
 static const double HALF_DIAGONAL = 0.8660254037844387; /* of a cell of size 1 */
-/* Limits on what is held: cells (about 400 bytes each once they are contoured), and entries of their lists. */
+/* Limits of memory: cells (about 400 bytes each in contouring), and entries of their lists. */
 static const size_t MOST_CELLS = (size_t)1 << 23, MOST_ENTRIES = (size_t)1 << 29;
-/* Children that one thread takes at a time, and list entries between two looks at the progress function. */
+/* Children per chunk of a thread, and list entries between two calls of the progress function. */
 enum { CHUNK_CHILDREN = 64, MOST_CHUNKS = 512 };
 static const size_t BLOCK_ENTRIES = (size_t)1 << 19;
 
@@ -154,7 +154,7 @@ typedef struct candidate {
 /* Cells with their lists, while they are being made. */
 typedef struct cell_batch {
   qmat_cell *cells;
-  uint8_t *whole; /* per cell: not to be halved */
+  uint8_t *whole; /* per cell: finished, not to be halved */
   uint32_t *lists;
   struct candidate *scratch;
   size_t count, cell_capacity, whole_capacity, list_count, list_capacity, scratch_capacity;
@@ -174,7 +174,7 @@ static int batch_reserve(cell_batch *batch, size_t cells, size_t entries) {
          qmat_grow((void **)&batch->lists, &batch->list_capacity, batch->list_count + entries, sizeof *batch->lists);
 }
 
-/* Whether the cell is small enough for every primitive that may show in it. */
+/* Whether the cell is small enough for every primitive that may reach into it. */
 static bool fine_enough(const candidate *list, size_t count, double size) {
   for (size_t i = 0; i < count; i++) {
     double away = list[i].distance - HALF_DIAGONAL * size;
@@ -183,9 +183,9 @@ static bool fine_enough(const candidate *list, size_t count, double size) {
   return true;
 }
 
-/* Drops the candidates that lie above another one in all of the cell, whose points are at most `reach` from the centre.
- * Each f is convex, so that it stays above its tangent: f_i(c + v) >= f_i(c) + g_i . v. And it stays below the distance
- * to the medial point x that is nearest to the centre: f_j(c + v) <= f_j(c) + g_j . v + |v|^2 / (2 |c - x|). */
+/* Drops candidates that are above another one in all of the cell, whose points are within `reach` of the centre. Every
+ * f is convex and so stays above its tangent: f_i(c + v) >= f_i(c) + g_i . v. It also stays below the distance to the
+ * medial point x nearest to the centre: f_j(c + v) <= f_j(c) + g_j . v + |v|^2 / (2 |c - x|). */
 static size_t drop_hidden(candidate *list, size_t count, double reach) {
   enum { ROUNDS = 8 };
   for (size_t round = 0; round < ROUNDS && round + 1 < count; round++) {
@@ -212,8 +212,8 @@ static size_t drop_hidden(candidate *list, size_t count, double reach) {
   return count;
 }
 
-/* Adds a cell to the batch unless the surface misses it. `list` holds the minimum of F wherever it is negative in
- * the cell. */
+/* Adds a cell to the batch unless the surface misses it. `list` contains the primitive that attains F wherever F is
+ * negative in the cell. */
 static int add_cell(const qmat_cells *cells, cell_batch *batch, const uint32_t at[3], uint32_t size,
                     const uint32_t *list, size_t list_count) {
   if (qmat_grow((void **)&batch->scratch, &batch->scratch_capacity, list_count, sizeof *batch->scratch)) return -1;
@@ -231,7 +231,7 @@ static int add_cell(const qmat_cells *cells, cell_batch *batch, const uint32_t a
   size_t count = 0;
   for (size_t i = 0; i < list_count; i++) {
     candidate c = found[i];
-    /* Nowhere in this cell the minimum, or nowhere negative and thus without a part in the surface. */
+    /* Nowhere the minimum in this cell, or nowhere negative: without influence on the surface. */
     if (c.distance > nearest + 2 * reach || c.distance > reach) continue;
     double sphere[4], length2 = 0;
     primitive_sphere(&cells->primitives, c.primitive, centre, sphere);
@@ -266,15 +266,15 @@ static int add_children(const qmat_cells *cells, const cell_batch *parents, size
 }
 
 static qmat_status too_many(qmat_context *context) {
-  qmat_fail(context, QMAT_ERROR_GEOMETRY, "The surface passes through more cells than can be held");
-  qmat_fail_hint(context, "lower the resolution or the detail");
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "the surface crosses too many cells for the memory limit");
+  qmat_fail_hint(context, "lower resolution or detail");
   return qmat_fail_field(context, "resolution");
 }
 
-/* Hands the whole cells of `from` to the result and the others to `next`. */
+/* Moves the finished cells of `from` to the result and the others to `next`. */
 static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t *cell_capacity, size_t *list_capacity,
                             const cell_batch *from, cell_batch *next) {
-  /* Each cell that is still to be halved will become two at the very least. */
+  /* Each cell that will be halved becomes at least two. */
   if (cells->count + 2 * (next->count + from->count) > MOST_CELLS ||
       cells->list_count + next->list_count + from->list_count > MOST_ENTRIES) {
     return too_many(context);
@@ -303,13 +303,13 @@ static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t *ce
   return QMAT_OK;
 }
 
-/* Halves every cell of `parents`: whole children go to the result, the others to `next`. */
+/* Halves every cell of `parents`: finished children go to the result, the others to `next`. */
 static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_capacity, size_t *list_capacity,
                          const cell_batch *parents, cell_batch *chunks, cell_batch *next) {
   int threads = qmat_threads(context);
   for (size_t first = 0; first < parents->count;) {
     size_t end = first, entries = 0;
-    /* Chunks are filled in parallel and emptied in order, so that their number leaves no trace in the result. */
+    /* Chunks are filled in parallel and emptied in order, so that the result does not depend on their number. */
     while (end < parents->count && entries < BLOCK_ENTRIES && end - first < MOST_CHUNKS * CHUNK_CHILDREN / 8) {
       entries += parents->cells[end++].list_count;
     }
@@ -363,7 +363,7 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
   cell_batch level = {0}, next = {0}, *chunks = NULL;
   size_t cell_capacity = 0, list_capacity = 0;
   if (count == 0) return QMAT_OK;
-  /* The root: a cube with a base cell to spare on each side. The odd shift keeps flat parts of a model off the planes
+  /* The root is a cube with a spare base cell on each side. The odd shift keeps flat regions of a model off the planes
    * of the grid. */
   double extent = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
   uint32_t size = cells->base;

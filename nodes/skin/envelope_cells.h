@@ -5,11 +5,11 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_distance.h"
 
-/* The cells of an octree that the surface of an envelope passes through, and only those. A cell is halved until it is
- * no larger than the base size, and further where the medial radii near it are small, down to the finest size. */
+/* The cells of an octree that the surface of an envelope crosses. A cell is halved down to the base size, and further
+ * where the medial radii near it are small, down to the finest size. */
 
-/* The primitives of an envelope, with radii raised to a floor so that none slips between the corners of the finest
- * cells. Numbered slabs, cones, spheres; a sphere of radius 0 that belongs to nothing is left out. */
+/* The primitives of an envelope, with radii raised to a floor so that none is missed by the corners of the finest
+ * cells. The order is slabs, cones, spheres; single spheres of radius 0 are left out. */
 typedef struct qmat_cell_primitives {
   size_t slab_count, cone_count, sphere_count;
   qmat_slab *slabs;
@@ -25,7 +25,7 @@ typedef struct qmat_cell {
   uint32_t at[3];      /* its lowest corner, in finest cells */
   uint32_t size;       /* in finest cells: a power of two */
   size_t list;         /* its primitives: lists[list .. list + list_count) */
-  uint32_t list_count; /* they hold the minimum of F wherever it is 0 or less in the cell */
+  uint32_t list_count; /* one of them attains F wherever F is 0 or less in the cell */
 } qmat_cell;
 
 typedef struct qmat_cells {
@@ -39,18 +39,18 @@ typedef struct qmat_cells {
   size_t refined_count; /* cells smaller than the base size */
 } qmat_cells;
 
-/* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of; `base` is the largest
- * size of a cell, halved up to `detail` times where radii are small; `floor` is the least radius. Freed with
- * qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED, or QMAT_ERROR_GEOMETRY when the cells
- * are too many to hold. The same cells in the same order for any number of threads. Cost: linear in the cells, times
- * the primitives that meet in one. */
+/* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of. `base` is the largest
+ * size of a cell, halved up to `detail` times where radii are small; `floor` is the least radius. Free with
+ * qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are too
+ * many cells. The same cells in the same order for any number of threads. Cost: linear in the cells, times the
+ * primitives that meet in one. */
 qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
                             int detail, double floor, qmat_cells *cells);
 void qmat_cells_uninit(qmat_cells *cells);
 
-/* F with the floor on the radii, at a point of the cell; where F is positive, a positive number that is at least F. */
+/* F with raised radii, at a point of the cell. Where F is positive: a positive number that is at least F. */
 double qmat_cell_distance(const qmat_cells *cells, const qmat_cell *cell, const double point[3]);
-/* The same, and its gradient: a unit vector (3 doubles). */
+/* The same, with its gradient: a unit vector (3 doubles). */
 double qmat_cell_gradient(const qmat_cells *cells, const qmat_cell *cell, const double point[3], double gradient[3]);
 
 #endif

@@ -11,18 +11,18 @@
 
 namespace qmat {
 
-/* Thrown into what allocates after it was asked to stop. */
+/* Thrown by allocations after a stop was requested. */
 struct Stopped {};
 
-/* Memory whose addresses only rise, so that the order of objects by address is the order in which they were made.
- * CGAL's mixed complex sorts simplices by the addresses of their vertices and cells: with any other memory the last
- * digits of its points depend on what the process did before. While an object of this class lives, the thread's
- * RisingAllocators take from it; it goes back to the system in one piece. Throws std::bad_alloc, and Stopped once
- * `stop` is set: CGAL asks nobody whether to go on, but it allocates all the time. */
+/* Memory whose addresses only rise, so that objects are ordered by address as they were made. CGAL's mixed complex
+ * sorts simplices by the addresses of their vertices and cells; with other memory the last digits of its points depend
+ * on the history of the process. While an object of this class lives, the RisingAllocators of its thread use it; the
+ * system gets it back in one piece. Throws std::bad_alloc, and Stopped once `stop` is set: CGAL has no way to cancel,
+ * but it allocates all the time. */
 class RisingMemory {
  public:
   explicit RisingMemory(const std::atomic<bool> &stop) : stop_(stop), outer_(current()) {
-    /* Address space only: pages come when they are touched. */
+    /* Reserves address space only; pages come when they are touched. */
     for (size_ = kLargest; base_ == nullptr; size_ /= 2) {
       if (size_ < kSmallest) throw std::bad_alloc();
       void *memory = mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
@@ -66,7 +66,7 @@ class RisingMemory {
   std::size_t size_ = 0, used_ = 0;
 };
 
-/* Takes from the thread's RisingMemory and gives nothing back; without one, the ordinary heap. */
+/* Allocates from the RisingMemory of the thread and never frees; without one, uses the ordinary heap. */
 template <class T>
 class RisingAllocator {
  public:

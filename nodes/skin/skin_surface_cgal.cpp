@@ -2,7 +2,7 @@
 #include "nodes/skin/skin_surface_cgal.h"
 
 #include "nodes/skin/rising_allocator.h"
-/* CGAL's own hook: see rising_allocator.h for why. Before the first CGAL header. */
+/* CGAL's hook; rising_allocator.h says why. Before the first CGAL header. */
 #define CGAL_ALLOCATOR(T) qmat::RisingAllocator<T>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -34,7 +34,8 @@ using Skin = CGAL::Skin_surface_3<Traits>;
 using Polyhedron = CGAL::Polyhedron_3<Kernel, CGAL::Skin_surface_polyhedral_items_3<Skin>>;
 using Triangle = std::array<uint32_t, 3>;
 
-/* CGAL finds points on the skin to 1e-4 of a unit: work on a larger copy. A power of two, so that no digit changes. */
+/* CGAL finds points on the skin to 1e-4 of a unit, so it gets a larger copy. The scale is a power of two, so that no
+ * digit changes. */
 constexpr double kScale = 1024;
 
 struct Soup {
@@ -42,7 +43,8 @@ struct Soup {
   std::vector<Triangle> triangles;
 };
 
-/* CGAL's order follows addresses: number vertices by position, start triangles at their smallest vertex, sort them. */
+/* CGAL's order follows addresses. Here vertices are numbered by position, triangles start at their smallest vertex, and
+ * are sorted. */
 Soup sorted_soup(const Polyhedron &polyhedron) {
   std::vector<Polyhedron::Vertex_const_handle> vertices;
   for (auto v = polyhedron.vertices_begin(); v != polyhedron.vertices_end(); v++) vertices.push_back(v);
@@ -68,7 +70,7 @@ Soup sorted_soup(const Polyhedron &polyhedron) {
   return soup;
 }
 
-/* Triangles that turn inwards are turned around, all of them. */
+/* Turns all triangles around where they face inwards. */
 void turn_outward(Soup &soup) {
   double volume = 0;
   for (const Triangle &t : soup.triangles) {
@@ -109,8 +111,8 @@ qmat_status make_skin(qmat_context *context, const std::atomic<bool> &stop, cons
       const double radius = kScale * b[3];
       weighted.emplace_back(Skin::Bare_point(kScale * b[0], kScale * b[1], kScale * b[2]), radius * radius);
     }
-    /* The skin of a ball is undisturbed as far as no neighbour's radical plane comes within radius / shrink of it.
-     * CGAL's own box around the balls comes closer for few balls: points without a ball push it out. */
+    /* The skin of a ball is undisturbed where no neighbour's radical plane comes within radius / shrink of it. CGAL's
+     * own box around few balls comes closer: points without a ball push it out. */
     const double far = kScale * 8 / shrink;
     for (int side = -1; side <= 1; side += 2) {
       weighted.emplace_back(Skin::Bare_point(side * far, 0, 0), -1);
@@ -140,8 +142,8 @@ qmat_status make_skin(qmat_context *context, const std::atomic<bool> &stop, cons
 
 }  // namespace
 
-/* CGAL works in a thread of its own, while this one asks whether to go on. What CGAL keeps in thread-local variables,
- * which it does not put in order when an exception passes through, goes with the thread. */
+/* CGAL runs in a thread of its own while this one calls the progress function. CGAL's thread-local variables, which an
+ * exception leaves in disorder, end with that thread. */
 qmat_status qmat_skin_surface(qmat_context *context, const double *balls, size_t count, double shrink, int subdivisions,
                               qmat_skin_triangles *surface) {
   *surface = {};
