@@ -14,20 +14,19 @@ enum {
   END_SIZE = 22,
   LARGEST_COMMENT = 65535,
   ALIGNMENT = 64,
-  FIRST_DATE = 1 << 5 | 1, /* the first of January 1980, so that equal content makes equal bytes */
-  PADDING_ID = 0x1986      /* of the extra field that aligns a member */
+  FIRST_DATE = 1 << 5 | 1, /* 1 January 1980: equal content makes equal bytes */
+  PADDING_ID = 0x1986      /* the extra field that aligns a member */
 };
 
 static qmat_status fail(qmat_context *context, const char *path, const char *what) {
-  qmat_fail(context, QMAT_ERROR_FORMAT, "%s", what);
-  return qmat_fail_at(context, path, 0, 0);
+  return qmat_fail_file(context, QMAT_ERROR_FORMAT, path, "%s", what);
 }
 
 static uint32_t checksum(const uint8_t *bytes, size_t size) {
   return (uint32_t)crc32_z(crc32_z(0, NULL, 0), bytes, size);
 }
 
-/* Where the record at the end of the archive begins; SIZE_MAX when there is none. */
+/* The offset of the end record of the archive; SIZE_MAX when there is none. */
 static size_t find_end(const qmat_bytes *bytes) {
   const size_t furthest = END_SIZE + LARGEST_COMMENT;
   if (bytes->size < END_SIZE) return SIZE_MAX;
@@ -51,7 +50,7 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
   const uint8_t *name = qmat_take_bytes(central, name_length);
   qmat_take_bytes(central, (size_t)extra + comment);
   if (central->failed || signature != CENTRAL_SIGNATURE || local.at > bytes->size) {
-    return fail(context, path, "the directory of the archive is broken");
+    return fail(context, path, "the directory of the archive is damaged");
   }
   member->name = qmat_alloc((size_t)name_length + 1, 1);
   if (!member->name) return qmat_fail_memory(context, "a USDZ package");
@@ -62,14 +61,14 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
   const uint16_t local_name = qmat_take_u16(&local), local_extra = qmat_take_u16(&local);
   qmat_take_bytes(&local, (size_t)local_name + local_extra);
   if (flags & 1) return fail(context, path, "a member of the archive is encrypted");
-  if (method != 0) return fail(context, path, "a member of the archive is compressed, which USDZ does not allow");
+  if (method != 0) return fail(context, path, "a member of the archive is compressed, which USDZ forbids");
   member->bytes = qmat_take_bytes(&local, size);
   member->size = size;
   if (local_signature != LOCAL_SIGNATURE || !member->bytes || packed != size) {
-    return fail(context, path, "a member of the archive is broken");
+    return fail(context, path, "a member of the archive is damaged");
   }
   if (checksum(member->bytes, size) != crc) {
-    return fail(context, path, "a member of the archive does not have the checksum that is written beside it");
+    return fail(context, path, "the checksum of a member of the archive is wrong");
   }
   return QMAT_OK;
 }
@@ -77,18 +76,18 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
 qmat_status qmat_usdz_open(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_usdz *package) {
   *package = (qmat_usdz){0};
   const size_t end = find_end(bytes);
-  if (end == SIZE_MAX) return fail(context, path, "the archive has no directory: it may have been cut off");
+  if (end == SIZE_MAX) return fail(context, path, "the archive has no directory: it may be incomplete");
   qmat_byte_reader record = {.bytes = bytes->data, .size = bytes->size, .at = end + 10};
   const size_t count = qmat_take_u16(&record);
   qmat_take_u32(&record);
   const size_t start = qmat_take_u32(&record);
   if (start > end || (end - start) / CENTRAL_SIZE < count) {
-    return fail(context, path, "the directory of the archive is broken");
+    return fail(context, path, "the directory of the archive is damaged");
   }
   package->members = qmat_calloc(count, sizeof *package->members);
   if (!package->members) return qmat_fail_memory(context, "a USDZ package");
   qmat_byte_reader central = {.bytes = bytes->data, .size = end, .at = start};
-  /* Members may not share bytes, so that checking their sums is linear in the file. */
+  /* Members must not overlap: checking their sums is then linear in the file. */
   size_t total = 0;
   for (size_t i = 0; i < count; i++) {
     package->member_count = i + 1;
@@ -113,7 +112,7 @@ const qmat_usdz_member *qmat_usdz_find(const qmat_usdz *package, const char *nam
   return NULL;
 }
 
-/* What the local header and the directory say alike. */
+/* The fields that the local header and the directory share. */
 static void put_facts(qmat_writer *writer, uint32_t crc, uint32_t size, uint16_t name_length, uint16_t extra) {
   qmat_put_u16(writer, 10); /* version needed */
   qmat_put_u16(writer, 0);  /* flags */
@@ -129,7 +128,7 @@ static void put_facts(qmat_writer *writer, uint32_t crc, uint32_t size, uint16_t
 
 void qmat_usdz_put(qmat_writer *writer, const char *name, const void *bytes, size_t size) {
   const size_t name_length = strlen(name), header = LOCAL_SIZE + name_length;
-  /* An extra field has 4 bytes of its own. */
+  /* The header of an extra field has 4 bytes. */
   const size_t extra = ALIGNMENT - (header + 4) % ALIGNMENT + 4;
   if (size > UINT32_MAX - 4096 || name_length > 255) {
     writer->failed = true;

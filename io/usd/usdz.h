@@ -4,8 +4,8 @@
 
 #include "io/bytes.h"
 
-/* USDZ packages: zip archives whose members are stored as they are, each beginning at a multiple of 64 bytes, the first
- * one being the layer to open. Source: the USDZ file format specification, version 1.3. */
+/* USDZ packages: zip archives of uncompressed members that start at multiples of 64 bytes. The first member is the root
+ * layer. Source: the USDZ file format specification, version 1.3. */
 
 typedef struct qmat_usdz_member {
   char *name; /* with folders; owned */
@@ -19,9 +19,9 @@ typedef struct qmat_usdz {
   qmat_usdz_member *members; /* in the archive's order */
 } qmat_usdz;
 
-/* Finds the members of the archive in `bytes`, which must outlive the package. Compressed and encrypted members are
- * refused by name, and so is one whose checksum differs. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY; free with
- * qmat_usdz_uninit also after a failure. Alignment is not asked for. */
+/* Finds the members of the archive in `bytes`, which must outlive the package. Compressed and encrypted members and
+ * wrong checksums are refused; alignment is not required. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY. Free with
+ * qmat_usdz_uninit, also after a failure. Cost: linear. */
 qmat_status qmat_usdz_open(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_usdz *package);
 
 void qmat_usdz_uninit(qmat_usdz *package);

@@ -163,14 +163,14 @@ static void test_a_wrong_ending_is_an_error_that_says_what_the_file_holds(void *
 static void test_what_is_not_read_is_refused_by_name(void **state) {
   (void)state;
   static const char known[] = "models are read from .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc and .usdz";
-  assert_not_read("a.usda", "#usda 1.0\n", 10, QMAT_ERROR_GEOMETRY, "no mesh of the scene is left", "");
-  assert_not_read("a.usd", "PXR-USDC\0\7", 10, QMAT_ERROR_FORMAT, "a binary layer of USD begins with PXR-USDC", "");
-  assert_not_read("a.usd", "?", 1, QMAT_ERROR_FORMAT, "a text layer of USD begins with '#usda 1.0'", "");
+  assert_not_read("a.usda", "#usda 1.0\n", 10, QMAT_ERROR_GEOMETRY, "the scene has no mesh that can be read", "");
+  assert_not_read("a.usd", "PXR-USDC\0\7", 10, QMAT_ERROR_FORMAT, "a binary layer of USD must start with PXR-USDC", "");
+  assert_not_read("a.usd", "?", 1, QMAT_ERROR_FORMAT, "a text layer of USD must start with '#usda 1.0'", "");
   uint8_t zip[64] = "PK\3\4";
   zip[26] = 6;
   memcpy(zip + 30, "a.usdc", 6);
-  assert_not_read("a.usdz", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may have been cut off", "");
-  assert_not_read("a", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may have been cut off", "");
+  assert_not_read("a.usdz", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may be incomplete", "");
+  assert_not_read("a", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may be incomplete", "");
   zip[30] = zip[33] = 'x';
   assert_not_read("a.zip", zip, 64, QMAT_ERROR_FORMAT, "archives are not read", known);
   assert_not_read("a", zip, 5, QMAT_ERROR_FORMAT, "archives are not read", known);
