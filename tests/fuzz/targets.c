@@ -315,7 +315,7 @@ static void read_graph(const uint8_t *content, size_t size) {
   qmat_context_uninit(&context);
 }
 
-/* The binary form has one spelling: a value that can be read is written as the same bytes. */
+/* A value that can be read is written as the same bytes; the JSON of a report may be spelled in other ways. */
 static void read_value(const uint8_t *content, size_t size) {
   qmat_context context = {0};
   qmat_value *value = NULL;
@@ -325,8 +325,11 @@ static void read_value(const uint8_t *content, size_t size) {
   if (status == QMAT_OK) {
     uint8_t *written = NULL;
     size_t written_size = 0;
+    qmat_digest digest;
     require(qmat_value_serialize(&context, value, &written, &written_size) == QMAT_OK);
-    require(written_size == size && memcmp(written, content, size) == 0);
+    require(qmat_digest_of(written, written_size, &digest) == QMAT_OK && qmat_digest_equal(&digest, &value->digest));
+    const bool same = written_size == size && memcmp(written, content, size) == 0;
+    require(same || value->type == QMAT_REPORT);
     qmat_free(written);
     qmat_value_release(value);
   }
