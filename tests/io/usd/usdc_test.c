@@ -221,7 +221,7 @@ static size_t read_quickly(qmat_writer *crate) {
   const clock_t start = clock();
   read_crate(crate, &layer);
   assert_true(clock() - start < 5 * CLOCKS_PER_SEC);
-  const size_t count = layer.spec_count;
+  const size_t count = layer.specs.count;
   qmat_usd_layer_uninit(&layer);
   qmat_writer_uninit(crate);
   return count;
