@@ -398,6 +398,33 @@ static void test_every_text_is_there_and_reads_alike(void **state) {
   }
 }
 
+/* The runner merges reports by these entries and would leave out the summary of a report that lacks one. */
+static void test_a_report_has_what_its_summary_needs(void **state) {
+  (void)state;
+  size_t checked = 0;
+  for (size_t i = 0; i < qmat_node_count; i++) {
+    const qmat_node *node = qmat_nodes[i];
+    if (!node->report_summary) continue;
+    assert_non_null(node->report_summary->sentence);
+    qmat_context context = {0};
+    subject run = subject_of(node);
+    assert_int_equal(qmat_node_run(&context, node, run.params, run.inputs, run.outputs), QMAT_OK);
+    size_t port = 0;
+    while (port < qmat_output_count(node) && node->outputs[port].type != QMAT_REPORT) port++;
+    if (port == qmat_output_count(node)) fail_msg("%s: has a summary but no report", node->name);
+    for (const qmat_summary_entry *entry = node->report_summary->entries; entry->key; entry++) {
+      const json_t *value = json_object_get(((const qmat_report *)run.outputs[port])->root, entry->key);
+      const bool is_sum = entry->kind == QMAT_SUMMARY_SUM, is_bound = entry->kind == QMAT_SUMMARY_BOUND;
+      if ((is_sum && !json_is_integer(value)) || (is_bound && !json_is_real(value)))
+        fail_msg("%s: its report lacks '%s'", node->name, entry->key);
+      checked += is_sum || is_bound;
+    }
+    subject_uninit(&run);
+    qmat_context_uninit(&context);
+  }
+  assert_true(checked >= 4);
+}
+
 static size_t size_of_type(qmat_param_type type) {
   switch (type) {
     case QMAT_PARAM_BOOL:
@@ -1053,6 +1080,7 @@ int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_names_are_group_dot_operator_sorted_and_unique),
       cmocka_unit_test(test_every_text_is_there_and_reads_alike),
+      cmocka_unit_test(test_a_report_has_what_its_summary_needs),
       cmocka_unit_test(test_parameters_have_a_name_a_unit_a_default_and_a_place_of_their_own),
       cmocka_unit_test(test_ports_have_a_name_of_their_own_and_a_type),
       cmocka_unit_test(test_defaults_pass_the_check_and_run),
