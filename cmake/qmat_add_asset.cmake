@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# An asset that is part of a build:
+# Makes an asset as part of a build:
 #
 #   qmat_add_asset(TARGET name GRAPH graph.yaml INPUT model.off OUTPUT asset.glb
 #                  [SET name=value ...] [INPUT_NAME model] [OUTPUT_NAME asset] [OPTIONS option ...])
 #
-# OUTPUT is made by `qmat run GRAPH` when it is missing, or when the graph, the model, a file that the model refers to, or
-# qmat itself has changed; its ending chooses the format. A relative OUTPUT is in the current build folder, other relative
-# paths are in the current source folder. TARGET is a target that needs the asset; one that does not exist is made, and
-# built by default. INPUT_NAME is the graph's input that takes the model, OUTPUT_NAME the output that is saved, which need
-# not be given when there is only one. ${qmat_GRAPH} is the graph of the paper.
+# `qmat run GRAPH` makes OUTPUT when it is missing, or when the graph, the model, a file that the model refers to, or qmat
+# itself has changed. The ending of OUTPUT chooses the format. A relative OUTPUT is in the current build folder; other
+# relative paths are in the current source folder. TARGET is the target that needs the asset; a new one is made and built
+# by default. INPUT_NAME is the graph's input that takes the model. OUTPUT_NAME is the output to save; it may be left out
+# if there is only one. ${qmat_GRAPH} is the graph of the paper.
 function(qmat_add_asset)
   cmake_parse_arguments(PARSE_ARGV 0 asset "" "TARGET;GRAPH;INPUT;OUTPUT;INPUT_NAME;OUTPUT_NAME" "SET;OPTIONS")
   foreach(name TARGET GRAPH INPUT OUTPUT)
@@ -17,7 +17,7 @@ function(qmat_add_asset)
     endif()
   endforeach()
   if(asset_UNPARSED_ARGUMENTS)
-    message(FATAL_ERROR "qmat_add_asset: '${asset_UNPARSED_ARGUMENTS}' is not understood")
+    message(FATAL_ERROR "qmat_add_asset: unknown argument '${asset_UNPARSED_ARGUMENTS}'")
   endif()
   cmake_path(ABSOLUTE_PATH asset_GRAPH BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
   cmake_path(ABSOLUTE_PATH asset_INPUT BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)

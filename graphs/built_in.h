@@ -4,7 +4,7 @@
 
 #include "graphs/graph.h"
 
-/* The text of graphs/qmat_plus.yaml, written into the program by CMake. */
+/* The text of graphs/qmat_plus.yaml, embedded by CMake. */
 extern const char qmat_plus_graph[];
 extern const size_t qmat_plus_graph_size; /* without the terminating zero */
 

@@ -17,6 +17,21 @@ const qmat_param *qmat_output_format_param(const qmat_node *type) {
   return NULL;
 }
 
+qmat_value_type qmat_graph_output_type(const qmat_graph *graph, size_t output) {
+  const qmat_graph_output *made = &graph->outputs[output];
+  return graph->nodes[made->node].type->outputs[made->port].type;
+}
+
+size_t qmat_graph_file_count(const qmat_graph *graph, size_t *last) {
+  size_t count = 0;
+  for (size_t i = 0; i < graph->output_count; i++) {
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE) continue;
+    *last = i;
+    count++;
+  }
+  return count;
+}
+
 const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node) {
   for (size_t row = 0; row < qmat_param_count(node->type); row++)
     if ((node->type->params[row].flags & QMAT_PARAM_REQUIRED) && !node->texts[row]) return &node->type->params[row];

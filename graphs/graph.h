@@ -70,6 +70,12 @@ void qmat_graph_uninit(qmat_graph *graph);
 /* The parameter of a node type that the ending of an output path sets, or NULL. */
 const qmat_param *qmat_output_format_param(const qmat_node *type);
 
+/* The type of value that output `output` of the graph is. */
+qmat_value_type qmat_graph_output_type(const qmat_graph *graph, size_t output);
+
+/* How many outputs of the graph are files; `*last` becomes the last of them. */
+size_t qmat_graph_file_count(const qmat_graph *graph, size_t *last);
+
 /* The first required parameter of a node that is not set, or NULL. */
 const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node);
 

@@ -34,6 +34,12 @@ static qmat_status suggest_port(qmat_context *context, const char *text, const c
   return qmat_suggest_name(context, text, kind, &names);
 }
 
+qmat_status qmat_suggest_nearest(qmat_context *context, const char *text, const char *const *names, size_t count,
+                                 const char *otherwise) {
+  const char *nearest = qmat_nearest_name(text, names, count);
+  return nearest ? qmat_fail_hint(context, "did you mean '%s'?", nearest) : qmat_fail_hint(context, "%s", otherwise);
+}
+
 bool qmat_is_graph_name(const char *text) {
   size_t length = 0;
   for (; text[length]; length++) {

@@ -20,6 +20,11 @@ void qmat_name_list_add(qmat_name_list *list, const char *name);
  * few. Frees the list. Returns the error's status. */
 qmat_status qmat_suggest_name(qmat_context *context, const char *text, const char *kind, qmat_name_list *list);
 
+/* Adds a hint to the newest error: the nearest of `count` names, or `otherwise` where none is near. Returns the error's
+ * status. */
+qmat_status qmat_suggest_nearest(qmat_context *context, const char *text, const char *const *names, size_t count,
+                                 const char *otherwise);
+
 /* Whether `text` may name a node, an input or an output. */
 bool qmat_is_graph_name(const char *text);
 

@@ -7,24 +7,13 @@
 #include <string.h>
 
 const char *qmat_param_type_name(qmat_param_type type) {
-  switch (type) {
-    case QMAT_PARAM_BOOL:
-      return "bool";
-    case QMAT_PARAM_INT:
-      return "int";
-    case QMAT_PARAM_FLOAT:
-      return "float";
-    case QMAT_PARAM_ENUM:
-      return "enum";
-    case QMAT_PARAM_STRING:
-      return "string";
-    case QMAT_PARAM_PATH:
-      return "path";
-  }
-  return "unknown";
+  static const char *const names[] = {
+      [QMAT_PARAM_BOOL] = "bool", [QMAT_PARAM_INT] = "int",       [QMAT_PARAM_FLOAT] = "float",
+      [QMAT_PARAM_ENUM] = "enum", [QMAT_PARAM_STRING] = "string", [QMAT_PARAM_PATH] = "path"};
+  return names[type];
 }
 
-/* A bound that stands for "none" is left out of listings. */
+/* Whether a bound is not the value that stands for "none". */
 static bool is_bound(const qmat_param *param, double number) {
   return fabs(number) < (param->type == QMAT_PARAM_INT ? 0x1p53 : 1e300);
 }
@@ -46,19 +35,17 @@ json_t *qmat_param_json(const qmat_param *param, const void *params) {
     case QMAT_PARAM_PATH: {
       const char *value = *(const char *const *)place;
       if (!value) return json_null();
-      json_t *string = json_string(value);
-      /* A path need not be UTF-8, but JSON must be. */
+      json_t *string = json_string(value); /* NULL for a path that is not UTF-8 */
       return string ? string : json_string("(not UTF-8)");
     }
   }
   return NULL;
 }
 
-static json_t *param_row(const qmat_node *type, const qmat_param *param, const void *defaults) {
+static json_t *param_row(const qmat_param *param, const void *defaults) {
   json_t *row = json_pack("{s:s, s:s, s:s?, s:s?, s:o}", "name", param->name, "type", qmat_param_type_name(param->type),
                           "unit", param->unit, "doc", param->doc, "default", qmat_param_json(param, defaults));
   if (!row) return NULL;
-  (void)type;
   if (param->type == QMAT_PARAM_INT || param->type == QMAT_PARAM_FLOAT) {
     bool whole = param->type == QMAT_PARAM_INT;
     if (is_bound(param, param->min))
@@ -102,7 +89,7 @@ json_t *qmat_node_json(const qmat_node *type) {
   json_t *params = json_array();
   if (defaults) qmat_params_default(type, defaults);
   for (size_t i = 0; defaults && params && i < qmat_param_count(type); i++)
-    if (json_array_append_new(params, param_row(type, &type->params[i], defaults)) != 0) {
+    if (json_array_append_new(params, param_row(&type->params[i], defaults)) != 0) {
       json_decref(params);
       params = NULL;
     }
@@ -127,7 +114,7 @@ json_t *qmat_registry_json(const qmat_registry *registry) {
   return nodes;
 }
 
-/* Text that is put together piece by piece; what does not fit is left out. */
+/* Text built from pieces; cut at its size. */
 typedef struct piece_writer {
   char *text;
   size_t size, used;

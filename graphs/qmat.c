@@ -27,7 +27,7 @@ struct qmat_job {
   qmat_context context;
   qmat_graph graph;
   qmat_run run;
-  bool loaded; /* a job whose graph could not be read keeps that error, whatever is done with it */
+  bool loaded; /* false: the graph could not be read, and every call returns that error */
   bool ran;
   job_save *saves;
   size_t save_count, save_capacity;
@@ -36,7 +36,7 @@ struct qmat_job {
   qmat_run_given *given;
   size_t given_count, given_capacity;
   char *cache_folder; /* NULL: none */
-  qmat_cache cache;   /* open while a run lasts, and for as long as its report may be asked for */
+  qmat_cache cache;   /* open during a run, and as long as its report may be requested */
   qmat_job_progress progress;
   void *progress_user;
   qmat_job_problem problem;
@@ -48,8 +48,7 @@ const char *qmat_version(void) {
 }
 
 char *qmat_nodes_json(void) {
-  const qmat_registry registry = {qmat_nodes, qmat_node_count};
-  json_t *nodes = qmat_registry_json(&registry);
+  json_t *nodes = qmat_registry_json(&(qmat_registry){qmat_nodes, qmat_node_count});
   char *text = nodes ? qmat_json_text(nodes, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   json_decref(nodes);
   return text;
@@ -59,7 +58,7 @@ void qmat_text_free(char *text) {
   qmat_free(text);
 }
 
-/* Ends a call: keeps the error for qmat_job_error. */
+/* Ends a call: stores its error for qmat_job_error. */
 static qmat_result finish(qmat_job *job, qmat_status status) {
   qmat_result result = (qmat_result)qmat_status_exit_code(status);
   if (result == QMAT_RESULT_OK) return result;
@@ -118,35 +117,31 @@ static qmat_job *new_job(void) {
   return job;
 }
 
-static qmat_registry all_nodes(void) {
-  return (qmat_registry){qmat_nodes, qmat_node_count};
+/* Ends the making of a job. */
+static qmat_result finish_new(qmat_job *job, qmat_status status) {
+  job->loaded = status == QMAT_OK;
+  return finish(job, status);
 }
 
 qmat_result qmat_job_new(qmat_job **job) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
-  const qmat_registry nodes = all_nodes();
-  qmat_status status = qmat_graph_read_built_in(&(*job)->context, &nodes, &(*job)->graph);
-  (*job)->loaded = status == QMAT_OK;
-  return finish(*job, status);
+  return finish_new(
+      *job, qmat_graph_read_built_in(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, &(*job)->graph));
 }
 
 qmat_result qmat_job_new_from_file(qmat_job **job, const char *path) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
-  const qmat_registry nodes = all_nodes();
-  qmat_status status = qmat_graph_read_file(&(*job)->context, &nodes, path, &(*job)->graph);
-  (*job)->loaded = status == QMAT_OK;
-  return finish(*job, status);
+  return finish_new(*job, qmat_graph_read_file(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, path,
+                                               &(*job)->graph));
 }
 
 qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
-  const qmat_registry nodes = all_nodes();
-  qmat_status status = qmat_graph_read_text(&(*job)->context, &nodes, "graph", text, size, &(*job)->graph);
-  (*job)->loaded = status == QMAT_OK;
-  return finish(*job, status);
+  return finish_new(*job, qmat_graph_read_text(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, "graph",
+                                               text, size, &(*job)->graph));
 }
 
 void qmat_job_free(qmat_job *job) {
@@ -164,7 +159,7 @@ void qmat_job_free(qmat_job *job) {
   qmat_free(job);
 }
 
-/* ---- what to do ---- */
+/* ---- inputs and outputs ---- */
 
 qmat_result qmat_job_set(qmat_job *job, const char *assignment) {
   if (!job->loaded) return job->problem.result;
@@ -200,7 +195,7 @@ static qmat_status make_scene(qmat_context *context, const char *name, qmat_scen
   return status;
 }
 
-/* Puts a value in place of what the port would make; the job takes the caller's reference. */
+/* Sets a port to a value. The job takes the caller's reference. */
 static qmat_status give(qmat_job *job, size_t node, size_t port, qmat_value *value) {
   for (size_t i = 0; i < job->given_count; i++)
     if (job->given[i].node == node && job->given[i].port == port) {
@@ -250,18 +245,11 @@ qmat_result qmat_job_want(qmat_job *job, const char *port) {
   return finish(job, status);
 }
 
-/* The only output that is a file. */
+/* Finds the only output that is a file. */
 static qmat_status only_file(qmat_job *job, size_t *output) {
-  size_t count = 0;
-  for (size_t i = 0; i < job->graph.output_count; i++) {
-    const qmat_graph_output *made = &job->graph.outputs[i];
-    if (job->graph.nodes[made->node].type->outputs[made->port].type != QMAT_FILE) continue;
-    *output = i;
-    count++;
-  }
+  const size_t count = qmat_graph_file_count(&job->graph, output);
   if (count == 1) return QMAT_OK;
-  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "the graph makes %zu files: say which output is to be saved",
-                   count);
+  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "the graph makes %zu files: name the output to save", count);
 }
 
 qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
@@ -335,8 +323,8 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   qmat_cache_close(&job->cache);
   job->ran = false;
   if (threads < 0 || threads > 1024)
-    return finish(job,
-                  qmat_fail(context, QMAT_ERROR_USAGE, "the number of threads is from 0 to 1024, not %d", threads));
+    return finish(
+        job, qmat_fail(context, QMAT_ERROR_USAGE, "the number of threads has to be from 0 to 1024, not %d", threads));
   qmat_run_save *saves = qmat_calloc(job->save_count, sizeof *saves);
   if (!saves) return finish(job, qmat_fail_memory(context, "paths"));
   for (size_t i = 0; i < job->save_count; i++) saves[i] = (qmat_run_save){job->saves[i].output, job->saves[i].path};
@@ -379,13 +367,13 @@ static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type t
   if (status != QMAT_OK) return status;
   *value = qmat_run_value(&job->run, node, index);
   if (!*value) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not asked for before the run", port);
+    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not requested before the run", port);
     return qmat_fail_hint(context, "qmat_job_want");
   }
   if ((*value)->type == QMAT_LIST) {
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has %zu values, one for each mesh of the scene", port,
               qmat_value_count(*value));
-    return qmat_fail_hint(context, "choose a mesh by scene.read's parameter mesh, or set that to merged");
+    return qmat_fail_hint(context, "set model.mesh to the name of a mesh, or to merged");
   }
   if ((*value)->type != type)
     return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name((*value)->type),
@@ -393,13 +381,17 @@ static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type t
   return QMAT_OK;
 }
 
+/* The value of a port, or NULL: the error is then in job->problem. */
+static const void *result_value(qmat_job *job, const char *port, qmat_value_type type) {
+  const qmat_value *value;
+  if (!job->loaded) return NULL;
+  return finish(job, find_value(job, port, type, &value)) == QMAT_RESULT_OK ? value : NULL;
+}
+
 qmat_result qmat_job_medial(qmat_job *job, const char *port, qmat_medial_view *view) {
   *view = (qmat_medial_view){0};
-  if (!job->loaded) return job->problem.result;
-  const qmat_value *value;
-  qmat_status status = find_value(job, port, QMAT_MEDIAL, &value);
-  if (status != QMAT_OK) return finish(job, status);
-  const qmat_medial *medial = (const qmat_medial *)value;
+  const qmat_medial *medial = result_value(job, port, QMAT_MEDIAL);
+  if (!medial) return job->problem.result;
   *view = (qmat_medial_view){medial->sphere_count, medial->edge_count, medial->triangle_count,
                              medial->spheres,      medial->edges,      medial->triangles};
   return QMAT_RESULT_OK;
@@ -407,22 +399,16 @@ qmat_result qmat_job_medial(qmat_job *job, const char *port, qmat_medial_view *v
 
 qmat_result qmat_job_mesh(qmat_job *job, const char *port, qmat_mesh_view *view) {
   *view = (qmat_mesh_view){0};
-  if (!job->loaded) return job->problem.result;
-  const qmat_value *value;
-  qmat_status status = find_value(job, port, QMAT_MESH, &value);
-  if (status != QMAT_OK) return finish(job, status);
-  const qmat_mesh *mesh = (const qmat_mesh *)value;
+  const qmat_mesh *mesh = result_value(job, port, QMAT_MESH);
+  if (!mesh) return job->problem.result;
   *view = (qmat_mesh_view){mesh->vertex_count, mesh->triangle_count, mesh->positions, mesh->triangles};
   return QMAT_RESULT_OK;
 }
 
 qmat_result qmat_job_file(qmat_job *job, const char *port, qmat_file_view *view) {
   *view = (qmat_file_view){.format = ""};
-  if (!job->loaded) return job->problem.result;
-  const qmat_value *value;
-  qmat_status status = find_value(job, port, QMAT_FILE, &value);
-  if (status != QMAT_OK) return finish(job, status);
-  const qmat_file *file = (const qmat_file *)value;
+  const qmat_file *file = result_value(job, port, QMAT_FILE);
+  if (!file) return job->problem.result;
   *view = (qmat_file_view){file->format, file->part_count};
   return QMAT_RESULT_OK;
 }
@@ -432,13 +418,10 @@ qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t part, con
   *name = "";
   *bytes = NULL;
   *size = 0;
-  if (!job->loaded) return job->problem.result;
-  const qmat_value *value;
-  qmat_status status = find_value(job, port, QMAT_FILE, &value);
-  if (status != QMAT_OK) return finish(job, status);
-  const qmat_file *file = (const qmat_file *)value;
+  const qmat_file *file = result_value(job, port, QMAT_FILE);
+  if (!file) return job->problem.result;
   if (part >= file->part_count)
-    return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' has %zu parts, so none of number %zu", port,
+    return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' has %zu parts and no part %zu", port,
                                  file->part_count, part));
   *name = file->parts[part].name;
   *bytes = file->parts[part].bytes;
@@ -453,11 +436,8 @@ static qmat_status dump(qmat_context *context, const json_t *root, char **json) 
 
 qmat_result qmat_job_report(qmat_job *job, const char *port, char **json) {
   *json = NULL;
-  if (!job->loaded) return job->problem.result;
-  const qmat_value *value;
-  qmat_status status = find_value(job, port, QMAT_REPORT, &value);
-  if (status == QMAT_OK) status = dump(&job->context, ((const qmat_report *)value)->root, json);
-  return finish(job, status);
+  const qmat_report *report = result_value(job, port, QMAT_REPORT);
+  return report ? finish(job, dump(&job->context, report->root, json)) : job->problem.result;
 }
 
 qmat_result qmat_job_run_report(qmat_job *job, char **json) {

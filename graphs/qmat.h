@@ -6,12 +6,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* qmat: the medial axis transform of 3D models. This is the library's one public header.
+/* qmat: the medial axis transform of 3D models. This is the library's only public header.
  *
- * A job is a graph of nodes, what is set and wanted of it, and what came of it:
+ * A job is a graph of nodes with its parameters and its results:
  *
  *     qmat_job *job;
- *     int result = qmat_job_new(&job);                             the built-in graph, the one of `qmat mat`
+ *     int result = qmat_job_new(&job);                             the built-in graph, that of `qmat mat`
  *     if (!result) result = qmat_job_set(job, "model=octopus.off");
  *     if (!result) result = qmat_job_set(job, "epsilon=1%");
  *     if (!result) result = qmat_job_save(job, "asset", "octopus.glb");
@@ -19,9 +19,9 @@
  *     if (result) puts(qmat_job_error(job)->text);
  *     qmat_job_free(job);
  *
- * Functions that can fail return a qmat_result; what went wrong is then in qmat_job_error. Positions are in the units
- * of the model. Texts are UTF-8 and are copied; numbers in texts are read without the locale. There is no global state:
- * different jobs may be used by different threads at the same time, one job by one thread at a time. */
+ * Functions that can fail return a qmat_result; qmat_job_error then has the error. Positions are in the units of the
+ * model. Texts are UTF-8 and are copied; numbers in texts are read without the locale. There is no global state:
+ * different threads may use different jobs at the same time, one thread at a time uses a job. */
 
 #if defined(__GNUC__)
 #define QMAT_API __attribute__((visibility("default")))
@@ -33,12 +33,12 @@
 extern "C" {
 #endif
 
-/* What a call came to; the exit codes of the command line are the same numbers. */
+/* The result of a call. The exit codes of the command line are the same numbers. */
 typedef enum qmat_result {
   QMAT_RESULT_OK = 0,
-  QMAT_RESULT_FAILED = 1,   /* a file, a model, memory, or a library beneath */
-  QMAT_RESULT_USAGE = 2,    /* a bad graph, name, value or order of calls */
-  QMAT_RESULT_CANCELLED = 3 /* the progress function asked to stop */
+  QMAT_RESULT_FAILED = 1,   /* a file, a model, memory, or a library */
+  QMAT_RESULT_USAGE = 2,    /* a wrong graph, name, value or order of calls */
+  QMAT_RESULT_CANCELLED = 3 /* by the progress function */
 } qmat_result;
 
 typedef struct qmat_job qmat_job;
@@ -49,78 +49,77 @@ QMAT_API const char *qmat_version(void);
 /* All node types with their ports and parameters, as JSON: what `qmat nodes --json` prints. NULL when memory is short;
  * free with qmat_text_free. */
 QMAT_API char *qmat_nodes_json(void);
-/* Frees a text that a function of this header has made; NULL is allowed. */
+/* Frees a text that this library returned; NULL is allowed. */
 QMAT_API void qmat_text_free(char *text);
 
 /* ---- making a job ---- */
 
-/* A job of the built-in graph, graphs/qmat_plus.yaml: nodes model, thickness, samples, initial, simple, errors, skin,
- * asset; inputs model, epsilon, vertices; output asset. `*job` is NULL only when memory is short; after any other
- * failure it holds the error. Free it with qmat_job_free. */
+/* A job with the built-in graph, graphs/qmat_plus.yaml: nodes model, surface, solid, thickness, samples, initial,
+ * refined, features, simple, errors, skin, asset; inputs model, epsilon, vertices, features; output asset. `*job` is
+ * NULL only when memory is short; after any other failure it has the error. Free it with qmat_job_free. */
 QMAT_API qmat_result qmat_job_new(qmat_job **job);
-/* The same of a graph file; its relative paths are relative to its folder. */
+/* The same with a graph file. Its relative paths are relative to its folder. */
 QMAT_API qmat_result qmat_job_new_from_file(qmat_job **job, const char *path);
-/* The same of `size` bytes of graph text, YAML or JSON; its relative paths are relative to the working folder. */
+/* The same with `size` bytes of graph text, YAML or JSON. Its relative paths are relative to the working folder. */
 QMAT_API qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size);
-/* Frees a job and everything that it has given out; NULL is allowed. */
+/* Frees a job and everything that it returned; NULL is allowed. */
 QMAT_API void qmat_job_free(qmat_job *job);
 
-/* ---- what to do ---- */
+/* ---- inputs and outputs ---- */
 
-/* Sets a parameter: "node.parameter=value", or "input=value" with the name of an input of the graph. Lengths are
- * fractions of the bounding-box diagonal; "1%" is 0.01. */
+/* Sets a parameter: "node.parameter=value", or "input=value" for an input of the graph. Lengths are fractions of the
+ * bounding-box diagonal; "1%" is 0.01. */
 QMAT_API qmat_result qmat_job_set(qmat_job *job, const char *assignment);
 
-/* Gives a triangle mesh as the value of an output port ("model.mesh"), in place of what the node would make; the node
- * then does not run, and an output of type scene carries `name` (NULL: "mesh"). `positions` holds 3 * vertex_count
- * doubles x y z, `triangles` 3 * triangle_count indices below vertex_count, counter-clockwise from outside; both are
- * copied. The mesh is treated as one from a file: vertices of equal position are welded, the orientation is made
- * consistent. Cost: linear. */
+/* Sets an output port ("model.mesh") to a triangle mesh. Its node then does not run; the node's output of type scene
+ * gets the name `name` (NULL: "mesh"). `positions` has 3 * vertex_count doubles x y z, `triangles` 3 * triangle_count
+ * indices below vertex_count, counter-clockwise from outside; both are copied. As for a file, vertices at the same
+ * position are welded and the orientation is made consistent. Cost: linear. */
 QMAT_API qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
                                         size_t vertex_count, const uint32_t *triangles, size_t triangle_count);
 
-/* Asks for the value of an output port ("simple.medial"), to be read after the run. When anything is asked for, only
- * what that and the saved outputs need is run; else every output of the graph is made. */
+/* Requests the value of an output port ("simple.medial"), to be read after the run. With requests, only the nodes that
+ * they and the saved outputs need run; without, every output of the graph is made. */
 QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
 
-/* Saves an output of the graph ("asset"; NULL: the only one that is a file) as `path` when the run has succeeded. The
- * path's ending chooses the format. May be called again for the same output with another path. */
+/* Saves an output of the graph ("asset"; NULL: the only one that is a file) as `path` after a successful run. The
+ * path's ending chooses the format. An output may be saved several times under different paths. */
 QMAT_API qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
 
-/* Keeps the results of every node in a folder, which is made when it is not there, and takes them from there when they
- * are known: a mesh that is given in memory counts by its content, like one from a file. Any number of jobs, threads
- * and processes may share a folder. NULL: no cache, which is how a job starts. What goes wrong with a cache never fails
- * a run; qmat_job_run_report tells of it ("cache"). QMAT_RESULT_USAGE: the path leads to a file. */
+/* Sets the folder of the cache, which is made if it is missing; NULL, the default: no cache. A cached result is used
+ * instead of running its node; a mesh in memory counts by its content. Any number of jobs, threads and processes may
+ * share a folder. A failure of the cache never fails a run; qmat_job_run_report has it under "cache".
+ * QMAT_RESULT_USAGE: the path is a file. */
 QMAT_API qmat_result qmat_job_cache(qmat_job *job, const char *folder);
-/* The folder that the command line uses: $QMAT_CACHE, or qmat in $XDG_CACHE_HOME or ~/.cache; NULL where that is "off"
- * or there is no home. Free with qmat_text_free. */
+/* The cache folder of the command line: $QMAT_CACHE, $XDG_CACHE_HOME/qmat or ~/.cache/qmat. NULL: $QMAT_CACHE is "off",
+ * or there is no home folder. Free with qmat_text_free. */
 QMAT_API char *qmat_cache_folder(void);
 
-/* How many nodes of the last run came from the cache, and how many there were. NULL is allowed. */
+/* How many nodes of the last run came from the cache, and how many it had. Either pointer may be NULL. */
 QMAT_API qmat_result qmat_job_hits(qmat_job *job, size_t *hits, size_t *nodes);
 
 /* ---- running ---- */
 
-/* Hears of the running node: `done` of `total` (0: not known) of `unit`. Returns false to cancel. Called from the
- * thread that runs the job. */
+/* Called while a node runs: `done` of `total` (0: unknown) of `unit`. Returns false to cancel. Called from the thread
+ * that runs the job. */
 typedef bool (*qmat_job_progress)(void *user, const char *node, const char *type, uint64_t done, uint64_t total,
                                   const char *unit);
 
-/* Runs the job with `threads` threads (0: as many as there are processors). `progress` may be NULL. Nothing is written
- * unless everything succeeds. A job may be changed and run again; what an earlier run gave out is freed then. The
- * results are the same bytes for any number of threads. */
+/* Runs the job on `threads` threads (0: one per processor). `progress` may be NULL. Files are written only after every
+ * node has succeeded. A job may be changed and run again, which frees what the earlier run returned. The results are
+ * the same bytes for any number of threads. */
 QMAT_API qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress, void *user);
 
 /* ---- results ---- */
-/* Pointers stay valid until the next run of the job or its end. Each call fails with QMAT_RESULT_USAGE when the port
- * was not asked for before the run, holds another type of value, or holds one for each of several meshes of a glTF
- * scene: "model.mesh=NAME" chooses one of them, "model.mesh=merged" takes them as one. */
+/* Pointers are valid until the next run or the end of the job. Each call fails with QMAT_RESULT_USAGE when the port was
+ * not requested before the run, has another type, or has one value per mesh of a glTF scene: set "model.mesh=NAME" to
+ * choose a mesh, or "model.mesh=merged" to merge them. */
 
 /* A medial mesh. */
 typedef struct qmat_medial_view {
   size_t sphere_count, edge_count, triangle_count;
   const double *spheres;     /* 4 * sphere_count: x y z radius */
-  const uint32_t *edges;     /* 2 * edge_count: medial cones, also those at the rim of slabs */
+  const uint32_t *edges;     /* 2 * edge_count: medial cones, including the sides of slabs */
   const uint32_t *triangles; /* 3 * triangle_count: medial slabs */
 } qmat_medial_view;
 
@@ -130,7 +129,7 @@ typedef struct qmat_mesh_view {
   const uint32_t *triangles; /* 3 * triangle_count */
 } qmat_mesh_view;
 
-/* A finished file: part 0 is the main one, the others are those that it refers to by their names. */
+/* A finished file: part 0 is the main file, the others are its side files. */
 typedef struct qmat_file_view {
   const char *format; /* "glb" */
   size_t part_count;
@@ -144,12 +143,12 @@ QMAT_API qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t 
                                         const uint8_t **bytes, size_t *size);
 /* A report as JSON text; free with qmat_text_free. */
 QMAT_API qmat_result qmat_job_report(qmat_job *job, const char *port, char **json);
-/* What the whole run did, as `qmat run --report` writes it; free with qmat_text_free. */
+/* The report of the run, as `qmat run --report` writes it; free with qmat_text_free. */
 QMAT_API qmat_result qmat_job_run_report(qmat_job *job, char **json);
 
 /* ---- errors ---- */
 
-/* What went wrong. Texts are never NULL; "" , element -1 and line 0 mean "does not apply". */
+/* An error. Texts are never NULL; "", element -1 and line 0 mean "does not apply". */
 typedef struct qmat_job_problem {
   qmat_result result;
   const char *status;       /* "usage", "io", "format", "geometry", "memory", "dependency", "internal", "cancelled" */
@@ -161,11 +160,11 @@ typedef struct qmat_job_problem {
   const char *file;
   int line, column; /* from 1 */
   const char *message, *hint;
-  const char *text; /* all of it on one line */
+  const char *text; /* the whole error on one line */
 } qmat_job_problem;
 
-/* The job's newest failure; its result is QMAT_RESULT_OK when nothing has failed. Valid until the next call on the job.
- * A NULL job tells of a shortage of memory. Never NULL. */
+/* The job's latest error; its result is QMAT_RESULT_OK when nothing has failed. Valid until the next call on the job.
+ * For a NULL job: a shortage of memory. Never NULL. */
 QMAT_API const qmat_job_problem *qmat_job_error(const qmat_job *job);
 
 #ifdef __cplusplus

@@ -20,7 +20,7 @@ qmat_shown qmat_show(const char *text) {
     shown.text[length] = c < 0x20 || c == 0x7f ? '?' : (char)c;
   }
   if (text[length]) {
-    /* Not in the middle of a UTF-8 character. */
+    /* Never cut inside a UTF-8 character. */
     while (length > 0 && ((unsigned char)text[length] & 0xc0) == 0x80) length--;
     memcpy(shown.text + length, "...", 3);
     length += 3;
@@ -42,14 +42,14 @@ static qmat_status fail_syntax(tree_reader *reader) {
   if (parser->error == YAML_MEMORY_ERROR) return qmat_fail_memory(reader->context, "graph");
   qmat_mark mark = mark_of(parser->problem_mark);
   if (parser->error == YAML_READER_ERROR) {
-    /* The reader knows no marks, only how many bytes it has seen. */
+    /* libyaml gives this error a byte offset and no mark. */
     mark = (qmat_mark){1, 1};
     for (size_t i = 0; i < parser->problem_offset && i < reader->size; i++) {
       mark.column++;
       if (reader->text[i] == '\n') mark = (qmat_mark){mark.line + 1, 1};
     }
   }
-  const char *problem = parser->problem ? parser->problem : "it cannot be read";
+  const char *problem = parser->problem ? parser->problem : "unknown error";
   if (parser->context)
     qmat_fail(reader->context, QMAT_ERROR_USAGE, "this is not YAML: %s, %s", parser->context, problem);
   else
@@ -57,7 +57,7 @@ static qmat_status fail_syntax(tree_reader *reader) {
   return fail_at(reader, mark);
 }
 
-/* The next event, which the caller deletes; anchors, aliases, tags and lists stop here. */
+/* Reads the next event, which the caller deletes. Refuses anchors, aliases, tags and lists. */
 static qmat_status next_event(tree_reader *reader, yaml_event_t *event) {
   if (!yaml_parser_parse(&reader->parser, event)) return fail_syntax(reader);
   const char *refused = NULL;
@@ -74,7 +74,7 @@ static qmat_status next_event(tree_reader *reader, yaml_event_t *event) {
       if (event->data.mapping_start.tag) refused = "tags (!name) are not part of the graph language";
       break;
     case YAML_SEQUENCE_START_EVENT:
-      refused = "lists are not part of the graph language; a mapping or a single value belongs here";
+      refused = "lists are not part of the graph language; use a mapping or a single value";
       break;
     default:
       break;
@@ -90,7 +90,7 @@ static qmat_status copy_text(tree_reader *reader, const yaml_event_t *event, con
   size_t length = event->data.scalar.length;
   const char *value = (const char *)event->data.scalar.value;
   if (memchr(value, 0, length)) {
-    qmat_fail(reader->context, QMAT_ERROR_USAGE, "the text has a zero character in it");
+    qmat_fail(reader->context, QMAT_ERROR_USAGE, "the text has a zero character");
     return fail_at(reader, mark_of(event->start_mark));
   }
   char *copy = qmat_arena_alloc(reader->arena, length + 1, 1);
@@ -146,7 +146,7 @@ static qmat_status read_entries(tree_reader *reader, int depth, qmat_tree *mappi
   }
 }
 
-/* Reads the value that starts with `event`, which stays the caller's. */
+/* Reads the value that starts with `event`; the caller keeps the event. */
 static qmat_status read_value(tree_reader *reader, const yaml_event_t *event, int depth, const qmat_tree **result) {
   qmat_tree *value = qmat_arena_calloc(reader->arena, 1, sizeof *value);
   if (!value) return qmat_fail_memory(reader->context, "graph");

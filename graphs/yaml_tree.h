@@ -12,8 +12,8 @@ typedef struct qmat_mark {
   int line, column;
 } qmat_mark;
 
-/* One value of a YAML document: a text, or a mapping from texts to values. There are no lists, anchors, aliases or
- * tags: the graph language has no use for them, and without them a document is never larger than its file. */
+/* One value of a YAML document: a text, or a mapping from texts to values. The graph language has no lists, anchors,
+ * aliases or tags; without them a document is never larger than its file. */
 typedef struct qmat_tree qmat_tree;
 
 typedef struct qmat_tree_entry {
@@ -26,8 +26,8 @@ typedef struct qmat_tree_entry {
 struct qmat_tree {
   bool is_mapping;
   qmat_mark mark;
-  const char *text; /* NUL-terminated, without other NULs; NULL for a mapping */
-  bool empty;       /* nothing was written, or an unquoted null or ~ */
+  const char *text; /* NUL-terminated, no other NULs; NULL for a mapping */
+  bool empty;       /* no text, or an unquoted null or ~ */
   qmat_tree_entry *entries;
 };
 
@@ -37,14 +37,14 @@ enum {
   QMAT_TREE_MAX_ENTRIES = 4096   /* of one mapping */
 };
 
-/* Reads one YAML document (JSON is a part of YAML) of `size` bytes. `file` is the name that errors give it. `*tree`
- * lives in `arena`. QMAT_ERROR_USAGE with the place: a syntax error, an empty or a second document, a list, an anchor,
- * an alias, a tag, a key that is given twice, or more than the limits above. Cost: linear in the size, and quadratic in
- * the entries of one mapping. */
+/* Reads one YAML document (or JSON, which is part of YAML) of `size` bytes. Errors call it `file`. `*tree` lives in
+ * `arena`. QMAT_ERROR_USAGE with the place: a syntax error, an empty or a second document, a list, anchor, alias or
+ * tag, a key that is given twice, or a limit above. Cost: linear in the size, quadratic in the entries of one mapping.
+ */
 qmat_status qmat_tree_read(qmat_context *context, qmat_arena *arena, const char *file, const char *text, size_t size,
                            const qmat_tree **tree);
 
-/* Text from a file as an error message may show it: at most 60 bytes, nothing that a terminal would act on. */
+/* Text from a file for an error message: at most 60 bytes, without control characters. */
 typedef struct qmat_shown {
   char text[68];
 } qmat_shown;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Loads the colliders that the build has made, and tells how large they are. */
+/* Loads the colliders that the build made, and prints their size. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include <qmat.h>
 
-/* The spheres of a .ma file (README.md says what stands in it); NULL when it cannot be read. */
+/* The spheres of a .ma file (see README.md for the format); NULL when it cannot be read. */
 static double *load_spheres(const char *path, size_t *count) {
   FILE *file = fopen(path, "r");
   size_t cones, slabs;

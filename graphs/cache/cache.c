@@ -21,10 +21,10 @@ static const char *const kind_folders[QMAT_CACHE_KIND_COUNT] = {"ac/", "cas/", "
 
 static const char tag_text[] =
     "Signature: 8a477f597d28d172789f06886806bc55\n"
-    "# This folder is a cache of qmat: whatever is in it can be made again.\n"
-    "# What a cache directory tag is: https://bford.info/cachedir/\n";
+    "# This folder is a cache of qmat: everything in it can be made again.\n"
+    "# About cache directory tags: https://bford.info/cachedir/\n";
 
-/* A line that follows a record's JSON holds the digest of that JSON. */
+/* A record's last line has the digest of its JSON. */
 static const char record_end[] = "\nsha256 ";
 
 /* ---- paths and files ---- */
@@ -45,11 +45,11 @@ static char *path_of_digest(const qmat_cache *cache, qmat_cache_kind kind, const
 static void warn(qmat_cache *cache, const char *what, const char *path, int number) {
   const char *reason = strerrordesc_np(number);
   if (!*cache->warning)
-    snprintf(cache->warning, sizeof cache->warning, "the cache cannot be written: %s %s: %s", what, path,
+    snprintf(cache->warning, sizeof cache->warning, "cannot write to the cache: %s %s: %s", what, path,
              reason ? reason : "unknown error");
 }
 
-/* Makes a folder and those above it. */
+/* Makes a folder and its parents. */
 static bool make_folders(char *path) {
   if (mkdir(path, 0777) == 0 || errno == EEXIST) return true;
   char *slash = strrchr(path, '/');
@@ -72,7 +72,7 @@ static bool write_all(int file, const void *bytes, size_t size) {
   return true;
 }
 
-/* Makes a temporary that carries a lock for as long as its writer lives; -1 with errno. */
+/* Makes a temporary file with a lock that lasts as long as its writer; -1 with errno. */
 static int make_temporary(qmat_cache *cache, char **path) {
   for (int attempt = 0; attempt < 1000; attempt++) {
     char name[64];
@@ -86,7 +86,7 @@ static int make_temporary(qmat_cache *cache, char **path) {
       return -1;
     }
     int file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    /* File systems without locks have no sweepers that hold one either. */
+    /* Any other error: the file system has no locks, and a sweep cannot take one either. */
     if (file >= 0 && (flock(file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)) return file;
     int number = errno;
     if (file >= 0) close(file);
@@ -98,11 +98,11 @@ static int make_temporary(qmat_cache *cache, char **path) {
   return -1;
 }
 
-/* Puts a whole file in its place, or nothing. */
+/* Writes a file, whole or not at all. */
 static bool place_file(qmat_cache *cache, const char *path, const void *bytes, size_t size) {
   char *temporary = NULL;
   bool done = false;
-  /* A sweep may take a temporary in the moment before it is locked: then once more. */
+  /* A sweep may delete a temporary just before it is locked: then try again. */
   for (int attempt = 0; attempt < 3 && !done; attempt++) {
     int file = make_temporary(cache, &temporary);
     done = file >= 0 && write_all(file, bytes, size) && (fsync(file) == 0 || errno == EINVAL) &&
@@ -121,7 +121,7 @@ static bool place_file(qmat_cache *cache, const char *path, const void *bytes, s
   return done;
 }
 
-/* Makes the folders when they are needed first. */
+/* Makes the folders at the first use. */
 static bool make_ready(qmat_cache *cache) {
   if (cache->ready) return true;
   if (cache->read_only) return false;
@@ -162,13 +162,13 @@ qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *opt
   snprintf(cache->folder, length + 2, "%s%s", options->folder,
            length > 0 && options->folder[length - 1] == '/' ? "" : "/");
   if (stat(options->folder, &about) == 0 && !S_ISDIR(about.st_mode)) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the cache has to be a folder, but this is a file");
+    qmat_fail(context, QMAT_ERROR_USAGE, "the cache has to be a folder, not a file");
     return qmat_fail_at(context, options->folder, 0, 0);
   }
   if (stat(options->folder, &about) == 0 && access(options->folder, W_OK) != 0) cache->read_only = true;
   if (!options->remote) return QMAT_OK;
   if (strncmp(options->remote, "http://", 7) != 0 && strncmp(options->remote, "https://", 8) != 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "a remote cache is at http://... or https://..., not '%.200s'",
+    qmat_fail(context, QMAT_ERROR_USAGE, "the URL of a remote cache starts with http:// or https://, not '%.200s'",
               qmat_show_url(options->remote).text);
     return QMAT_ERROR_USAGE;
   }
@@ -213,8 +213,7 @@ static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
   return false;
 }
 
-/* Moves what is not what it should be out of the way; where that cannot be, it is remembered for as long as this lasts.
- */
+/* Moves a damaged file to bad/. If that fails, the cache remembers it as damaged. */
 static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
   char *from = path_of_digest(cache, kind, digest), *to = path_of_digest(cache, QMAT_CACHE_BAD, digest);
   bool moved = from && to && !cache->read_only && (rename(from, to) == 0 || unlink(from) == 0);
@@ -225,7 +224,7 @@ static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest
     cache->bad[cache->bad_count++] = *digest;
 }
 
-/* The JSON of a record's bytes when they are whole and belong to that key. */
+/* A record's JSON, if its bytes are intact and belong to the key. */
 static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest *key) {
   const size_t tail = sizeof record_end - 1 + 64 + 1;
   qmat_digest wanted, digest;
@@ -253,9 +252,8 @@ static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
   return kept;
 }
 
-static void warn_of_lie(qmat_cache *cache, const char *what) {
-  if (!*cache->warning)
-    snprintf(cache->warning, sizeof cache->warning, "the remote cache has %s that is not what its name says", what);
+static void warn_of_damage(qmat_cache *cache, const char *what) {
+  if (!*cache->warning) snprintf(cache->warning, sizeof cache->warning, "the remote cache has a damaged %s", what);
 }
 
 static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
@@ -267,7 +265,7 @@ static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
     if (record)
       keep_bytes(cache, QMAT_CACHE_RECORD, key, body.bytes, body.size);
     else
-      warn_of_lie(cache, "a record");
+      warn_of_damage(cache, "record");
   }
   qmat_writer_uninit(&body);
   return record;
@@ -299,14 +297,14 @@ static bool has_blob(qmat_cache *cache, const qmat_digest *digest, uint64_t size
          qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
 }
 
-/* The blobs that the items of a list are in. Items are no lists themselves. */
+/* The items of a list, each in a blob of its own. Items are never lists. */
 typedef struct list_items {
   qmat_cache *cache;
-  bool missing; /* one of them is not there, or not what it should be: that is not the list's fault */
+  bool missing; /* an item is missing or damaged; the list's own blob may be intact */
 } list_items;
 
-/* The value of a blob's bytes. Sealing takes the digest of the value's binary form, so the bytes need not be hashed
- * twice. */
+/* The value of a blob's bytes. Sealing computes the digest of the value's serialised form, so the bytes are hashed
+ * once. */
 static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_digest *digest,
                                const qmat_value_source *items) {
   qmat_context nobody = {0}; /* bad bytes are no error here */
@@ -341,7 +339,7 @@ static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, ui
     if (value)
       keep_bytes(cache, QMAT_CACHE_BLOB, digest, body.bytes, body.size);
     else if (!(list && list->missing))
-      warn_of_lie(cache, "a blob");
+      warn_of_damage(cache, "blob");
   }
   qmat_writer_uninit(&body);
   return value;
@@ -377,8 +375,7 @@ void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key) {
 
 /* ---- writing ---- */
 
-/* Sends bytes to the remote cache. Of a blob it is enough that it is there; a record may be newer than the one that is.
- */
+/* Sends bytes to the remote cache. A blob that it has already is not sent; a record may be newer and is sent again. */
 static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
   const char *folder = kind_folders[kind];
@@ -387,8 +384,7 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
 }
 
-/* Whether the blob is there as it should be. One that was damaged goes: a value that was made anew would not be stored.
- */
+/* Whether the cache has an intact blob. A damaged one is moved away, or the new value would not be stored. */
 static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   if (!has_locally(cache, digest, size)) return false;
   qmat_digest found;
@@ -399,7 +395,7 @@ static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   return sound;
 }
 
-/* Stores the binary form of a value; gives what a record says of it. */
+/* Stores the serialised form of a value and returns its entry in a record. */
 static json_t *put_blob(qmat_cache *cache, const qmat_value *value, bool *added) {
   qmat_context nobody = {0};
   const qmat_digest *digest = &value->digest;
@@ -430,7 +426,7 @@ json_t *qmat_cache_put_value(qmat_cache *cache, const qmat_value *value, bool *a
   return stored;
 }
 
-/* The blobs that a record names for one value: its own, and those of a list's items. */
+/* The blobs of a value's entry in a record: its own, and those of a list's items. */
 static size_t blob_count(const json_t *stored) {
   return 1 + json_array_size(json_object_get(stored, "items"));
 }
@@ -489,14 +485,14 @@ bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json
   return done;
 }
 
-/* ---- looking after it ---- */
+/* ---- maintenance ---- */
 
 typedef struct entry_list {
   qmat_cache_entry *entries;
   size_t count, capacity;
 } entry_list;
 
-/* Whether a file of this name is one that the cache makes. */
+/* Whether the cache makes files of this name. */
 static bool is_ours(qmat_cache_kind kind, const char *name, qmat_digest *digest) {
   if (kind == QMAT_CACHE_TEMPORARY) return *name && strspn(name, "0123456789-") == strlen(name) && strlen(name) < 64;
   return qmat_digest_parse(name, digest);
@@ -559,7 +555,7 @@ static void delete_entry(const qmat_cache *cache, const qmat_cache_entry *entry,
   qmat_free(path);
 }
 
-/* Whether a temporary is one that nobody writes any more. */
+/* Whether the writer of a temporary is gone. */
 static bool is_abandoned(const qmat_cache *cache, const qmat_cache_entry *entry) {
   char *path = path_of(cache, entry->kind, entry->name);
   int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
@@ -575,7 +571,7 @@ static int64_t now_nanoseconds(void) {
   return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
 }
 
-/* The blob entry of that digest among those sorted by kind and name. */
+/* The entry of a blob in a sorted list, or NULL. */
 static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, const qmat_digest *digest) {
   qmat_cache_entry wanted = {.kind = QMAT_CACHE_BLOB};
   if (count == 0) return NULL;
@@ -583,7 +579,7 @@ static qmat_cache_entry *find_blob(qmat_cache_entry *entries, size_t count, cons
   return bsearch(&wanted, entries, count, sizeof *entries, by_kind_and_name);
 }
 
-/* Marks the blobs that a record names for one value; false when one of them is missing. */
+/* Marks the blobs of a value's entry in a record. False: one is missing. */
 static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t count, bool *named) {
   bool complete = true;
   for (size_t i = 0; i < blob_count(stored); i++) {
@@ -598,7 +594,7 @@ static bool mark_named(const json_t *stored, qmat_cache_entry *entries, size_t c
   return complete;
 }
 
-/* Marks the blobs that records name (by their use), and deletes records of which one is missing. */
+/* Deletes damaged files, records with a missing blob, and blobs that no record names. */
 static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t count, qmat_cache_sweep *sweep) {
   const int64_t hour = (int64_t)3600 * 1000000000, now = now_nanoseconds();
   bool *named = qmat_calloc(count, sizeof *named);
@@ -609,7 +605,7 @@ static void collect_unnamed(qmat_cache *cache, qmat_cache_entry *entries, size_t
     bool complete = record != NULL;
     for (size_t k = 0; k < json_array_size(outputs); k++)
       if (!mark_named(json_array_get(outputs, k), entries, count, named)) complete = false;
-    /* Another process may have stored the blobs since they were listed. */
+    /* Another process may have stored the blobs since the listing, so a new record stays. */
     if (record && !complete && now - entries[i].used > hour) delete_entry(cache, &entries[i], sweep);
     json_decref(record);
   }
@@ -641,7 +637,7 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   for (size_t i = 0; i < list.count; i++)
     if (list.entries[i].kind <= QMAT_CACHE_BLOB) total += list.entries[i].size;
   if (total > most_size) {
-    /* Somewhat below the limit, so that not every run after this one has to do it again. */
+    /* A tenth below the limit, so that the next run need not delete again. */
     uint64_t wanted = most_size - most_size / 10;
     qsort(list.entries, list.count, sizeof *list.entries, by_last_use);
     for (size_t i = 0; i < list.count && total > wanted; i++) {
@@ -659,7 +655,7 @@ qmat_cache_sweep qmat_cache_clear(qmat_cache *cache) {
   qmat_cache_entry *entries;
   size_t count;
   if (cache->read_only || !qmat_cache_list(cache, &entries, &count)) return sweep;
-  /* Records first: they are sorted so, and nobody then reads one whose blobs go. */
+  /* The list has records first, so that no process reads a record whose blobs are gone. */
   for (size_t i = 0; i < count; i++)
     if (entries[i].kind != QMAT_CACHE_TEMPORARY || is_abandoned(cache, &entries[i]))
       delete_entry(cache, &entries[i], &sweep);

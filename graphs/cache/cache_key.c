@@ -15,7 +15,7 @@ const char *qmat_param_input_file(const qmat_node *type, size_t row, const void 
   return path;
 }
 
-/* Text as JSON may hold it, different for different bytes: a backslash becomes two, a byte that is not UTF-8 \xNN. */
+/* Text as valid JSON, unique for its bytes: a backslash becomes two, a byte that is not UTF-8 becomes \xNN. */
 static json_t *escaped(const char *text) {
   qmat_writer writer = {0};
   while (*text) {
@@ -62,7 +62,7 @@ static bool add_param(json_t *items, const qmat_node *type, size_t row, const vo
   if (param->type == QMAT_PARAM_PATH && (param->flags & QMAT_PARAM_INPUT_FILE)) {
     const char *path = qmat_param_input_file(type, row, params);
     const char *slash = path ? strrchr(path, '/') : NULL;
-    /* Results may carry the file's name and depend on its ending, but not on where it is. */
+    /* Results may contain the file's name and depend on its ending, but not on its folder. */
     bool done = !path || add_item(items, "name", param->name, slash ? slash + 1 : path);
     return add_digest(items, "file", param->name, "", path ? files[row] : NULL, "none") && done;
   }

@@ -4,38 +4,37 @@
 
 #include "core/node.h"
 
-/* What the result of a node depends on, as a list of items, and the digest of that list: the key that a result is kept
- * under. The items come from the node's descriptor alone. Each is a JSON array of three texts, tag, name and value:
+/* Everything that a node's result depends on, as a list of items, and the digest of that list: the result's key. The
+ * node's descriptor alone determines the items. Each is a JSON array of three texts, tag, name and value:
  *
  *     key      format          "2"
- *     program  sources         digest of the sources of core/, io/ and nodes/ (where it was built so)
+ *     program  sources         digest of the sources of core/, io/ and nodes/ (QMAT_KEY_SOURCES)
  *     node     medial.simplify its version
  *     library  Embree          its version and instruction set
- *     param    epsilon         the value in canonical text; a choice by its name
- *     name     path            the name of a file that is read, without its folder
- *     file     path            the digest of its bytes, or "none" where no path is given
+ *     param    epsilon         the value as canonical text; an enum by its choice
+ *     name     path            the name of an input file, without its folder
+ *     file     path            the digest of its bytes, or "none" without a path
  *     input    mesh            type and digest of the value, or "none"
- *     side     path:skin.bin   the digest of a file that the one of parameter `path` refers to, or "absent"
+ *     side     path:skin.bin   the digest of a side file of parameter `path`, or "absent"
  *
- * Folders, host, user, time, threads, locale and the node's id are not among them. */
+ * Folders, host, user, time, threads, locale and the node's id are not part of a key. */
 
 enum { QMAT_KEY_FORMAT = 2 };
 
-/* The items of one run of a node. `inputs` holds a digest per input port, NULL where nothing is connected; `files` one
- * per parameter: of the file that it names, NULL for other parameters and where no path is given. NULL when memory is
- * short; the caller calls json_decref. */
+/* The items of one run of a node. `inputs` has a digest per input port, NULL if it is not connected. `files` has one
+ * per parameter: the digest of its input file, NULL if it names none. NULL when memory is short; the caller calls
+ * json_decref. */
 json_t *qmat_key_items(const qmat_node *type, const void *params, const qmat_digest *const *inputs,
                        const qmat_digest *const *files);
 
-/* Adds a file beside the one that parameter `param` names, by its path from that file's folder; NULL `digest`: it is
- * not there. False when memory is short. */
+/* Adds a side file of parameter `param`, by its path relative to the folder of that parameter's file. `digest` NULL:
+ * the file is missing. False when memory is short. */
 bool qmat_key_add_side_file(json_t *items, const char *param, const char *path, const qmat_digest *digest);
 
-/* The key: SHA-256 over the items, every text with its length before it. False for what is no list of items, or when
- * OpenSSL fails. */
+/* The key: SHA-256 over all texts, each with its length before it. False for malformed items, or when OpenSSL fails. */
 bool qmat_key_digest(const json_t *items, qmat_digest *key);
 
-/* The file that parameter `row` of a node names with these parameters; NULL: it names none. The text is the params'. */
+/* The input file that parameter `row` of a node names, or NULL. The text belongs to `params`. */
 const char *qmat_param_input_file(const qmat_node *type, size_t row, const void *params);
 
 #endif

@@ -62,7 +62,7 @@ const char *qmat_remote_warning(const qmat_remote_cache *remote) {
 
 /* ---- one request ---- */
 
-/* The body of an answer, or of what is sent. */
+/* The body of a request or of an answer. */
 typedef struct transfer {
   qmat_writer *received;
   uint64_t most_size;
@@ -74,7 +74,7 @@ static size_t take_bytes(char *bytes, size_t one, size_t size, void *user) {
   transfer *transfer = user;
   (void)one;
   if (!transfer->received) return size;
-  if (transfer->received->size + size > transfer->most_size) return 0; /* more than it can be: ends the transfer */
+  if (transfer->received->size + size > transfer->most_size) return 0; /* too long: ends the transfer */
   qmat_put_bytes(transfer->received, bytes, size);
   return transfer->received->failed ? 0 : size;
 }
@@ -124,12 +124,12 @@ static bool start(qmat_remote_cache *remote, const char *folder, const qmat_dige
   return true;
 }
 
-/* Ends a request: the status, or 0 when there was no answer, which is the last time that the server is asked. */
+/* Performs a request and returns the HTTP status; 0: no answer, and the server is not used again. */
 static long finish(qmat_remote_cache *remote) {
   CURLcode result = curl_easy_perform(remote->curl);
   long code = 0;
   if (result == CURLE_OK) curl_easy_getinfo(remote->curl, CURLINFO_RESPONSE_CODE, &code);
-  if (result == CURLE_WRITE_ERROR) return 0; /* an answer that is too long is no answer, but the server is alive */
+  if (result == CURLE_WRITE_ERROR) return 0; /* a longer answer than expected; the server is alive */
   if (result != CURLE_OK || code >= 500) {
     char reason[64];
     snprintf(reason, sizeof reason, "it answers with status %ld", code);
@@ -169,9 +169,9 @@ bool qmat_remote_put(qmat_remote_cache *remote, const char *folder, const qmat_d
   curl_easy_setopt(remote->curl, CURLOPT_SEEKFUNCTION, rewind_bytes);
   long code = finish(remote);
   if (code >= 200 && code < 300) return true;
-  /* A server that takes nothing is still one that may give. */
+  /* A server that refuses PUT may still answer GET. */
   if (code > 0 && !*remote->warning) {
-    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s takes nothing: status %ld",
+    snprintf(remote->warning, sizeof remote->warning, "the remote cache %.200s refuses to store: status %ld",
              qmat_show_url(remote->url).text, code);
     remote->read_only = true;
   }

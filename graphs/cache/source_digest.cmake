@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # cmake -DSOURCE=FOLDER -DOUTPUT=FILE.c -DENABLED=ON -P source_digest.cmake
-# Writes qmat_source_digest, the SHA-256 over the names and bytes of all sources that results come from.
+# Writes qmat_source_digest, the SHA-256 of the names and bytes of all sources that determine results.
 set(digest "")
 if(ENABLED)
   file(GLOB_RECURSE sources RELATIVE ${SOURCE} ${SOURCE}/core/*.[ch] ${SOURCE}/io/*.[ch] ${SOURCE}/io/*.cpp ${SOURCE}/nodes/*.[ch]

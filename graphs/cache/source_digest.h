@@ -2,8 +2,8 @@
 #ifndef QMAT_GRAPHS_CACHE_SOURCE_DIGEST_H
 #define QMAT_GRAPHS_CACHE_SOURCE_DIGEST_H
 
-/* The digest of the sources that results come from (core/, io/, nodes/), as hexadecimal digits, written by CMake; ""
- * when the program was configured with -DQMAT_KEY_SOURCES=OFF and only the versions of nodes tell old results apart. */
+/* The hexadecimal digest of the sources that determine results (core/, io/, nodes/), written by CMake; "" with
+ * -DQMAT_KEY_SOURCES=OFF, where only node versions distinguish old results. */
 extern const char qmat_source_digest[];
 
 #endif

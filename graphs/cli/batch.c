@@ -13,14 +13,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "graphs/run/run.h"
 #include "io/bytes.h"
 #include "io/model.h"
-
-static double now(void) {
-  struct timespec time;
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
 
 /* ---- finding ---- */
 
@@ -40,7 +35,7 @@ static qmat_status add_asset(qmat_context *context, qmat_batch *batch, const cha
   return asset->stem ? QMAT_OK : qmat_fail_memory(context, "assets");
 }
 
-/* Whether a folder's error is one to stop at: a folder that is not there holds no match. */
+/* A missing folder has no match; every other error of a folder ends the search. */
 static int is_unreadable(const char *folder, int number) {
   (void)folder;
   return number != ENOENT && number != ENOTDIR;
@@ -52,7 +47,7 @@ static qmat_status find_matches(qmat_context *context, const char *pattern, qmat
   if (result == GLOB_NOMATCH) return qmat_fail(context, QMAT_ERROR_USAGE, "no file matches '%s'", pattern);
   if (result != 0)
     return qmat_fail(context, result == GLOB_NOSPACE ? QMAT_ERROR_MEMORY : QMAT_ERROR_IO,
-                     "the folders of '%s' cannot be read", pattern);
+                     "cannot read the folders of '%s'", pattern);
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < found.gl_pathc && status == QMAT_OK; i++)
     status = add_asset(context, batch, "", 0, found.gl_pathv[i], strlen(found.gl_pathv[i]));
@@ -68,7 +63,7 @@ static qmat_status read_list(qmat_context *context, const char *path, qmat_batch
   for (const char *end = line + bytes.size; status == QMAT_OK && line < end;) {
     size_t length = strcspn(line, "\r\n");
     if (memchr(line, 0, length + 1) && line + length < end) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, "this is no list of paths: it holds a zero byte");
+      qmat_fail(context, QMAT_ERROR_FORMAT, "this is not a list of paths: it has a zero byte");
       status = qmat_fail_at(context, path, 0, 0);
     } else if (length > 0 && *line != '#') {
       status = add_asset(context, batch, path, folder_length, line, length);
@@ -77,7 +72,7 @@ static qmat_status read_list(qmat_context *context, const char *path, qmat_batch
   }
   qmat_bytes_uninit(&bytes);
   if (status == QMAT_OK && batch->count == 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the list names no file");
+    qmat_fail(context, QMAT_ERROR_USAGE, "the list is empty");
     status = qmat_fail_at(context, path, 0, 0);
   }
   return status;
@@ -95,7 +90,7 @@ static qmat_status check_stems(qmat_context *context, const qmat_batch *batch) {
   qmat_status status = QMAT_OK;
   for (size_t i = 1; i < batch->count && status == QMAT_OK; i++)
     if (strcmp(sorted[i - 1]->stem, sorted[i]->stem) == 0)
-      status = qmat_fail(context, QMAT_ERROR_USAGE, "the results of '%s' and '%s' would have one name",
+      status = qmat_fail(context, QMAT_ERROR_USAGE, "the results of '%s' and '%s' would have the same name",
                          sorted[i - 1]->input, sorted[i]->input);
   qmat_free(sorted);
   return status;
@@ -128,26 +123,26 @@ static bool start(qmat_asset *asset) {
   extern char **environ;
   posix_spawn_file_actions_t actions;
   if (posix_spawn_file_actions_init(&actions) != 0) return false;
-  /* What there is to say stands in the report. */
+  /* Messages go to the report. */
   int result = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   if (result == 0) result = posix_spawn(&asset->process, asset->words[0], &actions, NULL, asset->words, environ);
   posix_spawn_file_actions_destroy(&actions);
-  asset->started = now();
+  asset->started = qmat_clock_seconds();
   asset->state = result == 0 ? QMAT_ASSET_RUNNING : QMAT_ASSET_FAILED;
   return result == 0;
 }
 
 static void end(qmat_asset *asset, int status) {
-  asset->seconds = now() - asset->started;
+  asset->seconds = qmat_clock_seconds() - asset->started;
   asset->exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   asset->signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   asset->state = asset->exit_code == 0 ? QMAT_ASSET_DONE : QMAT_ASSET_FAILED;
   asset->result = json_load_file(asset->report, 0, NULL);
 }
 
-/* Waits for a while for any process to end; NULL: none has. */
+/* The asset of a process that has ended; NULL: none has, after a short wait. */
 static qmat_asset *wait_for_one(qmat_batch *batch) {
   for (size_t i = 0; i < batch->count; i++) {
     qmat_asset *asset = &batch->assets[i];

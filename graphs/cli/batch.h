@@ -7,7 +7,7 @@
 #include <jansson.h>
 #include <sys/types.h>
 
-/* One graph on many assets, each in a process of its own, so that what fails or crashes is one asset. */
+/* One graph on many models, each in a process of its own, so that a crash affects one model only. */
 
 typedef enum qmat_asset_state {
   QMAT_ASSET_WAITING,
@@ -18,15 +18,15 @@ typedef enum qmat_asset_state {
 
 typedef struct qmat_asset {
   char *input;  /* the model's path */
-  char *stem;   /* its file name without the ending: the name of what is made of it */
-  char **words; /* the command that makes it, ended by NULL */
-  char *report; /* the file that this command reports to */
+  char *stem;   /* its file name without the ending: the name of its results */
+  char **words; /* the command that processes it, ended by NULL */
+  char *report; /* the report file of this command */
   qmat_asset_state state;
   pid_t process; /* while it runs */
   double started, seconds;
-  int exit_code; /* -1: ended by `signal` */
+  int exit_code; /* -1: see `signal` */
   int signal;
-  json_t *result; /* what the command reported; NULL: nothing */
+  json_t *result; /* the report; NULL: none */
 } qmat_asset;
 
 typedef struct qmat_batch {
@@ -34,26 +34,26 @@ typedef struct qmat_batch {
   qmat_asset *assets;
 } qmat_batch;
 
-/* Adds the models that `inputs` names: the matches of a pattern with *, ? or [, or else the lines of a file, whose
- * relative paths are relative to its folder; empty lines and those that start with # are left out. QMAT_ERROR_USAGE: a
- * pattern without a match, an empty list, two models whose results would have one name. QMAT_ERROR_IO,
- * QMAT_ERROR_MEMORY. Free with qmat_batch_uninit, also after a failure. */
+/* Finds the models that `inputs` names: the matches of a pattern with *, ? or [, else the lines of a file. Paths in the
+ * file are relative to its folder; empty lines and lines that start with # are skipped. QMAT_ERROR_USAGE: a pattern
+ * without a match, an empty list, two models whose results would have the same name. QMAT_ERROR_IO, QMAT_ERROR_MEMORY.
+ * Free with qmat_batch_uninit, also after a failure. */
 qmat_status qmat_batch_find(qmat_context *context, const char *inputs, qmat_batch *batch);
 void qmat_batch_uninit(qmat_batch *batch);
 
-/* Hears of an asset that has just ended. */
+/* Called when an asset has ended. */
 typedef void qmat_batch_observer(void *user, const qmat_batch *batch, const qmat_asset *asset);
 
-/* Runs the commands of all assets, at most `jobs` at a time, in their order. A failing asset does not end the others.
- * QMAT_CANCELLED when `stop` says so: no more are started, and those that run are interrupted and waited for. */
+/* Runs the commands of all assets in order, at most `jobs` at a time. A failure does not stop the others.
+ * QMAT_CANCELLED when `stop` returns true: no more are started, and the running ones are interrupted and waited for. */
 qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, bool (*stop)(void),
                            qmat_batch_observer *observer, void *user);
 
-/* The same on a Slurm cluster: submits one job array, waits for it and collects what its tasks leave in `folder`, which
- * all machines share, as they do the program, models, results and cache. `jobs` tasks at a time (0: as many as there is
- * room for) of `threads` processors each. A task whose machine dies is started again by Slurm. Which partition, account
- * or limit is taken is told to sbatch by its own environment (SBATCH_PARTITION, ...). QMAT_ERROR_DEPENDENCY: sbatch
- * fails. QMAT_CANCELLED: `stop` said so, and the job is cancelled. */
+/* The same on a Slurm cluster: submits one job array, waits for it and collects its results from `folder`. All machines
+ * share this folder, the program, models, results and cache. `jobs` tasks run at a time (0: no limit), each on
+ * `threads` processors. Slurm restarts a task whose machine dies. The environment of sbatch (SBATCH_PARTITION, ...)
+ * chooses partition, account and limits. QMAT_ERROR_DEPENDENCY: sbatch fails. QMAT_CANCELLED: `stop` returned true, and
+ * the job is cancelled. */
 qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int jobs, int threads, const char *folder,
                                  bool (*stop)(void), qmat_batch_observer *observer, void *user);
 
@@ -61,7 +61,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
  * summary, error. NULL when memory is short; the caller calls json_decref. */
 json_t *qmat_asset_json(const qmat_asset *asset);
 
-/* What went wrong with it, in one line; "" for one that is done. `text` holds `size` bytes. */
+/* Writes why an asset failed, in one line; "" for one that succeeded. `text` holds `size` bytes. */
 void qmat_asset_error(const qmat_asset *asset, char *text, size_t size);
 
 #endif

@@ -9,7 +9,7 @@
 #include "io/bytes.h"
 #include "io/save.h"
 
-/* A word that a shell takes as it is. */
+/* Puts a word in quotes for the shell. */
 static void put_quoted(qmat_writer *writer, const char *word) {
   qmat_put_text(writer, "'");
   for (; *word; word++) {
@@ -28,9 +28,8 @@ static void put_path(qmat_writer *writer, const char *folder, const char *name) 
   put_quoted(writer, path);
 }
 
-/* A script whose n-th task runs the command of asset n and leaves its exit code as FOLDER/n.exit, in one piece. A task
- */
-/* whose machine dies leaves none, and Slurm starts it again. */
+/* Writes the script of the job array. Task n runs the command of asset n and writes its exit code to FOLDER/n.exit in
+ * one step. A task whose machine dies writes none, and Slurm restarts it. */
 static qmat_status write_script(qmat_context *context, const qmat_batch *batch, const char *folder) {
   qmat_writer writer = {0};
   qmat_file *file = NULL;
@@ -54,7 +53,7 @@ static qmat_status write_script(qmat_context *context, const qmat_batch *batch, 
   return status;
 }
 
-/* Runs a command of Slurm's and takes its first line; false when it fails. */
+/* Runs a Slurm command and reads its first line. False: it failed. */
 static bool ask(qmat_writer *command, char *line, size_t size) {
   qmat_put_bytes(command, "", 1);
   line[0] = 0;
@@ -93,7 +92,7 @@ static bool is_alive(const char *job) {
   qmat_put_text(&command, "squeue --noheader --format=%i --jobs=");
   qmat_put_text(&command, job);
   qmat_put_text(&command, " 2>/dev/null");
-  /* A job that is over for a while is not known any more, which is an error to squeue. */
+  /* squeue fails for a job that ended some time ago. */
   return ask(&command, line, sizeof line) && *line;
 }
 
@@ -109,7 +108,7 @@ static void exit_path(const char *folder, size_t index, char path[4200]) {
   snprintf(path, 4200, "%s/%zu.exit", folder, index);
 }
 
-/* Takes what a task has left; false when it has not ended. */
+/* Reads the result of a task. False: it has not ended. */
 static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   char path[4200];
   exit_path(folder, index, path);
@@ -118,7 +117,7 @@ static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   if (fscanf(file, "%d", &asset->exit_code) != 1) asset->exit_code = -1;
   fclose(file);
   unlink(path);
-  /* The shell tells of a signal like this. */
+  /* The shell reports a signal as 128 + its number. */
   asset->signal = asset->exit_code > 128 ? asset->exit_code - 128 : 0;
   asset->result = json_load_file(asset->report, 0, NULL);
   asset->seconds = json_real_value(json_object_get(asset->result, "seconds"));
@@ -131,11 +130,11 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
   char job[64], path[4200];
   qmat_status status = write_script(context, batch, folder);
   if (status == QMAT_OK && !submit(batch, jobs, threads, folder, job, sizeof job)) {
-    qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Slurm does not take the job: sbatch failed");
-    status = qmat_fail_hint(context, "without --engine slurm the batch runs here");
+    qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Slurm does not accept the job: sbatch failed");
+    status = qmat_fail_hint(context, "without --engine slurm the batch runs on this machine");
   }
   size_t left = status == QMAT_OK ? batch->count : 0;
-  /* Files may be seen somewhat later than the end of the job, where folders are shared. */
+  /* On a shared folder, files may appear after the job has ended. */
   for (int patience = 10; left > 0 && patience > 0;) {
     if (stop()) {
       cancel(job);
@@ -159,7 +158,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     asset->exit_code = -1;
     observer(user, batch, asset);
   }
-  /* Tasks that were cancelled may have ended since. */
+  /* Cancelled tasks may have written exit codes meanwhile. */
   for (size_t i = 0; i < batch->count; i++) {
     exit_path(folder, i, path);
     unlink(path);

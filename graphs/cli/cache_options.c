@@ -5,12 +5,13 @@
 #include "graphs/cli/command.h"
 
 const qmat_option qmat_cache_option_rows[] = {
-    {"cache", 0, "DIR", "Keep results there; else in $QMAT_CACHE, $XDG_CACHE_HOME/qmat or ~/.cache/qmat"},
-    {"no-cache", 0, NULL, "Keep no results and use none; so does QMAT_CACHE=off"},
-    {"cache-size", 0, "SIZE", "Delete what was used least recently above this size; default 10GB"},
-    {"cache-read-only", 0, NULL, "Use results that are kept, but keep none"},
-    {"remote-cache", 0, "URL", "Share results through an HTTP server that takes GET and PUT; else $QMAT_REMOTE_CACHE"},
-    {"remote-read-only", 0, NULL, "Use results of the remote cache, but send it none"},
+    {"cache", 0, "DIR", "Folder of the cache; default $QMAT_CACHE, $XDG_CACHE_HOME/qmat or ~/.cache/qmat"},
+    {"no-cache", 0, NULL, "Use no cache, like QMAT_CACHE=off"},
+    {"cache-size", 0, "SIZE", "Delete the least recently used results above this size; default 10GB"},
+    {"cache-read-only", 0, NULL, "Read results from the cache, but store none"},
+    {"remote-cache", 0, "URL",
+     "Share results through an HTTP server that takes GET and PUT; default $QMAT_REMOTE_CACHE"},
+    {"remote-read-only", 0, NULL, "Read results from the remote cache, but send none"},
     {0},
 };
 
@@ -47,7 +48,7 @@ qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invoca
   *open = false;
   *cache = (qmat_cache){0};
   if (size && !parse_size(size, &options.most_size)) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "a size such as 500MB or 10GB belongs here, not '%s'", qmat_show(size).text);
+    qmat_fail(context, QMAT_ERROR_USAGE, "expected a size such as 500MB or 10GB, found '%s'", qmat_show(size).text);
     return qmat_fail_field(context, "--cache-size");
   }
   if (qmat_invocation_value(invocation, "no-cache")) return QMAT_OK;
@@ -57,7 +58,7 @@ qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invoca
   }
   if (given && (!*given || strcmp(given, "off") == 0) && !named) return QMAT_OK;
   char *folder = given ? qmat_strdup(given) : qmat_cache_default_folder();
-  /* Without a home there is no place for a cache, which is no reason not to run. */
+  /* Without a home folder the run goes without a cache. */
   if (!folder) return given ? qmat_fail_memory(context, "cache") : QMAT_OK;
   options.folder = folder;
   qmat_status status = qmat_cache_open(context, &options, cache);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/json_text.h"
+#include "graphs/graph_names.h"
 
 const qmat_command *const qmat_commands[] = {
     &qmat_command_mat,   &qmat_command_run,   &qmat_command_batch,   &qmat_command_watch, &qmat_command_why,
@@ -23,9 +24,7 @@ qmat_status qmat_command_find(qmat_context *context, const char *name, const qma
     }
   }
   qmat_fail(context, QMAT_ERROR_USAGE, "there is no command '%s'", qmat_show(name).text);
-  const char *nearest = qmat_nearest_name(name, names, qmat_command_count);
-  return nearest ? qmat_fail_hint(context, "did you mean '%s'?", nearest)
-                 : qmat_fail_hint(context, "'qmat help' lists them");
+  return qmat_suggest_nearest(context, name, names, qmat_command_count, "'qmat help' lists them");
 }
 
 qmat_status qmat_invocation_add_option(qmat_context *context, qmat_invocation *invocation, qmat_option option) {
@@ -73,7 +72,7 @@ static qmat_status fail_unknown(qmat_context *context, const qmat_invocation *in
                  : qmat_fail_hint(context, "'qmat help %s' lists them", invocation->command->name);
 }
 
-/* Takes one option, and its value from the next word if need be. */
+/* Takes one option. Its value may be the next word. */
 static qmat_status take_option(qmat_context *context, qmat_invocation *invocation, char *const *words, size_t count,
                                size_t *at) {
   const char *word = words[*at], *value = NULL;
@@ -149,6 +148,23 @@ const char *qmat_invocation_value(const qmat_invocation *invocation, const char 
   return NULL;
 }
 
+qmat_status qmat_invocation_number(qmat_context *context, const qmat_invocation *invocation, const char *option,
+                                   int least, int most, int *number) {
+  const char *text = qmat_invocation_value(invocation, option);
+  double value = 0;
+  if (!text) return QMAT_OK;
+  if (!qmat_parse_number(text, &value) || strchr(text, '%') || value < least || value > most ||
+      value != (double)(int)value) {
+    char field[64];
+    snprintf(field, sizeof field, "--%s", option);
+    qmat_fail(context, QMAT_ERROR_USAGE, "expected a whole number from %d to %d, found '%s'", least, most,
+              qmat_show(text).text);
+    return qmat_fail_field(context, field);
+  }
+  *number = (int)value;
+  return QMAT_OK;
+}
+
 /* ---- help ---- */
 
 void qmat_print_wrapped(const char *text, int column, int indent) {
@@ -221,6 +237,6 @@ void qmat_commands_print(void) {
   printf("qmat COMMAND [ARGUMENTS] [OPTIONS]\n\nThe medial axis transform of 3D models, for asset pipelines.\n\n");
   for (size_t i = 0; i < qmat_command_count; i++) print_row(qmat_commands[i]->name, qmat_commands[i]->summary);
   printf(
-      "\n'qmat help COMMAND' tells more.\nExit codes: 0 done, 1 a run failed, 2 bad usage or a bad graph, 3 "
+      "\n'qmat help COMMAND' explains a command.\nExit codes: 0 done, 1 a run failed, 2 bad usage or a bad graph, 3 "
       "cancelled.\n");
 }

@@ -17,33 +17,19 @@
 typedef struct batch_call {
   qmat_context *context;
   qmat_invocation *invocation;
-  const char *folder, *format, *input; /* --out, format--, and the graph's input that takes the model */
+  const char *folder, *format, *input; /* --out, --format, and the graph's input that takes the model */
   char program[4096], reports[4096];
   int jobs, threads;
   bool json, quiet, slurm;
   size_t ended;
 } batch_call;
 
-static qmat_status read_count(qmat_context *context, const qmat_invocation *invocation, const char *option, int most,
-                              int *count) {
-  const char *text = qmat_invocation_value(invocation, option);
-  double number = 0;
-  if (!text) return QMAT_OK;
-  if (!qmat_parse_number(text, &number) || number < 1 || number > most || number != (double)(int)number) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "a whole number from 1 to %d belongs here, not '%s'", most,
-              qmat_show(text).text);
-    return qmat_fail_field(context, option);
-  }
-  *count = (int)number;
-  return QMAT_OK;
-}
-
 static bool is_input_file(const qmat_graph *graph, const qmat_graph_input *input) {
   const qmat_param *param = &graph->nodes[input->params[0].node].type->params[input->params[0].param];
   return param->type == QMAT_PARAM_PATH && (param->flags & QMAT_PARAM_INPUT_FILE);
 }
 
-/* The input of the graph that takes the model: the one that is asked for, or the only one that is a file. */
+/* Finds the graph's input that takes the model: --input, else the only input that is a file. */
 static qmat_status find_input(batch_call *call) {
   qmat_graph *graph = &call->invocation->graph;
   size_t found = 0;
@@ -58,7 +44,8 @@ static qmat_status find_input(batch_call *call) {
     found++;
   }
   if (found == 1) return QMAT_OK;
-  qmat_fail(call->context, QMAT_ERROR_USAGE, "%zu inputs of the graph are files: which one takes the model?", found);
+  qmat_fail(call->context, QMAT_ERROR_USAGE, "%zu inputs of the graph are files; choose the one that takes the model",
+            found);
   return qmat_fail_hint(call->context, "--input NAME");
 }
 
@@ -87,7 +74,7 @@ __attribute__((format(printf, 2, 3))) static void add_word(word_list *list, cons
   list->words[list->count] = NULL;
 }
 
-/* What the command line says of the cache and of parameters holds for every asset. */
+/* Adds the options that every asset gets: the cache, parameters, --force. */
 static void add_shared_words(word_list *list, const qmat_invocation *invocation) {
   for (size_t i = 0; i < invocation->given_count; i++) {
     const qmat_given_option *given = &invocation->given[i];
@@ -101,9 +88,8 @@ static void add_shared_words(word_list *list, const qmat_invocation *invocation)
 static qmat_status make_command(const batch_call *call, size_t index, qmat_asset *asset) {
   const qmat_graph *graph = &call->invocation->graph;
   word_list list = {0};
-  size_t files = 0;
-  for (size_t i = 0; i < graph->output_count; i++)
-    files += graph->nodes[graph->outputs[i].node].type->outputs[graph->outputs[i].port].type == QMAT_FILE;
+  size_t last;
+  const size_t files = qmat_graph_file_count(graph, &last);
   add_word(&list, "%s", call->program);
   add_word(&list, "run");
   add_word(&list, "--quiet");
@@ -115,10 +101,10 @@ static qmat_status make_command(const batch_call *call, size_t index, qmat_asset
     const qmat_graph_output *output = &graph->outputs[i];
     const qmat_node *type = graph->nodes[output->node].type;
     const qmat_param *format = qmat_output_format_param(type);
-    if (type->outputs[output->port].type != QMAT_FILE || !format) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format) continue;
     char ending[64];
     qmat_param_format(format, graph->nodes[output->node].params, ending, sizeof ending);
-    /* Of several files the names tell which is which. */
+    /* Several outputs differ by their names. */
     add_word(&list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, files > 1 ? "-" : "",
              files > 1 ? output->name : "", call->format ? call->format : ending);
   }
@@ -132,7 +118,7 @@ static qmat_status make_command(const batch_call *call, size_t index, qmat_asset
   return QMAT_OK;
 }
 
-/* ---- what is told ---- */
+/* ---- messages ---- */
 
 static void print_json_line(const qmat_asset *asset) {
   json_t *json = qmat_asset_json(asset);
@@ -152,7 +138,7 @@ static void on_asset(void *user, const qmat_batch *batch, const qmat_asset *asse
             asset->state == QMAT_ASSET_DONE ? "ok" : "failed", asset->seconds);
 }
 
-/* The columns that a name takes, as far as each of its characters takes one. */
+/* The width of a name, one column a character. */
 static int columns_of(const char *name) {
   int columns = 0;
   for (; *name; name++) columns += ((unsigned char)*name & 0xc0) != 0x80;
@@ -220,21 +206,22 @@ static void print_table(const qmat_batch *batch, const qmat_graph *graph) {
 
 /* ---- the call ---- */
 
-/* Refuses a format that an output of the graph is not saved in. */
+/* Refuses a format that an output of the graph does not have. */
 static qmat_status check_format(const batch_call *call) {
   const qmat_graph *graph = &call->invocation->graph;
   for (size_t i = 0; call->format && i < graph->output_count; i++) {
     char path[64];
     int format;
     snprintf(path, sizeof path, "asset.%.48s", call->format);
-    if (graph->nodes[graph->outputs[i].node].type->outputs[graph->outputs[i].port].type != QMAT_FILE) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE) continue;
     if (qmat_graph_output_format(call->context, graph, i, path, &format) != QMAT_OK)
       return qmat_fail_field(call->context, "--format");
   }
   return QMAT_OK;
 }
 
-/* A folder for the reports of the assets. The machines of a cluster share the folder of the results, and no other. */
+/* Makes a folder for the reports of the assets. On a cluster it is inside the results, the one folder that is shared.
+ */
 static qmat_status make_report_folder(batch_call *call) {
   const char *temporary = getenv("TMPDIR");
   if (!temporary || !*temporary) temporary = "/tmp";
@@ -242,7 +229,7 @@ static qmat_status make_report_folder(batch_call *call) {
                         call->slurm ? call->folder : temporary, call->slurm ? "." : "");
   if (length < (int)sizeof call->reports && mkdtemp(call->reports)) return QMAT_OK;
   call->reports[0] = 0;
-  qmat_fail(call->context, QMAT_ERROR_IO, "no folder for reports can be made in it");
+  qmat_fail(call->context, QMAT_ERROR_IO, "cannot make a folder for reports in it");
   return qmat_fail_at(call->context, call->slurm ? call->folder : temporary, 0, 0);
 }
 
@@ -253,29 +240,29 @@ static qmat_status prepare(batch_call *call) {
   call->folder = qmat_invocation_value(invocation, "out");
   call->format = qmat_invocation_value(invocation, "format");
   if (!qmat_invocation_value(invocation, "inputs") || !call->folder) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "which models to take and where to save the results has to be said");
+    qmat_fail(context, QMAT_ERROR_USAGE, "--inputs and --out are required");
     return qmat_fail_hint(context, "--inputs 'models/*.off' --out results");
   }
   if (mkdir(call->folder, 0777) != 0 && (stat(call->folder, &about) != 0 || !S_ISDIR(about.st_mode))) {
-    qmat_fail(context, QMAT_ERROR_IO, "the folder of the results cannot be made");
+    qmat_fail(context, QMAT_ERROR_IO, "cannot make the folder of the results");
     return qmat_fail_at(context, call->folder, 0, 0);
   }
   const char *engine = qmat_invocation_value(invocation, "engine");
   call->slurm = engine && strcmp(engine, "slurm") == 0;
   if (engine && !call->slurm && strcmp(engine, "local") != 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the engine is local or slurm, not '%s'", qmat_show(engine).text);
+    qmat_fail(context, QMAT_ERROR_USAGE, "the engine has to be local or slurm, not '%s'", qmat_show(engine).text);
     return qmat_fail_field(context, "--engine");
   }
-  /* A cluster has its own idea of how many fit. */
+  /* The cluster decides how many tasks run at a time. */
   call->jobs = call->slurm ? 0 : qmat_threads(context);
-  qmat_status status = read_count(context, invocation, "jobs", 1024, &call->jobs);
+  qmat_status status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &call->jobs);
   call->threads = call->slurm || call->jobs > qmat_threads(context) ? 1 : qmat_threads(context) / call->jobs;
-  if (status == QMAT_OK) status = read_count(context, invocation, "threads", 1024, &call->threads);
+  if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 1, 1024, &call->threads);
   if (status == QMAT_OK) status = check_format(call);
   if (status == QMAT_OK) status = find_input(call);
   if (status != QMAT_OK) return status;
   ssize_t length = readlink("/proc/self/exe", call->program, sizeof call->program - 1);
-  if (length <= 0) return qmat_fail(context, QMAT_ERROR_IO, "the program cannot find itself");
+  if (length <= 0) return qmat_fail(context, QMAT_ERROR_IO, "cannot find the path of this program");
   call->program[length] = 0;
   return make_report_folder(call);
 }
@@ -313,16 +300,16 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"inputs", 0, "GLOB|LIST", "The models: a pattern with *, ? or [ (in quotes), or a file with a path a line"},
-    {"out", 0, "DIR", "Where results are saved, under the models' names; it is made when it is not there"},
-    {"format", 0, "ENDING", "Of what is saved; else what the graph says"},
-    {"input", 0, "NAME", "The graph's input that takes the model; else the only one that is a file"},
-    {"jobs", 0, "N", "How many assets at a time; else as many as there are processors"},
-    {"threads", 0, "N", "Of each asset; else the processors are shared out"},
-    {"engine", 0, "local|slurm", "Run here, or as a job array of a Slurm cluster that shares folders and cache"},
-    {"set", 0, "NAME=VALUE", "Set a parameter for all assets; may be repeated"},
-    {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
-    {"json", 0, NULL, "A line of JSON for each asset when it ends, instead of the table"},
+    {"inputs", 0, "GLOB|LIST", "The models: a quoted pattern with *, ? or [, or a file with one path a line"},
+    {"out", 0, "DIR", "Folder of the results, which get the models' names; made if it is missing"},
+    {"format", 0, "ENDING", "Format of the results; default the graph's"},
+    {"input", 0, "NAME", "The graph's input that takes the model; default the only one that is a file"},
+    {"jobs", 0, "N", "How many models at a time; default one per processor"},
+    {"threads", 0, "N", "Threads of each model; default an equal share of the processors"},
+    {"engine", 0, "local|slurm", "Run here, or as a job array on a Slurm cluster that shares folders and cache"},
+    {"set", 0, "NAME=VALUE", "Set a parameter for all models; may be repeated"},
+    {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},
+    {"json", 0, NULL, "Print a line of JSON as each model ends, instead of the table"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };
@@ -332,10 +319,9 @@ const qmat_command qmat_command_batch = {
     .arguments = "GRAPH",
     .summary = "Run a graph on many models",
     .doc =
-        "Runs a graph file on each of many models, each in a process of its own: what fails is listed at the end and "
-        "does not stop the others. What was done before comes from the cache, so that a batch that was interrupted "
-        "goes "
-        "on where it stopped. The exit code is 1 when an asset has failed.",
+        "Runs a graph file on many models, each in a process of its own. A failure does not stop the others; failures "
+        "are listed at the end, and the exit code is then 1. Finished work is in the cache, so an interrupted batch "
+        "continues when it is started again.",
     .options = options,
     .caching = qmat_cache_option_rows,
     .least = 1,

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/graph_names.h"
 #include "graphs/run/run_report.h"
 
 /* One call of `qmat cache`. */
@@ -51,7 +52,7 @@ static qmat_status stats(cache_call *call) {
   return QMAT_OK;
 }
 
-/* The name and version of the node that a record is of. */
+/* The key item of a record's node: its name and version. */
 static const json_t *node_item(const json_t *record) {
   const json_t *items = json_object_get(record, "key");
   for (size_t i = 0; i < json_array_size(items); i++) {
@@ -116,7 +117,7 @@ static qmat_status show(cache_call *call) {
     const qmat_cache_entry *entry = &call->entries[i];
     if (entry->kind != QMAT_CACHE_RECORD || strncmp(entry->name, prefix, strlen(prefix)) != 0) continue;
     if (found || !*prefix) {
-      qmat_fail(call->context, QMAT_ERROR_USAGE, *prefix ? "several keys start like this" : "a key is missing");
+      qmat_fail(call->context, QMAT_ERROR_USAGE, *prefix ? "several keys start with this" : "expected a key");
       return qmat_fail_hint(call->context, "'qmat cache ls' lists them");
     }
     found = entry;
@@ -134,7 +135,7 @@ static qmat_status show(cache_call *call) {
 
 static qmat_status verify(cache_call *call) {
   size_t broken = 0, incomplete = 0, checked = 0;
-  /* Blobs stand after records: they are checked first, so that records of broken ones are found incomplete. */
+  /* From the end, where the blobs are: a record of a broken blob is then found incomplete. */
   for (size_t i = call->count; i-- > 0;) {
     const qmat_cache_entry *entry = &call->entries[i];
     if (entry->kind > QMAT_CACHE_BLOB) continue;
@@ -153,7 +154,7 @@ static qmat_status verify(cache_call *call) {
   else
     printf("%zu checked, %zu broken, %zu incomplete\n", checked, broken, incomplete);
   if (status == QMAT_OK && broken > 0)
-    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache were not what their names say", broken);
+    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache were damaged", broken);
   return status;
 }
 
@@ -187,10 +188,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   for (size_t i = 0; i < count; i++) names[i] = actions[i].name;
   while (action < count && strcmp(names[action], name) != 0) action++;
   if (action == count) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is nothing that can be done with the cache", qmat_show(name).text);
-    const char *near = qmat_nearest_name(name, names, count);
-    return near ? qmat_fail_hint(context, "did you mean '%s'?", near)
-                : qmat_fail_hint(context, "stats, ls, show KEY, verify, gc or clear");
+    qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache action '%s'", qmat_show(name).text);
+    return qmat_suggest_nearest(context, name, names, count, "stats, ls, show KEY, verify, gc or clear");
   }
   if (invocation->argument_count > 1 && actions[action].run != show)
     return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is one argument too many",
@@ -199,7 +198,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   bool open;
   qmat_status status = qmat_open_cache(context, invocation, &cache, &open);
   if (status == QMAT_OK && !open) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache to look into");
+    qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache");
     status = qmat_fail_hint(context, "--cache DIR");
   }
   cache_call call = {.context = context,
@@ -215,19 +214,20 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"json", 0, NULL, "As JSON"},
+    {"json", 0, NULL, "Print JSON"},
     {0},
 };
 
 const qmat_command qmat_command_cache = {
     .name = "cache",
     .arguments = "stats|ls|show KEY|verify|gc|clear",
-    .summary = "Look into the cache, check it, clean it up",
+    .summary = "List, check and clean the cache",
     .doc =
-        "stats: where it is and how large. ls: its results, with the start of their keys. show KEY: what a result "
-        "depends "
-        "on and what came out; the start of the key is enough. verify: reads and checks everything; exit code 1 when "
-        "something was broken. gc: deletes what is left over and what is beyond the size. clear: deletes everything.",
+        "stats: folder and size. ls: the results, with the start of their keys. show KEY: what a result depends on, "
+        "and "
+        "its outputs; the start of the key is enough. verify: checks every file; the exit code is 1 if one was "
+        "damaged. "
+        "gc: deletes unused files, and the least recently used results above the size. clear: deletes everything.",
     .options = options,
     .caching = qmat_cache_option_rows,
     .least = 1,

@@ -23,11 +23,11 @@ static const qmat_option options[] = {
 const qmat_command qmat_command_check = {
     .name = "check",
     .arguments = "GRAPH",
-    .summary = "Look for mistakes in a graph file without running it",
+    .summary = "Check a graph file without running it",
     .doc =
-        "Reads a graph file and checks its names, wiring and parameters. The first mistake is told with its file, "
-        "line and column, and the exit code is 2. Required parameters may be missing when they are inputs of the "
-        "graph.",
+        "Checks the names, connections and parameters of a graph file. The first mistake is printed with its file, "
+        "line "
+        "and column, and the exit code is 2. A required parameter may be missing if it is an input of the graph.",
     .options = options,
     .least = 1,
     .most = 1,

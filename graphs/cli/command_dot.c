@@ -5,15 +5,15 @@
 #include "graphs/cli/command.h"
 #include "graphs/run/graph_run.h"
 
-/* Colours that people with colour blindness can distinguish, by the number of the value type. Each edge also carries the
- * name of its type as a tooltip. */
+/* Colours that people with colour blindness can distinguish, by the number of the value type. Each edge also carries
+ * the name of its type as a tooltip. */
 static const char *type_colour(qmat_value_type type) {
   static const char *const colours[] = {"#7f7f7f", "#0072b2", "#56b4e9", "#009e73", "#d55e00",
                                         "#e69f00", "#cc79a7", "#000000", "#b2df8a", "#882255"};
   return colours[type % (sizeof colours / sizeof *colours)];
 }
 
-/* Ids and descriptor names are ASCII words, but paths and texts of parameters are anything. */
+/* Paths and texts of parameters may hold any character. */
 static void print_escaped(const char *text) {
   for (; *text; text++) {
     switch (*text) {
@@ -47,7 +47,7 @@ static void print_ports(const qmat_port *ports, size_t count, const char *prefix
   printf("</tr>");
 }
 
-/* What a run would do: of several runs of a node, in several formats, the one that is least done. */
+/* What a run would do with a node. Of several steps in several formats: one that is not a hit, if any. */
 static const qmat_run_step *step_of(const qmat_run *run, size_t node) {
   const qmat_run_step *found = NULL;
   for (size_t i = 0; i < run->step_count; i++)
@@ -55,7 +55,7 @@ static const qmat_run_step *step_of(const qmat_run *run, size_t node) {
   return found;
 }
 
-/* Told by words and a number of the frame's lines too, not by colour alone. */
+/* Colour is not the only sign: the state is also a word, and a node that runs has a double frame. */
 static const char *state_style(const qmat_run_step *step) {
   if (!step) return "";
   if (step->state == QMAT_STEP_HIT) return ", fillcolor=\"#d5eedd\"";
@@ -135,7 +135,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"status", 0, NULL, "Show what a run would do with each node: hit, run, or depends on nodes before it"},
+    {"status", 0, NULL, "Show the state of each node: hit (cached), run, or depends (on earlier nodes)"},
     {"set", 0, "NAME=VALUE", "With --status: set a parameter as 'qmat run' would; may be repeated"},
     {"output", 'o', "[NAME=]PATH", "With --status: save an output as 'qmat run' would; may be repeated"},
     {0},
@@ -146,8 +146,9 @@ const qmat_command qmat_command_dot = {
     .arguments = "GRAPH",
     .summary = "Draw a graph file (Graphviz)",
     .doc =
-        "Prints a graph file in the language of Graphviz: qmat dot GRAPH | dot -Tsvg -o graph.svg. Inputs stand above "
-        "a node's name and outputs below; colours are the types of values.",
+        "Prints a graph file in the language of Graphviz: qmat dot GRAPH | dot -Tsvg -o graph.svg. Inputs are above "
+        "the "
+        "name of a node, outputs below it. Colours are the types of values.",
     .options = options,
     .caching = qmat_cache_option_rows,
     .least = 1,

@@ -12,7 +12,7 @@
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const char *from = invocation->arguments[0], *to = qmat_invocation_value(invocation, "output");
   if (!to) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "where to save the medial mesh is not given");
+    qmat_fail(context, QMAT_ERROR_USAGE, "the output path is missing");
     return qmat_fail_hint(context, "-o PATH");
   }
   const qmat_format format = qmat_format_of_name(to);
@@ -41,7 +41,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 
 static const qmat_option options[] = {
     {"output", 'o', "PATH", "Save the medial mesh; the ending chooses the format: .ma or .ply"},
-    {"node", 0, "NAME", "The node or prim that carries it, where several do"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh to extract, if several have one"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };
@@ -49,10 +49,10 @@ static const qmat_option options[] = {
 const qmat_command qmat_command_extract = {
     .name = "extract",
     .arguments = "FILE -o OUTPUT",
-    .summary = "Take a medial mesh back out of a file that carries one",
+    .summary = "Extract a medial mesh from a glTF or USD file",
     .doc =
-        "Reads glTF and USD that qmat wrote, also after other programs changed what else is in them, and saves the "
-        "medial mesh in the space of the node that carries it. Counts that the file states are checked.",
+        "Reads a glTF or USD file that qmat wrote, even if other programs have changed the rest of it, and saves its "
+        "medial mesh in the space of the node that carries it. The counts that the file states are checked.",
     .options = options,
     .least = 1,
     .most = 1,

@@ -9,7 +9,7 @@
 #include "io/model.h"
 #include "nodes/nodes.h"
 
-/* Control characters in a file's texts are not for the terminal. */
+/* Prints a text of the file without its control characters. */
 static void print_text(const char *key, const char *text) {
   printf("  %s: ", key);
   for (; *text; text++) putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
@@ -42,7 +42,7 @@ static double number_of(const json_t *object, const char *key) {
   return json_is_number(value) ? json_number_value(value) : (double)NAN;
 }
 
-/* Whether what the file states is refuted: the error is larger for certain. */
+/* Compares the errors that the file states with measured bounds. A stated error below its lower bound is refuted. */
 static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured) {
   const struct {
     const char *title, *stated, *most, *least;
@@ -80,7 +80,7 @@ static qmat_status run_node(qmat_context *context, const char *name, const qmat_
   return status;
 }
 
-/* Makes of a mesh as it was read what the shipped graph takes as the solid's surface, in its place. */
+/* Replaces a mesh by the solid's surface, made as in the shipped graph. */
 static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
   static const char *const nodes[] = {"mesh.subdivide", "mesh.unite"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
@@ -94,8 +94,8 @@ static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
   return QMAT_OK;
 }
 
-/* `mesh_choice` is the number of the mesh that the medial mesh describes, where the model is glTF, too; else "merged".
- */
+/* Evaluates the medial mesh against a model. `mesh_choice` is the number of the mesh that it describes if the model is
+ * glTF, else "merged". */
 static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
                                  const qmat_medial *medial, const json_t *facts) {
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
@@ -121,8 +121,7 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
   return status;
 }
 
-/* Prints what the file carries: the medial mesh of node `name`, or the only one. `carrier` (NULL: not known) tells
- * which mesh it is of. */
+/* Prints the medial mesh of node `name`, or the only one. `carrier` (NULL: unknown) has the number of its mesh. */
 static qmat_status print_medial(qmat_context *context, const char *path, const char *name, const json_t *carrier,
                                 const char *against) {
   qmat_medial *medial;
@@ -152,7 +151,7 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
   return status;
 }
 
-/* The one of that node, or all. */
+/* Prints the medial mesh of one node, or all. */
 static qmat_status print_medials(qmat_context *context, const char *path, const char *name, const char *against) {
   json_t *carriers = qmat_medial_carriers(context, path);
   if (!carriers) return context->error.status;
@@ -171,7 +170,7 @@ static qmat_status print_medials(qmat_context *context, const char *path, const 
     const qmat_error before = context->error;
     const qmat_status of_one =
         print_medial(context, path, json_string_value(json_object_get(carrier, "node")), carrier, against);
-    /* The first error is told; the others are looked at all the same. */
+    /* The first error is reported; the other medial meshes are still compared. */
     if (status != QMAT_OK)
       context->error = before;
     else
@@ -201,7 +200,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   if (carried == QMAT_OK) {
     status = QMAT_OK;
   } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
-    status = carried; /* it has one that cannot be told apart or read, or should have one */
+    status = carried; /* its medial mesh is ambiguous, unreadable, or missing with --against */
   } else if (!has_surface) {
     context->error = first;
   }
@@ -209,21 +208,24 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"against", 0, "MODEL", "Bound the errors of the medial mesh to this model anew, and compare with what is stated"},
-    {"node", 0, "NAME", "The node or prim whose medial mesh is meant, where several have one"},
+    {"against", 0, "MODEL",
+     "Measure the errors of the medial mesh against this model, and compare them with the stated ones"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh to use, if several have one"},
     {0},
 };
 
 const qmat_command qmat_command_info = {
     .name = "info",
     .arguments = "FILE",
-    .summary = "Tell what a model's file holds",
+    .summary = "Print what a model file contains",
     .doc =
-        "Prints what reading the file finds: counts, units, what was left out. Of a file that carries medial "
-        "meshes, the counts of each and what the file says of it. With --against, its errors are bounded anew, with "
-        "subdivision surfaces at their limit and parts that reach into each other as their union, and the "
-        "exit code is 1 where one is for certain larger than stated; where both files are glTF, each is compared with "
-        "the mesh of the number that its node carries, in that mesh's own space.",
+        "Prints the contents of a model file: counts, units, and what was left out; for each medial mesh in it, its "
+        "counts and stated errors.\n"
+        "With --against, bounds the errors anew, on limit surfaces of subdivision cages and on the union of "
+        "overlapping "
+        "components. The exit code is 1 if an error is certainly larger than stated. If both files are glTF, each "
+        "medial "
+        "mesh is compared with the mesh that its node refers to, in that mesh's own space.",
     .options = options,
     .least = 1,
     .most = 1,

@@ -8,7 +8,7 @@
 #include "graphs/node_json.h"
 #include "io/model.h"
 
-/* The first input of the built-in graph is the argument, the others are options: one of each name. */
+/* The first input of the built-in graph is the argument; each other input is an option of that name. */
 static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
   qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, &invocation->graph);
   if (status != QMAT_OK) return status;
@@ -36,7 +36,7 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   return status;
 }
 
-/* Whether a file is to be saved that can hold a medial mesh for each mesh of a scene. */
+/* Whether an output can hold a medial mesh for each mesh of a scene. */
 static bool saves_scene(const qmat_invocation *invocation) {
   for (size_t i = 0; i < invocation->given_count; i++) {
     if (strcmp(invocation->given[i].name, "output") != 0) continue;
@@ -49,9 +49,9 @@ static bool saves_scene(const qmat_invocation *invocation) {
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
   qmat_graph *graph = &invocation->graph;
   qmat_status status = qmat_graph_set_named(context, graph, graph->inputs[0].name, invocation->arguments[0]);
-  /* The other formats hold one medial mesh, so that the meshes of a scene are taken as one. */
+  /* The other formats hold one medial mesh, so the meshes of a scene are merged. */
   if (status == QMAT_OK && !saves_scene(invocation)) status = qmat_graph_assign(context, graph, "model.mesh=merged");
-  /* Whoever asks for a number of spheres wants that number, whatever the distance. */
+  /* --vertices alone means that number of spheres at any distance. */
   if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
       !qmat_invocation_value(invocation, "epsilon"))
     status = qmat_graph_set_named(context, graph, "epsilon", "0");
@@ -64,7 +64,7 @@ static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   if (!qmat_invocation_value(invocation, "output")) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "where to save the result is not given");
+    qmat_fail(context, QMAT_ERROR_USAGE, "the output path is missing");
     return qmat_fail_hint(context, "-o PATH");
   }
   return qmat_execute(context, invocation, set_inputs, NULL, NULL);
@@ -75,11 +75,12 @@ const qmat_command qmat_command_mat = {
     .arguments = "INPUT -o OUTPUT",
     .summary = "Describe a model by medial spheres, cones and slabs",
     .doc =
-        "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to "
-        "0, which means no bound on the distance. A glTF scene that is saved as glTF goes on with all that is in it, "
-        "and each of its meshes gains a medial mesh; for other formats its meshes are taken as one "
-        "(model.mesh=merged). Every other parameter is reached by --set; 'qmat nodes' lists the nodes and 'qmat node "
-        "NAME' their parameters.",
+        "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to 0: "
+        "no bound on the distance.\n"
+        "A glTF scene saved as glTF keeps its contents, and each of its meshes gets a medial mesh. For other formats "
+        "its "
+        "meshes are merged (model.mesh=merged).\n"
+        "--set reaches every other parameter; 'qmat nodes' lists the nodes, 'qmat node NAME' their parameters.",
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,
     .least = 1,

@@ -59,18 +59,9 @@ static void print_page(const qmat_node *type) {
 }
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  const qmat_registry *registry = &invocation->registry;
-  const char *name = invocation->arguments[0];
-  const qmat_node *type = qmat_registry_find(registry, name);
-  if (!type) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "there is no node type '%s'", qmat_show(name).text);
-    const char **names = qmat_calloc(registry->count, sizeof *names);
-    for (size_t i = 0; names && i < registry->count; i++) names[i] = registry->nodes[i]->name;
-    const char *nearest = names ? qmat_nearest_name(name, names, registry->count) : NULL;
-    qmat_free(names);
-    if (nearest) return qmat_fail_hint(context, "did you mean '%s'?", nearest);
-    return qmat_fail_hint(context, "'qmat nodes' lists them");
-  }
+  const qmat_node *type;
+  qmat_status status = qmat_registry_get(context, &invocation->registry, invocation->arguments[0], &type);
+  if (status != QMAT_OK) return status;
   if (qmat_invocation_value(invocation, "json")) return qmat_print_json(context, qmat_node_json(type));
   print_page(type);
   return QMAT_OK;
@@ -85,7 +76,7 @@ const qmat_command qmat_command_node = {
     .name = "node",
     .arguments = "NAME",
     .summary = "Explain one node: inputs, outputs, parameters",
-    .doc = "Prints what a node does, where it comes from, and what its inputs, outputs and parameters mean.",
+    .doc = "Prints what a node does, its source, and the meaning of its inputs, outputs and parameters.",
     .options = options,
     .least = 1,
     .most = 1,

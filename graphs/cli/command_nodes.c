@@ -24,7 +24,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"json", 0, NULL, "Print everything that is known of the nodes as JSON"},
+    {"json", 0, NULL, "Print the full descriptions of the nodes as JSON"},
     {0},
 };
 
@@ -32,8 +32,7 @@ const qmat_command qmat_command_nodes = {
     .name = "nodes",
     .arguments = "",
     .summary = "List the nodes that a graph may use",
-    .doc =
-        "Lists the types of nodes, each with its inputs and outputs. A '?' marks an input that may stay unconnected.",
+    .doc = "Lists the node types with their inputs and outputs. A '?' marks an optional input.",
     .options = options,
     .run = run,
 };

@@ -5,20 +5,14 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   return qmat_execute(context, invocation, qmat_read_graph_argument, NULL, NULL);
 }
 
-static const qmat_option options[] = {
-    {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
-    {"to", 0, "NODE", "Stop at this node: run it and what it needs"},
-    {0},
-};
-
 const qmat_command qmat_command_run = {
     .name = "run",
     .arguments = "GRAPH",
     .summary = "Run a graph file",
     .doc =
-        "Runs a graph file. Files are written only when everything has succeeded. Paths in the graph are relative to "
-        "the graph file, paths given here to the working folder.",
-    .options = options,
+        "Runs a graph file. Files are written only after every node has succeeded. Paths in the graph are relative to "
+        "the graph file; paths given here are relative to the working folder.",
+    .options = qmat_output_options,
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,
     .least = 1,

@@ -7,9 +7,8 @@
 #include "graphs/cli/command.h"
 #include "nodes/mesh/subdivision_osd.h"
 
-/* What reads and computes is part of what makes a result, so a bug report needs it. The versions of libraries without
- */
-/* a function that tells it are those that the program was built with. */
+/* Results depend on the libraries, so bug reports need their versions. Libraries without a version function have the
+ * version that the program was built with. */
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   (void)context;
   printf("qmat %s\n", QMAT_VERSION);
@@ -21,7 +20,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"verbose", 'v', NULL, "Also the libraries that it was built with"},
+    {"verbose", 'v', NULL, "Also print the versions of the libraries"},
     {0},
 };
 

@@ -9,11 +9,11 @@
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
 
-/* A file that the run depends on, as it was when it was read. */
+/* A file that the run depends on, with its digest when it was read. */
 typedef struct watched_file {
   char *path;
   const char *name; /* in `path`, without the folder */
-  int folder;       /* inotify's number of its folder; -1: it cannot be watched */
+  int folder;       /* the watch of its folder; -1: the folder cannot be watched */
   bool readable;
   qmat_digest digest;
 } watched_file;
@@ -41,7 +41,7 @@ static void add_file(watcher *watcher, const char *path, bool readable, const qm
     return;
   }
   watched_file file = {.path = copy, .name = slash ? slash + 1 : copy, .readable = readable, .digest = *digest};
-  /* Folders are watched, not files: programs save by renaming a new file to the old one's name. */
+  /* Folders are watched, since programs save a file by renaming a new one. */
   const uint32_t events = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVED_FROM | IN_DELETE;
   if (slash == copy) {
     file.folder = inotify_add_watch(watcher->inotify, "/", events);
@@ -59,7 +59,7 @@ static void add_as_it_is(watcher *watcher, const char *path) {
   add_file(watcher, path, readable, &digest);
 }
 
-/* Takes the files that a run has read, or would have read had it come to that. */
+/* Collects the files that a run read, and those that a failed run would have read. */
 static void on_run(void *user, const qmat_graph *graph, const qmat_run *run) {
   watcher *watcher = user;
   for (size_t i = 0; i < run->hashed_count; i++)
@@ -82,7 +82,7 @@ static bool has_changed(const watcher *watcher) {
   return false;
 }
 
-/* Whether one of the events that wait is of a file of ours. */
+/* Takes all waiting events. True: one of them is about a watched file. */
 static bool take_events(const watcher *watcher) {
   _Alignas(struct inotify_event) char events[8192];
   bool ours = false;
@@ -99,14 +99,14 @@ static bool take_events(const watcher *watcher) {
   return ours;
 }
 
-/* Waits until the bytes of a file are others; false: the program is to end. */
+/* Waits until the bytes of a file change. False: the program was interrupted. */
 static bool wait_for_change(const watcher *watcher) {
   struct pollfd waiting = {.fd = watcher->inotify, .events = POLLIN};
-  /* What changed while it was read is seen here. */
+  /* A file may have changed during the run. */
   for (bool changed = has_changed(watcher); !changed;) {
     if (qmat_interrupted()) return false;
     if (poll(&waiting, 1, 500) <= 0 || !take_events(watcher)) continue;
-    /* Several files may be saved at once: until nothing has come for a while. */
+    /* Several files may be saved at once, so this waits until no event has come for a while. */
     while (poll(&waiting, 1, 60) > 0) take_events(watcher);
     changed = has_changed(watcher);
   }
@@ -116,7 +116,7 @@ static bool wait_for_change(const watcher *watcher) {
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
   watcher watcher = {.inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC)};
-  if (watcher.inotify < 0) return qmat_fail(context, QMAT_ERROR_IO, "files cannot be watched: %s", strerror(errno));
+  if (watcher.inotify < 0) return qmat_fail(context, QMAT_ERROR_IO, "cannot watch files: %s", strerror(errno));
   qmat_status status = QMAT_OK;
   do {
     forget_files(&watcher);
@@ -139,22 +139,15 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   return status;
 }
 
-static const qmat_option options[] = {
-    {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
-    {"to", 0, "NODE", "Stop at this node: run it and what it needs"},
-    {0},
-};
-
 const qmat_command qmat_command_watch = {
     .name = "watch",
     .arguments = "GRAPH",
     .summary = "Run a graph file again whenever a file it depends on is saved",
     .doc =
-        "Runs a graph file, and again when the graph, a model or a file that a model refers to has other bytes. With "
-        "the "
-        "cache only what the change reaches is run. A mistake is told, and the next save is waited for. Ctrl-C ends "
-        "it.",
-    .options = options,
+        "Runs a graph file, and runs it again whenever the graph, a model or a file that a model refers to changes. "
+        "With the cache, only the nodes that the change affects run. An error is printed, and the next change starts "
+        "the next run. Ctrl-C ends the program.",
+    .options = qmat_output_options,
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,
     .least = 1,

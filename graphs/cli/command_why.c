@@ -15,7 +15,7 @@ static void print_why(const json_t *why) {
     printf("  %s\n", json_string_value(json_object_get(json_array_get(causes, i), "text")));
 }
 
-/* Marks the nodes that the causes of a marked one lead to. */
+/* Marks the nodes that cause a marked node to run. */
 static void mark_causes(const qmat_run *run, const json_t *whys, bool *marked) {
   for (size_t i = json_array_size(whys); i-- > 0;) {
     const json_t *causes = json_object_get(json_array_get(whys, i), "causes");
@@ -28,7 +28,7 @@ static void mark_causes(const qmat_run *run, const json_t *whys, bool *marked) {
   }
 }
 
-static qmat_status tell(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
+static qmat_status explain(qmat_context *context, const qmat_invocation *invocation, qmat_planned_run *planned) {
   qmat_run *run = &planned->run;
   bool *marked = qmat_calloc(run->step_count, sizeof *marked);
   json_t *records = qmat_cache_records(&planned->cache), *whys = json_array(), *shown = json_array();
@@ -61,31 +61,31 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_planned_run planned;
   qmat_status status = qmat_plan_invocation(context, invocation, qmat_read_graph_argument, true, &planned);
   if (status == QMAT_OK && !planned.cached) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache to look into");
+    qmat_fail(context, QMAT_ERROR_USAGE, "there is no cache to compare with");
     status = qmat_fail_hint(context, "--cache DIR");
   }
-  if (status == QMAT_OK) status = tell(context, invocation, &planned);
+  if (status == QMAT_OK) status = explain(context, invocation, &planned);
   qmat_planned_run_uninit(&planned);
   return status;
 }
 
 static const qmat_option options[] = {
     {"set", 0, "NAME=VALUE", "Set a parameter as 'qmat run' would; may be repeated"},
-    {"output", 'o', "[NAME=]PATH", "Save an output as 'qmat run' would, so that its format is known; may be repeated"},
-    {"to", 0, "NODE", "Stop at this node"},
-    {"json", 0, NULL, "As JSON"},
+    {"output", 'o', "[NAME=]PATH", "Save an output as 'qmat run' would: it sets the format; may be repeated"},
+    {"to", 0, "NODE", "Only this node and the nodes that it needs"},
+    {"json", 0, NULL, "Print JSON"},
     {0},
 };
 
 const qmat_command qmat_command_why = {
     .name = "why",
     .arguments = "GRAPH [NODE]",
-    .summary = "Tell why nodes would run, or why they ran",
+    .summary = "Explain why nodes would run, or why they ran",
     .doc =
-        "Compares what each result depends on (parameters, bytes of files and inputs, versions of the node and of the "
-        "libraries beneath) with the nearest result that the cache has, and names what is different. For a result that "
-        "is in the cache it tells what was different when it was made. With a node, only this one and those whose "
-        "changes reach it. Nothing is run.",
+        "Compares everything that a result depends on (parameters, bytes of files and inputs, versions of the node and "
+        "its libraries) with the most similar cached result, and prints the differences. For a result in the cache it "
+        "prints what was different when the result was made. With NODE, only that node and the nodes that cause it to "
+        "run. Nothing runs.",
     .options = options,
     .caching = qmat_cache_option_rows,
     .least = 1,

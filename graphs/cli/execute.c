@@ -13,30 +13,25 @@
 #include "graphs/run/run_report.h"
 
 const qmat_option qmat_common_options[] = {
-    {"set", 0, "NAME=VALUE", "Set a parameter: node.parameter=value, or input=value; may be repeated"},
-    {"threads", 0, "N", "Use that many threads; 0: as many as there are processors, which is the default"},
-    {"progress", 0, "HOW", "tty, json (one object a line) or off, on stderr; default tty on a terminal, else off"},
-    {"report", 0, "FILE", "Write what was done, or the error, as JSON"},
-    {"force", 0, "[=NODE]", "Run every node, or this one, whatever the cache has; may be repeated with a node"},
-    {"dry-run", 0, NULL, "Print which nodes would run and which results the cache has, and stop there"},
-    {"depfile", 0, "FILE", "Write what the saved files depend on as a rule for Make or Ninja"},
+    {"set", 0, "NAME=VALUE", "Set a parameter, as node.parameter=value or input=value; may be repeated"},
+    {"threads", 0, "N", "Number of threads; 0, the default: one per processor"},
+    {"progress", 0, "HOW",
+     "Progress on stderr: tty, json (one object a line) or off; default tty on a terminal, else off"},
+    {"report", 0, "FILE", "Write a report of the run, or of its error, as JSON"},
+    {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},
+    {"dry-run", 0, NULL, "Print which nodes would run and which results are cached; run nothing"},
+    {"depfile", 0, "FILE", "Write the dependencies of the saved files as a rule for Make and Ninja"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };
 
-static qmat_status read_threads(qmat_context *context, const char *text) {
-  double number = 0;
-  if (!text) return QMAT_OK;
-  if (!qmat_parse_number(text, &number) || strchr(text, '%') || number < 0 || number > 1024 ||
-      number != (double)(int)number) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "a whole number from 0 to 1024 belongs here, not '%s'", qmat_show(text).text);
-    return qmat_fail_field(context, "--threads");
-  }
-  context->threads = (int)number;
-  return QMAT_OK;
-}
+const qmat_option qmat_output_options[] = {
+    {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
+    {"to", 0, "NODE", "Run only this node and the nodes that it needs"},
+    {0},
+};
 
-/* Reads "NAME=PATH", or "PATH" when only one output of the graph is a file. */
+/* Reads "NAME=PATH", or "PATH" if exactly one output of the graph is a file. */
 static qmat_status read_save(qmat_context *context, const qmat_graph *graph, const char *text, qmat_run_save *save) {
   const char *equals = strchr(text, '=');
   char name[QMAT_GRAPH_NAME_SIZE];
@@ -47,16 +42,10 @@ static qmat_status read_save(qmat_context *context, const qmat_graph *graph, con
     save->path = equals + 1;
     return qmat_graph_find_output(context, graph, name, &save->output);
   }
-  size_t files = 0;
-  for (size_t i = 0; i < graph->output_count; i++) {
-    const qmat_graph_output *output = &graph->outputs[i];
-    if (graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE) continue;
-    save->output = i;
-    files++;
-  }
+  const size_t files = qmat_graph_file_count(graph, &save->output);
   save->path = text;
   if (files == 1) return QMAT_OK;
-  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' does not say which output it is for: the graph makes %zu files",
+  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' needs the name of an output: the graph makes %zu files",
             qmat_show(text).text, files);
   if (files > 0)
     qmat_fail_hint(context, "-o %s=%s", graph->outputs[save->output].name, qmat_show(text).text);
@@ -117,7 +106,7 @@ qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *inv
   return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
 }
 
-/* A report of a failure must not replace what the run would have read or written, however early it failed. */
+/* The report of a failure must not replace a file that the run would have read or written. */
 static bool may_write_error(const qmat_invocation *invocation, const char *path) {
   for (size_t i = 0; i < invocation->argument_count; i++)
     if (qmat_same_file(path, invocation->arguments[i])) return false;
@@ -138,7 +127,7 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
   return true;
 }
 
-/* Whether a step before has told the same of the same mesh: what failed once is missing in all that comes after it. */
+/* Whether an earlier step reported the same failure of the same mesh. Later nodes repeat it. */
 static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
   for (size_t i = 0; i < step; i++) {
     const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
@@ -148,8 +137,7 @@ static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *
   return false;
 }
 
-/* What readers of files left out, say: strings in the reports of steps that ran; and meshes that could not be
- * described. */
+/* Prints the warnings in the steps' reports, such as what a reader left out, and the meshes that failed. */
 static void print_warnings(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
     const char *id = run->graph->nodes[run->steps[i].node].id;
@@ -181,7 +169,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   qmat_planned_run planned = {0};
   qmat_run *run = &planned.run;
   qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
-  if (status == QMAT_OK) status = read_threads(context, qmat_invocation_value(invocation, "threads"));
+  if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 0, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
   if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
@@ -208,7 +196,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   }
   if (status == QMAT_OK && !quiet && !dry) qmat_run_print(run, stdout);
   if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
-    /* The first error is the one to be told, also when its report cannot be written. */
+    /* A failure to write the report must not replace this error. */
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);
     qmat_save_json(context, report, report_path);

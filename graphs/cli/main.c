@@ -29,22 +29,19 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
 }
 
 int main(int argc, char **argv) {
-  /* Only what tells which characters the terminal shows: numbers stay those of the C locale. */
+  /* Only the character set, for the progress bar: numbers are read and written without the locale. */
   setlocale(LC_CTYPE, "");
   qmat_catch_interrupts();
-  signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is an error of writing, not the end of the program */
+  signal(SIGXFSZ, SIG_IGN); /* a file size limit is then an error of write() and does not kill the program */
   qmat_context context = {0};
   const char *name = argc > 1 ? argv[1] : "help";
   if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";
   if (strcmp(name, "--version") == 0) name = "version";
   size_t count = argc > 2 ? (size_t)argc - 2 : 0;
   qmat_status status = call(&context, name, argv + (argc > 2 ? 2 : argc), count);
-  if (status == QMAT_OK && argc < 2) {
-    qmat_fail(&context, QMAT_ERROR_USAGE, "no command is given");
-    status = QMAT_ERROR_USAGE;
-  }
+  if (status == QMAT_OK && argc < 2) status = qmat_fail(&context, QMAT_ERROR_USAGE, "no command is given");
   if (fflush(stdout) != 0 && status == QMAT_OK)
-    status = qmat_fail(&context, QMAT_ERROR_IO, "the standard output cannot be written");
+    status = qmat_fail(&context, QMAT_ERROR_IO, "cannot write to the standard output");
   if (status != QMAT_OK) {
     char line[2048];
     qmat_error_format(&context.error, line, sizeof line);

@@ -7,13 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/graph_names.h"
 #include "graphs/run/run_report.h"
 
-/* The one variable of the program that can change: a signal has no other way to tell. */
+/* The program's one global variable: a signal handler has no other place. */
 static volatile sig_atomic_t interrupted;
 
 static void on_interrupt(int number) {
@@ -30,12 +30,6 @@ void qmat_catch_interrupts(void) {
 
 bool qmat_interrupted(void) {
   return interrupted != 0;
-}
-
-static double now(void) {
-  struct timespec time;
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
 static int terminal_width(void) {
@@ -58,10 +52,8 @@ qmat_status qmat_progress_view_init(qmat_context *context, const char *mode, qma
       view->mode = (qmat_progress_mode)i;
       return QMAT_OK;
     }
-  qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is no way to show progress", qmat_show(mode).text);
-  const char *nearest = qmat_nearest_name(mode, modes, 3);
-  if (nearest) return qmat_fail_hint(context, "did you mean '%s'?", nearest);
-  return qmat_fail_hint(context, "tty, json or off");
+  qmat_fail(context, QMAT_ERROR_USAGE, "there is no progress mode '%s'", qmat_show(mode).text);
+  return qmat_suggest_nearest(context, mode, modes, 3, "tty, json or off");
 }
 
 /* ---- a line of JSON ---- */
@@ -75,7 +67,7 @@ static void print_event(const qmat_progress_view *view, const char *event, json_
   json_object_set_new(line, "steps", json_integer((json_int_t)view->step_count));
   if (more) json_object_update(line, more);
   char *text = qmat_json_text(line, JSON_COMPACT | JSON_REAL_PRECISION(9), NULL);
-  /* In one piece, so that lines stay whole when others write to the same terminal. */
+  /* One write, so that lines stay whole when other processes write to the same terminal. */
   if (text) fprintf(stderr, "%s\n", text);
   qmat_free(text);
   json_decref(line);
@@ -84,7 +76,7 @@ static void print_event(const qmat_progress_view *view, const char *event, json_
 
 /* ---- a line on a terminal ---- */
 
-/* One line that never reaches the last column, so that the terminal does not wrap it. */
+/* A line that stays short of the last column, so that the terminal does not wrap it. */
 typedef struct line_writer {
   char bytes[1024];
   size_t size;
@@ -98,7 +90,7 @@ static void put_code(line_writer *line, const char *code) {
   line->size += length;
 }
 
-/* Text of one column a character, cut at the width. Node ids and types are ASCII, units nearly always. */
+/* Puts text, one column a character, cut at the width. */
 static void put_text(line_writer *line, const char *text) {
   for (; *text && line->column < line->width && line->size + 1 < sizeof line->bytes; text++) {
     line->bytes[line->size++] = *text;
@@ -138,7 +130,7 @@ static void draw(qmat_progress_view *view, uint64_t done, uint64_t total, const 
     snprintf(text, sizeof text, " %3d %%", (int)(fraction * 100));
     put_text(&line, text);
   }
-  snprintf(text, sizeof text, " %7.1f s", now() - view->started);
+  snprintf(text, sizeof text, " %7.1f s", qmat_clock_seconds() - view->started);
   put_text(&line, text);
   if (!finished && done > 0) {
     qmat_format_count(done, count);
@@ -159,13 +151,13 @@ static bool on_progress(void *user, const char *node_id, const char *node_type, 
   (void)node_id;
   (void)node_type;
   qmat_progress_view *view = user;
-  /* The runner asks once between nodes, without anything to tell. */
-  bool tells = done > 0 || total > 0;
-  if (view->mode == QMAT_PROGRESS_TTY && tells) draw(view, done, total, unit, false);
-  if (view->mode == QMAT_PROGRESS_JSON && tells)
+  /* Some calls only ask whether to cancel. */
+  bool has_news = done > 0 || total > 0;
+  if (view->mode == QMAT_PROGRESS_TTY && has_news) draw(view, done, total, unit, false);
+  if (view->mode == QMAT_PROGRESS_JSON && has_news)
     print_event(view, "progress",
                 json_pack("{s:I, s:I, s:s, s:f}", "done", (json_int_t)done, "total", (json_int_t)total, "unit", unit,
-                          "seconds", now() - view->started));
+                          "seconds", qmat_clock_seconds() - view->started));
   return !interrupted;
 }
 
@@ -176,7 +168,7 @@ static void on_started(void *user, const qmat_run *run, size_t step) {
   view->step_count = run->step_count;
   view->id = node->id;
   view->type = node->type->name;
-  view->started = now();
+  view->started = qmat_clock_seconds();
   if (view->mode == QMAT_PROGRESS_TTY) draw(view, 0, 0, "", false);
   if (view->mode == QMAT_PROGRESS_JSON) print_event(view, "start", NULL);
 }

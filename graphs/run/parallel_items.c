@@ -7,21 +7,21 @@
 #include <stdlib.h>
 #include <time.h>
 
-/* Threads of the system and not of OpenMP: a region that a node opens within one of OpenMP's gets one thread. */
+/* These are pthreads, since a parallel region of a node inside an OpenMP thread would get one thread only. */
 
 static const int64_t ASK_INTERVAL = 50000000; /* nanoseconds between two calls of the outer progress function */
-static const int TELL_AFTER = 20;             /* calls without news until it is told again what is done */
+static const int TELL_AFTER = 20;             /* calls without news before progress is reported again */
 
 typedef enum place_state { PLACE_FREE, PLACE_BUSY, PLACE_DONE } place_state;
 
 typedef struct item_pool item_pool;
 
-/* Where one item at a time runs. */
+/* A place for one running item. */
 typedef struct place {
   item_pool *pool;
   pthread_t thread;
   place_state state;
-  bool outside; /* the item runs in the calling thread */
+  bool outside; /* runs in the calling thread */
   size_t item;
   qmat_context context; /* of the item */
 } place;
@@ -32,16 +32,16 @@ struct item_pool {
   qmat_item_fn *run;
   void *user;
   size_t count;
-  pthread_mutex_t lock; /* of all that follows */
+  pthread_mutex_t lock; /* guards the fields below */
   pthread_cond_t changed;
-  size_t done, failed; /* items that are done; the first that failed, SIZE_MAX: none */
+  size_t done, failed; /* number of finished items; the first item that failed, SIZE_MAX: none */
   qmat_error error;    /* of that one */
   bool cancelled;
-  size_t told; /* of those that are done; the calling thread's, as the next */
+  size_t told; /* the last number reported; used by the calling thread only, as the next */
   int silent;  /* calls of the outer progress function since */
 };
 
-/* Items by size, the largest first; equal ones in their order. */
+/* Sorts by size, the largest first; equal sizes keep their order. */
 typedef struct sized_item {
   size_t size, item;
 } sized_item;
@@ -52,7 +52,7 @@ static int by_falling_size(const void *a, const void *b) {
   return first->item < second->item ? -1 : first->item > second->item;
 }
 
-/* Asks the outer progress function whether to go on, and tells it what is done where that is news. */
+/* Calls the outer progress function, which may cancel. */
 static void ask_outer(item_pool *pool) {
   pthread_mutex_lock(&pool->lock);
   const size_t done = pool->done;
@@ -72,8 +72,8 @@ static void ask_outer(item_pool *pool) {
   pthread_mutex_unlock(&pool->lock);
 }
 
-static bool item_may_go_on(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                           const char *unit) {
+static bool item_may_continue(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                              const char *unit) {
   (void)node_id;
   (void)node_type;
   (void)done;
@@ -83,9 +83,9 @@ static bool item_may_go_on(void *user, const char *node_id, const char *node_typ
   item_pool *pool = here->pool;
   if (here->outside) ask_outer(pool);
   pthread_mutex_lock(&pool->lock);
-  const bool go_on = !pool->cancelled && here->item < pool->failed;
+  const bool needed = !pool->cancelled && here->item < pool->failed;
   pthread_mutex_unlock(&pool->lock);
-  return go_on;
+  return needed;
 }
 
 static void *run_item(void *user) {
@@ -93,7 +93,7 @@ static void *run_item(void *user) {
   item_pool *pool = here->pool;
   const qmat_status status = pool->run(pool->user, &here->context, here->item);
   pthread_mutex_lock(&pool->lock);
-  /* One that was stopped is behind one that failed, or all were cancelled. */
+  /* An item that was stopped comes after one that failed, or all were cancelled. */
   if (status != QMAT_OK && here->item < pool->failed && !pool->cancelled) {
     pool->failed = here->item;
     pool->error = here->context.error;
@@ -107,12 +107,12 @@ static void *run_item(void *user) {
   return NULL;
 }
 
-/* Starts an item; where the system has no thread to give and nothing else runs, runs it here. False: not now. */
+/* Starts an item. If the system has no thread and nothing else runs, runs it here. False: not started. */
 static bool start_item(item_pool *pool, place *here, size_t item, int threads, bool alone) {
   *here = (place){.pool = pool,
                   .state = PLACE_BUSY,
                   .item = item,
-                  .context = {.progress = item_may_go_on,
+                  .context = {.progress = item_may_continue,
                               .progress_user = here,
                               .threads = threads,
                               .node_id = pool->outer->node_id,
@@ -127,7 +127,7 @@ static bool start_item(item_pool *pool, place *here, size_t item, int threads, b
   return alone;
 }
 
-/* Waits for an item to end, but not much longer than ASK_INTERVAL. */
+/* Waits until an item ends, at most about ASK_INTERVAL. */
 static void wait_for_change(item_pool *pool, const place *places, size_t place_count) {
   struct timespec until;
   clock_gettime(CLOCK_MONOTONIC, &until);
@@ -143,7 +143,7 @@ static void wait_for_change(item_pool *pool, const place *places, size_t place_c
   pthread_mutex_unlock(&pool->lock);
 }
 
-/* Frees the places of items that have ended; gives their threads back. */
+/* Frees the places and threads of finished items. */
 static void collect_ended(item_pool *pool, place *places, size_t place_count, size_t *running, int *free_threads) {
   for (size_t i = 0; i < place_count; i++) {
     pthread_mutex_lock(&pool->lock);
@@ -166,14 +166,14 @@ static place *find_free(item_pool *pool, place *places, size_t place_count) {
   return found;
 }
 
-/* The threads, of those that are free, for an item of which `rest` is the size with all that have not started yet. */
+/* An item's share of the free threads; `rest` is the size of all items that have not started, this one included. */
 static int share_of(int free_threads, double size, double rest) {
   const double share = rest > 0 ? round(free_threads * size / rest) : 1;
   return share < 1 ? 1 : share > free_threads ? free_threads : (int)share;
 }
 
 static void run_all(item_pool *pool, const sized_item *order, place *places, size_t place_count) {
-  double rest = 0; /* whole numbers below 2^53, but for models that no machine holds */
+  double rest = 0; /* exact: sizes in bytes stay below 2^53 */
   for (size_t i = 0; i < pool->count; i++) rest += (double)order[i].size;
   int free_threads = qmat_threads(pool->outer);
   size_t next = 0, running = 0;
@@ -183,7 +183,7 @@ static void run_all(item_pool *pool, const sized_item *order, place *places, siz
     pthread_mutex_lock(&pool->lock);
     const size_t last = pool->cancelled ? 0 : pool->failed;
     pthread_mutex_unlock(&pool->lock);
-    /* Items that come after one that failed are passed over: their results are not needed. */
+    /* Items after a failed one are skipped. */
     while (next < pool->count && order[next].item >= last) rest -= (double)order[next++].size;
     if (next == pool->count && running == 0) return;
     place *here = next < pool->count && free_threads > 0 ? find_free(pool, places, place_count) : NULL;

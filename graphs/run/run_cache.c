@@ -61,7 +61,7 @@ void qmat_run_note_reads(qmat_run *run, const qmat_step_reads *reads) {
   }
 }
 
-/* What is known of a file; it is hashed when it is asked for first. NULL when memory is short. */
+/* The digest of a file, which is hashed once. NULL when memory is short. */
 static const qmat_run_file_digest *digest_file(qmat_run *run, const char *path) {
   const qmat_run_file_digest *known = find_file(run->hashed, run->hashed_count, path);
   if (known) return known;
@@ -77,7 +77,7 @@ static const qmat_node *type_of(const qmat_run *run, const qmat_run_step *step) 
   return run->graph->nodes[step->node].type;
 }
 
-/* The items that need nothing but what is known before the step runs. NULL when a file cannot be read. */
+/* The key items that are known before the step runs. NULL when a file cannot be read. */
 static json_t *make_items(qmat_run *run, const qmat_run_step *step) {
   const qmat_node *type = type_of(run, step);
   size_t params = qmat_param_count(type), ports = qmat_input_count(type);
@@ -103,22 +103,17 @@ static json_t *make_items(qmat_run *run, const qmat_run_step *step) {
   return items;
 }
 
-/* The path of a side file that a record names: beside the file of that parameter. */
+/* The path of a side file in a record, which is relative to the file of that parameter. */
 static char *side_path(const qmat_node *type, const qmat_run_step *step, const char *param, const char *name) {
   for (size_t row = 0; row < qmat_param_count(type); row++) {
     const char *main_file = qmat_param_input_file(type, row, step->params);
     if (!main_file || strcmp(type->params[row].name, param) != 0) continue;
-    size_t folder = *name == '/' ? 0 : qmat_folder_length(main_file), length = strlen(name);
-    char *path = qmat_alloc(folder + length + 1, 1);
-    if (!path) return NULL;
-    memcpy(path, main_file, folder);
-    memcpy(path + folder, name, length + 1);
-    return path;
+    return *name == '/' ? qmat_strdup(name) : qmat_path_beside(main_file, name);
   }
   return NULL;
 }
 
-/* Adds the files that the step read when it ran last with these items, with the bytes that they have now. */
+/* Adds the side files of the step's last run with these items, with their current digests. */
 static bool add_sides(qmat_run *run, const qmat_run_step *step, const json_t *sides, json_t *items) {
   for (size_t i = 0; i < json_array_size(sides); i++) {
     const json_t *side = json_array_get(sides, i);
@@ -153,7 +148,7 @@ static bool read_output(const json_t *output, const qmat_port *port, qmat_run_ma
   return true;
 }
 
-/* Whether a record tells of the outputs of this node type. */
+/* Whether a record has the outputs of this node type. */
 static bool record_fits(const qmat_node *type, const json_t *record) {
   const json_t *outputs = json_object_get(record, "outputs");
   size_t count = qmat_output_count(type);
@@ -165,7 +160,7 @@ static bool record_fits(const qmat_node *type, const json_t *record) {
   return true;
 }
 
-/* Takes what a record says the step makes, if all of it is there. */
+/* Fills in the step's results from a record, if the cache has all of them. */
 static bool take_record(qmat_run *run, size_t index, const json_t *record) {
   qmat_run_step *step = &run->steps[index];
   const qmat_node *type = type_of(run, step);
@@ -175,7 +170,7 @@ static bool take_record(qmat_run *run, size_t index, const json_t *record) {
     read_output(json_array_get(outputs, port), &type->outputs[port], &step->made[port]);
     if (!qmat_cache_has_stored(run->cache, json_array_get(outputs, port))) return false;
   }
-  /* Reports are small, and the summary of the run is made of them. */
+  /* Reports are loaded at once: they are small, and the run's summary needs them. */
   for (size_t port = 0; port < qmat_output_count(type) && !step->report; port++) {
     if (type->outputs[port].type != QMAT_REPORT) continue;
     qmat_value *value = qmat_run_load(run, index, port);
@@ -223,8 +218,8 @@ qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
 
 /* ---- storing ---- */
 
-/* A file that was read besides those that parameters name: the parameter that it belongs to, and its path from there.
- */
+/* A file that a step read and no parameter names: the parameter that it belongs to, and its path relative to that
+ * parameter's file. */
 typedef struct side_file {
   const char *param, *path;
   const qmat_run_file_digest *file;
@@ -236,9 +231,8 @@ static int by_name(const void *a, const void *b) {
   return order ? order : strcmp(first->path, second->path);
 }
 
-/* Sorts what was read into the files that the key holds already and those beside them. False when a file was not what
- */
-/* the key says, or cannot be named. */
+/* Collects the side files among the files that a step read. False when another file changed since the key was made, or
+ * a side file cannot be named in a record. */
 static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qmat_step_reads *reads, side_file *sides,
                        size_t *count) {
   const qmat_node *type = type_of(run, step);
@@ -251,7 +245,7 @@ static bool find_sides(const qmat_run *run, const qmat_run_step *step, const qma
       const char *path = qmat_param_input_file(type, row, step->params);
       if (!path) continue;
       is_main = strcmp(path, file->path) == 0;
-      /* A path that is neither below the folder nor absolute would be looked for elsewhere the next time. */
+      /* Any other path would depend on the working folder. */
       size_t folder = qmat_folder_length(path);
       bool below = strncmp(file->path, path, folder) == 0 && file->path[folder] != '/';
       if (below ? !side.param || *side.path == '/' : !side.param && *file->path == '/') {
@@ -279,7 +273,7 @@ static json_t *start_record(const json_t *items, double seconds) {
                    (json_int_t)time.tv_sec * 1000 + time.tv_nsec / 1000000, "seconds", seconds, "key", items);
 }
 
-/* Stores the values; gives the record's list of them. */
+/* Stores the step's values and returns the record's list of them. */
 static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) {
   const qmat_node *type = type_of(run, step);
   json_t *outputs = json_array();
@@ -306,7 +300,7 @@ static json_t *put_outputs(qmat_run *run, qmat_run_step *step, bool *any_added) 
   return NULL;
 }
 
-/* The same key must always give the same bytes; where it does not, the node's version should have been raised. */
+/* Warns when the cache has other bytes under the same key: the node's version should have been raised. */
 static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   json_t *record = qmat_cache_record(run->cache, &step->key);
@@ -316,14 +310,14 @@ static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
       read_output(json_array_get(json_object_get(record, "outputs"), port), &node->type->outputs[port], &made);
       if (!qmat_digest_equal(&made.digest, &step->made[port].digest) && !*run->cache->warning)
         snprintf(run->cache->warning, sizeof run->cache->warning,
-                 "node '%s' (%s) has made another '%s' than the cache has from the same inputs", node->id,
-                 node->type->name, node->type->outputs[port].name);
+                 "node '%s' (%s) made another '%s' than the cache has for the same inputs", node->id, node->type->name,
+                 node->type->outputs[port].name);
     }
   }
   json_decref(record);
 }
 
-/* The names of the side files under the key that is known without them. */
+/* Stores the names of the side files under the key without side files. */
 static bool put_sides(qmat_run *run, const qmat_run_step *step, const side_file *sides, size_t count, json_t *items) {
   json_t *record = start_record(items, step->seconds), *names = json_array();
   bool done = record && names;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/json_text.h"
+#include "graphs/cache/cache_key.h"
 #include "graphs/node_json.h"
 #include "graphs/run/run_paths.h"
 #include "io/bytes.h"
@@ -81,17 +82,15 @@ static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
 static json_t *input_json(const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
     const qmat_node *type = run->graph->nodes[run->steps[i].node].type;
-    for (size_t row = 0; row < qmat_param_count(type); row++)
-      if (type->params[row].type == QMAT_PARAM_PATH && (type->params[row].flags & QMAT_PARAM_INPUT_FILE)) {
-        const char *path;
-        memcpy(&path, (const char *)run->steps[i].params + type->params[row].offset, sizeof path);
-        if (path) return qmat_json_string(path);
-      }
+    for (size_t row = 0; row < qmat_param_count(type); row++) {
+      const char *path = qmat_param_input_file(type, row, run->steps[i].params);
+      if (path) return qmat_json_string(path);
+    }
   }
   return json_null();
 }
 
-/* Where results are kept, or null. */
+/* The cache of the run, or null. */
 static json_t *cache_json(const qmat_run *run) {
   if (!run->cache) return json_null();
   size_t hits = 0;
@@ -106,7 +105,7 @@ static json_t *cache_json(const qmat_run *run) {
   return json;
 }
 
-/* jansson's setters refuse NULL, so only a shortage of memory in the outer object has to be looked for. */
+/* jansson's setters refuse NULL, so only the outer object has to be checked for a shortage of memory. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   json_t *nodes = json_array(), *outputs = json_array(), *report = json_object();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
@@ -159,7 +158,7 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
   char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
   if (!text) return qmat_fail_memory(context, "report");
   size_t length = strlen(text);
-  text[length] = '\n'; /* takes the place of the terminating zero */
+  text[length] = '\n'; /* replaces the terminating zero */
   qmat_file_part part = {.name = (char *)"", .size = length + 1, .bytes = (uint8_t *)text};
   const qmat_file file = {.base = {.type = QMAT_FILE}, .part_count = 1, .parts = &part};
   qmat_status status = qmat_file_save(context, &file, path);
@@ -169,7 +168,7 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
 
 /* ---- depfile ---- */
 
-/* A path as Make and Ninja read it in a depfile. */
+/* Puts a path, escaped as Make and Ninja read it in a depfile. */
 static void put_escaped(qmat_writer *writer, const char *path) {
   for (; *path; path++) {
     if (*path == ' ' || *path == '#' || *path == '\\') qmat_put_text(writer, "\\");
@@ -273,7 +272,7 @@ void qmat_run_print(const qmat_run *run, FILE *out) {
     for (size_t port = 0; port < qmat_output_count(node->type); port++) {
       char made[128];
       describe_made(&node->type->outputs[port], &step->made[port], made, sizeof made);
-      /* The size of a file has been told already. */
+      /* The size of a file is already in the line. */
       if (!*made || (run->cache && node->type->outputs[port].type == QMAT_FILE)) continue;
       fprintf(out, "%s%s", joint, made);
       joint = ", ";

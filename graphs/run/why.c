@@ -18,7 +18,7 @@ json_t *qmat_cache_records(qmat_cache *cache) {
   }
   for (size_t i = 0; i < count; i++) {
     json_t *record = entries[i].kind == QMAT_CACHE_RECORD ? qmat_cache_record(cache, &entries[i].digest) : NULL;
-    /* Lists of side files are no results. */
+    /* Records without outputs list side files. */
     if (json_object_get(record, "outputs"))
       json_array_append_new(records, record);
     else
@@ -35,7 +35,7 @@ static const char *text_of(const json_t *item, size_t index) {
   return text ? text : "";
 }
 
-/* The tag that items are paired by: a text that is set and one that is not are the same parameter. */
+/* The tag that items are compared by: "unset" is a parameter too. */
 static const char *group_of(const json_t *item) {
   return strcmp(text_of(item, 0), "unset") == 0 ? "param" : text_of(item, 0);
 }
@@ -71,7 +71,7 @@ static json_int_t made_at(const json_t *record) {
   return json_integer_value(json_object_get(record, "made"));
 }
 
-/* The record of the same node type with the fewest other items, made before `until`. */
+/* The record of the same node type with the fewest different items, made before `until`. */
 static const json_t *nearest(const json_t *records, const json_t *items, json_int_t until) {
   const json_t *best = NULL;
   size_t least = SIZE_MAX;
@@ -95,7 +95,7 @@ __attribute__((format(printf, 1, 2))) static json_t *sentence(const char *format
   va_start(arguments, format);
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  /* What was cut may end within a character. */
+  /* A text that was cut may end inside a character. */
   json_t *json = json_string(text);
   for (size_t length = strlen(text); !json && length > 0; json = json_string(text)) text[--length] = 0;
   return json;
@@ -105,7 +105,7 @@ static const char *shown_value(const json_t *item) {
   return !item || strcmp(text_of(item, 0), "unset") == 0 ? "not set" : text_of(item, 2);
 }
 
-/* The node that an input takes its value from, or "". */
+/* The node and port that an input takes its value from, or NULL and "". */
 static const qmat_graph_node *maker_of(const qmat_run *run, const qmat_run_step *step, const char *input,
                                        const char **port) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
@@ -117,8 +117,8 @@ static const qmat_graph_node *maker_of(const qmat_run *run, const qmat_run_step 
   return maker;
 }
 
-static json_t *tell_difference(const qmat_run *run, const qmat_run_step *step, const json_t *now,
-                               const json_t *before) {
+static json_t *describe_difference(const qmat_run *run, const qmat_run_step *step, const json_t *now,
+                                   const json_t *before) {
   const json_t *any = now ? now : before;
   const char *tag = group_of(any), *name = text_of(any, 1), *port;
   if (strcmp(tag, "key") == 0)
@@ -134,21 +134,21 @@ static json_t *tell_difference(const qmat_run *run, const qmat_run_step *step, c
   if (strcmp(tag, "file") == 0) {
     const json_t *like = now ? json_pack("[s, s, s]", "name", name, "") : NULL;
     const json_t *file = like ? find_item(step->key_items, like) : NULL;
-    json_t *text = sentence("the file of parameter %s has other bytes%s%s%s", name, file ? " (" : "",
+    json_t *text = sentence("the file of parameter %s changed%s%s%s", name, file ? " (" : "",
                             file ? text_of(file, 2) : "", file ? ")" : "");
     json_decref((json_t *)like);
     return text;
   }
   if (strcmp(tag, "side") == 0) {
     const char *path = strchr(name, ':') ? strchr(name, ':') + 1 : name;
-    if (now && strcmp(text_of(now, 2), "absent") == 0) return sentence("the side file %s is not there", path);
+    if (now && strcmp(text_of(now, 2), "absent") == 0) return sentence("the side file %s is missing", path);
     if (!before) return sentence("the side file %s was not read before", path);
-    return sentence(now ? "the side file %s has other bytes" : "the side file %s is not read any more", path);
+    return sentence(now ? "the side file %s changed" : "the side file %s is no longer read", path);
   }
   if (strcmp(tag, "input") == 0) {
     const qmat_graph_node *maker = maker_of(run, step, name, &port);
-    if (!maker) return sentence("input %s is not connected, but was", name);
-    return sentence("input %s takes other bytes from %s.%s", name, maker->id, port);
+    if (!maker) return sentence("input %s was connected and is not now", name);
+    return sentence("input %s gets other bytes from %s.%s", name, maker->id, port);
   }
   return sentence("%s %s is %s, was %s", tag, name, shown_value(now), shown_value(before));
 }
@@ -163,7 +163,7 @@ static void add_difference(const qmat_run *run, const qmat_run_step *step, const
   const char *port;
   json_t *cause =
       json_pack("{s:s, s:s, s:o, s:o, s:o}", "tag", group_of(any), "name", text_of(any, 1), "now", value_json(now),
-                "before", value_json(before), "text", tell_difference(run, step, now, before));
+                "before", value_json(before), "text", describe_difference(run, step, now, before));
   const qmat_graph_node *maker =
       strcmp(group_of(any), "input") == 0 ? maker_of(run, step, text_of(any, 1), &port) : NULL;
   if (maker) json_object_set_new(cause, "from", json_string(maker->id));
@@ -181,7 +181,7 @@ static void add_differences(const qmat_run *run, const qmat_run_step *step, cons
       add_difference(run, step, NULL, json_array_get(before, i), causes);
 }
 
-/* A file of the step that cannot be read, so that its key is not known. */
+/* Adds the files that cannot be read, without which the step has no key. */
 static void add_unreadable(const qmat_run *run, const qmat_run_step *step, json_t *causes) {
   const qmat_node *type = run->graph->nodes[step->node].type;
   for (size_t row = 0; row < qmat_param_count(type); row++) {
@@ -194,7 +194,7 @@ static void add_unreadable(const qmat_run *run, const qmat_run_step *step, json_
   }
 }
 
-/* The nodes that have to run before it is known what this one takes. */
+/* Adds the nodes that have to run before the step's key is known. */
 static void add_waiting(const qmat_run *run, const qmat_run_step *step, json_t *causes) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   for (size_t port = 0; port < qmat_input_count(node->type); port++) {
@@ -203,10 +203,10 @@ static void add_waiting(const qmat_run *run, const qmat_run_step *step, json_t *
     const qmat_graph_node *maker = maker_of(run, step, node->type->inputs[port].name, &from);
     if (!maker) continue;
     json_array_append_new(
-        causes, json_pack("{s:s, s:s, s:n, s:n, s:o, s:s}", "tag", "input", "name", node->type->inputs[port].name,
-                          "now", "before", "text",
-                          sentence("input %s takes what %s will make", node->type->inputs[port].name, maker->id),
-                          "from", maker->id));
+        causes,
+        json_pack("{s:s, s:s, s:n, s:n, s:o, s:s}", "tag", "input", "name", node->type->inputs[port].name, "now",
+                  "before", "text", sentence("input %s comes from %s", node->type->inputs[port].name, maker->id),
+                  "from", maker->id));
   }
 }
 
@@ -227,33 +227,33 @@ json_t *qmat_why(const qmat_run *run, const json_t *records, size_t index) {
   const char *text = NULL;
   bool hit = step->state == QMAT_STEP_HIT;
   const json_t *before = step->keyed ? nearest(records, step->key_items, hit ? made_at(record) : INT64_MAX) : NULL;
-  json_t *told = NULL;
+  json_t *sentence_text = NULL;
   if (step->missing) {
     char missing[256];
     qmat_step_describe_missing(run->graph, step, missing, sizeof missing);
-    told = sentence("cannot run: %s", missing);
+    sentence_text = sentence("cannot run: %s", missing);
   } else if (step->state == QMAT_STEP_DEPENDS) {
     add_waiting(run, step, causes);
-    text = "it is not known yet: it runs unless nodes before it make what they made before";
+    text = "not known yet: it runs unless the nodes before it make the same bytes as before";
   } else if (!step->keyed) {
     add_unreadable(run, step, causes);
-    text = "would run: its key cannot be made";
+    text = "would run: a file cannot be read";
   } else if (hit) {
     format_date(made_at(record), date, sizeof date);
     json_object_set_new(why, "made", json_integer(made_at(record)));
-    told = sentence("is in the cache since %s, when it took %.2f s; it ran then %s", date,
-                    json_real_value(json_object_get(record, "seconds")),
-                    before ? "because" : "since there was nothing like it in the cache");
+    sentence_text = sentence("in the cache since %s, made in %.2f s; it ran then %s", date,
+                             json_real_value(json_object_get(record, "seconds")),
+                             before ? "because" : "because the cache had no similar result");
   } else if (step->forced) {
-    text = "would run: that is asked for";
+    text = "would run: --force";
   } else if (record && json_object_get(record, "outputs")) {
-    text = "would run: a part of its result has gone from the cache";
+    text = "would run: a part of its result is missing from the cache";
     before = NULL;
   } else {
-    text = before ? "would run:" : "would run: the cache has no result of a node of this type";
+    text = before ? "would run:" : "would run: the cache has no result of this node type";
   }
   if (before && !step->forced) add_differences(run, step, json_object_get(before, "key"), causes);
-  json_object_set_new(why, "text", told ? told : json_string(text));
+  json_object_set_new(why, "text", sentence_text ? sentence_text : json_string(text));
   json_decref(record);
   json_decref(causes);
   return why;

@@ -154,7 +154,7 @@ two='\000\000\000\100'
 # shellcheck disable=SC2059
 printf "$zero$zero$zero$two$zero$zero$zero$one$zero$zero$zero$one\000\002\001\000\001\003\000\003\002\001\002\003" >elsewhere/box.bin
 "$qmat" why "$graph" model --set model="$model" >out.txt 2>err.txt
-holds "why names the side file" grep -q 'the side file box.bin has other bytes' out.txt
+holds "why names the side file" grep -q 'the side file box.bin changed' out.txt
 run -o b.ma
 all run "another byte in the side file"
 
@@ -224,7 +224,7 @@ if [ "$(id -u)" -eq 0 ] && mount -t tmpfs -o size=64k tmpfs full 2>/dev/null; th
   run -o a.glb --cache full
   holds "a run on a full disk" test "$code" -eq 0
   holds "a full disk does not change a result" cmp a.glb cold.glb
-  holds "a full disk is told" grep -q 'warning: the cache cannot be written' err.txt
+  holds "a full disk is told" grep -q 'warning: cannot write to the cache' err.txt
   holds "a full disk is told once" test "$(grep -c warning err.txt)" -eq 1
   "$qmat" cache verify --cache full >out.txt 2>err.txt
   holds "nothing half-written on a full disk" test $? -eq 0

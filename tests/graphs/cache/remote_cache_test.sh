@@ -109,7 +109,7 @@ holds "reading only sends nothing" diff -r web web.kept
 # A server that lies: other bytes under every name, then records under other names.
 for file in web/cas/*; do printf 'X' | dd of="$file" bs=1 seek=40 conv=notrunc status=none; done
 run liar
-holds "a lie is told once" test "$(grep -c 'is not what its name says' err.txt)" -eq 1
+holds "a lie is told once" test "$(grep -c 'has a damaged' err.txt)" -eq 1
 rm -rf web/cas/* web/ac/*
 run ours --force
 rm -rf web && cp -r web.kept web
@@ -126,7 +126,7 @@ stop_server
 start_server "" || holds "nginx starts again" false
 rm -rf web && mkdir web
 run alone1
-holds "a server that takes nothing is told once" test "$(grep -c 'takes nothing' err.txt)" -eq 1
+holds "a server that takes nothing is told once" test "$(grep -c 'refuses to store' err.txt)" -eq 1
 stop_server
 start_server 'location / { default_type text/html; return 200 "<html>welcome</html>"; }' || holds "nginx starts again" false
 run alone2

@@ -110,7 +110,7 @@ mkdir other
 cp models/box1.off other/
 batch --inputs '[mo]*/*.off' --out results
 holds "two results of one name" test $code -eq 2
-holds "two results of one name are told" grep -q "would have one name" err.txt
+holds "two results of one name are told" grep -q "would have the same name" err.txt
 batch --inputs 'nothing*' --out results
 holds "a pattern without a match" test $code -eq 2
 batch --inputs 'nowhere/*.off' --out results
