@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* medial.features: spheres of radius zero along the convex creases of the surface, linked to the medial sheets. */
+/* medial.features: spheres of radius zero along the convex creases of the surface, linked to the medial sheets
+ * (section 5, future work). */
 #include <math.h>
 #include <string.h>
 
@@ -21,24 +22,24 @@ typedef struct {
 
 #define NONE UINT32_MAX
 
-/* The medial mesh's edges at each sphere, and the search for shortest paths along them, all over the centres. */
+/* The adjacency of the spheres, and the state of a shortest-path search along medial edges. */
 typedef struct {
   const double *spheres; /* 4 per sphere, unit frame */
   size_t *starts;        /* per sphere, + 1 */
   uint32_t *neighbours;
-  double *distances; /* per sphere: along edges from the root, where `reached` says so */
+  double *distances; /* per sphere: along edges from the root; valid in the search of `reached` */
   uint32_t *parents;
-  uint32_t *reached, *converged, *wanted, *linked; /* per sphere: the number of the search that said so */
+  uint32_t *reached, *finished, *wanted, *linked; /* per sphere: the last search that set this mark */
   uint32_t search;
   uint32_t *heap, *places;
   size_t heap_count;
 } sheet_graph;
 
-/* A point on a crease that gets a sphere. */
+/* A point on a crease that becomes a sphere. */
 typedef struct {
   double unit[3];
-  uint32_t vertex; /* of the mesh; NONE between two */
-  uint32_t anchor; /* the sphere of the medial mesh that it is linked to */
+  uint32_t vertex; /* of the mesh; NONE between two vertices */
+  uint32_t anchor; /* the sphere of the initial medial mesh that it is linked to */
 } feature;
 
 typedef struct {
@@ -52,7 +53,7 @@ typedef struct {
   feature *features; /* heap */
   size_t feature_count, feature_capacity;
   uint32_t *feature_of_vertex; /* of the mesh */
-  uint32_t *segments;          /* 2 per segment of a crease: its features, in the crease's direction; heap */
+  uint32_t *segments;          /* 2 features per segment of a crease, in the crease's direction; heap */
   size_t segment_count, segment_capacity;
   sheet_graph graph;
   uint32_t *edges, *triangles; /* of the result; heap */
@@ -90,15 +91,15 @@ static qmat_status add_segment(feature_builder *b, uint32_t from, uint32_t to) {
   return QMAT_OK;
 }
 
-/* Features at both ends of an edge of the mesh, and between them where it is long. */
+/* Adds features at both ends of a mesh edge, and between them if the edge is longer than the spacing. */
 static qmat_status divide_edge(feature_builder *b, uint32_t from, uint32_t to) {
   const double *a = &b->positions[3 * (size_t)from], *c = &b->positions[3 * (size_t)to];
-  const double parts = fmax(ceil(qmat_point_distance(a, c) / b->params->spacing), 1);
+  const double pieces = fmax(ceil(qmat_point_distance(a, c) / b->params->spacing), 1);
   uint32_t last, next = NONE;
   qmat_status status = feature_at_vertex(b, from, &last);
-  for (double i = 1; i < parts && status == QMAT_OK; i++) {
+  for (double i = 1; i < pieces && status == QMAT_OK; i++) {
     double place[3];
-    for (int k = 0; k < 3; k++) place[k] = a[k] + i / parts * (c[k] - a[k]);
+    for (int k = 0; k < 3; k++) place[k] = a[k] + i / pieces * (c[k] - a[k]);
     status = add_feature(b, place, NONE, &next);
     if (status == QMAT_OK) status = add_segment(b, last, next);
     last = next;
@@ -123,10 +124,9 @@ static qmat_status place_features(feature_builder *b) {
   return status;
 }
 
-/* --- the sphere of the medial mesh that each is linked to ----------------------------------------------------------
- */
+/* --- anchors ----------------------------------------------------------------------------------------------------- */
 
-/* The corner of the nearest primitive whose sphere is nearest. */
+/* Of the corners of the nearest primitive, the one whose sphere is nearest. */
 static uint32_t nearest_sphere(const qmat_envelope *envelope, const double *spheres, const double *point) {
   size_t primitive;
   uint32_t ids[3];
@@ -163,8 +163,7 @@ static qmat_status find_anchors(feature_builder *b) {
   return status;
 }
 
-/* --- paths in the medial mesh --------------------------------------------------------------------------------------
- */
+/* --- shortest paths in the medial mesh --------------------------------------------------------------------------- */
 
 static qmat_status make_graph(feature_builder *b) {
   qmat_arena *arena = &b->context->arena;
@@ -175,7 +174,7 @@ static qmat_status make_graph(feature_builder *b) {
   g->starts = qmat_arena_calloc(arena, count + 2, sizeof *g->starts);
   g->neighbours = qmat_arena_alloc(arena, m->edge_count, 2 * sizeof *g->neighbours);
   g->distances = qmat_arena_alloc(arena, count, sizeof *g->distances);
-  uint32_t **const rows[] = {&g->parents, &g->reached, &g->converged, &g->wanted, &g->linked, &g->heap, &g->places};
+  uint32_t **const rows[] = {&g->parents, &g->reached, &g->finished, &g->wanted, &g->linked, &g->heap, &g->places};
   bool bad = !spheres || !g->starts || !g->neighbours || !g->distances;
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
     bad |= !(*rows[i] = qmat_arena_calloc(arena, count, sizeof **rows[i]));
@@ -215,7 +214,8 @@ static uint32_t take_nearest(sheet_graph *g) {
   return first;
 }
 
-/* The tree of shortest paths from `root` (Dijkstra 1959), as far as the `missing` wanted spheres need it. */
+/* Grows the tree of shortest paths from `root` (Dijkstra 1959) until it contains all wanted spheres, `missing` of them.
+ */
 static void find_paths(sheet_graph *g, uint32_t root, size_t missing) {
   g->distances[root] = 0;
   g->parents[root] = NONE;
@@ -224,14 +224,14 @@ static void find_paths(sheet_graph *g, uint32_t root, size_t missing) {
   put(g, 0, root);
   while (g->heap_count && missing) {
     const uint32_t v = take_nearest(g);
-    g->converged[v] = g->search;
+    g->finished[v] = g->search;
     missing -= g->wanted[v] == g->search;
     for (size_t i = g->starts[v]; i < g->starts[v + 1]; i++) {
       const uint32_t w = g->neighbours[i];
       const double distance =
           g->distances[v] + qmat_point_distance(&g->spheres[4 * (size_t)v], &g->spheres[4 * (size_t)w]);
       const bool is_new = g->reached[w] != g->search;
-      if (g->converged[w] == g->search || !(is_new || distance < g->distances[w])) continue;
+      if (g->finished[w] == g->search || !(is_new || distance < g->distances[w])) continue;
       g->distances[w] = distance;
       g->parents[w] = v;
       g->reached[w] = g->search;
@@ -240,8 +240,7 @@ static void find_paths(sheet_graph *g, uint32_t root, size_t missing) {
   }
 }
 
-/* --- the collar between creases and medial mesh --------------------------------------------------------------------
- */
+/* --- slabs between creases and medial mesh ----------------------------------------------------------------------- */
 
 static qmat_status add_edge(feature_builder *b, uint32_t u, uint32_t v) {
   if (qmat_grow((void **)&b->edges, &b->edge_capacity, 2 * (b->edge_count + 1), sizeof *b->edges))
@@ -259,9 +258,9 @@ static qmat_status add_triangle(feature_builder *b, uint32_t u, uint32_t v, uint
   return QMAT_OK;
 }
 
-/* Links one feature and the segments that start at it: a fan over the tree of paths in the medial mesh from its anchor
- * to those of the features that follow, and a slab on each segment. A cone over a tree, and slabs that each bring one
- * free edge with them, do not change the homotopy type. `following` holds segments. */
+/* Links one feature and the segments that start at it: a fan of slabs over the tree of paths from its anchor to the
+ * anchors of the next features, and a slab on each segment. A cone over a tree keeps the homotopy type, and so does a
+ * slab that adds one free edge. `following` holds the segments. */
 static qmat_status link_feature(feature_builder *b, uint32_t id, const uint32_t *following, size_t count) {
   sheet_graph *g = &b->graph;
   const uint32_t sphere = (uint32_t)b->initial->sphere_count + id, root = b->features[id].anchor;
@@ -277,7 +276,7 @@ static qmat_status link_feature(feature_builder *b, uint32_t id, const uint32_t 
   g->linked[root] = g->search;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     const uint32_t next = b->segments[2 * (size_t)following[i] + 1], anchor = b->features[next].anchor;
-    if (g->converged[anchor] != g->search) {
+    if (g->finished[anchor] != g->search) {
       b->gaps++;
       continue;
     }
@@ -307,10 +306,9 @@ static qmat_status link_features(feature_builder *b) {
   return status;
 }
 
-/* --- the result ----------------------------------------------------------------------------------------------------
- */
+/* --- the result -------------------------------------------------------------------------------------------------- */
 
-/* A feature at a vertex answers for it: samples start with the vertices of the mesh. */
+/* A feature at a vertex is responsible for it: the first samples are the vertices. */
 static qmat_status set_regions(const feature_builder *b, qmat_medial *medial) {
   const qmat_medial *m = b->initial;
   if (m->region_offset_count == 0) return QMAT_OK;
@@ -385,10 +383,11 @@ static qmat_status build(feature_builder *b) {
 static qmat_status check_inputs(const feature_builder *b) {
   qmat_status status = QMAT_OK;
   if (!b->mesh->oriented) {
-    qmat_fail(b->context, QMAT_ERROR_GEOMETRY, "its triangles do not agree on a side: convex creases look like others");
+    qmat_fail(b->context, QMAT_ERROR_GEOMETRY,
+              "the triangles are not consistently oriented, so convex and concave creases cannot be told apart");
     status = qmat_fail_field(b->context, "mesh");
   } else if (b->initial->sphere_count == 0) {
-    qmat_fail(b->context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
+    qmat_fail(b->context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     status = qmat_fail_field(b->context, "medial");
   }
   return status;
@@ -431,14 +430,14 @@ static const char *const feature_kinds[] = {"none", "sharp", NULL};
 static const qmat_param params[] = {
     {.name = "features",
      .unit = "",
-     .doc = "Leave the medial mesh as it is, or give sharp convex edges and corners spheres of radius zero",
+     .doc = "Leave the medial mesh as it is, or add spheres of radius zero on sharp convex edges and corners",
      .type = QMAT_PARAM_ENUM,
      .default_number = FEATURES_SHARP,
      .choices = feature_kinds,
      .offset = AT(features)},
     {.name = "angle",
      .unit = "degrees",
-     .doc = "An edge is sharp when the normals of its facets differ by more than this",
+     .doc = "An edge is sharp if the normals of its facets differ by more than this",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 40,
      .min = 1,
@@ -446,7 +445,7 @@ static const qmat_param params[] = {
      .offset = AT(angle)},
     {.name = "shortest",
      .unit = "diagonal",
-     .doc = "Sharp edges that hang together over less than this are noise",
+     .doc = "Connected sharp edges with a total length below this are ignored as noise",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.02,
      .min = 0,
@@ -455,7 +454,7 @@ static const qmat_param params[] = {
      .offset = AT(shortest)},
     {.name = "spacing",
      .unit = "diagonal",
-     .doc = "Longer sharp edges get further spheres between their ends",
+     .doc = "The largest distance between neighbouring spheres on a sharp edge",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.01,
      .min = 1e-4,
@@ -472,8 +471,8 @@ static const qmat_port inputs[] = {
 };
 
 static const qmat_port outputs[] = {
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The same with spheres of radius zero behind the others"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Creases, corners, and their spheres"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The input, with the spheres of radius zero at the end"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts of creases, corners and their spheres"},
     {0},
 };
 
@@ -482,11 +481,12 @@ const qmat_node qmat_node_medial_features = {
     .version = 1,
     .summary = "Extends an initial medial mesh to the sharp convex edges and corners of the surface",
     .doc =
-        "The medial sheet of a convex crease reaches it with radius zero, which spheres through samples never do. "
-        "Creases are chained from corner to corner: where they meet, end or bend by more than 45 degrees. Along "
-        "them come spheres of radius zero, joined by medial cones and linked by slabs to the nearest spheres of the "
-        "medial mesh in a way that keeps the homotopy type. medial.simplify keeps them on their creases. Concave "
-        "creases carry no sheet to the surface and are left alone.",
+        "The medial axis of a solid touches its convex creases with radius zero, but spheres through samples never do. "
+        "This node adds spheres of radius zero along the creases, joins them by medial cones, and links them by slabs "
+        "to the nearest spheres of the medial mesh. The homotopy type does not change. medial.simplify keeps these "
+        "spheres on their creases.\n\n"
+        "A crease runs from corner to corner: where creases meet, end or bend by more than 45 degrees. Concave creases "
+        "are ignored, since the medial axis does not reach them.",
     .citation = "Section 5, future work",
     .params_size = sizeof(medial_features_params),
     .params = params,

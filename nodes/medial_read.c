@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.read: a medial mesh from a .ma file. */
 #include "core/node.h"
 #include "io/model.h"
 
@@ -32,8 +33,8 @@ const qmat_node qmat_node_medial_read = {
     .version = 1,
     .summary = "Reads a medial mesh from a .ma file",
     .doc =
-        "Numbers and indices are checked; edges and triangles are sorted, repeated ones are left out, and edges of "
-        "triangles are added where the file lacks them.",
+        "Checks numbers and indices. Sorts edges and triangles, leaves out duplicates, and adds the edges of triangles "
+        "that the file lacks.",
     .citation = "",
     .params_size = sizeof(medial_read_params),
     .params = params,

@@ -183,7 +183,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
   if (status == QMAT_OK) status = qmat_thickness_check(context, r.mesh, r.thickness, rounds[0].samples);
   if (status == QMAT_OK && rounds[0].medial->sphere_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "there is no medial sphere");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     status = qmat_fail_field(context, "medial");
   }
   if (status == QMAT_OK) status = qmat_frame_of_mesh(context, r.mesh, &r.frame);

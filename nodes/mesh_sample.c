@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* mesh.sample: points on a surface, more of them on large and on thin facets (section 3.2, eq. 7 and 8). */
-#include <float.h>
+/* mesh.sample: spreads samples over a surface, more on large and on thin facets (section 3.2, eq. 7 and 8). */
 #include <math.h>
 #include <string.h>
 
@@ -9,16 +8,13 @@
 #include "core/geometry/triangle.h"
 #include "core/hash.h"
 #include "core/node.h"
+#include "nodes/initial/facet_relaxation.h"
 #include "nodes/initial/sample_spacing.h"
 
-#define MOST_PER_FACET 64
-#define MOST_SITES (MOST_PER_FACET + 3)
-/* A facet's cell starts with three corners, and every other site cuts off at most one more than it leaves. */
-#define MOST_CELL_CORNERS (MOST_SITES + 3)
-/* Neighbours smaller than this share of the median area count as this large in eq. 7, or slivers would ask for samples
- * without end. */
+/* Least area of a neighbour in eq. 7, as a share of the median area. Without it a sliver would force thousands of
+ * samples on its neighbours. */
 #define SMALLEST_NEIGHBOUR 1e-3
-/* Facets that are equal up to rounding must not ask for a sample because of it. */
+/* Facets that are equal up to rounding get no sample for their area. */
 #define AREA_TOLERANCE 1e-9
 
 typedef struct mesh_sample_params {
@@ -31,16 +27,16 @@ typedef struct mesh_sample_params {
   int64_t seed;
 } mesh_sample_params;
 
-/* The two smallest areas among the facets at a vertex, of different facets. */
+/* The smallest two areas among the facets at a vertex. */
 typedef struct smallest_areas {
   double area[2];
   uint32_t facet[2];
 } smallest_areas;
 
-/* What the spacing adds to eq. 7. */
+/* The samples that the spacing adds to eq. 7. */
 typedef struct spaced_points {
-  uint32_t *on_sides; /* 3 per facet: points that it owns on its sides; NULL without a spacing */
-  uint64_t *in_rows;  /* per facet: points in rows, where these are more than eq. 7 asks for, else 0 */
+  uint32_t *on_sides; /* 3 per facet: points on the sides that it owns; NULL without a spacing */
+  uint64_t *in_rows;  /* per facet: points in rows if they outnumber the samples of eq. 7, else 0 */
 } spaced_points;
 
 typedef struct sample_counts {
@@ -58,8 +54,7 @@ static void exchange(double *a, double *b) {
   *b = kept;
 }
 
-/* The number that stands at `rank` when the numbers are sorted; reorders them. Pivots come from a hash, so that no
- * order of facets makes it slow. */
+/* The number at `rank` in sorted order; reorders the numbers. Pivots come from a hash, so no input order is slow. */
 static double select_number(double *numbers, size_t count, size_t rank) {
   size_t low = 0, high = count;
   while (high - low > 1) {
@@ -105,8 +100,8 @@ static void note_area(smallest_areas *smallest, double area, uint32_t facet) {
   }
 }
 
-/* The first term of eq. 7: how many times the smallest other facet that shares a vertex fits into this one, rounded up,
- * less one. Degenerate neighbours are no patch to compare with and are passed over. */
+/* The first term of eq. 7: the ratio of a facet's area to its smallest neighbour's, rounded up, minus one. Degenerate
+ * neighbours are ignored. */
 static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_t ids[3], uint32_t facet, double area,
                                 double floor_area, int64_t most) {
   double smallest = INFINITY;
@@ -118,7 +113,7 @@ static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_
   return (int64_t)fmin(fmax(count, 0), (double)most);
 }
 
-/* Fills offsets (triangle_count + 1) with where each facet's added samples begin, before the limit on their sum. */
+/* Fills offsets (triangle_count + 1) with the index of each facet's first added sample, before max_samples. */
 static qmat_status count_samples(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
                                  const double *unit_positions, const qmat_field *thickness, const double *areas,
                                  uint64_t *offsets, spaced_points *spaced, sample_counts *counts) {
@@ -155,7 +150,7 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
       counts->degenerate++;
       continue;
     }
-    /* One more than the cap tells that it was reached. */
+    /* One more than the cap, so that `capped` counts it. */
     const int64_t by_thickness = thin ? params->n_f : 0;
     const int64_t by_area = samples_for_area(at_vertices, mesh->triangles + 3 * i, (uint32_t)i, areas[i], floor_area,
                                              params->max_per_facet + 1);
@@ -182,11 +177,11 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
   return QMAT_OK;
 }
 
-/* Thins the counts out evenly, so that no more than `room` samples are added. */
+/* Scales the counts down evenly to at most `room` added samples. */
 static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, sample_counts *counts) {
   const uint64_t wanted = offsets[facet_count];
   if (wanted > room) {
-    /* Rounding the running sum, not each count, keeps the share also where every facet wants a single sample. */
+    /* Rounding the running sum, not each count, keeps the ratio even if every facet has a single sample. */
     for (size_t i = 0; i <= facet_count; i++) {
       const uint64_t scaled = (uint64_t)floor((double)offsets[i] * (double)room / (double)wanted);
       offsets[i] = scaled < room ? scaled : room;
@@ -196,122 +191,9 @@ static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, 
   counts->dropped = (size_t)(wanted - offsets[facet_count]);
 }
 
-/* --- where: Lloyd's relaxation on the bounded Voronoi diagram of a facet ------------------------------------------ */
+/* --- where ------------------------------------------------------------------------------------------------------- */
 
-typedef struct flat_point {
-  double x, y;
-} flat_point;
-
-/* The corners of a facet in its own plane, its longest edge 1 long: the first at the origin, the second on the x axis,
- * the third above it. */
-static void flatten(const double *a, const double *b, const double *c, flat_point corners[3]) {
-  double ab[3], ac[3], normal[3];
-  qmat_subtract(b, a, ab);
-  qmat_subtract(c, a, ac);
-  const double base = sqrt(qmat_dot(ab, ab));
-  const double longest = fmax(fmax(base, sqrt(qmat_dot(ac, ac))), qmat_point_distance(c, b));
-  const double along = qmat_dot(ab, ac) / base;
-  corners[0] = (flat_point){0, 0};
-  corners[1] = (flat_point){base / longest, 0};
-  corners[2] = (flat_point){along / longest, 2 * qmat_triangle_area(a, b, c, normal) / base / longest};
-}
-
-/* Cuts off the part of a convex polygon that is nearer to `other` than to `site`; returns the new number of corners.
- * `in` and `out` may not overlap. */
-static size_t clip_by_bisector(const flat_point *in, size_t count, flat_point site, flat_point other, flat_point *out) {
-  const flat_point normal = {other.x - site.x, other.y - site.y};
-  const flat_point middle = {0.5 * (other.x + site.x), 0.5 * (other.y + site.y)};
-  size_t kept = 0;
-  /* Rounding may bend a polygon and let the line cross it more than twice, but never past the end of the array. */
-  for (size_t i = 0; i < count && kept + 2 <= MOST_CELL_CORNERS; i++) {
-    const flat_point p = in[i], q = in[i + 1 < count ? i + 1 : 0];
-    const double s = (p.x - middle.x) * normal.x + (p.y - middle.y) * normal.y;
-    const double t = (q.x - middle.x) * normal.x + (q.y - middle.y) * normal.y;
-    if (s <= 0) out[kept++] = p;
-    if ((s < 0 && t > 0) || (s > 0 && t < 0)) {
-      const double cut = s / (s - t);
-      out[kept++] = (flat_point){p.x + cut * (q.x - p.x), p.y + cut * (q.y - p.y)};
-    }
-  }
-  return kept;
-}
-
-/* The square of how far the polygon reaches from a point. */
-static double squared_reach(const flat_point *polygon, size_t count, flat_point from) {
-  double reach = 0;
-  for (size_t i = 0; i < count; i++) {
-    const double x = polygon[i].x - from.x, y = polygon[i].y - from.y;
-    reach = fmax(reach, x * x + y * y);
-  }
-  return reach;
-}
-
-/* The centroid of a polygon; `otherwise` when it has no area. */
-static flat_point polygon_centroid(const flat_point *polygon, size_t count, flat_point otherwise) {
-  double area = 0, x = 0, y = 0;
-  for (size_t i = 1; i + 1 < count; i++) {
-    const flat_point u = {polygon[i].x - polygon[0].x, polygon[i].y - polygon[0].y};
-    const flat_point v = {polygon[i + 1].x - polygon[0].x, polygon[i + 1].y - polygon[0].y};
-    const double part = u.x * v.y - u.y * v.x;
-    area += part;
-    x += part * (u.x + v.x);
-    y += part * (u.y + v.y);
-  }
-  if (!(area > 0)) return otherwise;
-  return (flat_point){polygon[0].x + x / (3 * area), polygon[0].y + y / (3 * area)};
-}
-
-/* The centroid of a site's Voronoi cell within the facet (Tournois et al. 2010). Sites 0 to 2 are the corners. */
-static flat_point cell_centroid(const flat_point *sites, size_t count, size_t index) {
-  flat_point polygons[2][MOST_CELL_CORNERS];
-  memcpy(polygons[0], sites, 3 * sizeof *sites);
-  const flat_point site = sites[index];
-  int current = 0;
-  size_t corners = 3;
-  double reach = squared_reach(polygons[0], corners, site);
-  for (size_t i = 0; i < count; i++) {
-    const double x = sites[i].x - site.x, y = sites[i].y - site.y, square = x * x + y * y;
-    /* Two sites in one place have no bisector, and one that is twice the cell's reach away cuts nothing. */
-    if (i == index || square == 0 || square >= 4 * reach) continue;
-    corners = clip_by_bisector(polygons[current], corners, site, sites[i], polygons[1 - current]);
-    current = 1 - current;
-    reach = squared_reach(polygons[current], corners, site);
-  }
-  return polygon_centroid(polygons[current], corners, site);
-}
-
-/* Spreads `count` samples over a facet: their barycentrics (3 each). */
-static void spread_samples(const mesh_sample_params *params, const double *a, const double *b, const double *c,
-                           uint32_t facet, size_t count, double *barycentrics) {
-  if (count == 1) {
-    for (int k = 0; k < 3; k++) barycentrics[k] = 1.0 / 3;
-    return;
-  }
-  flat_point sites[2][MOST_SITES], corners[3];
-  flatten(a, b, c, corners);
-  memcpy(sites[0], corners, sizeof corners);
-  memcpy(sites[1], corners, sizeof corners);
-  for (size_t i = 0; i < count; i++) {
-    /* Uniform on the triangle: the square root makes equal areas equally likely. */
-    const double u = sqrt(qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i)));
-    const double v = qmat_hash_unit(qmat_hash3((uint64_t)params->seed, facet, 2 * i + 1));
-    sites[0][3 + i] = (flat_point){u * (1 - v) * corners[1].x + u * v * corners[2].x, u * v * corners[2].y};
-  }
-  int current = 0;
-  for (int64_t round = 0; round < params->lloyd_rounds; round++) {
-    for (size_t i = 3; i < 3 + count; i++) sites[1 - current][i] = cell_centroid(sites[current], 3 + count, i);
-    current = 1 - current;
-  }
-  for (size_t i = 0; i < count; i++) {
-    const flat_point site = sites[current][3 + i];
-    double *weights = barycentrics + 3 * i;
-    weights[2] = fmin(fmax(site.y / corners[2].y, 0), 1);
-    weights[1] = fmin(fmax((site.x - weights[2] * corners[2].x) / corners[1].x, 0), 1 - weights[2]);
-    weights[0] = 1 - weights[2] - weights[1];
-  }
-}
-
-/* Places a facet's samples: those on its sides first, then those inside. */
+/* Places a facet's samples: first on its sides, then inside. */
 static void place_samples(const mesh_sample_params *params, const double *unit_positions, const uint32_t *ids,
                           uint32_t facet, const spaced_points *spaced, size_t count, double *barycentrics) {
   const double *a = unit_positions + 3 * (size_t)ids[0], *b = unit_positions + 3 * (size_t)ids[1],
@@ -327,13 +209,14 @@ static void place_samples(const mesh_sample_params *params, const double *unit_p
   if (spaced->in_rows && spaced->in_rows[facet] > 0) {
     qmat_row_points_fill(a, b, c, params->spacing, qmat_hash3((uint64_t)params->seed, facet, 0), count, barycentrics);
   } else {
-    spread_samples(params, a, b, c, facet, count, barycentrics);
+    const qmat_facet_relaxation_seed seed = {(uint64_t)params->seed, facet};
+    qmat_facet_relaxation(a, b, c, seed, params->lloyd_rounds, count, barycentrics);
   }
 }
 
 /* --- the node --------------------------------------------------------------------------------------------------- */
 
-/* A spacing so small that its samples could not be counted is a mistake; limits on the sum are max_samples' work. */
+/* Below this spacing the number of samples could overflow; max_samples limits it otherwise. */
 static qmat_status check(qmat_context *context, const void *raw_params) {
   const mesh_sample_params *params = raw_params;
   if (params->spacing == 0 || params->spacing >= 1e-4) return QMAT_OK;
@@ -350,7 +233,7 @@ static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, co
   return QMAT_OK;
 }
 
-/* The mesh's vertices as the first samples: each on the first facet that uses it. */
+/* The first samples are the vertices, each on the first facet that uses it. */
 static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh, qmat_samples *samples) {
   memcpy(samples->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *samples->positions);
   for (size_t i = 0; i < mesh->vertex_count; i++) samples->facets[i] = UINT32_MAX;
@@ -362,7 +245,7 @@ static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh,
   }
   for (size_t i = 0; i < mesh->vertex_count; i++) {
     if (samples->facets[i] != UINT32_MAX) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "a vertex that no triangle uses is no point of the surface");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "no triangle uses the vertex");
     qmat_fail_field(context, "mesh");
     qmat_fail_element(context, "vertex", (int64_t)i);
     return qmat_fail_hint(context, "remove unused vertices");
@@ -370,7 +253,7 @@ static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh,
   return QMAT_OK;
 }
 
-/* Adds offsets[i + 1] - offsets[i] samples to each facet, all behind the vertices. */
+/* Adds offsets[i + 1] - offsets[i] samples to each facet, after the vertices. */
 static qmat_status sample_facets(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
                                  const double *unit_positions, const uint64_t *offsets, const spaced_points *spaced,
                                  qmat_samples *samples) {
@@ -417,7 +300,7 @@ static qmat_status fill_report(qmat_context *context, const qmat_mesh *mesh, con
   return QMAT_OK;
 }
 
-/* The facets' areas, and the vertices, in the unit frame. */
+/* The areas and the vertices in the unit frame. */
 static qmat_status measure_areas(qmat_context *context, const qmat_mesh *mesh, double *unit_positions, double *areas) {
   qmat_frame frame;
   const qmat_status status = qmat_frame_of_mesh(context, mesh, &frame);
@@ -485,7 +368,7 @@ done:
 static const qmat_param params[] = {
     {.name = "spacing",
      .unit = "diagonal",
-     .doc = "Facets and sides that are larger get samples this far apart, whatever eq. 7 says; 0: none",
+     .doc = "The largest distance between neighbouring samples on long sides and large facets; 0: eq. 7 alone",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.02,
      .min = 0,
@@ -494,7 +377,7 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_sample_params, spacing)},
     {.name = "theta",
      .unit = "1",
-     .doc = "A facet is thin up to this share of the mean thickness (eq. 8)",
+     .doc = "A facet is thin if its thickness is at most this ratio of the mean (eq. 8)",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.5,
      .min = 0,
@@ -502,7 +385,7 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_sample_params, theta)},
     {.name = "n_f",
      .unit = "samples",
-     .doc = "Samples that a thin facet gets beyond those for its area (eq. 7)",
+     .doc = "Extra samples for each thin facet (eq. 7)",
      .type = QMAT_PARAM_INT,
      .default_number = 1,
      .min = 0,
@@ -518,15 +401,15 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_sample_params, lloyd_rounds)},
     {.name = "max_per_facet",
      .unit = "samples",
-     .doc = "The most samples that are added to one facet",
+     .doc = "The most samples added to one facet by eq. 7",
      .type = QMAT_PARAM_INT,
-     .default_number = MOST_PER_FACET,
+     .default_number = QMAT_MOST_FACET_SAMPLES,
      .min = 0,
-     .max = MOST_PER_FACET,
+     .max = QMAT_MOST_FACET_SAMPLES,
      .offset = offsetof(mesh_sample_params, max_per_facet)},
     {.name = "max_samples",
      .unit = "samples",
-     .doc = "The most samples in all; beyond it all facets get proportionally fewer, vertices always stay",
+     .doc = "The most samples in all. Beyond it all facets get proportionally fewer; the vertices always stay",
      .type = QMAT_PARAM_INT,
      .default_number = 4000000,
      .min = 0,
@@ -534,7 +417,7 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_sample_params, max_samples)},
     {.name = "seed",
      .unit = "1",
-     .doc = "Selects the random points that the relaxation starts from",
+     .doc = "Seed of the random points that the relaxation starts from",
      .type = QMAT_PARAM_INT,
      .default_number = 0,
      .min = 0,
@@ -544,14 +427,14 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface; every vertex lies on a triangle"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface; every vertex belongs to a triangle"},
     {.name = "thickness", .type = QMAT_FIELD, .doc = "The thickness of each facet, from mesh.sdf"},
     {0},
 };
 
 static const qmat_port outputs[] = {
     {.name = "samples", .type = QMAT_SAMPLES, .doc = "All vertices, then the added points facet by facet"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "How many samples there are, and why"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts of samples by their origin"},
     {0},
 };
 
@@ -560,14 +443,13 @@ const qmat_node qmat_node_mesh_sample = {
     .version = 1,
     .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
-        "Every vertex is a sample. A facet gets as many more as the smallest facet around it fits into it, less one, "
-        "and n_f more where it is thin. Neighbours count as at least a thousandth of the median area; degenerate "
-        "facets get none and are nobody's neighbours. A single sample lies at the centroid; several start at random "
-        "and are spread by Lloyd's relaxation on the facet's bounded Voronoi diagram, in which the corners stay. Sides "
-        "longer than the spacing, and facets that would get fewer samples than it asks for, are filled evenly, since "
-        "eq. 7 compares facets only with each other and says nothing to a mesh that is coarse everywhere. The "
-        "report counts samples, vertices and added ones; added_by_area and added_by_thickness (before max_samples); "
-        "thin and degenerate facets; facets capped by max_per_facet; and samples dropped by max_samples.",
+        "Every vertex is a sample. A facet gets further samples for its area relative to its smallest neighbour, and "
+        "n_f more if it is thin. Neighbours count as at least a thousandth of the median area; degenerate facets are "
+        "ignored.\n\n"
+        "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "
+        "facet's bounded Voronoi diagram, with fixed corners.\n\n"
+        "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "
+        "and large facets are therefore filled evenly at the given spacing.",
     .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* mesh.sdf: the thickness of a solid at each facet, by its shape diameter function (section 3.2). */
+/* mesh.sdf: the thickness of a solid at each facet, as its shape diameter function (section 3.2). */
 #include <math.h>
 #include <string.h>
 
@@ -10,16 +10,16 @@
 #include "nodes/initial/sample_thinning.h"
 
 #define MOST_RAYS 1024
-/* Rays start at the facet; its own plane is met at a distance of rounding. In the unit frame. */
+/* Hits closer than this (unit frame) are on the facet itself, by rounding. */
 #define RAY_START 1e-9
-/* Cosine between the facet's normal and the normal of what a ray hits above which the hit is refused. A little above
- * zero, so that walls at a right angle do not come and go with rounding. */
+/* A hit is ignored if the cosine of its normal with the facet's is above this. Slightly above 0, so that walls at a
+ * right angle do not depend on rounding. */
 #define SAME_SIDE 1e-6
-/* Facets around one vertex that are asked for their value: a fan of thousands must not cost its square. */
+/* The most facets considered around a vertex, so that a fan of thousands does not cost quadratic time. */
 #define MOST_NEIGHBOURS 256
-/* A facet may take the value of one that is at most this share of that value away. */
+/* A facet may take the value of another within this share of that value. */
 #define SAME_VALUE 0.1
-/* How far out of each other's planes such facets may be, as a share of the spacing. */
+/* The largest distance of such facets from each other's planes, as a share of the spacing. */
 #define SAME_PLANE 0.25
 
 typedef struct mesh_sdf_params {
@@ -30,7 +30,7 @@ typedef struct mesh_sdf_params {
 
 typedef enum facet_state { MEASURED, NO_VALID_RAY, DEGENERATE } facet_state;
 
-/* A ray in a facet's own frame (first edge, its perpendicular, inward normal), and its weight. */
+/* A ray in a facet's frame (first edge, its perpendicular, inward normal), and its weight. */
 typedef struct cone_ray {
   double direction[3];
   double weight;
@@ -42,8 +42,8 @@ typedef struct vertex_facets {
   uint32_t *facets;
 } vertex_facets;
 
-/* The same number of rays for equal parts of the cone's solid angle, turned by the golden angle from one to the next
- * (Vogel 1979). Weights are the inverse of the angle to the axis, as in Shapira et al. 2008, section 3.1. */
+/* Spreads rays evenly over the cone's solid angle, with the golden angle between successive rays (Vogel 1979). The
+ * weight is the inverse of the angle to the axis (Shapira et al. 2008, section 3.1). */
 static void make_cone(double full_angle, size_t count, cone_ray *rays) {
   const double pi = 3.14159265358979323846, golden_angle = 2.39996322972865332223;
   if (count == 1) {
@@ -58,7 +58,7 @@ static void make_cone(double full_angle, size_t count, cone_ray *rays) {
   }
 }
 
-/* Shell sort: in place, no allocation, fast for the few dozen rays of a facet (gaps of Ciura 2001). */
+/* Shell sort: in place, and fast for the few dozen rays of a facet (gaps of Ciura 2001). */
 static void sort_numbers(double *numbers, size_t count) {
   static const size_t gaps[] = {701, 301, 132, 57, 23, 10, 4, 1};
   for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; g++) {
@@ -71,7 +71,7 @@ static void sort_numbers(double *numbers, size_t count) {
   }
 }
 
-/* Sorts the numbers; the mean of the middle two when their count is even. */
+/* Sorts the numbers. The mean of the middle two if their count is even. */
 static double median_of(double *numbers, size_t count) {
   sort_numbers(numbers, count);
   return count % 2 == 1 ? numbers[count / 2] : 0.5 * (numbers[count / 2 - 1] + numbers[count / 2]);
@@ -83,7 +83,7 @@ static double robust_mean(const double *lengths, const double *weights, size_t c
   memcpy(scratch, lengths, count * sizeof *scratch);
   const double median = median_of(scratch, count);
   for (size_t i = 0; i < count; i++) scratch[i] = fabs(lengths[i] - median);
-  /* Equal lengths deviate by rounding only. */
+  /* The second term tolerates rounding if all lengths are equal. */
   const double reach = 1.5 * median_of(scratch, count) + 1e-9 * median;
   double sum = 0, total = 0;
   for (size_t i = 0; i < count; i++) {
@@ -91,7 +91,7 @@ static double robust_mean(const double *lengths, const double *weights, size_t c
     sum += weights[i] * lengths[i];
     total += weights[i];
   }
-  return sum / total; /* half of the lengths are within one deviation, so there are some */
+  return sum / total; /* half of the lengths are within one deviation, so total > 0 */
 }
 
 static facet_state measure_facet(const qmat_surface *surface, const cone_ray *rays, size_t ray_count, uint32_t facet,
@@ -114,7 +114,7 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
     double direction[3], hit_normal[3], distance;
     for (int k = 0; k < 3; k++) direction[k] = local[0] * first[k] + local[1] * second[k] - local[2] * normal[k];
     if (!qmat_surface_cast(surface, centroid, direction, RAY_START, &distance, NULL, hit_normal)) continue;
-    /* A surface that faces the same way was met from outside (Shapira et al. 2008, section 3.1). */
+    /* A surface that faces the same way is hit from outside (Shapira et al. 2008, section 3.1). */
     if (qmat_dot(hit_normal, normal) > SAME_SIDE) continue;
     lengths[count] = distance;
     weights[count++] = rays[i].weight;
@@ -152,8 +152,8 @@ static double squared_centroid_distance(const qmat_surface *surface, uint32_t le
   return square;
 }
 
-/* The value for a facet that has none, from the facets at its corners that have one (`known`): the median for one
- * without a valid ray, the nearest one's for a degenerate one; `otherwise` when there are none. */
+/* A value for a facet without one, from the known facets at its corners: that of the nearest, or the median of all;
+ * `otherwise` if no facet there is known. */
 static double borrow_value(const qmat_surface *surface, const vertex_facets *around, const double *values,
                            const uint8_t *known, uint32_t facet, bool nearest, double otherwise) {
   const uint32_t *ids = qmat_surface_mesh(surface)->triangles + 3 * (size_t)facet;
@@ -182,7 +182,7 @@ static double borrow_value(const qmat_surface *surface, const vertex_facets *aro
   return nearest ? values[best_facet] : median_of(found, count);
 }
 
-/* Gives values to the facets that could not be measured. */
+/* Facets without a valid ray take the median of their neighbours; degenerate facets take the nearest neighbour's. */
 static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface, const uint8_t *states,
                              double *values) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
@@ -196,9 +196,9 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
   }
   if (measured == count) return QMAT_OK;
   if (measured == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "no ray from any facet meets an opposite side: the mesh encloses nothing");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "no ray hits an opposite side: the surface encloses no solid");
     qmat_fail_field(context, "mesh");
-    return qmat_fail_hint(context, "the normals of a solid point outwards");
+    return qmat_fail_hint(context, "check that the surface is closed and its normals point outwards");
   }
   const double mean = sum / (double)measured;
   vertex_facets around;
@@ -217,7 +217,7 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
   return QMAT_OK;
 }
 
-/* For each facet the one that is measured in its place, itself when it is one. */
+/* Sets the facet that is measured in place of each facet, possibly itself. */
 static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *surface, double spacing,
                                   uint32_t *stand_ins) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
@@ -240,7 +240,6 @@ static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *sur
   return qmat_samples_thin(context, centroids, normals, radii, count, spacing, SAME_PLANE * spacing, stand_ins);
 }
 
-/* What every facet's measuring needs. */
 typedef struct measuring {
   const qmat_surface *surface;
   const cone_ray *rays;
@@ -253,14 +252,15 @@ typedef struct measuring {
 static bool takes_value(const measuring *m, uint32_t facet) {
   const uint32_t measured = m->stand_ins[facet];
   if (m->states[measured] != MEASURED) return false;
-  const double reach = 3 * SAME_VALUE * m->values[measured]; /* the distance is between sums of three corners */
+  const double reach =
+      3 * SAME_VALUE * m->values[measured]; /* squared_centroid_distance compares sums of three corners */
   return squared_centroid_distance(m->surface, facet, measured) <= reach * reach;
 }
 
-/* Measures the facets that stand for themselves, or else those that are left. */
+/* Measures the facets that stand for themselves, or the others. */
 static qmat_status measure_facets(qmat_context *context, const measuring *m, bool stand_ins) {
   const size_t count = qmat_surface_mesh(m->surface)->triangle_count;
-  /* About a tenth of a second of rays between two looks at the progress function. */
+  /* About a tenth of a second of rays between two progress reports. */
   const size_t slice = 100000 / m->ray_count + 1;
   const int threads = qmat_threads(context);
   for (size_t begin = 0; begin < count; begin += slice) {
@@ -348,8 +348,8 @@ static const qmat_param params[] = {
     {.name = "spacing",
      .unit = "diagonal",
      .doc =
-         "Facets of the same plane whose centroids are nearer than this share one value, where the solid is ten times "
-         "as thick as they are apart; 0: every facet is measured",
+         "Coplanar facets with centroids nearer than this share one value if the solid is at least ten times as thick "
+         "as their distance; 0: every facet is measured",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.002,
      .min = 0,
@@ -360,7 +360,7 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface of a solid, normals outwards"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface of a solid, with outward normals"},
     {0},
 };
 
@@ -376,13 +376,13 @@ const qmat_node qmat_node_mesh_sdf = {
     .version = 2,
     .summary = "Measures how thick a solid is at each facet",
     .doc =
-        "The shape diameter function: from each facet's centroid a fixed pattern of rays goes into the solid within a "
-        "cone around the inward normal. Hits on surfaces that face the same way as the facet are ignored. The "
-        "thickness is the mean of the ray lengths within 1.5 median absolute deviations of their median, weighted by "
-        "the inverse of the angle to the normal. It is neither smoothed nor normalised. Facets without a valid ray "
-        "take the median of the facets at their corners, or the mean of all; degenerate facets take the value of the "
-        "nearest facet at their corners. On meshes far finer than the spacing only some facets are measured, and "
-        "their neighbours take their values.",
+        "Each facet casts a fixed pattern of rays from its centroid into the solid, within a cone around the inward "
+        "normal. Hits on surfaces that face the same way as the facet are ignored. The thickness is a weighted mean "
+        "of the ray lengths within 1.5 median absolute deviations of their median; the weight is the inverse of the "
+        "angle to the normal. It is neither smoothed nor normalised.\n\n"
+        "Facets without a valid ray take the median of the facets at their corners, or the mean of all. Degenerate "
+        "facets take the value of the nearest facet at their corners. On meshes much finer than the spacing only some "
+        "facets are measured, and their neighbours take their values.",
     .citation =
         "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
         "diameter function",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* mesh.subdivide: subdivision surfaces as triangles whose vertices lie on the limit. */
+/* mesh.subdivide: subdivision surfaces become triangles with vertices on the limit surface. */
 #include <math.h>
 #include <string.h>
 
@@ -20,17 +20,17 @@ typedef struct mesh_subdivide_params {
   int boundary_rule; /* a qmat_boundary + 1; 0: as authored */
 } mesh_subdivide_params;
 
-/* Faces at the deepest level: a gigabyte. */
+/* The most faces at the deepest level: about a gigabyte. */
 static const double MOST_FACES = 1 << 22;
 
-/* What a level strays from the next one is a quarter of what the level before does where the surface is smooth, and at
- * worst about half where it is not: all that come add up to no more than this many times what is seen at the next. */
+/* The deviation from one level to the next shrinks to a quarter on smooth surfaces, and to about half at worst. The sum
+ * over all further levels is therefore at most this factor times the deviation measured at the next level. */
 static const double all_levels = 2;
 
 enum { NO_VERTEX = -1, GROUPS = QMAT_SCHEME_COUNT * QMAT_BOUNDARY_COUNT };
 
-/* All surfaces of one scheme and one boundary rule, as a cage of one surface. They share no vertices, so together they
- * are what each is alone. */
+/* All surfaces of one scheme and one boundary rule, merged into one cage. They share no vertices, so they do not affect
+ * each other. */
 typedef struct group {
   qmat_cage cage;
   uint32_t scheme, boundary, face_count;
@@ -39,14 +39,14 @@ typedef struct group {
 typedef struct subdivision {
   qmat_context *context;
   const mesh_subdivide_params *params;
-  qmat_cage source;      /* the mesh's own, or its triangles as one; nothing in it is to be freed */
+  qmat_cage source;      /* the mesh's cage, or its triangles as a cage; borrowed */
   uint8_t *face_groups;  /* per face of the source */
   size_t *first_corners; /* per face of the source */
   group groups[GROUPS];
-  size_t surface_count; /* that are subdivided */
+  size_t surface_count; /* subdivided ones */
 } subdivision;
 
-/* A level made, and how far it is from the limit surface, in diagonals. */
+/* The mesh of a level, and its distance from the limit surface in diagonals. */
 typedef struct attempt {
   qmat_mesh *mesh;
   double seen, unresolved, deviation;
@@ -59,7 +59,7 @@ static qmat_status fail_shortage(qmat_context *context) {
   return qmat_fail_memory(context, "the cages of subdivision surfaces");
 }
 
-/* The cage to start from. Triangles of a mesh without one are a surface of the scheme none. */
+/* Finds the cage. The triangles of a mesh without cage become a surface of the scheme none. */
 static qmat_status find_source(subdivision *s, const qmat_mesh *mesh) {
   s->source = mesh->cage;
   if (mesh->cage.surface_count > 0) return QMAT_OK;
@@ -95,23 +95,23 @@ static qmat_status fail_face(qmat_context *context, size_t face, const char *why
   return qmat_fail_element(context, "face", (int64_t)face);
 }
 
-/* Faces that no scheme takes. `last_use` is per vertex, zeroed. */
+/* Refuses faces that no scheme accepts. `last_use` (per vertex) starts as zeros. */
 static qmat_status check_face(const subdivision *s, size_t face, uint32_t *last_use) {
   const uint32_t size = s->source.face_sizes[face], *corners = s->source.corners + s->first_corners[face];
   if (size < 3) return fail_face(s->context, face, "a face of a subdivision surface has %u corners", size);
   if (s->groups[s->face_groups[face]].scheme == QMAT_SCHEME_LOOP && size != 3) {
-    fail_face(s->context, face, "Loop's scheme subdivides triangles, but the face has %u corners", size);
-    return qmat_fail_hint(s->context, "scheme catmull_clark takes any polygons");
+    fail_face(s->context, face, "Loop's scheme needs triangles, but the face has %u corners", size);
+    return qmat_fail_hint(s->context, "scheme=catmull_clark accepts any polygons");
   }
   for (uint32_t k = 0; k < size; k++) {
     if (last_use[corners[k]] == (uint32_t)face + 1)
-      return fail_face(s->context, face, "the face names vertex %u of its cage twice", corners[k]);
+      return fail_face(s->context, face, "the face uses vertex %u of its cage twice", corners[k]);
     last_use[corners[k]] = (uint32_t)face + 1;
   }
   return QMAT_OK;
 }
 
-/* Sorts the faces into groups. */
+/* Assigns the faces to groups. */
 static qmat_status sort_faces(subdivision *s) {
   qmat_arena *arena = &s->context->arena;
   const qmat_cage *source = &s->source;
@@ -144,7 +144,7 @@ static qmat_status sort_faces(subdivision *s) {
   return QMAT_OK;
 }
 
-/* Fills the cage of a group with its faces, and their vertices as numbered by `ids`, one per vertex of the source. */
+/* Fills the cage of a group with its faces and vertices. `ids` has room for one number per vertex of the source. */
 static qmat_status fill_group(subdivision *s, size_t index, int32_t *ids) {
   qmat_arena *arena = &s->context->arena;
   const qmat_cage *source = &s->source;
@@ -198,8 +198,8 @@ static qmat_status fill_group(subdivision *s, size_t index, int32_t *ids) {
 
 /* ---- levels ---- */
 
-/* The faces of all groups at a level: as many as there are corners at the first, or four of a triangle, and then four
- * times as many at each. */
+/* The number of faces of all groups at a level. Level 1 has a face per corner, or four per triangle (Loop); each
+ * further level has four times as many. */
 static double faces_at(const subdivision *s, int level) {
   double first = 0;
   for (size_t i = QMAT_BOUNDARY_COUNT; i < GROUPS; i++) {
@@ -209,7 +209,7 @@ static double faces_at(const subdivision *s, int level) {
   return ldexp(first, 2 * (level - 1));
 }
 
-/* Adds the faces of the scheme none as they are, without holes. */
+/* Adds the faces of the scheme none unchanged, except holes. */
 static qmat_status add_unsubdivided(const subdivision *s, qmat_soup *soup) {
   const qmat_cage *source = &s->source;
   bool any = false;
@@ -227,7 +227,7 @@ static qmat_status add_unsubdivided(const subdivision *s, qmat_soup *soup) {
   return status;
 }
 
-/* Whether the middle of p and r is nearer to `centre` than that of q and t. */
+/* Whether the midpoint of p and r is nearer to `centre` than the midpoint of q and t. */
 static bool is_first_nearer(const double *p, const double *q, const double *r, const double *t, const double *centre) {
   double first[3], second[3];
   for (int k = 0; k < 3; k++) {
@@ -237,7 +237,7 @@ static bool is_first_nearer(const double *p, const double *q, const double *r, c
   return qmat_point_distance(first, centre) <= qmat_point_distance(second, centre);
 }
 
-/* Adds a level as triangles: of the diagonals of a quad the one that is nearer to the surface. */
+/* Adds a level as triangles. A quad is split along the diagonal that is nearer to the surface. */
 static qmat_status add_level(qmat_context *context, const qmat_limit_level *limit, qmat_soup *soup) {
   const size_t size = limit->face_size, first = soup->vertex_count;
   const double *positions = limit->positions;
@@ -260,37 +260,37 @@ static qmat_status add_level(qmat_context *context, const qmat_limit_level *limi
   return status;
 }
 
-/* The largest distance from the level's points that are no vertices of the mesh to it, in diagonals. */
+/* Measures the largest distance to the mesh from the limit points that are not its vertices, in diagonals. */
 static qmat_status measure_level(qmat_context *context, const qmat_surface *surface, const qmat_limit_level *limit,
                                  attempt *a) {
   const size_t count = limit->position_count, size = limit->face_size, slice = 1 << 15;
   double *points = qmat_alloc(count, 3 * sizeof *points);
-  uint8_t *asked = qmat_calloc(count, 1);
-  qmat_status status = points && asked ? QMAT_OK : qmat_fail_memory(context, "points of the limit surface");
+  uint8_t *tested = qmat_calloc(count, 1);
+  qmat_status status = points && tested ? QMAT_OK : qmat_fail_memory(context, "points of the limit surface");
   for (size_t i = 0; i < limit->face_count && status == QMAT_OK; i++)
-    for (size_t k = size; k < limit->face_stride; k++) asked[limit->faces[i * limit->face_stride + k]] = 1;
+    for (size_t k = size; k < limit->face_stride; k++) tested[limit->faces[i * limit->face_stride + k]] = 1;
   if (status == QMAT_OK) qmat_frame_to_unit(qmat_surface_frame(surface), limit->positions, count, points);
   double farthest = 0;
-  size_t asked_count = 0;
+  size_t tested_count = 0;
   const int threads = qmat_threads(context);
   for (size_t begin = 0; begin < count && status == QMAT_OK; begin += slice) {
     const size_t end = count - begin < slice ? count : begin + slice;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest) reduction(+ : asked_count)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest) reduction(+ : tested_count)
     for (size_t i = begin; i < end; i++) {
-      if (!asked[i]) continue;
-      asked_count++;
+      if (!tested[i]) continue;
+      tested_count++;
       farthest = fmax(farthest, qmat_surface_distance(surface, points + 3 * i, INFINITY, NULL, NULL));
     }
     status = qmat_progress(context, end, count, "points of the limit surface");
   }
   a->seen = fmax(a->seen, farthest);
-  a->point_count += asked_count;
+  a->point_count += tested_count;
   qmat_free(points);
-  qmat_free(asked);
+  qmat_free(tested);
   return status;
 }
 
-/* Makes the mesh of a level and measures it; `report` gains what the welding has found. */
+/* Makes the mesh of a level and measures it. `report` gets the results of welding. */
 static qmat_status make_attempt(const subdivision *s, int level, int depth, attempt *a, json_t *report) {
   qmat_context *context = s->context;
   qmat_limit_level limits[GROUPS] = {0};
@@ -309,7 +309,8 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
     a->creases_without_edge += limits[i].creases_without_edge;
   }
   if (status == QMAT_OK && soup.facet_count == 0) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "nothing is left of it: all faces are holes, or at the border");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY,
+              "no face is left: all are holes, or at a border that the boundary rule drops");
     status = qmat_fail_field(context, "mesh");
   }
   if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, "", &options, &a->mesh, report);
@@ -323,7 +324,7 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
     const double diagonal = qmat_surface_frame(surface)->diagonal;
     a->unresolved /= diagonal;
     a->deviation = all_levels * a->seen + a->unresolved;
-    /* Nobody else has seen the mesh yet. */
+    /* Nobody else has the mesh yet, so it may be sealed again. */
     a->mesh->deviation = a->deviation * diagonal;
     a->mesh->base.sealed = false;
     status = qmat_value_seal(context, &a->mesh->base);
@@ -336,21 +337,19 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
 
 static qmat_status fail_too_fine(const subdivision *s, int level, int depth, const attempt *coarser) {
   if (!coarser->mesh) {
-    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "level %d is measured with %.0f faces; at most %.0f are made", level,
+    qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "measuring level %d takes %.0f faces, and at most %.0f are made", level,
               faces_at(s, depth), MOST_FACES);
     return qmat_fail_field(s->context, "level");
   }
-  qmat_fail(
-      s->context, QMAT_ERROR_GEOMETRY,
-      "a level that is nearer to the limit surface than %.2g of the diagonal is measured with %.0f faces; at most "
-      "%.0f are made",
-      coarser->deviation, faces_at(s, depth), MOST_FACES);
+  qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
+            "a deviation below %.2g of the diagonal takes %.0f faces, and at most %.0f are made", coarser->deviation,
+            faces_at(s, depth), MOST_FACES);
   qmat_fail_field(s->context, "epsilon");
-  return qmat_fail_hint(s->context, "a larger epsilon or tolerance, or level=%d", level - 1);
+  return qmat_fail_hint(s->context, "set a larger epsilon or tolerance, or level=%d", level - 1);
 }
 
-/* The level asked for, or the first whose deviation is allowed. Edges that are semi-sharp are subdivided until they are
- * not, so far as that matters. */
+/* Makes the given level, or the first whose deviation is allowed. Semi-sharp edges are subdivided deeper as long as
+ * they dominate the deviation. */
 static qmat_status find_level(const subdivision *s, double allowed, int *level, int *depth, attempt *best,
                               json_t *report) {
   const bool is_chosen = s->params->level == 0;
@@ -377,8 +376,9 @@ static qmat_status find_level(const subdivision *s, double allowed, int *level, 
 /* ---- the node ---- */
 
 static int add_warning(json_t *root, size_t creases) {
-  char text[96];
-  snprintf(text, sizeof text, "%zu creases of subdivision surfaces join no neighbours: they are left out", creases);
+  char text[128];
+  snprintf(text, sizeof text, "%zu creases of subdivision surfaces are not edges of their cages and are ignored",
+           creases);
   return json_object_set_new(root, "warnings", json_pack("[s]", text));
 }
 
@@ -461,7 +461,7 @@ static const char *const boundary_rules[] = {
 static const qmat_param params[] = {
     {.name = "level",
      .unit = "subdivisions",
-     .doc = "How often faces are cut into four; 0: as often as epsilon asks for",
+     .doc = "The number of subdivisions; 0: as many as epsilon needs",
      .type = QMAT_PARAM_INT,
      .default_number = 0,
      .min = 0,
@@ -469,7 +469,7 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_subdivide_params, level)},
     {.name = "epsilon",
      .unit = "diagonal",
-     .doc = "The distance that the result is to be good for; 0: 0.01",
+     .doc = "The error bound of the final result; 0: 0.01",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.01,
      .min = 0,
@@ -478,7 +478,7 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_subdivide_params, epsilon)},
     {.name = "tolerance",
      .unit = "epsilon",
-     .doc = "How far the mesh may be from the limit surface, as a share of epsilon",
+     .doc = "The largest distance between mesh and limit surface",
      .type = QMAT_PARAM_FLOAT,
      .default_number = 0.1,
      .min = 0.001,
@@ -486,14 +486,14 @@ static const qmat_param params[] = {
      .offset = offsetof(mesh_subdivide_params, tolerance)},
     {.name = "scheme",
      .unit = "",
-     .doc = "What the model's surfaces are subdivided by, or what all are, whatever the model says",
+     .doc = "The subdivision scheme: the model's own, or one for all its surfaces",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_SCHEME_NONE,
      .choices = schemes,
      .offset = offsetof(mesh_subdivide_params, scheme)},
     {.name = "boundary",
      .unit = "",
-     .doc = "Faces at a border are left out, or it is a smooth curve, or that with corners at vertices of one face",
+     .doc = "At a border: drop its faces, make it a smooth curve, or a smooth curve with sharp corners at single faces",
      .type = QMAT_PARAM_ENUM,
      .default_number = 0,
      .choices = boundary_rules,
@@ -502,13 +502,15 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "A surface, maybe with the cages of subdivision surfaces"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "A surface, optionally with the cages of its subdivision surfaces"},
     {0},
 };
 
 static const qmat_port outputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The limit surface as triangles; the input where nothing is subdivided"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "The level, and how far the triangles are from the limit surface"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The limit surface as triangles; the input if nothing is subdivided"},
+    {.name = "report",
+     .type = QMAT_REPORT,
+     .doc = "The level, and the distance between the triangles and the limit surface"},
     {0},
 };
 
@@ -517,16 +519,16 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 const qmat_node qmat_node_mesh_subdivide = {
     .name = "mesh.subdivide",
     .version = 1,
-    .summary = "Takes subdivision surfaces to their limit",
+    .summary = "Replaces subdivision surfaces by triangles on their limit surface",
     .doc =
-        "Surfaces that a USD file calls Catmull-Clark, Loop or bilinear are subdivided with their creases, corners, "
-        "boundary rules and holes, and the vertices are pushed to the limit surface; other surfaces of the same file "
-        "stay as they are, and all become one mesh. A mesh without such surfaces passes through, unless a scheme is "
-        "given: then its polygons, of other formats its triangles, are the cage. The deviation of a level is twice "
-        "the largest distance from the mesh to the limits of edge middles and face centres, since each further level "
-        "brings a quarter of the one before on smooth surfaces, and about half at worst; edges that are still "
-        "semi-sharp add the distance to their neighbours. It is measured, not proved. The mesh carries it along: "
-        "medial.simplify holds its errors to what is left of epsilon, and medial.evaluate adds it to what it states.",
+        "Subdivides the Catmull-Clark, Loop and bilinear surfaces of a USD file, with their creases, corners, boundary "
+        "rules and holes, and moves the vertices to the limit surface. Other surfaces stay as they are. A mesh without "
+        "subdivision surfaces passes through, unless a scheme is given: then its polygons, or its triangles in other "
+        "formats, are the cage.\n\n"
+        "The deviation of a level is twice the largest distance between the mesh and the limits of edge midpoints and "
+        "face centres; semi-sharp edges add the distance to their neighbours. It is an estimate, not a bound.\n\n"
+        "The mesh carries its deviation along: medial.simplify keeps its errors below epsilon minus the deviation, and "
+        "medial.evaluate adds the deviation to the errors that it states.",
     .citation = "Catmull and Clark 1978; Loop 1987; DeRose et al. 1998, Subdivision surfaces in character animation",
     .params_size = sizeof(mesh_subdivide_params),
     .params = params,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* mesh.unite: parts that reach into each other become the boundary of their union. */
+/* mesh.unite: closed components that intersect are replaced by the boundary of their union. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ typedef struct box {
   double low[3], high[3];
 } box;
 
-/* A sheet that others come near: its box, and the part of that where they do. */
+/* A sheet: its bounding box, and the box of the intersections with other sheets' boxes. */
 typedef struct sheet {
   uint32_t leader; /* triangle */
   box bounds, reach;
@@ -46,7 +46,7 @@ static int compare_keys(const void *left, const void *right) {
   return (a > b) - (a < b);
 }
 
-/* Joins triangles at their edges, and finds the shells where some edge has not as many running one way as the other. */
+/* Joins triangles at their edges. A shell is open if some of its edges runs one way more often than the other. */
 static qmat_status find_shells(unison *u) {
   const qmat_mesh *mesh = u->mesh;
   qmat_arena *arena = &u->context->arena;
@@ -108,7 +108,7 @@ static box triangle_box(const qmat_mesh *mesh, size_t triangle) {
   return b;
 }
 
-/* False where they have no point in common. */
+/* False if the boxes are disjoint. */
 static bool intersect_boxes(const box *a, const box *b, box *common) {
   bool meet = true;
   for (int k = 0; k < 3; k++) {
@@ -125,8 +125,8 @@ static int compare_sheets(const void *left, const void *right) {
   return order != 0 ? order : (a->leader > b->leader) - (a->leader < b->leader);
 }
 
-/* Finds out which sheets of closed shells come near each other: `reaches` (per triangle) becomes 1 where a triangle's
- * box meets that of another sheet, and `is_near` (zeroed, per shell by its leader) 1 for their shells. */
+/* Finds the sheets of closed shells whose boxes intersect. `reaches` (per triangle) becomes 1 if the triangle's box
+ * meets such an intersection, and `is_near` (zeroed, per shell by its leader) becomes 1 for their shells. */
 static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
   const qmat_mesh *mesh = u->mesh;
   qmat_arena *arena = &u->context->arena;
@@ -235,7 +235,7 @@ static qmat_status fill_report(const unison *u, const qmat_united *united, bool 
   }
   if (united->why_not) {
     char text[160];
-    snprintf(text, sizeof text, "parts that reach into each other are not united: %s", united->why_not);
+    snprintf(text, sizeof text, "intersecting parts are not united: %s", united->why_not);
     bad |= json_object_set_new(root, "warnings", json_pack("[s]", text));
   }
   return bad ? qmat_fail_memory(u->context, "the report") : qmat_value_seal(u->context, &report->base);
@@ -254,7 +254,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = qmat_frame_of_mesh(context, u.mesh, &frame);
   if (status == QMAT_OK && !keep) {
     if (u.mesh->triangle_count >= UINT32_MAX / 3)
-      united.why_not = "there are too many triangles";
+      united.why_not = "the mesh has too many triangles";
     else
       status = find_shells(&u);
     if (status == QMAT_OK && u.shell_count > u.open_count) status = find_union(&u, &united);
@@ -277,7 +277,7 @@ static const char *const choices[] = {[PARTS_UNION] = "union", [PARTS_KEEP] = "k
 static const qmat_param params[] = {
     {.name = "parts",
      .unit = "",
-     .doc = "What becomes of closed parts that reach into each other: their union, or they are kept as they are",
+     .doc = "Closed parts that intersect are replaced by their union, or kept as they are",
      .type = QMAT_PARAM_ENUM,
      .default_number = PARTS_UNION,
      .choices = choices,
@@ -286,13 +286,13 @@ static const qmat_param params[] = {
 };
 
 static const qmat_port inputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "A surface, maybe of several parts"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "A surface of one or more parts"},
     {0},
 };
 
 static const qmat_port outputs[] = {
-    {.name = "mesh", .type = QMAT_MESH, .doc = "The boundary of their union; the input where no part loses anything"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "How many parts there are, and how many became others"},
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The boundary of the union; the input if no part loses anything"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "Counts of parts, of open parts, and of united parts"},
     {0},
 };
 
@@ -301,18 +301,16 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 const qmat_node qmat_node_mesh_unite = {
     .name = "mesh.unite",
     .version = 1,
-    .summary = "Takes parts that reach into each other as one solid",
+    .summary = "Replaces parts that intersect by the boundary of their union",
     .doc =
-        "What of a part's surface lies inside another is no boundary of the solid, but would bound the medial "
-        "spheres. Triangles of closed parts are cut where they meet, in exact arithmetic, and those pieces kept that "
-        "have the inside behind and the outside before them, inside being where the surface winds around a point, as "
-        "for all nodes. So a part within another vanishes, parts that share a face become one, cavities stay, what "
-        "reaches into a cavity fills it, and of equal parts one is left; parts that meet others are freed of their "
-        "meetings with themselves too. Parts that lose no surface (apart, within cavities, or touching in points and "
-        "lines only) stay as they are, and so do open parts. A mesh where nothing is to be done passes through. "
-        "Points on cuts are rounded to doubles, and the result is closed where the input was. Where parts cannot be "
-        "united the mesh passes through with a warning in the report. Cost: 5 to 20 microseconds a triangle of parts "
-        "that meet or vanish, and 200 a pair of triangles that meet; else a search for edges.",
+        "A surface inside another part is not a boundary of the solid, but it would limit the medial spheres. This "
+        "node cuts the triangles of closed parts where they intersect, in exact arithmetic, and keeps the pieces with "
+        "the inside (a winding number above 0) on one side only.\n\n"
+        "A part inside another vanishes, parts that share a face become one, cavities stay, and of equal parts one is "
+        "kept. Intersecting parts also lose their self-intersections. Open parts stay as they are, and so do parts "
+        "that lose no surface: disjoint ones, and those that touch in points and lines only.\n\n"
+        "New vertices are rounded to doubles. The result is closed if the input is. If the parts cannot be united, the "
+        "mesh passes through and the report has a warning.",
     .citation = "Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_unite_params),
     .params = params,

@@ -4,11 +4,11 @@
 
 #include "core/node.h"
 
-/* Every node of the library, sorted by name; the table is written by CMake from the list in nodes/CMakeLists.txt. */
+/* Every node, sorted by name. CMake writes the table from the list in nodes/CMakeLists.txt. */
 extern const qmat_node *const qmat_nodes[];
 extern const size_t qmat_node_count;
 
-/* The node of that name, or NULL. */
+/* The node with that name, or NULL. */
 const qmat_node *qmat_node_find(const char *name);
 
 #endif

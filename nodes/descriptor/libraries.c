@@ -22,7 +22,8 @@ static void describe_opensubdiv(char *text, size_t size) {
   snprintf(text, size, "%s", qmat_opensubdiv_version());
 }
 
-/* The kernels that Embree chooses on this processor, by its own rules: it does not tell. */
+/* The instruction set that Embree chooses on this processor. Embree does not report it, so its rules are repeated here.
+ */
 static const char *embree_instructions(void) {
 #if defined(__x86_64__)
   __builtin_cpu_init();

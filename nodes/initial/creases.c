@@ -15,7 +15,7 @@ static double cosine_of(double degrees) {
   return cos(degrees * (3.14159265358979323846 / 180));
 }
 
-/* A side of a triangle: its ends, and the side 3 * triangle + k that runs from corner k on. */
+/* A side of a triangle: its ends, and 3 * triangle + k for the side from corner k to the next. */
 typedef struct {
   uint32_t low, high;
   size_t side;
@@ -33,7 +33,8 @@ static void normal_of(const qmat_mesh *mesh, const double *positions, size_t tri
   qmat_triangle_area(&positions[3 * (size_t)t[0]], &positions[3 * (size_t)t[1]], &positions[3 * (size_t)t[2]], normal);
 }
 
-/* Whether the surface bends outward at the edge of two sides: the corner across lies below the other triangle. */
+/* Whether the edge of two sides is sharp and convex: the second triangle's opposite corner is below the first triangle.
+ */
 static bool is_crease(const qmat_mesh *mesh, const double *positions, const triangle_side *sides, double least_cosine) {
   double normals[2][3], across[3];
   for (int k = 0; k < 2; k++) normal_of(mesh, positions, sides[k].side / 3, normals[k]);
@@ -45,7 +46,7 @@ static bool is_crease(const qmat_mesh *mesh, const double *positions, const tria
   return qmat_dot(normals[0], across) < 0;
 }
 
-/* Leaves out edges that hang together over less than `shortest`. */
+/* Leaves out connected edges with a total length below `shortest`. */
 static qmat_status drop_short(qmat_context *context, const double *positions, size_t vertex_count, double shortest,
                               qmat_crease_edges *edges) {
   uint32_t *parent = qmat_sets_new(context, vertex_count);
@@ -90,7 +91,7 @@ qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh,
   return drop_short(context, positions, mesh->vertex_count, shortest, edges);
 }
 
-/* The edges at each vertex, while they are chained. */
+/* The edges at each vertex. */
 typedef struct {
   const qmat_crease_edges *edges;
   const double *positions;
@@ -119,7 +120,7 @@ static bool is_corner(const crease_graph *g, uint32_t vertex, double least_cosin
   return !(-qmat_dot(along[0], along[1]) >= least_cosine * sqrt(square[0] * square[1]));
 }
 
-/* Follows a crease from a vertex to the next corner, or around. */
+/* Follows a crease from a vertex to the next corner, or around a loop. */
 static void follow(crease_graph *g, uint32_t vertex, uint32_t edge, qmat_creases *creases) {
   size_t *end = &creases->starts[creases->count + 1];
   const uint32_t first = vertex;

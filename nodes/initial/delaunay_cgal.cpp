@@ -29,9 +29,9 @@ using Triangulation =
 
 constexpr size_t kPointsPerReport = 4096;
 
-/* Room for the cells of the next point. CGAL notes the new cells around a point in a thread-local map that it leaves
- * full when memory runs out among them, and the thread's next triangulation would be built with what is in there: so
- * the shortage has to come before. CGAL makes at most this many cells with that map. */
+/* Reserves memory for the cells of the next point. CGAL records the new cells around a point in a thread-local map. If
+ * memory runs out meanwhile, the map keeps stale cells and corrupts the thread's next triangulation, so a shortage must
+ * occur before. CGAL uses that map for at most this many cells. */
 void reserve_cells(Triangulation &triangulation) {
   constexpr size_t kMostCells = Triangulation::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
   auto &cells = triangulation.tds().cells();
@@ -84,8 +84,8 @@ qmat_status collect(qmat_context *context, Triangulation &triangulation, qmat_te
   if (!tetrahedra->corners || !tetrahedra->neighbours) return qmat_fail_memory(context, "tetrahedra");
   for (size_t i = 0; i < cells.size(); i++) cells[i].handle->info() = static_cast<uint32_t>(i);
   for (size_t i = 0; i < cells.size(); i++) {
-    /* Which corner comes first depends on CGAL's history: start every cell at its smallest id by even permutations,
-     * so that its corners are the same in every run and on every compiler. */
+    /* The order of CGAL's corners depends on the insertion history. Even permutations start every cell at its smallest
+     * id, so that the result is the same in every run and with every compiler. */
     std::array<int, 4> corner = {0, 1, 2, 3};
     const auto id = [&](int k) { return cells[i].handle->vertex(k)->info(); };
     const auto first = std::min_element(corner.begin(), corner.end(), [&](int a, int b) { return id(a) < id(b); });
@@ -111,7 +111,7 @@ qmat_status qmat_delaunay_tetrahedra(qmat_context *context, const double *points
                                      qmat_tetrahedra *tetrahedra) {
   *tetrahedra = {};
   if (count >= QMAT_NO_TETRAHEDRON)
-    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are more than a triangulation can number", count);
+    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are too many for a triangulation", count);
   try {
     std::vector<Point> sites;
     sites.reserve(count);
@@ -120,7 +120,7 @@ qmat_status qmat_delaunay_tetrahedra(qmat_context *context, const double *points
     const qmat_status status = triangulate(context, sites, triangulation);
     if (status != QMAT_OK) return status;
     if (triangulation.dimension() < 3) {
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "all %zu samples lie in one plane: there is no solid", count);
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "all %zu samples are coplanar, so they enclose no solid", count);
       return qmat_fail_field(context, "samples");
     }
     return collect(context, triangulation, tetrahedra);

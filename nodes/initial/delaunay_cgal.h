@@ -17,11 +17,11 @@ typedef struct qmat_tetrahedra {
   uint32_t *neighbours; /* 4 * count: the tetrahedron across the facet opposite corner k, or QMAT_NO_TETRAHEDRON */
 } qmat_tetrahedra;
 
-/* The 3D Delaunay triangulation of `count` points (3 doubles each, finite), by CGAL with exact predicates. Cospherical
- * points are broken by symbolic perturbation, so the result does not depend on the order of insertion; tetrahedra are
- * sorted by their corner ids. Of equal points the one with the smallest id stands for all.
- * The arrays live in context->arena. QMAT_ERROR_GEOMETRY when all points lie in one plane; QMAT_ERROR_DEPENDENCY with
- * CGAL's text; QMAT_CANCELLED. One thread. Cost: O(n log n) for points on surfaces, about 5 microseconds a point. */
+/* The 3D Delaunay triangulation of `count` points (3 doubles each, finite), by CGAL with exact predicates. Symbolic
+ * perturbation resolves cospherical points, so the result does not depend on the order of insertion. Tetrahedra are
+ * sorted by their corner ids. Equal points are represented by the smallest id. The arrays live in the context's arena.
+ * QMAT_ERROR_GEOMETRY if all points are coplanar, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY with CGAL's message,
+ * QMAT_CANCELLED. One thread. Cost: O(n log n) for points on surfaces, about 5 microseconds per point. */
 qmat_status qmat_delaunay_tetrahedra(qmat_context *context, const double *points, size_t count,
                                      qmat_tetrahedra *tetrahedra);
 

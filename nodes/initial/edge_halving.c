@@ -8,12 +8,12 @@
 
 #define NONE UINT32_MAX
 
-/* Each round halves an edge once; edges this many times halved are as short as they need to be. */
+/* Each round halves an edge at most once. */
 enum { MOST_ROUNDS = 8 };
 
-/* The middle of an edge as an inscribed sphere, when the interpolated one leaves the solid by more than the tolerance.
- * Both ends inscribed, the middle can leave it by at most (length^2 - change^2) / (2 length): short edges need no look.
- */
+/* Sets the inscribed sphere at an edge's midpoint; false unless the interpolated sphere leaves the solid by more than
+ * the tolerance. Between two inscribed spheres it leaves by at most (length^2 - change^2) / (2 length), so short edges
+ * need no distance query. */
 static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance,
                         double middle[4]) {
   double square = 0;
@@ -27,7 +27,7 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   return true;
 }
 
-/* The new vertex in the middle of an edge, or NONE; the edges are sorted rows. */
+/* The vertex that halves an edge, or NONE. The edges are sorted. */
 static uint32_t middle_of(const qmat_medial *medial, const size_t *row_starts, const uint32_t *middles, uint32_t a,
                           uint32_t b) {
   const uint32_t low = a < b ? a : b, high = a < b ? b : a;
@@ -42,11 +42,11 @@ static uint32_t middle_of(const qmat_medial *medial, const size_t *row_starts, c
   return middles[first];
 }
 
-/* The two to four parts of a slab with some sides halved. */
-static size_t divide(const uint32_t *corners, const uint32_t *middles, uint32_t *parts) {
+/* Divides a slab with halved sides into two to four slabs, or copies it. Returns their number. */
+static size_t divide(const uint32_t *corners, const uint32_t *middles, uint32_t *pieces) {
   int halved = 0;
   for (int k = 0; k < 3; k++) halved += middles[k] != NONE;
-  /* Start at a corner so that the halved sides come first; middles[k] is between corners k and k + 1. */
+  /* Rotates the corners so that the halved sides come first; middles[k] is between corners k and k + 1. */
   size_t s = 0;
   if (halved == 1)
     while (middles[s] == NONE) s++;
@@ -56,11 +56,11 @@ static size_t divide(const uint32_t *corners, const uint32_t *middles, uint32_t 
   const uint32_t ab = middles[s], bc = middles[(s + 1) % 3], ca = middles[(s + 2) % 3];
   const uint32_t by_count[4][12] = {
       {a, b, c}, {a, ab, c, ab, b, c}, {ab, b, bc, a, ab, bc, a, bc, c}, {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca}};
-  memcpy(parts, by_count[halved], sizeof by_count[halved]);
+  memcpy(pieces, by_count[halved], sizeof by_count[halved]);
   return (size_t)halved + 1;
 }
 
-/* One round; `*added` grows by the edges halved. */
+/* One round; adds the number of halved edges to `*added`. */
 static qmat_status halve_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
                                double tolerance, size_t *added) {
   qmat_arena *arena = &context->arena;
@@ -103,17 +103,17 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   for (size_t e = 0; e < edges; e++) {
     const uint32_t a = medial->edges[2 * e], b = medial->edges[2 * e + 1];
     const uint32_t halves[2][2] = {{a, middles[e] == NONE ? b : middles[e]}, {b, middles[e]}};
-    const size_t parts = middles[e] == NONE ? 1 : 2;
-    memcpy(&new_edges[2 * edge_count], halves, parts * sizeof halves[0]);
-    edge_count += parts;
-    if (parts == 2) memcpy(&all[4 * (size_t)middles[e]], &middle_spheres[4 * e], 4 * sizeof *all);
+    const size_t pieces = middles[e] == NONE ? 1 : 2;
+    memcpy(&new_edges[2 * edge_count], halves, pieces * sizeof halves[0]);
+    edge_count += pieces;
+    if (pieces == 2) memcpy(&all[4 * (size_t)middles[e]], &middle_spheres[4 * e], 4 * sizeof *all);
   }
   for (size_t t = 0; t < triangles; t++) {
     const uint32_t *corners = &medial->triangles[3 * t];
-    uint32_t sides[3], parts[12];
+    uint32_t sides[3], pieces[12];
     for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, row_starts, middles, corners[k], corners[(k + 1) % 3]);
-    const size_t made = divide(corners, sides, parts);
-    memcpy(&new_triangles[3 * triangle_count], parts, 3 * made * sizeof *parts);
+    const size_t made = divide(corners, sides, pieces);
+    memcpy(&new_triangles[3 * triangle_count], pieces, 3 * made * sizeof *pieces);
     triangle_count += made;
   }
   qmat_free(medial->spheres);

@@ -8,9 +8,9 @@
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 
-/* Rows of an even triangular pattern are this far apart, in spacings. */
+/* The distance between the rows of a regular triangular pattern, in spacings. */
 static const double row_height = 0.86602540378443864676;
-/* The displacement of a point, in steps of its row and in rows. */
+/* The range of a point's random displacement, in steps along its row and in rows. */
 static const double displacement = 0.2;
 
 typedef struct side {
@@ -58,11 +58,11 @@ void qmat_side_points_fill(int side, uint32_t count, double *barycentrics) {
   }
 }
 
-/* The rows of a triangle: along its longest side, which starts at corner `base`. */
+/* The rows of a triangle, parallel to its longest side, which starts at corner `base`. */
 typedef struct rows {
   int base;
   double length;
-  uint64_t count; /* of rows, without the longest side and the corner across */
+  uint64_t count; /* of rows, without the longest side and the opposite corner */
 } rows;
 
 static rows find_rows(const double *a, const double *b, const double *c, double spacing) {
@@ -84,7 +84,7 @@ static rows find_rows(const double *a, const double *b, const double *c, double 
   return r;
 }
 
-/* The share of the height at which a row lies, and how many points it has. */
+/* The height of a row as a share of the triangle's height. */
 static double row_place(const rows *r, uint64_t row) {
   return (double)(row + 1) / (double)(r->count + 1);
 }
@@ -108,7 +108,7 @@ void qmat_row_points_fill(const double *a, const double *b, const double *c, dou
   for (uint64_t row = 0; row < r.count; row++) {
     const uint64_t points = row_points(&r, row, spacing);
     for (uint64_t i = 0; i < points; i++, index++) {
-      /* Point `index` is taken when the running share of the wanted ones passes a whole number. */
+      /* Point `index` is taken when the running share of wanted points passes a whole number. */
       if (picked >= wanted || (double)(index + 1) * (double)wanted < (double)(picked + 1) * (double)all) continue;
       const double x = displacement * (qmat_hash_unit(qmat_hash3(key, index, 0)) - 0.5);
       const double y = displacement * (qmat_hash_unit(qmat_hash3(key, index, 1)) - 0.5);

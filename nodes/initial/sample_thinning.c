@@ -8,16 +8,16 @@
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 
-/* Each level's cells are half as wide as those of the one before; smaller radii search the finest level. */
+/* The cell width halves from level to level. Radii below the finest level search that level. */
 enum { LEVELS = 8, REPORT_EVERY = 65536 };
-/* Normals look the same way when the cosine between them is at least this. */
-static const double same_way = 0.7;
-/* Cells are no narrower than this (unit frame), so that they can be numbered however small the radii are. */
+/* Normals agree if their cosine is at least this. */
+static const double least_cosine = 0.7;
+/* The least cell width (unit frame), so that cell coordinates fit their integers. */
 static const double narrowest = 1e-9;
 
 #define NONE UINT32_MAX
 
-/* Kept samples by place: on every level each is in the list of its cell's bucket. */
+/* A hash grid of the kept samples. On every level a sample is in the list of its cell's bucket. */
 typedef struct sample_grid {
   double widths[LEVELS];
   size_t bucket_mask; /* buckets: a power of two, less one */
@@ -55,7 +55,7 @@ static void grid_add(sample_grid *grid, const double *point, uint32_t sample) {
 
 typedef struct thinning {
   const double *points, *normals, *radii;
-  double detail;
+  double tolerance;
   sample_grid grid;
 } thinning;
 
@@ -63,12 +63,12 @@ static bool stands_for(const thinning *t, uint32_t kept, uint32_t sample) {
   double offset[3];
   for (size_t k = 0; k < 3; k++) offset[k] = t->points[3 * (size_t)sample + k] - t->points[3 * (size_t)kept + k];
   const double *mine = &t->normals[3 * (size_t)sample], *theirs = &t->normals[3 * (size_t)kept];
-  return qmat_dot(offset, offset) < t->radii[sample] * t->radii[sample] && qmat_dot(mine, theirs) >= same_way &&
-         fabs(qmat_dot(offset, mine)) <= t->detail && fabs(qmat_dot(offset, theirs)) <= t->detail;
+  return qmat_dot(offset, offset) < t->radii[sample] * t->radii[sample] && qmat_dot(mine, theirs) >= least_cosine &&
+         fabs(qmat_dot(offset, mine)) <= t->tolerance && fabs(qmat_dot(offset, theirs)) <= t->tolerance;
 }
 
-/* The kept sample that stands for this one, or the sample itself. The cells of its level are at least twice its radius
- * wide, so that two by two by two of them hold all that is near. */
+/* The kept sample that stands for this one, or the sample itself. The cells of its level are at least twice as wide as
+ * its radius, so 2 x 2 x 2 cells contain every candidate. */
 static uint32_t find_stand_in(const thinning *t, uint32_t sample) {
   const sample_grid *grid = &t->grid;
   const double radius = t->radii[sample], *point = &t->points[3 * (size_t)sample];
@@ -88,10 +88,10 @@ static uint32_t find_stand_in(const thinning *t, uint32_t sample) {
 }
 
 qmat_status qmat_samples_thin(qmat_context *context, const double *points, const double *normals, const double *radii,
-                              size_t count, double largest, double detail, uint32_t *stand_ins) {
-  thinning t = {.points = points, .normals = normals, .radii = radii, .detail = detail};
+                              size_t count, double largest, double tolerance, uint32_t *stand_ins) {
+  thinning t = {.points = points, .normals = normals, .radii = radii, .tolerance = tolerance};
   if (count >= NONE / LEVELS)
-    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are more than can be thinned out", count);
+    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are too many to thin out", count);
   qmat_status status = grid_init(context, &t.grid, count, largest);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     if (i % REPORT_EVERY == 0) status = qmat_progress(context, i, count, "samples");
@@ -101,7 +101,7 @@ qmat_status qmat_samples_thin(qmat_context *context, const double *points, const
   return status;
 }
 
-/* The unit normals of samples: 3 doubles each, zero where there is none. */
+/* The unit normals of samples (3 doubles each), zero where undefined. */
 static void find_normals(const qmat_surface *surface, const qmat_samples *samples, double *normals) {
   const double *positions = qmat_surface_positions(surface);
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
@@ -126,14 +126,14 @@ static void find_normals(const qmat_surface *surface, const qmat_samples *sample
   }
 }
 
-/* How far a sample may be from what stands for it: this share of the thickness, and of the diagonal at most. */
+/* The radius of a sample, as a share of the thickness, and its upper bound in diagonals. */
 static const double thickness_share = 0.25, longest_reach = 0.01;
 
 qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                const double *points, const double *thickness, double detail, const double *reaches,
+                                const double *points, const double *thickness, double tolerance, const double *reaches,
                                 uint32_t *stand_ins) {
   const size_t count = samples->count;
-  if (detail == 0) {
+  if (tolerance == 0) {
     for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
     return QMAT_OK;
   }
@@ -143,8 +143,8 @@ qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surfa
   find_normals(surface, samples, normals);
   const double diagonal = qmat_surface_frame(surface)->diagonal;
   for (size_t i = 0; i < count; i++) {
-    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), detail), longest_reach);
+    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), tolerance), longest_reach);
     if (reaches) radii[i] = fmin(radii[i], reaches[i]);
   }
-  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, detail, stand_ins);
+  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, tolerance, stand_ins);
 }

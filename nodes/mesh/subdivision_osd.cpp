@@ -32,20 +32,20 @@ double distance(const Point &a, const Point &b) {
   return std::hypot(a.x[0] - b.x[0], a.x[1] - b.x[1], a.x[2] - b.x[2]);
 }
 
-/* What OpenSubdiv says, which is otherwise printed. Its callbacks are of the process, so they are set once. */
-thread_local char said[256];
+/* OpenSubdiv's first message, which it would print otherwise. Its callbacks are global, so they are set once. */
+thread_local char message[256];
 
 void keep_first(const char *text) {
-  if (said[0] == 0) std::snprintf(said, sizeof said, "%s", text);
+  if (message[0] == 0) std::snprintf(message, sizeof message, "%s", text);
 }
 
-void listen() {
+void capture_messages() {
   static std::once_flag once;
   std::call_once(once, [] {
     Far::SetErrorCallback([](Far::ErrorType, const char *text) { keep_first(text); });
     Far::SetWarningCallback(keep_first);
   });
-  said[0] = 0;
+  message[0] = 0;
 }
 
 Sdc::SchemeType scheme_of(const qmat_cage *cage) {
@@ -97,8 +97,8 @@ std::unique_ptr<Far::TopologyRefiner> refiner_of(const qmat_cage *cage) {
       Factory::Create(topology, Factory::Options(scheme_of(cage), options_of(cage))));
 }
 
-/* The limits of the vertices of the deepest level, and how far they may be wrong: limit masks take what is still sharp
- * for sharp for ever, while the true limit of such a vertex lies within its neighbours. */
+/* The limits of the vertices of the deepest level, and a bound of their error: limit masks treat semi-sharp edges as
+ * infinitely sharp, but the true limit of such a vertex is within the hull of its neighbours. */
 std::vector<Point> limits_of(const Far::TopologyRefiner &refiner, const qmat_cage *cage, double *unresolved) {
   const Far::PrimvarRefinerReal<double> primvar(refiner);
   std::vector<Point> points(cage->vertex_count), finer;
@@ -127,7 +127,7 @@ std::vector<Point> limits_of(const Far::TopologyRefiner &refiner, const qmat_cag
   return finer;
 }
 
-/* The vertices of `level` as those of the deepest. */
+/* The vertices of the deepest level that descend from those of `level`. */
 std::vector<int> descendants(const Far::TopologyRefiner &refiner, int level) {
   std::vector<int> result(static_cast<size_t>(refiner.GetLevel(level).GetNumVertices()));
   for (size_t v = 0; v < result.size(); v++) {
@@ -167,10 +167,10 @@ qmat_status fill(qmat_context *context, const Far::TopologyRefiner &refiner, con
 }
 
 qmat_status make(qmat_context *context, const qmat_cage *cage, int level, int depth, qmat_limit_level *limit) {
-  listen();
+  capture_messages();
   const std::unique_ptr<Far::TopologyRefiner> refiner = refiner_of(cage);
   if (!refiner) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "OpenSubdiv takes its cage for no surface%s%s", said[0] ? ": " : "", said);
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "OpenSubdiv rejects the cage%s%s", message[0] ? ": " : "", message);
     return qmat_fail_field(context, "mesh");
   }
   const Far::TopologyLevel &base = refiner->GetLevel(0);

@@ -10,37 +10,36 @@ extern "C" {
 
 #define QMAT_NO_SHELL UINT32_MAX
 
-/* The triangles of a mesh, told apart: edges join them to shells, and edges of two triangles to the sheets of a shell.
- */
+/* A mesh divided into shells and sheets. A shell is connected across edges, a sheet across edges of two triangles. */
 typedef struct qmat_shells {
   size_t vertex_count, triangle_count;
   const double *positions;   /* 3 * vertex_count, finite */
   const uint32_t *triangles; /* 3 * triangle_count */
-  /* triangle_count: one triangle of its shell, the same for all of that, or QMAT_NO_SHELL: it stays as it is and bounds
-   * nothing. At each edge of a shell as many triangles run one way as the other. */
+  /* triangle_count: the triangle that names its shell. QMAT_NO_SHELL: the triangle stays as it is and bounds nothing.
+   * At each edge of a shell as many triangles run one way as the other. */
   const uint32_t *shells;
-  const uint32_t *sheets; /* triangle_count: the same for its sheet */
-  const uint8_t *reaches; /* triangle_count: 0 where no triangle of another sheet comes near */
+  const uint32_t *sheets; /* triangle_count: the triangle that names its sheet */
+  const uint8_t *reaches; /* triangle_count: 0 if no triangle of another sheet is near */
 } qmat_shells;
 
-/* What became of them. */
+/* The result. */
 typedef struct qmat_united {
-  bool changed;        /* else nothing else is set but `why_not` */
-  const char *why_not; /* a literal: why they could not be united; NULL: they could, or nothing was to be done */
+  bool changed;        /* false: only `why_not` is set */
+  const char *why_not; /* a literal: why they cannot be united; NULL: they are, or nothing changes */
   size_t vertex_count, triangle_count;
-  double *positions;    /* 3 * vertex_count: those of the mesh that are left, in their order, then those on cuts */
-  uint32_t *triangles;  /* 3 * triangle_count: in the order of the triangles that they are or are cut from */
-  size_t shells_united; /* that were cut or left out */
-  size_t cut_triangles; /* of the mesh, that others meet */
+  double *positions;    /* 3 * vertex_count: the used vertices of the mesh in their order, then vertices on cuts */
+  uint32_t *triangles;  /* 3 * triangle_count: in the order of the triangles that they are cut from */
+  size_t shells_united; /* cut or left out */
+  size_t cut_triangles; /* of the mesh */
 } qmat_united;
 
-/* The boundary of what the shells wind around (a winding number above 0), exactly: triangles are cut where they meet,
- * and those parts of them kept that have the inside behind and the outside before them. Shells that lose nothing of
- * their surface to others stay as they are, those without shell do in any case. Points on cuts are rounded to doubles
- * at the end; triangles that lose a corner by that are left out, and edges still have as many triangles one way as the
- * other. The arrays are made by qmat_alloc; the caller frees them. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY with CGAL's
- * text, QMAT_CANCELLED. One thread. Cost: 5 to 20 microseconds a triangle of shells that meet or vanish, 200 a pair of
- * triangles that meet, and for each piece of surface between cuts a look at every 64th triangle.
+/* The boundary of the union: the points with a winding number above 0. Triangles are cut along their intersections in
+ * exact arithmetic, and the pieces with the inside behind them and the outside in front are kept. Shells that lose no
+ * surface to others stay as they are. Points on cuts are rounded to doubles at the end. Triangles that lose a corner by
+ * that are left out; every edge still has as many triangles one way as the other. The caller frees the arrays
+ * (qmat_free). QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY with CGAL's message, QMAT_CANCELLED. One thread. Cost: 5 to 20
+ * microseconds per triangle of shells that intersect or vanish, 200 per pair of intersecting triangles, and a box test
+ * with every 64th triangle for each region of the surface between cuts.
  * Source: Zhou, Grinspun, Zorin, Jacobson 2016, Mesh arrangements for solid geometry. */
 qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, qmat_united *united);
 

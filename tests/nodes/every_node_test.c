@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What must hold for every node of the table, whatever it computes: its descriptor is complete and reads well, its
- * parameters can be set to what they promise, the same inputs give the same bytes, bad inputs give an error that names
- * them, and it can be stopped or run out of memory at any point. A new node is tested here without a line of code. */
+/* Tests of every node in the table, generated from its descriptor. The descriptor is complete and its texts follow one
+ * style. Parameters work at their bounds. The same inputs give the same bytes on any number of threads. Bad inputs give
+ * an error that names them. A run can be cancelled or run out of memory at any point. A new node needs no code here. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,12 +22,12 @@
 #include "tests/shapes.h"
 #include "tests/shortage.h"
 
-/* A run at the bound of a parameter may ask for hours of work. It is stopped after this many seconds by its progress
- * function, which is then what was tested; after the request it has LATENCY seconds left to return. */
+/* A run at the bound of a parameter can take hours. Its progress function stops it after PATIENCE seconds, and it must
+ * return within LATENCY seconds. */
 static const double PATIENCE = 1, LATENCY = 20;
 
-/* So many of the points at which a run may be stopped, or run out of memory, are tried; fewer when the run is one of
- * many (with each choice of a parameter). */
+/* The number of points at which a run is stopped or runs out of memory; fewer if the run is one of many (with each
+ * choice of a parameter). */
 enum { MOST_STOPS = 8, MOST_SHORTAGES = 32, FEWER_SHORTAGES = 6 };
 
 enum { MOST_PORTS = 16 };
@@ -40,7 +40,7 @@ static double now(void) {
 
 /* ---- values for ports ---- */
 
-/* Families of values that belong together, one of each type. */
+/* Families of matching values, one of each type. */
 typedef enum world {
   WORLD_SOLID,    /* a small solid and what the nodes themselves make of it */
   WORLD_OTHER,    /* the same of another solid with other counts */
@@ -103,8 +103,8 @@ static void use_world(subject *run, world from) {
     run->inputs[i] = made.values[from][run->node->inputs[i].type];
 }
 
-/* Lengths five times their default, as far as they go: work grows with their inverse square, and every node is run
- * hundreds of times here. */
+/* Sets lengths to five times their default, within their range. Work grows with the inverse square of lengths, and
+ * every node is run hundreds of times. */
 static void make_coarse(const qmat_node *node, void *params) {
   for (size_t row = 0; row < qmat_param_count(node); row++) {
     const qmat_param *param = &node->params[row];
@@ -114,8 +114,8 @@ static void make_coarse(const qmat_node *node, void *params) {
   }
 }
 
-/* Coarse parameters, else the defaults, and the solid's values at every input. Required texts are filled: paths of
- * files that are read with the first known file that the node can work on. */
+/* Coarse lengths, defaults for the other parameters, and the solid's values at every input. A required path becomes the
+ * first test file that the node accepts. */
 static subject subject_of(const qmat_node *node) {
   subject run = {.node = node, .params = qmat_calloc(1, node->params_size)};
   assert_non_null(run.params);
@@ -142,7 +142,7 @@ static subject subject_of(const qmat_node *node) {
   return run;
 }
 
-/* Runs the node of that name with default parameters and hands out its output `port`. */
+/* Runs a node with default parameters, except `param`, and returns its output `port`. */
 static qmat_value *make(const char *name, const char *port, world in, const char *param, const char *text) {
   const qmat_node *node = qmat_node_find(name);
   assert_non_null(node);
@@ -196,7 +196,7 @@ static qmat_value *failure(void) {
   return &made->base;
 }
 
-/* That report twice. */
+/* A list of the report twice. */
 static qmat_value *list_of(const qmat_value *report) {
   qmat_list *list = qmat_list_new(2);
   assert_non_null(list);
@@ -229,8 +229,8 @@ static void make_solid(world to, const qmat_model *model) {
                 ((const qmat_medial *)values[QMAT_MEDIAL])->sphere_count);
 }
 
-/* A family from a few numbers: a field of `thickness` per facet, the vertices as samples, and a medial mesh of one
- * sphere of that radius at each of the first three vertices, joined by all edges and triangles. */
+/* A family made by hand: a field of `thickness` per facet, the vertices as samples, and a medial mesh of a sphere with
+ * that radius at each of the first `sphere_count` vertices, joined by all edges and triangles. */
 static void make_by_hand(world to, const double *positions, size_t vertex_count, const uint32_t *triangles,
                          size_t triangle_count, bool closed, double thickness, size_t sphere_count) {
   qmat_value **values = made.values[to];
@@ -298,7 +298,7 @@ static int make_fixture(void **state) {
   assert_non_null(mkdtemp(made.folder));
   snprintf(made.files[0], sizeof made.files[0], "%s/model.off", made.folder);
   snprintf(made.files[1], sizeof made.files[1], "%s/medial.ma", made.folder);
-  /* Slender, since work grows with the surface measured in squared diagonals. The second comes last: its file stays. */
+  /* Slender, since work grows with the area in squared diagonals. The second is made last, and its file stays. */
   qmat_model model;
   assert_int_equal(qmat_model_make_box(2, 0.3, 0.2, 6, &model), QMAT_OK);
   make_solid(WORLD_OTHER, &model);
@@ -583,11 +583,11 @@ static void check_same(const subject *run, const digests *expected, const char *
       fail_msg("%s: '%s' has other bytes %s", run->node->name, run->node->outputs[i].name, what);
 }
 
-/* Stops a run after a time, or after a number of questions. */
+/* Stops a run after a time, or after a number of progress calls. */
 typedef struct stopper {
   double deadline; /* 0: none */
   size_t calls, stop_at;
-  qmat_context *context; /* asks at every opportunity, however short the time since the last; NULL: as usual */
+  qmat_context *context; /* set: progress is reported at every opportunity; NULL: as usual */
   double stopped;        /* when; 0: not yet */
 } stopper;
 
@@ -606,7 +606,7 @@ static bool may_go_on(void *user, const char *node_id, const char *node_type, ui
   return false;
 }
 
-/* Runs with patience: true when the run came to an end by itself. */
+/* Runs for at most PATIENCE seconds; true if the run ended by itself. */
 static bool execute_patiently(qmat_context *context, subject *run, qmat_status *status) {
   stopper watch = {.deadline = now() + PATIENCE, .stop_at = SIZE_MAX};
   context->progress = may_go_on;
@@ -635,7 +635,7 @@ static void test_defaults_pass_the_check_and_run(void **state) {
     if (qmat_params_check(&context, run.node, run.params) != QMAT_OK || execute(&context, &run) != QMAT_OK)
       fail_msg("%s: %s", run.node->name, context.error.message);
     for (size_t port = 0; port < qmat_output_count(run.node); port++) {
-      /* An input that is handed on has the references of its owners too. */
+      /* An input that passes through is also referenced by its owners. */
       bool is_input = false;
       for (size_t k = 0; k < qmat_input_count(run.node); k++) is_input = is_input || run.inputs[k] == run.outputs[port];
       if (!is_input) assert_int_equal(run.outputs[port]->references, 1);
@@ -668,7 +668,7 @@ static bool is_named(const qmat_node *node, const qmat_error *error) {
   return qmat_input_find(node, error->field) != SIZE_MAX;
 }
 
-/* Sets one parameter, and leaves the others alone: the node runs, or refuses it by name. */
+/* Sets one parameter: the node runs, or refuses the parameter by name. */
 static void try_param(const qmat_node *node, const qmat_param *param, const char *text) {
   subject run = subject_of(node);
   qmat_context context = {.threads = 2};
@@ -681,7 +681,7 @@ static void try_param(const qmat_node *node, const qmat_param *param, const char
   const double start = now();
   if (status == QMAT_OK && !execute_patiently(&context, &run, &status))
     print_message("%s: %s=%s was stopped after %.1f s\n", node->name, param->name, text, now() - start);
-  /* With a choice another parameter may be what does not fit: the spacing of an algorithm that is not the default. */
+  /* A choice can make another parameter invalid, such as the spacing of an algorithm that is not the default. */
   const qmat_error *error = &context.error;
   const bool names_it =
       param->type == QMAT_PARAM_ENUM ? is_named(node, error) : strcmp(error->field, param->name) == 0 || error->file[0];
@@ -714,7 +714,7 @@ static void test_every_parameter_at_its_bounds_runs_or_is_refused_by_name(void *
           try_param(node, param, text);
           qmat_format_number(param->max, text, sizeof text);
           try_param(node, param, text);
-          /* What is nearly nothing is where things are divided by. */
+          /* Divisions by tiny values overflow. */
           if (param->type == QMAT_PARAM_FLOAT && param->min <= 0) try_param(node, param, "1e-300");
           break;
         default:
@@ -774,7 +774,8 @@ static void compare_threads(subject *run, const char *what) {
   }
 }
 
-/* Calls `visit` with the node's defaults, and with every other choice of each enum: it may be another algorithm. */
+/* Calls `visit` with the node's defaults, and with every other choice of each enum, which can select another algorithm.
+ */
 static void for_each_choice(const qmat_node *node, void (*visit)(subject *run, const char *what)) {
   subject run = subject_of(node);
   visit(&run, "");
@@ -798,7 +799,7 @@ static void test_any_number_of_threads_and_any_run_gives_the_same_bytes(void **s
   for (size_t i = 0; i < qmat_node_count; i++) for_each_choice(qmat_nodes[i], compare_threads);
 }
 
-/* The digest of what the value holds now, not of what it held when it was sealed. */
+/* The digest of the value's present content, not of its content when it was sealed. */
 static qmat_digest digest_now(const qmat_value *value) {
   qmat_context context = {0};
   uint8_t *bytes;
@@ -945,7 +946,32 @@ static void test_an_empty_mesh_and_an_empty_medial_mesh_are_refused(void **state
   }
 }
 
-/* A field, samples or regions that were made of another mesh. */
+/* Thickness and medial spheres are measured in the solid that a surface encloses. A node that makes them from a mesh
+ * refuses a single triangle; nodes that take a medial mesh too may still have a result. */
+static void test_one_triangle_that_encloses_nothing_is_refused(void **state) {
+  (void)state;
+  size_t tested = 0;
+  for (size_t i = 0; i < qmat_node_count; i++) {
+    subject run = subject_of(qmat_nodes[i]);
+    bool takes_mesh = false, takes_medial = false, measures = false;
+    for (size_t port = 0; port < qmat_input_count(run.node); port++) {
+      takes_mesh = takes_mesh || run.node->inputs[port].type == QMAT_MESH;
+      takes_medial = takes_medial || run.node->inputs[port].type == QMAT_MEDIAL;
+    }
+    for (size_t port = 0; port < qmat_output_count(run.node); port++)
+      measures = measures || run.node->outputs[port].type == QMAT_FIELD || run.node->outputs[port].type == QMAT_MEDIAL;
+    if (takes_mesh && !takes_medial && measures) {
+      use_world(&run, WORLD_TRIANGLE);
+      if (check_result_or_clear_error(&run, "one triangle") != QMAT_ERROR_GEOMETRY)
+        fail_msg("%s makes something of one triangle", run.node->name);
+      tested++;
+    }
+    subject_uninit(&run);
+  }
+  assert_true(tested >= 2);
+}
+
+/* A field or samples of another mesh. */
 static void test_values_that_do_not_belong_together_are_refused(void **state) {
   (void)state;
   static const world others[] = {WORLD_OTHER, WORLD_EMPTY, WORLD_TRIANGLE, WORLD_FLAT};
@@ -1006,7 +1032,7 @@ static void test_numbers_that_are_not_finite_cannot_be_sealed(void **state) {
 
 /* ---- being stopped, and running out of memory ---- */
 
-/* Of `count` points the `index`-th of at most `most`, spread evenly with both ends. */
+/* The `index`-th of at most `most` points spread evenly over `count`, with both ends. */
 static size_t spread(size_t index, size_t count, size_t most) {
   return count <= most ? index : index * (count - 1) / (most - 1);
 }
@@ -1047,7 +1073,7 @@ static void try_shortages(subject *run, const char *what) {
   release_outputs(run);
   qmat_context_uninit(&context);
   assert_true(needed > 0);
-  /* Memory that stays short from some point on, and a single allocation that fails. */
+  /* Memory stays short from some point on, or a single allocation fails. */
   const size_t most = *what ? FEWER_SHORTAGES : MOST_SHORTAGES;
   for (size_t k = 0; k < 2 * most && k / 2 < needed; k++) {
     context = (qmat_context){.threads = 1};
@@ -1092,6 +1118,7 @@ int main(int argc, char **argv) {
       cmocka_unit_test(test_missing_unsealed_and_wrong_inputs_are_refused_by_name),
       cmocka_unit_test(test_odd_values_give_a_result_or_an_error_that_names_what_is_at_fault),
       cmocka_unit_test(test_an_empty_mesh_and_an_empty_medial_mesh_are_refused),
+      cmocka_unit_test(test_one_triangle_that_encloses_nothing_is_refused),
       cmocka_unit_test(test_values_that_do_not_belong_together_are_refused),
       cmocka_unit_test(test_numbers_that_are_not_finite_cannot_be_sealed),
       cmocka_unit_test(test_a_cancelled_run_has_no_outputs),

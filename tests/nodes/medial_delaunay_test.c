@@ -11,7 +11,7 @@
 #include "core/geometry/surface.h"
 #include "tests/nodes/pipeline.h"
 
-/* The tetrahedra's own spheres: nothing that is near is merged, nothing is refined. */
+/* The spheres of the tetrahedra, without merging, halving or thinning. */
 #define PLAIN "merge=0 max_envelope_error=0 thinning_tolerance=0"
 
 static double distance(const double *a, const double *b) {
@@ -32,7 +32,7 @@ static qmat_field *constant_thickness(const qmat_mesh *mesh, double value) {
   return field;
 }
 
-/* The mesh's vertices and nothing else, for cases by hand. Takes the mesh over. */
+/* Samples of the mesh's vertices only, for cases by hand. Takes the mesh over. */
 static void sample_vertices(pipeline *p, qmat_mesh *mesh) {
   qmat_context context = {0};
   *p = (pipeline){.mesh = mesh->base.sealed ? mesh : shape_seal(mesh)};
@@ -183,7 +183,7 @@ static void test_ring_around_an_edge_gives_a_slab(void **state) {
     qmat_surface_free(surface);
     qmat_context_uninit(&context);
   }
-  /* None is thin: nothing is left. */
+  /* No sample is thin, so every tetrahedron is dropped. */
   qmat_context context = {0};
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base};
@@ -213,7 +213,7 @@ static void test_sphere_gives_its_centre(void **state) {
 
 static void test_capsule_gives_its_axis(void **state) {
   (void)state;
-  /* Vertices alone lie on the ideal surface: empty spheres are as deep as the axis, but for those of slivers. */
+  /* The vertices lie on the ideal surface, so empty spheres reach the axis, except those of slivers. */
   pipeline p;
   sample_vertices(&p, pipeline_model("capsule", 24));
   pipeline_delaunay(&p, 0, PLAIN " radius=circumradius incentres=thin theta=0");
@@ -248,7 +248,7 @@ static void test_thin_sheet_gives_one_piece_near_its_middle(void **state) {
     middle += fabs(s[2]) <= 0.5 * half;
   }
   assert_true((double)middle > 0.6 * (double)p.medial->sphere_count);
-  /* Without completion, where samples are farther apart than the sheet is thick, hardly anything of it is found. */
+  /* Without incentres a sheet that is thinner than the sample spacing is mostly missed. */
   const size_t all = p.medial->sphere_count;
   pipeline_delaunay(&p, 0, "incentres=thin theta=0");
   assert_true(p.medial->sphere_count < all);
@@ -290,7 +290,7 @@ static void test_two_solids_give_two_pieces(void **state) {
   pipeline_free(&p);
 }
 
-/* Tetrahedra that reach from one sphere to the other are needles, whose incentres may lie below a bulging surface. */
+/* Tetrahedra between two spheres are needles. Their incentres can lie below a bulging surface. */
 static void test_spheres_beside_each_other_are_not_joined(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_sphere(1, 24), *small = shape_sphere(0.05, 24);
@@ -348,7 +348,7 @@ static void test_circumradius_touches_its_samples_and_holds_none(void **state) {
   pipeline_free(&p);
 }
 
-static void test_flat_parts_are_thinned_and_every_sample_is_answered_for(void **state) {
+static void test_flat_regions_are_thinned_and_every_sample_has_a_sphere(void **state) {
   (void)state;
   size_t triangulated[2];
   for (int resolution = 0; resolution < 2; resolution++) {
@@ -374,7 +374,7 @@ static void test_flat_parts_are_thinned_and_every_sample_is_answered_for(void **
     }
     pipeline_free(&p);
   }
-  /* Four times the vertices, but not four times as many that matter. */
+  /* Four times the vertices, but fewer than four times the triangulated samples. */
   assert_true(2 * triangulated[1] < 5 * triangulated[0]);
 }
 
@@ -410,7 +410,7 @@ static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(
   pipeline_free(&p);
 }
 
-static void test_completion_adds_incentres_and_keeps_the_rest(void **state) {
+static void test_all_incentres_add_spheres_and_keep_the_others(void **state) {
   (void)state;
   pipeline p;
   pipeline_make(&p, pipeline_model("octopus", 6), "spacing=0", "incentres=all");
@@ -444,7 +444,7 @@ static void test_samples_all_have_a_sphere(void **state) {
     for (size_t k = 0; k < p.medial->region_sample_count; k++) answered[p.medial->region_samples[k]] = 1;
     size_t missing = 0;
     for (size_t k = 0; k < p.samples->count; k++) missing += !answered[k];
-    assert_true(missing * 100 <= p.samples->count); /* slivers on the surface may be all that a sample has */
+    assert_true(missing * 100 <= p.samples->count); /* some samples only belong to slivers on the surface */
     free(answered);
     pipeline_free(&p);
   }
@@ -493,7 +493,7 @@ static int by_coordinates(const void *left, const void *right) {
 
 static void test_order_of_samples_does_not_move_the_spheres(void **state) {
   (void)state;
-  /* Vertices alone, no two of whose choices tie: the same spheres come in another order. */
+  /* Vertices only, without ties: the same spheres in another order. */
   pipeline p, q;
   qmat_mesh *mesh = pipeline_model("tapered-capsule", 10);
   pipeline_shuffle(mesh);
@@ -631,9 +631,9 @@ int main(void) {
       cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
-      cmocka_unit_test(test_flat_parts_are_thinned_and_every_sample_is_answered_for),
+      cmocka_unit_test(test_flat_regions_are_thinned_and_every_sample_has_a_sphere),
       cmocka_unit_test(test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller),
-      cmocka_unit_test(test_completion_adds_incentres_and_keeps_the_rest),
+      cmocka_unit_test(test_all_incentres_add_spheres_and_keep_the_others),
       cmocka_unit_test(test_samples_all_have_a_sphere),
       cmocka_unit_test(test_moving_scaling_and_shuffling_change_little),
       cmocka_unit_test(test_order_of_samples_does_not_move_the_spheres),

@@ -39,7 +39,7 @@ static qmat_topology topology_of(const qmat_medial *medial) {
   return t;
 }
 
-/* What came in is still there, as it was; what is new has radius 0 and does not change the topology. */
+/* The input is unchanged; new spheres have radius 0 and keep the topology. */
 static void check_extension(const qmat_medial *before, const result *r) {
   const qmat_medial *after = r->medial;
   assert_int_equal(after->sphere_count, before->sphere_count + (size_t)pipeline_count(r->report, "spheres"));

@@ -28,7 +28,7 @@ static void release(qmat_value *outputs[]) {
   for (size_t i = 0; i < REFINED_OUTPUTS; i++) qmat_value_release(outputs[i]);
 }
 
-/* The medial mesh of a sphere alone, which answers for no sample. */
+/* A medial mesh of one sphere, without responsible regions. */
 static void set_sphere(pipeline *p, double x, double y, double z, double radius) {
   qmat_medial *medial = qmat_medial_new();
   assert_non_null(medial);
@@ -42,15 +42,15 @@ static void set_sphere(pipeline *p, double x, double y, double z, double radius)
   p->medial = medial;
 }
 
-/* The largest distance to the envelope over so many random places of the surface, and its corners, in diagonals. */
-static double largest_distance(const qmat_mesh *mesh, const qmat_medial *medial, size_t looks) {
+/* The largest distance to the envelope over `count` random points of the surface and its vertices, in diagonals. */
+static double largest_distance(const qmat_mesh *mesh, const qmat_medial *medial, size_t count) {
   qmat_context context = {0};
   qmat_envelope *envelope;
   assert_int_equal(qmat_envelope_of_medial(&context, medial, &envelope), QMAT_OK);
   double largest = 0;
   for (size_t i = 0; i < mesh->vertex_count; i++)
     largest = fmax(largest, qmat_envelope_distance(envelope, &mesh->positions[3 * i], NULL));
-  for (size_t i = 0; i < looks; i++) {
+  for (size_t i = 0; i < count; i++) {
     const uint32_t *ids = &mesh->triangles[3 * (i % mesh->triangle_count)];
     const double u = sqrt(qmat_hash_unit(qmat_hash3(1, i, 0))), v = qmat_hash_unit(qmat_hash3(1, i, 1));
     const double weights[3] = {1 - u, u * (1 - v), i % 3 ? u * v : 0}; /* a third of them near a side */
@@ -89,7 +89,7 @@ static void test_a_cubes_inscribed_sphere_is_farthest_from_its_corners(void **st
   const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
   assert_near(pipeline_number(report, "farthest_place"), expected, 1e-12);
   assert_near(pipeline_number(report, "farthest_place_left"), expected, 1e-12);
-  /* Beyond the limit are the samples in the corners that a sphere larger by it cuts off; the grid has more of them. */
+  /* The far points are the samples outside the sphere enlarged by the limit; the grid has more of them. */
   int64_t far = 0;
   for (size_t i = 0; i < p.samples->count; i++) {
     const double *s = &p.samples->positions[3 * i];
@@ -100,7 +100,7 @@ static void test_a_cubes_inscribed_sphere_is_farthest_from_its_corners(void **st
   assert_int_equal(pipeline_count(report, "rounds"), 0);
   assert_ptr_equal(outputs[REFINED_MEDIAL], &p.medial->base);
   release(outputs);
-  /* What is farther than is tolerated is made anew, whatever it was. */
+  /* A point beyond the trigger makes the node replace the medial mesh. */
   must_refine(&p, 0, "epsilon=0.1", outputs);
   const qmat_medial *medial = (const qmat_medial *)outputs[REFINED_MEDIAL];
   assert_true(medial->sphere_count > 100);
@@ -143,7 +143,7 @@ static void test_more_samples_bring_a_coarse_solid_nearer(void **state) {
     assert_true(pipeline_count(report, "rounds") >= 1);
     assert_true(pipeline_count(report, "far_places_left") < pipeline_count(report, "far_places"));
     assert_int_equal(pipeline_count(report, "spheres"), medial->sphere_count);
-    /* Between the places that it looks at it cannot be much worse. */
+    /* Between its test points the distance is not much larger. */
     assert_true(largest_distance(p.mesh, medial, 20000) < after + 0.002);
     assert_true(largest_distance(p.mesh, p.medial, 20000) > 0.02);
     /* The samples of equations 7 and 8 are still there, and the others lie on their facets. */
@@ -166,7 +166,7 @@ static void test_more_samples_bring_a_coarse_solid_nearer(void **state) {
         assert_near(samples->positions[3 * s + k], place, 1e-12);
       }
     }
-    /* Every sample has a sphere that answers for it, as medial.simplify wants it. */
+    /* Every sample is in a responsible region, as medial.simplify requires. */
     uint8_t *answered = qmat_calloc(samples->count, 1);
     assert_non_null(answered);
     for (size_t s = 0; s < medial->region_sample_count; s++) answered[medial->region_samples[s]] = 1;

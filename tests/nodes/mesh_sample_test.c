@@ -176,7 +176,7 @@ static void test_thin_facets_add_n_f(void **state) {
 
 static void test_facet_is_not_its_own_neighbour(void **state) {
   (void)state;
-  /* Alone, a facet has nobody to be larger than. */
+  /* A single facet has no neighbour to compare with. */
   qmat_mesh *mesh = shape_new();
   shape_vertex(mesh, 0, 0, 0);
   shape_vertex(mesh, 3, 0, 0);
@@ -344,7 +344,7 @@ static double least_distance(const qmat_mesh *mesh, const qmat_samples *samples,
   return least;
 }
 
-/* The mean squared distance from a facet's points to its nearest sample, corners included: what Lloyd lessens. */
+/* The mean squared distance from a facet's points to the nearest sample or corner, which Lloyd's relaxation lowers. */
 static double quantisation_error(const qmat_mesh *mesh, const qmat_samples *samples, uint32_t facet) {
   enum { STEPS = 60 };
   double sum = 0;

@@ -338,7 +338,7 @@ static void test_an_octahedron_goes_to_the_limit_points_of_loop(void **state) {
       assert_vertex(r.mesh, p[0], p[1], p[2]);
     }
   release(&r);
-  /* The same of a mesh that has no cage, and says nothing of schemes. */
+  /* The same for a mesh without a cage. */
   qmat_mesh *plain = shape_new();
   for (size_t i = 0; i < 6; i++) shape_vertex(plain, positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
   for (size_t i = 0; i < 8; i++) shape_triangle(plain, corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]);
@@ -380,7 +380,7 @@ static void test_borders_follow_their_rule(void **state) {
   assert_false(r.mesh->closed);
   assert_vertex(r.mesh, 1.0 / 6, 1.0 / 6, 0);
   release(&r);
-  /* The parameter has the last word. */
+  /* The parameter overrides the rule of the model. */
   r = good(RUN(mesh_of(&spec), "level", "1", "boundary", "edge_and_corner"));
   assert_vertex(r.mesh, 0, 0, 0);
   assert_vertex(r.mesh, 3, 0, 0);
@@ -567,7 +567,7 @@ static void test_nothing_left_is_an_error(void **state) {
   spec.hole_count = 6;
   add_surface(mesh, &spec);
   shape_triangle(mesh, 0, 1, 2); /* so that the mesh itself is no error */
-  check_error(RUN(shape_seal(mesh), "level", "1"), "mesh", "nothing is left");
+  check_error(RUN(shape_seal(mesh), "level", "1"), "mesh", "no face is left");
   check_error(RUN(shape_seal(shape_new()), "level", "1"), "mesh", "no triangles");
 }
 
@@ -593,7 +593,7 @@ static qmat_mesh *sheet_of(uint32_t n) {
   return mesh;
 }
 
-/* What a level is measured with are four times as many faces: 66248 * 4^2 are made, 66248 * 4^3 are not. */
+/* Measuring a level takes four times its faces: 66248 * 4^2 are within the limit, 66248 * 4^3 are not. */
 static void test_levels_that_take_too_much_are_errors(void **state) {
   (void)state;
   check_error(RUN(sheet_of(182), "level", "2", "scheme", "loop"), "level", "at most 4194304");

@@ -40,7 +40,7 @@ static qmat_mesh *sphere_at(double x, double y, double z, double radius, uint32_
   return sphere;
 }
 
-/* Makes one vertex of those in one place, as reading a model does. */
+/* Welds equal vertices, as reading a model does. */
 static void weld(qmat_mesh *mesh) {
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     const double *p = mesh->positions + 3 * (size_t)mesh->triangles[i];
@@ -95,8 +95,8 @@ static void release(result *r) {
   qmat_value_release(&r->report->base);
 }
 
-/* Seals the mesh and runs the node on it. Whatever comes out has every edge balanced, no vertex unused and no two
- * vertices in one place where the input has none. */
+/* Seals the mesh and runs the node on it. Checks that every edge is balanced, every vertex used, and no two vertices
+ * equal unless the input has equal ones. */
 static result unite_with(qmat_mesh *mesh, const char *params) {
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   shape_seal(mesh);
@@ -408,7 +408,7 @@ static void test_triangles_without_area_in_parts_that_meet(void **state) {
 
 /* ---- properties ---- */
 
-/* Boxes between whole numbers: all kinds of touching, and the union is counted in cells. */
+/* Boxes with integer corners touch in every way, and their union is counted in cells. */
 static void test_random_boxes_against_counted_cells(void **state) {
   (void)state;
   enum { SIZE = 6 };
@@ -496,7 +496,7 @@ static void test_the_order_of_parts_and_runs_make_no_difference(void **state) {
   release(&one);
 }
 
-/* Each pair is a union of its own; those that meet nobody stay as they are. */
+/* Each pair is a union of its own; the others stay as they are. */
 static void test_hundreds_of_parts(void **state) {
   (void)state;
   enum { PAIRS = 120 };
@@ -514,7 +514,7 @@ static void test_hundreds_of_parts(void **state) {
   release(&r);
 }
 
-/* What is united is united: nothing is found to do in it again. */
+/* The node does not change its own result. */
 static void test_a_union_passes(void **state) {
   (void)state;
   result r = unite(row_of_spheres(4, 0));

@@ -2,7 +2,7 @@
 #ifndef QMAT_TESTS_NODES_PIPELINE_H
 #define QMAT_TESTS_NODES_PIPELINE_H
 
-/* From a model to what the medial nodes read. Include after cmocka. */
+/* Makes the inputs of the medial nodes from a model. Include after cmocka. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -99,7 +99,7 @@ static inline void pipeline_shuffle(qmat_mesh *mesh) {
   mesh->triangles = triangles;
 }
 
-/* What the medial nodes read, and the initial medial mesh. */
+/* The inputs of the medial nodes, and the initial medial mesh. */
 typedef struct pipeline {
   qmat_mesh *mesh;
   qmat_field *thickness;
@@ -108,7 +108,7 @@ typedef struct pipeline {
   qmat_report *report; /* of medial.delaunay */
 } pipeline;
 
-/* Seals the mesh and takes it over; its thickness and samples. */
+/* Seals the mesh, takes it over, and makes its thickness and samples. */
 static inline void pipeline_sample(pipeline *p, qmat_mesh *mesh, const char *sample_params) {
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   *p = (pipeline){.mesh = mesh->base.sealed ? mesh : shape_seal(mesh)};
@@ -120,7 +120,7 @@ static inline void pipeline_sample(pipeline *p, qmat_mesh *mesh, const char *sam
   qmat_value_release(outputs[1]);
 }
 
-/* The initial medial mesh in place of any that is there. */
+/* Replaces the initial medial mesh. */
 static inline void pipeline_delaunay(pipeline *p, int threads, const char *delaunay_params) {
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   qmat_value_release(p->medial ? &p->medial->base : NULL);

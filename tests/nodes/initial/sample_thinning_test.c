@@ -26,10 +26,11 @@ static void add(cloud *c, double x, double y, double z, double nx, double ny, do
   c->radii[i] = radius;
 }
 
-static void thin(cloud *c, double largest, double detail) {
+static void thin(cloud *c, double largest, double tolerance) {
   qmat_context context = {0};
   assert_int_equal(
-      qmat_samples_thin(&context, c->points, c->normals, c->radii, c->count, largest, detail, c->stand_ins), QMAT_OK);
+      qmat_samples_thin(&context, c->points, c->normals, c->radii, c->count, largest, tolerance, c->stand_ins),
+      QMAT_OK);
   qmat_context_uninit(&context);
 }
 
@@ -53,7 +54,7 @@ static void test_other_sides_and_other_planes_are_kept(void **state) {
   add(&c, 0, 0, -0.001, 0, 0, -1, 0.1);   /* the other side of a sheet */
   add(&c, 0.01, 0, 0, 1, 0, 0, 0.1);      /* around a crease */
   add(&c, 0.02, 0, 0.012, 0, 0, 1, 0.1);  /* a step */
-  add(&c, 0.02, 0, -0.008, 0, 0, 1, 0.1); /* within the detail */
+  add(&c, 0.02, 0, -0.008, 0, 0, 1, 0.1); /* within the tolerance */
   add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);      /* without a normal */
   add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);
   thin(&c, 0.1, 0.01);
@@ -67,15 +68,15 @@ static double component(const cloud *c, size_t a, size_t b, const double *along)
   return sum;
 }
 
-/* The rule as the header has it. */
-static bool may_stand_for(const cloud *c, size_t kept, size_t i, double detail) {
+/* The rule of the header. */
+static bool may_stand_for(const cloud *c, size_t kept, size_t i, double tolerance) {
   double square = 0, cosine = 0;
   for (size_t k = 0; k < 3; k++) {
     square += pow(c->points[3 * i + k] - c->points[3 * kept + k], 2);
     cosine += c->normals[3 * i + k] * c->normals[3 * kept + k];
   }
-  return sqrt(square) < c->radii[i] && cosine >= 0.7 && fabs(component(c, i, kept, &c->normals[3 * i])) <= detail &&
-         fabs(component(c, i, kept, &c->normals[3 * kept])) <= detail;
+  return sqrt(square) < c->radii[i] && cosine >= 0.7 && fabs(component(c, i, kept, &c->normals[3 * i])) <= tolerance &&
+         fabs(component(c, i, kept, &c->normals[3 * kept])) <= tolerance;
 }
 
 static void test_random_samples_agree_with_brute_force(void **state) {
