@@ -4,7 +4,7 @@
 
 #include "core/geometry/surface.h"
 #include "nodes/initial/delaunay_cgal.h"
-#include "nodes/initial/voronoi_dual.h"
+#include "nodes/initial/voronoi_dual_params.h"
 
 /* The origin of a tetrahedron's medial vertex. A dropped tetrahedron has none. */
 typedef enum { QMAT_CELL_DROPPED = 0, QMAT_CELL_CIRCUMCENTRE, QMAT_CELL_INCENTRE } qmat_cell_kind;
