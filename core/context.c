@@ -137,9 +137,8 @@ void qmat_error_format(const qmat_error *error, char *text, size_t size) {
     APPEND("%s: ", error->node_type);
   }
   if (error->field[0] != '\0' && !starts_with_word(error->message, error->field)) APPEND("%s: ", error->field);
-  if (error->element >= 0 && error->element_kind[0] != '\0') {
+  if (error->element >= 0 && error->element_kind[0] != '\0')
     APPEND("%s %lld: ", error->element_kind, (long long)error->element);
-  }
   APPEND("%s", error->message[0] != '\0' ? error->message : qmat_status_name(error->status));
   if (error->hint[0] != '\0') APPEND(" (%s)", error->hint);
 #undef APPEND

@@ -86,9 +86,8 @@ void qmat_params_default(const qmat_node *node, void *params) {
 /* The unit in parentheses after a range, or nothing for plain numbers. */
 static void format_unit(const qmat_param *param, char *text, size_t size) {
   text[0] = '\0';
-  if (param->unit && param->unit[0] != '\0' && strcmp(param->unit, "1") != 0) {
+  if (param->unit && param->unit[0] != '\0' && strcmp(param->unit, "1") != 0)
     snprintf(text, size, " (%s)", param->unit);
-  }
 }
 
 static qmat_status fail_range(qmat_context *context, const qmat_param *param, const char *text) {
@@ -177,9 +176,7 @@ static qmat_status parse_enum(qmat_context *context, const qmat_param *param, co
       return QMAT_OK;
     }
     const char *joint = i == 0 ? "" : i + 1 == count ? " or " : ", ";
-    if (used < sizeof list) {
-      used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", joint, param->choices[i]);
-    }
+    if (used < sizeof list) used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", joint, param->choices[i]);
   }
   qmat_fail(context, QMAT_ERROR_USAGE, "%s must be %s, not '%s'", param->name, list, text);
   const char *nearest = qmat_nearest_name(text, param->choices, count);

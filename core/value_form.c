@@ -198,9 +198,8 @@ qmat_status qmat_value_serialize(qmat_context *context, const qmat_value *value,
 }
 
 qmat_status qmat_value_seal(qmat_context *context, qmat_value *value) {
-  if (value->sealed) {
+  if (value->sealed)
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "a %s was sealed twice", qmat_value_type_name(value->type));
-  }
   qmat_status status = qmat_value_check(context, value);
   if (status != QMAT_OK) return status;
 
@@ -287,9 +286,8 @@ static qmat_status read_array(qmat_context *context, reader *from, qmat_value *v
   size_t *count = mutable_slot(value, row->count_offset);
   const size_t size = from->size;
   if (size % stride != 0) return fail_form(context, from, "an array ends within an element");
-  if (shares_count(qmat_value_rows(value), row) && *count != size / stride) {
+  if (shares_count(qmat_value_rows(value), row) && *count != size / stride)
     return fail_form(context, from, "two arrays that share a count differ in length");
-  }
   if (size == 0) return QMAT_OK;
   void *array = qmat_alloc(size / stride, stride);
   if (!array) return qmat_fail_memory(context, row->name);
@@ -312,9 +310,8 @@ static qmat_status read_parts(qmat_context *context, reader *from, qmat_value *v
   uint64_t count;
   size_t *part_count = mutable_slot(value, row->count_offset);
   enum { LEAST_BYTES = 12 }; /* a part has at least its two sizes */
-  if (!take_number(from, 8, &count) || count > (from->size - from->used) / LEAST_BYTES) {
+  if (!take_number(from, 8, &count) || count > (from->size - from->used) / LEAST_BYTES)
     return fail_form(context, from, "there are fewer parts than it states");
-  }
   if (count == 0) return QMAT_OK;
   qmat_file_part *parts = qmat_calloc((size_t)count, sizeof *parts);
   if (!parts) return qmat_fail_memory(context, "the parts of a file");
@@ -446,9 +443,8 @@ qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, 
   reader from = {bytes, size, 0, items};
   const uint8_t *magic = take(&from, sizeof MAGIC);
   uint64_t version;
-  if (!magic || memcmp(magic, MAGIC, sizeof MAGIC) != 0) {
+  if (!magic || memcmp(magic, MAGIC, sizeof MAGIC) != 0)
     return fail_form(context, &from, "it does not start with QMAT");
-  }
   if (!take_number(&from, 4, &version)) return fail_form(context, &from, "its version is missing");
   if (version != FORM_VERSION) {
     return qmat_fail(context, QMAT_ERROR_FORMAT, "the serialised form has version %u; this qmat reads version %d",
@@ -468,9 +464,8 @@ qmat_status qmat_value_deserialize(qmat_context *context, const uint8_t *bytes, 
   if (status == QMAT_OK) {
     status = qmat_value_seal(context, made);
     /* The bytes are wrong, not a node or a model. */
-    if (status == QMAT_ERROR_GEOMETRY || status == QMAT_ERROR_INTERNAL) {
+    if (status == QMAT_ERROR_GEOMETRY || status == QMAT_ERROR_INTERNAL)
       status = context->error.status = QMAT_ERROR_FORMAT;
-    }
   }
   if (status != QMAT_OK) {
     qmat_value_release(made);

@@ -26,9 +26,8 @@ static const qmat_value_row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   const qmat_scene *scene = (const qmat_scene *)value;
   const qmat_status status = qmat_check_utf8(context, scene->name, "name of the scene");
-  if (status == QMAT_OK && !(scene->meters_per_unit >= 0 && isfinite(scene->meters_per_unit))) {
+  if (status == QMAT_OK && !(scene->meters_per_unit >= 0 && isfinite(scene->meters_per_unit)))
     return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the unit of the scene is negative or not finite");
-  }
   if (status != QMAT_OK) return status;
   const qmat_status of_format = qmat_check_utf8(context, scene->format, "format of the scene");
   return of_format != QMAT_OK ? of_format : qmat_check_parts(context, scene->parts, scene->part_count);
@@ -76,9 +75,8 @@ static qmat_status check_cage(qmat_context *context, const qmat_cage *cage) {
   };
   qmat_status status = qmat_check_u32_count(context, cage->vertex_count, "vertices of a cage");
   if (status == QMAT_OK) status = qmat_check_u32_count(context, cage->face_count, "faces of a cage");
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_check_finite(context, cage->positions, cage->vertex_count, 3, "cage vertex", "position");
-  }
   for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++) {
     status = qmat_check_ids(context, arrays[i].ids, arrays[i].length, arrays[i].count, arrays[i].kind,
                             arrays[i].components, arrays[i].of);
@@ -143,9 +141,8 @@ static qmat_status check_samples(qmat_context *context, const qmat_value *value)
     return qmat_fail_field(context, "vertex_count");
   }
   status = qmat_check_finite(context, samples->positions, samples->count, 3, "sample", "position");
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_check_finite(context, samples->barycentrics, samples->count, 3, "sample", "barycentric coordinate");
-  }
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < samples->count; i++) {
     const double *weights = samples->barycentrics + 3 * i;
@@ -202,16 +199,14 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
   if (status == QMAT_OK) status = qmat_check_u32_count(context, medial->edge_count, "edges");
   if (status == QMAT_OK) status = qmat_check_u32_count(context, medial->triangle_count, "triangles");
   if (status == QMAT_OK) status = qmat_check_spheres(context, medial->spheres, medial->sphere_count, "sphere");
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_check_simplices(context, medial->edges, medial->edge_count, 2, medial->sphere_count, "edge");
-  }
   if (status == QMAT_OK) {
     status =
         qmat_check_simplices(context, medial->triangles, medial->triangle_count, 3, medial->sphere_count, "triangle");
   }
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_check_sides(context, medial->edges, medial->edge_count, medial->triangles, medial->triangle_count);
-  }
   return status == QMAT_OK ? check_regions(context, medial) : status;
 }
 

@@ -146,9 +146,8 @@ static qmat_status number_primitives(qmat_context *context, qmat_envelope *envel
     status = qmat_fail_memory(context, "medial primitives");
     goto done;
   }
-  for (size_t i = 0; i < filled; i++) {
+  for (size_t i = 0; i < filled; i++)
     memcpy(envelope->ends + 4 * i, spheres + 4 * (size_t)envelope->ids[i], 4 * sizeof *spheres);
-  }
 done:
   qmat_free(sides);
   qmat_free(used);
@@ -321,9 +320,8 @@ static inline double lower_bound(const envelope_node *node, const double p[3]) {
 
 static inline double item_distance(const qmat_envelope *envelope, envelope_item item, const double p[3]) {
   if (item.primitive < envelope->slab_count) return qmat_slab_prepared_distance(&envelope->slabs[item.slot], p);
-  if (item.primitive < envelope->slab_count + envelope->cone_count) {
+  if (item.primitive < envelope->slab_count + envelope->cone_count)
     return qmat_cone_prepared_distance(&envelope->cones[item.slot], p);
-  }
   return qmat_sphere_distance(envelope->spheres + 4 * (size_t)item.slot, p);
 }
 

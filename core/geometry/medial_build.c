@@ -54,9 +54,8 @@ static size_t sort_rows(uint32_t *rows, uint32_t *swap, size_t *starts, size_t c
 qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial, const uint32_t *edges,
                                       size_t edge_count, const uint32_t *triangles, size_t triangle_count) {
   size_t sphere_count = medial->sphere_count;
-  if (edge_count > MOST_ROWS || triangle_count > MOST_ROWS || sphere_count > UINT32_MAX) {
+  if (edge_count > MOST_ROWS || triangle_count > MOST_ROWS || sphere_count > UINT32_MAX)
     return qmat_fail_memory(context, "the edges and triangles of a medial mesh");
-  }
   qmat_status status = qmat_check_ids(context, edges, 2 * edge_count, sphere_count, "edge", 2, "sphere");
   if (status != QMAT_OK) return status;
   status = qmat_check_ids(context, triangles, 3 * triangle_count, sphere_count, "triangle", 3, "sphere");

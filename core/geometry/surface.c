@@ -408,9 +408,8 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   char config[64];
   snprintf(config, sizeof config, "ignore_config_files=1,threads=%d", qmat_threads(context));
   surface->device = rtcNewDevice(config);
-  if (!surface->device) {
+  if (!surface->device)
     return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree cannot start (error %d)", (int)rtcGetDeviceError(NULL));
-  }
   rtcSetDeviceErrorFunction(surface->device, keep_message, &message);
   qmat_status status = QMAT_OK;
   if (!rtcGetDeviceProperty(surface->device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED)) {
@@ -439,9 +438,8 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
                                     &surface->blocks);
 check:
   if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
-  if (status == QMAT_OK && (!surface->scene || !geometry)) {
+  if (status == QMAT_OK && (!surface->scene || !geometry))
     status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Embree created no scene");
-  }
 done:
   if (geometry) rtcReleaseGeometry(geometry);
   rtcSetDeviceErrorFunction(surface->device, NULL, NULL);
