@@ -22,9 +22,10 @@ step() {
 
 # list_skips FILE: the lines "skipped: REASON" of a log. In a log of ctest, each with the name of its test.
 list_skips() {
-  awk '/^[0-9]+\/[0-9]+ Test: / { test = $3 ": " }
-    /^skipped: / { sub(/^skipped: /, ""); print "  " test $0; next }
-    /^\[  SKIPPED \] test_/ { if (last !~ /^skipped: /) print "  " test $4 " (no reason given)" }
+  awk '/^[0-9]+\/[0-9]+ Test: / { test = $3 ": "; summary = 0 }
+    /test\(s\), listed below:/ { summary = 1 }
+    /^skipped: / { print "  " test substr($0, 10) }
+    /^\[  SKIPPED \] test_/ && !summary { if (last !~ /^skipped: /) print "  " test $4 " (no reason given)" }
     { last = $0 }' "$1"
 }
 
@@ -32,6 +33,7 @@ finish() {
   if [ -s "$skips" ]; then
     printf '\nSkipped:\n'
     sort -u "$skips"
+    if grep -q '(no reason given)$' "$skips"; then failed=$((failed + 1)); fi
   fi
   printf '\nDisk space used:\n'
   du -sh build/* 2>/dev/null | awk '$1 !~ /K$/ { printf "  %6s %s\n", $1, $2 }'
@@ -87,7 +89,7 @@ run_ctest() {
 }
 
 step "What this needs"
-echo "Builds: about 3 GB in $PWD/build. On two cores all of it takes about half an hour."
+echo "Builds: about 1.5 GB in $PWD/build. On two cores all of it takes less than half an hour."
 if ! sh .ci/packages.sh packages.txt tests/packages.txt; then
   failed=1
   finish
