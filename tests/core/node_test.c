@@ -294,100 +294,6 @@ static void test_formatting_cuts_at_the_size_given(void **state) {
   assert_string_equal(text, "");
 }
 
-static void test_numbers_are_read_in_full(void **state) {
-  (void)state;
-  const struct {
-    const char *text;
-    double number;
-  } cases[] = {{"0", 0},
-               {"-1", -1},
-               {"+1.5", 1.5},
-               {".5", 0.5},
-               {"5.", 5},
-               {"1e3", 1000},
-               {"1E-3", 0.001},
-               {"1%", 0.01},
-               {"0.1%", 0.001},
-               {"1e-1%", 0.001},
-               {"-7.3%", -0.073},
-               {"1e400%", 0},
-               {"1e-400", 0},
-               {"1e-999999%", 0},
-               {"2.5e1%", 0.25},
-               {"1e309%", 1e307},
-               {"00012", 12},
-               {"1e-99999999999999999999", 0},
-               {"179769313486231570000000000000000000000%", 1797693134862315700000000000000000000.0}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    double number = -99;
-    if (strcmp(cases[i].text, "1e400%") == 0) { /* beyond what a double holds, also after the percent */
-      assert_false(qmat_parse_number(cases[i].text, &number));
-      continue;
-    }
-    assert_true(qmat_parse_number(cases[i].text, &number));
-    assert_true(number == cases[i].number);
-  }
-}
-
-static void test_what_is_not_a_plain_finite_number_is_refused(void **state) {
-  (void)state;
-  const char *const texts[] = {"",     " ",      " 1",       "1 ",     "0x10", "0x1p3", "inf", "-inf",
-                               "nan",  "NAN(1)", "infinity", "e5",     ".",    "-",     "+",   "--1",
-                               "1e",   "1e+",    "1,5",      "1.2.3",  "%",    "1%%",   "1% ", "1e400",
-                               "1e5x", "\t1",    "1\n",      "-1e400", "١",    "1_000", ".e1", "-.%"};
-  for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
-    double number = -99;
-    assert_false(qmat_parse_number(texts[i], &number));
-    assert_true(number == -99);
-  }
-}
-
-/* "p%" and p/100 as text are the same double for every p with up to six digits. */
-static void test_a_percentage_is_rounded_once(void **state) {
-  (void)state;
-  for (int i = 0; i < 100000; i += 7) {
-    char percent[32], plain[32];
-    double from_percent, from_plain;
-    snprintf(percent, sizeof percent, "%d.%03d%%", i / 1000, i % 1000);
-    snprintf(plain, sizeof plain, "%de-5", i);
-    assert_true(qmat_parse_number(percent, &from_percent));
-    assert_true(qmat_parse_number(plain, &from_plain));
-    assert_true(from_percent == from_plain);
-  }
-}
-
-static void test_numbers_are_written_short_and_exact(void **state) {
-  (void)state;
-  const struct {
-    double number;
-    const char *text;
-  } cases[] = {{0.01, "0.01"},
-               {1, "1"},
-               {-2.5, "-2.5"},
-               {0.1 + 0.2, "0.30000000000000004"},
-               {1e-5, "1e-05"},
-               {DBL_MAX, "1.7976931348623157e+308"},
-               {5e-324, "5e-324"},
-               {1000, "1000"},
-               {-123456789012340, "-123456789012340"},
-               {1e15, "1e+15"}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    char text[32];
-    qmat_format_number(cases[i].number, text, sizeof text);
-    assert_string_equal(text, cases[i].text);
-  }
-  for (uint64_t i = 0; i < 5000; i++) {
-    const uint64_t bits = qmat_hash3(9, i, 0);
-    double number, again;
-    memcpy(&number, &bits, sizeof number);
-    if (!isfinite(number)) continue;
-    char text[32];
-    qmat_format_number(number, text, sizeof text);
-    assert_true(qmat_parse_number(text, &again));
-    assert_memory_equal(&again, &number, sizeof number);
-  }
-}
-
 static void test_numbers_do_not_depend_on_the_locale(void **state) {
   (void)state;
   locale_with_comma();
@@ -409,51 +315,6 @@ static void test_numbers_do_not_depend_on_the_locale(void **state) {
   assert_string_equal(context.error.message, "epsilon must be between 0 and 1 (diagonal), not 1.5");
 }
 
-static void test_the_nearest_name_is_found_within_the_limit(void **state) {
-  (void)state;
-  const char *const names[] = {"medial.simplify", "medial.skin", "mesh.sample", "mesh.sdf", "x"};
-  const struct {
-    const char *text, *nearest;
-  } cases[] = {{"medial.simplfy", "medial.simplify"}, /* a letter missing */
-               {"medial.ksin", "medial.skin"},        /* two swapped: one step */
-               {"mesh.sfd", "mesh.sdf"},
-               {"mesh.sampel", "mesh.sample"},
-               {"mesh.sdf", "mesh.sdf"},
-               {"mash.sof", "mesh.sdf"}, /* two of 8 letters: 1 + 8 / 3 = 3 allow it */
-               {"scene.write", NULL},
-               {"y", NULL},
-               {"", NULL}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    const char *nearest = qmat_nearest_name(cases[i].text, names, 5);
-    if (!cases[i].nearest) {
-      assert_null(nearest);
-    } else {
-      assert_non_null(nearest);
-      assert_string_equal(nearest, cases[i].nearest);
-    }
-  }
-  assert_null(qmat_nearest_name("mesh.sdf", NULL, 0));
-}
-
-static void test_the_first_of_equally_near_names_wins(void **state) {
-  (void)state;
-  const char *const names[] = {"cat", "bat", "rat"};
-  assert_string_equal(qmat_nearest_name("hat", names, 3), "cat");
-}
-
-static void test_names_of_any_length_are_compared_safely(void **state) {
-  (void)state;
-  char lengthy[5000], fits[64];
-  memset(lengthy, 'a', sizeof lengthy);
-  lengthy[sizeof lengthy - 1] = '\0';
-  memset(fits, 'a', sizeof fits);
-  fits[63] = '\0';
-  const char *const names[] = {lengthy, fits};
-  assert_null(qmat_nearest_name(lengthy, names, 2));
-  assert_ptr_equal(qmat_nearest_name(fits, names, 2), fits);
-  assert_ptr_equal(qmat_nearest_name(fits + 1, names, 2), fits);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_rows_are_counted_and_found_by_name),
@@ -465,14 +326,7 @@ int main(void) {
       cmocka_unit_test(test_the_check_asks_for_required_texts_ranges_and_rules),
       cmocka_unit_test(test_formatted_values_read_back_to_themselves),
       cmocka_unit_test(test_formatting_cuts_at_the_size_given),
-      cmocka_unit_test(test_numbers_are_read_in_full),
-      cmocka_unit_test(test_what_is_not_a_plain_finite_number_is_refused),
-      cmocka_unit_test(test_a_percentage_is_rounded_once),
-      cmocka_unit_test(test_numbers_are_written_short_and_exact),
       cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),
-      cmocka_unit_test(test_the_nearest_name_is_found_within_the_limit),
-      cmocka_unit_test(test_the_first_of_equally_near_names_wins),
-      cmocka_unit_test(test_names_of_any_length_are_compared_safely),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -61,7 +61,7 @@ static void test_exact_depth_is_positive_inside(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
-static void test_near_depth_differs_by_no_more_than_the_way_to_the_node(void **state) {
+static void test_near_depth_differs_by_at_most_the_distance_to_the_node(void **state) {
   static const double spacings[] = {0.1, 0.02, 0.003};
   random_numbers random = {.seed = 1};
   for (size_t i = 0; i < 3; i++) {
@@ -93,42 +93,42 @@ static void test_nodes_are_exact(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
-static void test_answers_do_not_depend_on_what_was_asked_before(void **state) {
+static void test_depths_do_not_depend_on_earlier_queries(void **state) {
   enum { POINTS = 20000 };
-  double(*points)[3] = calloc(POINTS, sizeof *points), *answers = calloc(POINTS, sizeof *answers);
-  double *ways = calloc(POINTS, sizeof *ways);
-  assert_true(points && answers && ways);
+  double(*points)[3] = calloc(POINTS, sizeof *points), *depths = calloc(POINTS, sizeof *depths);
+  double *distances = calloc(POINTS, sizeof *distances);
+  assert_true(points && depths && distances);
   random_numbers random = {.seed = 2};
   for (size_t i = 0; i < POINTS; i++) random_point(&random, 0.6, points[i]);
   qmat_depth_lattice forward, backward;
   make_lattice(&forward, state, 0.004);
   make_lattice(&backward, state, 0.004);
   const size_t before = forward.nodes.mask;
-  for (size_t i = 0; i < POINTS; i++) answers[i] = qmat_depth_lattice_near(&forward, points[i], &ways[i]);
+  for (size_t i = 0; i < POINTS; i++) depths[i] = qmat_depth_lattice_near(&forward, points[i], &distances[i]);
   for (size_t i = POINTS; i-- > 0;) {
     double distance;
     const double near = qmat_depth_lattice_near(&backward, points[i], &distance);
-    assert_memory_equal(&near, &answers[i], sizeof near);
-    assert_memory_equal(&distance, &ways[i], sizeof distance);
+    assert_memory_equal(&near, &depths[i], sizeof near);
+    assert_memory_equal(&distance, &distances[i], sizeof distance);
   }
-  /* The table has grown meanwhile, and still holds every node once. */
+  /* The table has grown and still has every node once. */
   assert_true(forward.nodes.mask > before && 2 * forward.nodes.count <= forward.nodes.mask + 1);
   assert_int_equal(forward.nodes.count, backward.nodes.count);
   assert_int_equal(forward.queries, forward.nodes.count);
   for (size_t i = 0; i < POINTS; i++) {
     double distance;
     const double near = qmat_depth_lattice_near(&forward, points[i], &distance);
-    assert_memory_equal(&near, &answers[i], sizeof near);
+    assert_memory_equal(&near, &depths[i], sizeof near);
   }
-  assert_int_equal(forward.queries, forward.nodes.count); /* remembered: nothing was asked again */
+  assert_int_equal(forward.queries, forward.nodes.count); /* from the cache: no new queries */
   qmat_depth_lattice_uninit(&forward);
   qmat_depth_lattice_uninit(&backward);
   free(points);
-  free(answers);
-  free(ways);
+  free(depths);
+  free(distances);
 }
 
-static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
+static void test_points_beyond_the_lattice_get_the_exact_depth(void **state) {
   qmat_depth_lattice lattice;
   make_lattice(&lattice, state, 0.01);
   static const double points[][3] = {{2.5, 0, 0}, {0, -100, 0}, {0, 0, 1e9}, {2.0000001, 2, 2}};
@@ -142,7 +142,7 @@ static void test_points_beyond_the_lattice_are_asked_exactly(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
-static void test_places_that_were_asked_bound_depths_around_them(void **state) {
+static void test_queried_places_bound_the_depths_around_them(void **state) {
   qmat_depth_lattice lattice;
   make_lattice(&lattice, state, 0.02);
   random_numbers random = {.seed = 3};
@@ -171,7 +171,7 @@ static void test_places_that_were_asked_bound_depths_around_them(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
-static void test_corners_of_the_lattice_have_keys_of_their_own(void **state) {
+static void test_corners_of_the_lattice_have_different_keys(void **state) {
   /* The finest spacing that the keys can number, and the farthest nodes. */
   static const double spacings[] = {0, 1e-6, 0.01};
   for (size_t i = 0; i < 3; i++) {
@@ -192,12 +192,12 @@ static void test_corners_of_the_lattice_have_keys_of_their_own(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_exact_depth_is_positive_inside),
-      cmocka_unit_test(test_near_depth_differs_by_no_more_than_the_way_to_the_node),
+      cmocka_unit_test(test_near_depth_differs_by_at_most_the_distance_to_the_node),
       cmocka_unit_test(test_nodes_are_exact),
-      cmocka_unit_test(test_answers_do_not_depend_on_what_was_asked_before),
-      cmocka_unit_test(test_points_beyond_the_lattice_are_asked_exactly),
-      cmocka_unit_test(test_places_that_were_asked_bound_depths_around_them),
-      cmocka_unit_test(test_corners_of_the_lattice_have_keys_of_their_own),
+      cmocka_unit_test(test_depths_do_not_depend_on_earlier_queries),
+      cmocka_unit_test(test_points_beyond_the_lattice_get_the_exact_depth),
+      cmocka_unit_test(test_queried_places_bound_the_depths_around_them),
+      cmocka_unit_test(test_corners_of_the_lattice_have_different_keys),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -461,39 +461,6 @@ static void test_two_runs_give_the_same_digests(void **state) {
   assert_memory_equal(&first[0], &f->run.steps[1].made[0].digest, sizeof first[0]);
 }
 
-static void test_counts_sizes_and_bounds_are_written_for_people(void **state) {
-  (void)state;
-  static const struct {
-    uint64_t number;
-    const char *count, *bytes;
-  } numbers[] = {{0, "0", "0 bytes"},
-                 {1, "1", "1 byte"},
-                 {999, "999", "999 bytes"},
-                 {1000, "1,000", "1 kB"},
-                 {26021, "26,021", "26 kB"},
-                 {999499, "999,499", "999 kB"},
-                 {999500, "999,500", "1 MB"},
-                 {1234567, "1,234,567", "1.2 MB"},
-                 {123456789012, "123,456,789,012", "123 GB"}};
-  static const struct {
-    double fraction;
-    const char *text;
-  } bounds[] = {{0, "0 %"},      {-1, "0 %"},     {0.0098, "0.98 %"}, {0.00977, "0.98 %"}, {0.00981, "0.99 %"},
-                {0.01, "1 %"},   {0.123, "13 %"}, {1, "100 %"},       {1.234, "124 %"},    {0.0000123, "0.0013 %"},
-                {0.00999, "1 %"}};
-  char text[48];
-  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
-    qmat_format_count(numbers[i].number, text);
-    assert_string_equal(text, numbers[i].count);
-    qmat_format_bytes(numbers[i].number, text);
-    assert_string_equal(text, numbers[i].bytes);
-  }
-  for (size_t i = 0; i < sizeof bounds / sizeof *bounds; i++) {
-    qmat_format_bound(bounds[i].fraction, text);
-    assert_string_equal(text, bounds[i].text);
-  }
-}
-
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
 
 int main(void) {
@@ -515,7 +482,6 @@ int main(void) {
       TEST(test_the_report_tells_every_node_file_and_the_summary),
       TEST(test_the_reports_of_several_meshes_become_one_summary),
       TEST(test_two_runs_give_the_same_digests),
-      TEST(test_counts_sizes_and_bounds_are_written_for_people),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
