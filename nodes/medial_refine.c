@@ -29,7 +29,7 @@ enum { MOST_ROUNDS = 8 };
 /* Samples, and the initial medial mesh made of them. */
 typedef struct {
   qmat_samples *samples;
-  double *reaches; /* per sample, unit frame: bounds the distance to the one that stands for it; NULL: unbounded */
+  double *reaches; /* per sample, unit frame: bounds the distance to its representative; NULL: unbounded */
   qmat_medial *medial;
   size_t far_count;
   double *far_points; /* 3 each, unit frame: test points farther from the envelope than the limit */

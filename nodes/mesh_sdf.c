@@ -218,12 +218,12 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
 }
 
 /* Sets the facet that is measured in place of each facet, possibly itself. */
-static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *surface, double spacing,
-                                  uint32_t *stand_ins) {
+static qmat_status find_representatives(qmat_context *context, const qmat_surface *surface, double spacing,
+                                        uint32_t *representatives) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
   const size_t count = mesh->triangle_count;
-  for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+  for (size_t i = 0; i < count; i++) representatives[i] = (uint32_t)i;
   if (spacing == 0) return QMAT_OK;
   double *centroids = qmat_arena_alloc(&context->arena, count, 3 * sizeof *centroids);
   double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
@@ -237,28 +237,28 @@ static qmat_status find_stand_ins(qmat_context *context, const qmat_surface *sur
     (void)qmat_triangle_area(a, b, c, normals + 3 * i);
     radii[i] = spacing;
   }
-  return qmat_samples_thin(context, centroids, normals, radii, count, spacing, SAME_PLANE * spacing, stand_ins);
+  return qmat_samples_thin(context, centroids, normals, radii, count, spacing, SAME_PLANE * spacing, representatives);
 }
 
 typedef struct measuring {
   const qmat_surface *surface;
   const cone_ray *rays;
   size_t ray_count;
-  const uint32_t *stand_ins;
+  const uint32_t *representatives;
   uint8_t *states;
   double *values;
 } measuring;
 
 static bool takes_value(const measuring *m, uint32_t facet) {
-  const uint32_t measured = m->stand_ins[facet];
+  const uint32_t measured = m->representatives[facet];
   if (m->states[measured] != MEASURED) return false;
   const double reach =
       3 * SAME_VALUE * m->values[measured]; /* squared_centroid_distance compares sums of three corners */
   return squared_centroid_distance(m->surface, facet, measured) <= reach * reach;
 }
 
-/* Measures the facets that stand for themselves, or the others. */
-static qmat_status measure_facets(qmat_context *context, const measuring *m, bool stand_ins) {
+/* Measures the facets that represent themselves, or the others. */
+static qmat_status measure_facets(qmat_context *context, const measuring *m, bool representatives) {
   const size_t count = qmat_surface_mesh(m->surface)->triangle_count;
   /* About a tenth of a second of rays between two progress reports. */
   const size_t slice = 100000 / m->ray_count + 1;
@@ -267,9 +267,9 @@ static qmat_status measure_facets(qmat_context *context, const measuring *m, boo
     const size_t end = count - begin < slice ? count : begin + slice;
 #pragma omp parallel for schedule(dynamic, 16) num_threads(threads)
     for (size_t i = begin; i < end; i++) {
-      if ((m->stand_ins[i] == i) != stand_ins) continue;
-      if (!stand_ins && takes_value(m, (uint32_t)i)) {
-        m->values[i] = m->values[m->stand_ins[i]];
+      if ((m->representatives[i] == i) != representatives) continue;
+      if (!representatives && takes_value(m, (uint32_t)i)) {
+        m->values[i] = m->values[m->representatives[i]];
         m->states[i] = MEASURED;
       } else {
         m->states[i] = (uint8_t)measure_facet(m->surface, m->rays, m->ray_count, (uint32_t)i, m->values + i);
@@ -296,13 +296,13 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 
   cone_ray *rays = qmat_arena_alloc(&context->arena, ray_count, sizeof *rays);
   uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
-  uint32_t *stand_ins = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *stand_ins);
+  uint32_t *representatives = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *representatives);
   field = qmat_field_new();
   if (field) {
     field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
     field->unit = qmat_strdup("model unit");
   }
-  if (!rays || !states || !stand_ins || !field || !field->values || field->unit == NULL) {
+  if (!rays || !states || !representatives || !field || !field->values || field->unit == NULL) {
     status = qmat_fail_memory(context, "the thickness");
     goto done;
   }
@@ -310,8 +310,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   field->domain = QMAT_PER_FACET;
 
   make_cone(params->cone_angle, ray_count, rays);
-  const measuring m = {surface, rays, ray_count, stand_ins, states, field->values};
-  status = find_stand_ins(context, surface, params->spacing, stand_ins);
+  const measuring m = {surface, rays, ray_count, representatives, states, field->values};
+  status = find_representatives(context, surface, params->spacing, representatives);
   if (status == QMAT_OK) status = measure_facets(context, &m, true);
   if (status == QMAT_OK && params->spacing > 0) status = measure_facets(context, &m, false);
   if (status == QMAT_OK) status = fill_gaps(context, surface, states, field->values);

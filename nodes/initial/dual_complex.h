@@ -22,7 +22,7 @@ typedef struct qmat_dual_complex {
   const double *points;               /* 3 per sample */
   const uint8_t *thin;                /* per sample */
   const uint32_t *surface_components; /* per mesh vertex: smallest vertex of its component; NULL: one component */
-  const uint32_t *stand_ins;          /* per sample: the sample triangulated in its place, possibly itself */
+  const uint32_t *representatives;    /* per sample: the triangulated sample that represents it, possibly itself */
   size_t site_count;                  /* triangulated samples */
   qmat_tetrahedra cells;              /* corners are samples */
   uint8_t *kinds;                     /* per cell: a qmat_cell_kind */

@@ -11,7 +11,7 @@
 enum { MOST_ADDED = 1 << 20 };
 
 /* The reach of samples near far points, as a share of the spacing. It is less than the displacement of points in
- * neighbouring rows, so the new samples do not stand for each other. */
+ * neighbouring rows, so the new samples do not represent each other. */
 static const double reach_share = 0.5;
 
 typedef struct {

@@ -17,7 +17,7 @@ typedef struct qmat_resampling {
 } qmat_resampling;
 
 /* Adds evenly spaced samples behind those of `before`. `reaches` (one per sample of `before`; NULL: unbounded) and
- * `*reaches_after` (one per new and old sample) bound the distance between a sample and the one that stands for it in
+ * `*reaches_after` (one per new and old sample) bound the distance between a sample and its representative in
  * the triangulation; near the far points the bound is below the new spacing. `*samples` is not sealed. Both outputs
  * are NULL if nothing changes, or if there would be more than 2^20 new samples. The caller releases the samples and
  * frees the reaches (qmat_free). QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their

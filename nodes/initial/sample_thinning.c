@@ -59,7 +59,7 @@ typedef struct thinning {
   sample_grid grid;
 } thinning;
 
-static bool stands_for(const thinning *t, uint32_t kept, uint32_t sample) {
+static bool represents(const thinning *t, uint32_t kept, uint32_t sample) {
   double offset[3];
   for (size_t k = 0; k < 3; k++) offset[k] = t->points[3 * (size_t)sample + k] - t->points[3 * (size_t)kept + k];
   const double *mine = &t->normals[3 * (size_t)sample], *theirs = &t->normals[3 * (size_t)kept];
@@ -67,9 +67,9 @@ static bool stands_for(const thinning *t, uint32_t kept, uint32_t sample) {
          fabs(qmat_dot(offset, mine)) <= t->tolerance && fabs(qmat_dot(offset, theirs)) <= t->tolerance;
 }
 
-/* The kept sample that stands for this one, or the sample itself. The cells of its level are at least twice as wide as
+/* The kept sample that represents this one, or the sample itself. The cells of its level are at least twice as wide as
  * its radius, so 2 x 2 x 2 cells contain every candidate. */
-static uint32_t find_stand_in(const thinning *t, uint32_t sample) {
+static uint32_t find_representative(const thinning *t, uint32_t sample) {
   const sample_grid *grid = &t->grid;
   const double radius = t->radii[sample], *point = &t->points[3 * (size_t)sample];
   int level = 0;
@@ -83,20 +83,20 @@ static uint32_t find_stand_in(const thinning *t, uint32_t sample) {
     for (cell[1] = low[1]; cell[1] <= high[1]; cell[1]++)
       for (cell[2] = low[2]; cell[2] <= high[2]; cell[2]++)
         for (uint32_t entry = grid->heads[bucket_of(grid, level, cell)]; entry != NONE; entry = grid->next[entry])
-          if (stands_for(t, entry / LEVELS, sample)) return entry / LEVELS;
+          if (represents(t, entry / LEVELS, sample)) return entry / LEVELS;
   return sample;
 }
 
 qmat_status qmat_samples_thin(qmat_context *context, const double *points, const double *normals, const double *radii,
-                              size_t count, double largest, double tolerance, uint32_t *stand_ins) {
+                              size_t count, double largest, double tolerance, uint32_t *representatives) {
   thinning t = {.points = points, .normals = normals, .radii = radii, .tolerance = tolerance};
   if (count >= NONE / LEVELS)
     return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu samples are too many to thin out", count);
   qmat_status status = grid_init(context, &t.grid, count, largest);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     if (i % REPORT_EVERY == 0) status = qmat_progress(context, i, count, "samples");
-    stand_ins[i] = find_stand_in(&t, (uint32_t)i);
-    if (stand_ins[i] == i) grid_add(&t.grid, &points[3 * i], (uint32_t)i);
+    representatives[i] = find_representative(&t, (uint32_t)i);
+    if (representatives[i] == i) grid_add(&t.grid, &points[3 * i], (uint32_t)i);
   }
   return status;
 }
@@ -129,12 +129,12 @@ static void find_normals(const qmat_surface *surface, const qmat_samples *sample
 /* The radius of a sample, as a share of the thickness, and its upper bound in diagonals. */
 static const double thickness_share = 0.25, longest_reach = 0.01;
 
-qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                const double *points, const double *thickness, double tolerance, const double *reaches,
-                                uint32_t *stand_ins) {
+qmat_status qmat_representatives_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                      const double *points, const double *thickness, double tolerance,
+                                      const double *reaches, uint32_t *representatives) {
   const size_t count = samples->count;
   if (tolerance == 0) {
-    for (size_t i = 0; i < count; i++) stand_ins[i] = (uint32_t)i;
+    for (size_t i = 0; i < count; i++) representatives[i] = (uint32_t)i;
     return QMAT_OK;
   }
   double *normals = qmat_arena_alloc(&context->arena, count, 3 * sizeof *normals);
@@ -146,5 +146,5 @@ qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surfa
     radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), tolerance), longest_reach);
     if (reaches) radii[i] = fmin(radii[i], reaches[i]);
   }
-  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, tolerance, stand_ins);
+  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, tolerance, representatives);
 }

@@ -4,23 +4,23 @@
 
 #include "core/geometry/surface.h"
 
-/* Finds samples that others nearby can stand for. Sample a stands for sample b if b's radius contains a, their normals
+/* Finds samples that others nearby can represent. Sample a represents sample b if b's radius contains a, their normals
  * agree, and each is within `tolerance` of the other's tangent plane. A sample is thus left out only if the surface is
- * flat there up to about that tolerance, and the two sides of a thin sheet or a crease never stand for each other.
- * Samples with smaller ids take precedence: stand_ins[i] becomes i, or the smaller id of the sample that stands for i.
+ * flat there up to about that tolerance, and the two sides of a thin sheet or a crease never represent each other.
+ * Samples with smaller ids take precedence: representatives[i] becomes i, or the smaller id of its representative.
  *
- * `points` and `normals` hold 3 doubles per sample (unit frame; a sample with a zero normal stands only for itself),
+ * `points` and `normals` hold 3 doubles per sample (unit frame; a sample with a zero normal represents only itself),
  * `radii` one per sample, at most `largest` (> 0). QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear in
  * `count` if the radii change slowly over the surface; about 0.3 microseconds per sample. */
 qmat_status qmat_samples_thin(qmat_context *context, const double *points, const double *normals, const double *radii,
-                              size_t count, double largest, double tolerance, uint32_t *stand_ins);
+                              size_t count, double largest, double tolerance, uint32_t *representatives);
 
 /* The same for the samples of a solid's surface. The radius is a quarter of the thickness, at least `tolerance` and at
- * most 1 % of the diagonal. With a tolerance of 0 every sample stands for itself. `points` (3 doubles per sample) are
+ * most 1 % of the diagonal. With a tolerance of 0 every sample represents itself. `points` (3 doubles per sample) are
  * in the unit frame, `thickness` (one per sample) in model units. `reaches` (one per sample, unit frame; NULL: none)
  * bounds the radii further. Statuses and threads as above. */
-qmat_status qmat_stand_ins_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
-                                const double *points, const double *thickness, double tolerance, const double *reaches,
-                                uint32_t *stand_ins);
+qmat_status qmat_representatives_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
+                                      const double *points, const double *thickness, double tolerance,
+                                      const double *reaches, uint32_t *representatives);
 
 #endif

@@ -128,7 +128,7 @@ static void sort_numbers(uint32_t *row, size_t length) {
   }
 }
 
-/* The samples that a triangulated sample stands for, itself included, in rising order: those of sample i are
+/* The samples that a triangulated sample represents, itself included, in rising order: those of sample i are
  * items[starts[i] .. starts[i + 1]). */
 typedef struct {
   size_t *starts;
@@ -140,13 +140,13 @@ static qmat_status find_represented(const qmat_dual_complex *d, represented_samp
   s->starts = qmat_arena_calloc(&d->context->arena, count + 2, sizeof *s->starts);
   s->items = qmat_arena_alloc(&d->context->arena, count, sizeof *s->items);
   if (!s->starts || !s->items) return qmat_fail_memory(d->context, "regions");
-  for (size_t i = 0; i < count; i++) s->starts[d->stand_ins[i] + 2]++;
+  for (size_t i = 0; i < count; i++) s->starts[d->representatives[i] + 2]++;
   for (size_t i = 0; i < count; i++) s->starts[i + 2] += s->starts[i + 1];
-  for (size_t i = 0; i < count; i++) s->items[s->starts[d->stand_ins[i] + 1]++] = (uint32_t)i;
+  for (size_t i = 0; i < count; i++) s->items[s->starts[d->representatives[i] + 1]++] = (uint32_t)i;
   return QMAT_OK;
 }
 
-/* Eq. 11: a medial vertex is responsible for the corners of its tetrahedra, and for the samples they stand for. */
+/* Eq. 11: a medial vertex is responsible for the corners of its tetrahedra, and for the samples they represent. */
 static qmat_status set_regions(qmat_dual_complex *d, qmat_medial *medial) {
   const size_t count = medial->sphere_count; /* the regions of vertices that halve an edge stay empty */
   uint32_t *offsets = qmat_calloc(count + 1, sizeof *offsets);
@@ -215,7 +215,7 @@ static qmat_status make_medial(qmat_dual_complex *d, qmat_medial *medial, size_t
   return qmat_value_seal(d->context, &medial->base);
 }
 
-/* Triangulates the samples that stand for themselves. */
+/* Triangulates the samples that represent themselves. */
 static qmat_status triangulate(qmat_dual_complex *d) {
   qmat_arena *arena = &d->context->arena;
   const size_t count = d->samples->count;
@@ -223,7 +223,7 @@ static qmat_status triangulate(qmat_dual_complex *d) {
   double *points = qmat_arena_alloc(arena, count, 3 * sizeof *points);
   if (!sites || !points) return qmat_fail_memory(d->context, "samples");
   for (size_t i = 0; i < count; i++) {
-    if (d->stand_ins[i] != i) continue;
+    if (d->representatives[i] != i) continue;
     memcpy(&points[3 * d->site_count], &d->points[3 * i], 3 * sizeof *points);
     sites[d->site_count++] = (uint32_t)i;
   }
@@ -272,17 +272,17 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
   double *points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *points);
   double *values = qmat_arena_alloc(&context->arena, count, sizeof *values);
   uint8_t *thin = qmat_arena_alloc(&context->arena, count, sizeof *thin);
-  uint32_t *stand_ins = qmat_arena_alloc(&context->arena, count, sizeof *stand_ins);
-  if (!points || !values || !thin || !stand_ins) return qmat_fail_memory(context, "samples");
+  uint32_t *representatives = qmat_arena_alloc(&context->arena, count, sizeof *representatives);
+  if (!points || !values || !thin || !representatives) return qmat_fail_memory(context, "samples");
   qmat_frame_to_unit(qmat_surface_frame(d->surface), d->samples->positions, count, points);
   qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
   const double theta = qmat_thickness_threshold(thickness, d->params->theta);
   for (size_t i = 0; i < count; i++) thin[i] = values[i] <= theta;
   d->points = points;
   d->thin = thin;
-  d->stand_ins = stand_ins;
-  qmat_status status = qmat_stand_ins_find(context, d->surface, d->samples, points, values,
-                                           d->params->thinning_tolerance, reaches, stand_ins);
+  d->representatives = representatives;
+  qmat_status status = qmat_representatives_find(context, d->surface, d->samples, points, values,
+                                                 d->params->thinning_tolerance, reaches, representatives);
   if (status == QMAT_OK) status = triangulate(d);
   if (status == QMAT_OK) status = qmat_medial_vertices_select(d);
   if (status != QMAT_OK) return status;

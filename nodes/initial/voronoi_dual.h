@@ -6,9 +6,9 @@
 #include "nodes/initial/voronoi_dual_params.h"
 
 /* Makes the initial medial mesh, sealed: the dual of the Delaunay tetrahedra inside the solid (Algorithm 1). Samples
- * that others nearby stand for are not triangulated (nodes/initial/sample_thinning.h). `thickness` and `samples` must
+ * that others nearby represent are not triangulated (nodes/initial/sample_thinning.h). `thickness` and `samples` must
  * fit the surface's mesh (qmat_thickness_check). `reaches` (one per sample, unit frame) bounds the distance between a
- * sample and the one that stands for it; NULL: no further bound. `report` gets counts and is not sealed; NULL: none.
+ * sample and its representative; NULL: no further bound. `report` gets counts and is not sealed; NULL: none.
  * The caller releases `*medial`; it is NULL on failure. QMAT_ERROR_GEOMETRY if no medial vertex is inside,
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. Cost: about 10
  * microseconds per sample. */

@@ -18,12 +18,12 @@ struct Id {
 };
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<Id, Exact>;
 /* The triangles of a plane over a face: how many there are, and how many more turn left than right. */
-struct Cover {
+struct LayerCount {
   int count = 0, layers = 0;
   bool is_known = false;
 };
 using FaceBase =
-    CGAL::Constrained_triangulation_face_base_2<Exact, CGAL::Triangulation_face_base_with_info_2<Cover, Exact>>;
+    CGAL::Constrained_triangulation_face_base_2<Exact, CGAL::Triangulation_face_base_with_info_2<LayerCount, Exact>>;
 using Delaunay =
     CGAL::Constrained_Delaunay_triangulation_2<Exact, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>,
                                                CGAL::Exact_intersections_tag>;
@@ -166,10 +166,10 @@ bool Arrangement::is_beside(uint32_t triangle, uint32_t other, const View &view,
   const uint32_t *c = mesh_.corners(triangle), *d = mesh_.corners(other);
   for (size_t k = 0; k < 3; k++) {
     const Inexact::Point_2 from = view.flatten(mesh_.position(d[k])), to = view.flatten(mesh_.position(d[(k + 1) % 3]));
-    bool beside = true;
+    bool is_separated = true;
     for (size_t i = 0; i < 3; i++)
-      beside = beside && CGAL::orientation(from, to, view.flatten(mesh_.position(c[i]))) != turn;
-    if (beside) return true;
+      is_separated = is_separated && CGAL::orientation(from, to, view.flatten(mesh_.position(c[i]))) != turn;
+    if (is_separated) return true;
   }
   return false;
 }
@@ -251,10 +251,10 @@ void Arrangement::add_piece(uint32_t source, Corners c, int layers) {
 template <class Plane, class VertexOf>
 void Arrangement::count_layers(Plane &plane, const std::vector<uint32_t> &group, const View &view,
                                const VertexOf &vertex) const {
-  std::map<Pair, Cover> borders; /* left minus right of an edge, from the smaller id to the larger */
-  const auto add = [](std::map<Pair, Cover> &at, uint32_t from, uint32_t to, int count, int layers) {
+  std::map<Pair, LayerCount> borders; /* left minus right of an edge, from the smaller id to the larger */
+  const auto add = [](std::map<Pair, LayerCount> &at, uint32_t from, uint32_t to, int count, int layers) {
     const int sign = from < to ? 1 : -1;
-    Cover &border = at[{std::min(from, to), std::max(from, to)}];
+    LayerCount &border = at[{std::min(from, to), std::max(from, to)}];
     border.count += sign * count;
     border.layers += sign * layers;
   };
@@ -263,7 +263,7 @@ void Arrangement::count_layers(Plane &plane, const std::vector<uint32_t> &group,
     for (size_t k = 0; k < 3; k++)
       add(borders, same_[mesh_.corners(t)[k]], same_[mesh_.corners(t)[(k + 1) % 3]], turn, 1);
   }
-  std::map<Pair, Cover> steps; /* the same for the edges of the plane */
+  std::map<Pair, LayerCount> steps; /* the same for the edges of the plane */
   for (const auto &[ends, border] : borders) {
     if (border.count == 0 && border.layers == 0) continue;
     const auto last = vertex(ends.second);

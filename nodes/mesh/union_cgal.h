@@ -3,24 +3,11 @@
 #define QMAT_NODES_MESH_UNION_CGAL_H
 
 #include "core/context.h"
+#include "nodes/mesh/shells.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define QMAT_NO_SHELL UINT32_MAX
-
-/* A mesh divided into shells and sheets. A shell is connected across edges, a sheet across edges of two triangles. */
-typedef struct qmat_shells {
-  size_t vertex_count, triangle_count;
-  const double *positions;   /* 3 * vertex_count, finite */
-  const uint32_t *triangles; /* 3 * triangle_count */
-  /* triangle_count: the triangle that names its shell. QMAT_NO_SHELL: the triangle stays as it is and bounds nothing.
-   * At each edge of a shell as many triangles run one way as the other. */
-  const uint32_t *shells;
-  const uint32_t *sheets; /* triangle_count: the triangle that names its sheet */
-  const uint8_t *reaches; /* triangle_count: 0 if no triangle of another sheet is near */
-} qmat_shells;
 
 /* The result. */
 typedef struct qmat_united {

@@ -2,7 +2,7 @@
 #ifndef QMAT_NODES_MESH_UNION_MESH_CGAL_H
 #define QMAT_NODES_MESH_UNION_MESH_CGAL_H
 
-/* The mesh whose shells are united, as the parts of the union see it: C++, with CGAL's kernels. */
+/* The mesh whose shells are united, for the C++ files of the union, with CGAL's kernels. */
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/disjoint_sets.h"
-#include "nodes/mesh/union_cgal.h"
+#include "nodes/mesh/shells.h"
 
 namespace qmat {
 

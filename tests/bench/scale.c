@@ -201,19 +201,20 @@ static qmat_status time_cgal(qmat_context *context, const qmat_mesh *mesh, const
   if (status != QMAT_OK) return status;
   double *points = qmat_arena_alloc(&context->arena, samples->count, 3 * sizeof *points);
   double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
-  uint32_t *stand_ins = qmat_arena_alloc(&context->arena, samples->count, sizeof *stand_ins);
-  if (!points || !values || !stand_ins) {
+  uint32_t *representatives = qmat_arena_alloc(&context->arena, samples->count, sizeof *representatives);
+  if (!points || !values || !representatives) {
     status = qmat_fail_memory(context, "samples");
   } else {
     qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, points);
     qmat_thickness_of_samples(mesh, thickness, samples, values);
-    status = qmat_stand_ins_find(context, surface, samples, points, values, detail_of_delaunay(), NULL, stand_ins);
+    status = qmat_representatives_find(context, surface, samples, points, values, detail_of_delaunay(), NULL,
+                                       representatives);
   }
   if (status == QMAT_OK) {
     seconds[1] = qmat_plain_delaunay_seconds(points, samples->count);
     size_t kept = 0;
     for (size_t i = 0; i < samples->count; i++)
-      if (stand_ins[i] == i) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
+      if (representatives[i] == i) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
     seconds[0] = qmat_plain_delaunay_seconds(points, kept);
     if (!(seconds[0] > 0 && seconds[1] > 0)) status = qmat_fail(context, QMAT_ERROR_DEPENDENCY, "CGAL failed");
   }

@@ -15,7 +15,7 @@ enum { MOST = 4000 };
 typedef struct cloud {
   size_t count;
   double points[3 * MOST], normals[3 * MOST], radii[MOST];
-  uint32_t stand_ins[MOST];
+  uint32_t representatives[MOST];
 } cloud;
 
 static void add(cloud *c, double x, double y, double z, double nx, double ny, double nz, double radius) {
@@ -29,7 +29,7 @@ static void add(cloud *c, double x, double y, double z, double nx, double ny, do
 static void thin(cloud *c, double largest, double tolerance) {
   qmat_context context = {0};
   assert_int_equal(
-      qmat_samples_thin(&context, c->points, c->normals, c->radii, c->count, largest, tolerance, c->stand_ins),
+      qmat_samples_thin(&context, c->points, c->normals, c->radii, c->count, largest, tolerance, c->representatives),
       QMAT_OK);
   qmat_context_uninit(&context);
 }
@@ -44,7 +44,7 @@ static void test_earlier_samples_stand_for_later_ones_within_their_radius(void *
   add(&c, -0.1, 0, 0, 0, 0, 1, 0.1);  /* not nearer than the radius */
   thin(&c, 0.1, 0.01);
   const uint32_t expected[] = {0, 0, 2, 3, 4};
-  for (size_t i = 0; i < c.count; i++) assert_int_equal(c.stand_ins[i], expected[i]);
+  for (size_t i = 0; i < c.count; i++) assert_int_equal(c.representatives[i], expected[i]);
 }
 
 static void test_other_sides_and_other_planes_are_kept(void **state) {
@@ -59,7 +59,7 @@ static void test_other_sides_and_other_planes_are_kept(void **state) {
   add(&c, 0.03, 0, 0, 0, 0, 0, 0.1);
   thin(&c, 0.1, 0.01);
   const uint32_t expected[] = {0, 1, 2, 3, 0, 5, 6};
-  for (size_t i = 0; i < c.count; i++) assert_int_equal(c.stand_ins[i], expected[i]);
+  for (size_t i = 0; i < c.count; i++) assert_int_equal(c.representatives[i], expected[i]);
 }
 
 static double component(const cloud *c, size_t a, size_t b, const double *along) {
@@ -69,7 +69,7 @@ static double component(const cloud *c, size_t a, size_t b, const double *along)
 }
 
 /* The rule of the header. */
-static bool may_stand_for(const cloud *c, size_t kept, size_t i, double tolerance) {
+static bool may_represent(const cloud *c, size_t kept, size_t i, double tolerance) {
   double square = 0, cosine = 0;
   for (size_t k = 0; k < 3; k++) {
     square += pow(c->points[3 * i + k] - c->points[3 * kept + k], 2);
@@ -99,14 +99,14 @@ static void test_random_samples_agree_with_brute_force(void **state) {
   thin(&c, 0.1, 0.004);
   size_t kept = 0;
   for (size_t i = 0; i < c.count; i++) {
-    const uint32_t other = c.stand_ins[i];
+    const uint32_t other = c.representatives[i];
     bool told = false;
-    for (size_t j = 0; j < i && !told; j++) told = c.stand_ins[j] == j && may_stand_for(&c, j, i, 0.004);
+    for (size_t j = 0; j < i && !told; j++) told = c.representatives[j] == j && may_represent(&c, j, i, 0.004);
     assert_int_equal(told, other != i);
     kept += other == i;
     if (other == i) continue;
-    assert_true(other < i && c.stand_ins[other] == other);
-    assert_true(may_stand_for(&c, other, i, 0.004));
+    assert_true(other < i && c.representatives[other] == other);
+    assert_true(may_represent(&c, other, i, 0.004));
   }
   assert_true(kept > MOST / 10 && kept < 9 * MOST / 10);
 }
@@ -123,7 +123,7 @@ static void test_nothing_and_a_cancelled_run(void **state) {
   thin(&c, 0.1, 0.01);
   add(&c, 0, 0, 0, 0, 0, 1, 0.1);
   qmat_context context = {.progress = refuse};
-  assert_int_equal(qmat_samples_thin(&context, c.points, c.normals, c.radii, 1, 0.1, 0.01, c.stand_ins),
+  assert_int_equal(qmat_samples_thin(&context, c.points, c.normals, c.radii, 1, 0.1, 0.01, c.representatives),
                    QMAT_CANCELLED);
   qmat_context_uninit(&context);
 }
