@@ -8,6 +8,7 @@
 #include "io/draco.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/mesh/ma.h"
+#include "io/mesh/ply_medial.h"
 #include "io/model.h"
 #include "io/usd/usd_medial.h"
 
@@ -121,6 +122,8 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
     status = qmat_usd_read_medial(context, &bytes, path, name, medial, stated);
   } else if (status == QMAT_OK && format == QMAT_FORMAT_MA) {
     status = qmat_ma_read(context, &bytes, path, medial);
+  } else if (status == QMAT_OK && format == QMAT_FORMAT_PLY) {
+    status = qmat_ply_read_medial(context, &bytes, path, medial, stated);
   } else if (status == QMAT_OK) {
     qmat_fail(context, status = QMAT_ERROR_GEOMETRY, "%s does not carry medial meshes", qmat_format_title(format));
     qmat_fail_at(context, path, 0, 0);

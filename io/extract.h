@@ -7,11 +7,11 @@
 #include "core/value.h"
 
 /* Takes the medial mesh back out of a file that carries one: glTF (qmat_data in the extras of a node), USD (as
- * io/usd/usd_write.h writes it), or .ma. It is in the space of the model or mesh that was
- * described: the node's or prim's own, moved by the origin that the file states. `name` is that node's
- * or prim's name, or NULL where there is one only; it does not apply to .ma. `facts` (a JSON object, may be NULL) gains
- * what the file says of it: the extras or customData that start with qmat_, without the data. Stated counts are checked
- * against what is there. `*medial` is sealed and released by the caller; NULL on failure. QMAT_ERROR_FORMAT,
+ * io/usd/usd_write.h writes it), PLY (as io/mesh/ply_medial.h writes it), or .ma. It is in the space of the model or
+ * mesh that was described: the node's or prim's own, moved by the origin that the file states. `name` is that node's or
+ * prim's name, or NULL where there is one only; it does not apply to PLY and .ma. `facts` (a JSON object, may be NULL)
+ * gains what the file says of it: the extras or customData that start with qmat_, without the data. Stated counts are
+ * checked against what is there. `*medial` is sealed and released by the caller; NULL on failure. QMAT_ERROR_FORMAT,
  * QMAT_ERROR_GEOMETRY where there is none, QMAT_ERROR_USAGE where there are several and none is named, QMAT_ERROR_IO,
  * QMAT_ERROR_MEMORY. One thread; linear. */
 qmat_status qmat_medial_extract(qmat_context *context, const char *path, const char *name, qmat_medial **medial,

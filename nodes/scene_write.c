@@ -5,7 +5,7 @@
 #include "core/node.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/ply_medial.h"
 #include "io/usd/usd_write.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
@@ -241,7 +241,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
       case FORMAT_PLY:
         stated[0] = errors_of(medial, (const qmat_report *)inputs[IN_REPORT]);
         status = params->format == FORMAT_MA ? qmat_ma_write(context, medial, &file)
-                                             : qmat_ply_write_medial(context, medial, &file);
+                                             : qmat_ply_write_medial(context, medial, &stated[0], &file);
         break;
       case FORMAT_USDA:
       case FORMAT_USDZ:

@@ -5,7 +5,7 @@
 #include "graphs/run/run_paths.h"
 #include "io/extract.h"
 #include "io/mesh/ma.h"
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/ply_medial.h"
 #include "io/model.h"
 #include "io/save.h"
 
@@ -27,8 +27,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_file *file = NULL;
   qmat_status status = qmat_medial_extract(context, from, qmat_invocation_value(invocation, "node"), &medial, NULL);
   if (status != QMAT_OK) return status;
-  status =
-      format == QMAT_FORMAT_MA ? qmat_ma_write(context, medial, &file) : qmat_ply_write_medial(context, medial, &file);
+  status = format == QMAT_FORMAT_MA ? qmat_ma_write(context, medial, &file)
+                                    : qmat_ply_write_medial(context, medial, NULL, &file);
   if (status == QMAT_OK) status = qmat_file_save(context, file, to);
   if (status == QMAT_OK && !qmat_invocation_value(invocation, "quiet")) {
     printf("%s: %zu spheres, %zu cones, %zu slabs -> %s\n", from, medial->sphere_count, medial->edge_count,

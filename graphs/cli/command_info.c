@@ -65,27 +65,34 @@ static qmat_status compare(qmat_context *context, const json_t *facts, const jso
           qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states", rows[i].title);
     }
   }
+  printf("  %s for an epsilon of %.6g\n",
+         json_is_true(json_object_get(measured, "certified")) ? "certified" : "not certified",
+         number_of(measured, "epsilon"));
   return status;
 }
 
-/* Runs a node with default parameters. `outputs` holds one pointer per port. */
-static qmat_status run_node(qmat_context *context, const char *name, const qmat_value *const inputs[],
+/* Runs a node with default parameters, but for `epsilon` where that is above zero. `outputs` holds one pointer per
+ * port.
+ */
+static qmat_status run_node(qmat_context *context, const char *name, double epsilon, const qmat_value *const inputs[],
                             qmat_value *outputs[]) {
   const qmat_node *node = qmat_node_find(name);
   void *params = qmat_calloc(1, node->params_size);
   if (!params) return qmat_fail_memory(context, "parameters");
   qmat_params_default(node, params);
+  const qmat_param *param = qmat_param_find(node, "epsilon");
+  if (param && epsilon > 0) memcpy((char *)params + param->offset, &epsilon, sizeof epsilon);
   const qmat_status status = qmat_node_run(context, node, params, inputs, outputs);
   qmat_free(params);
   return status;
 }
 
 /* Replaces a mesh by the solid's surface, made as in the shipped graph. */
-static qmat_status make_solid(qmat_context *context, qmat_value **mesh) {
+static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value **mesh) {
   static const char *const nodes[] = {"mesh.subdivide", "mesh.unite"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
     qmat_value *outputs[2] = {NULL};
-    const qmat_status status = run_node(context, nodes[i], (const qmat_value *const[]){*mesh}, outputs);
+    const qmat_status status = run_node(context, nodes[i], epsilon, (const qmat_value *const[]){*mesh}, outputs);
     if (status != QMAT_OK) return status;
     qmat_value_release(outputs[1]);
     qmat_value_release(*mesh);
@@ -105,9 +112,10 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
   qmat_value *output = NULL;
   qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
   if (status == QMAT_OK) {
-    status = make_solid(context, &mesh);
+    const double epsilon = number_of(facts, "qmat_epsilon");
+    status = make_solid(context, epsilon, &mesh);
     if (status == QMAT_OK)
-      status = run_node(context, "medial.evaluate", (const qmat_value *const[]){mesh, &medial->base}, &output);
+      status = run_node(context, "medial.evaluate", epsilon, (const qmat_value *const[]){mesh, &medial->base}, &output);
     if (status == QMAT_OK) {
       printf("against %s\n", path);
       status = compare(context, facts, ((const qmat_report *)output)->root);

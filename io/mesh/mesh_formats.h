@@ -28,8 +28,4 @@ qmat_status qmat_stl_read(qmat_context *context, const qmat_bytes *bytes, const 
 /* Whether the bytes are a binary STL file: their number matches the facet count in the header. */
 bool qmat_stl_is_binary(const qmat_bytes *bytes);
 
-/* Writes a medial mesh as binary little-endian PLY: vertices x y z radius (double), edges vertex1 vertex2 (int), faces.
- * The caller releases `*file`, which is sealed; NULL on failure. QMAT_ERROR_MEMORY. Cost: linear. */
-qmat_status qmat_ply_write_medial(qmat_context *context, const qmat_medial *medial, qmat_file **file);
-
 #endif

@@ -390,32 +390,3 @@ qmat_status qmat_ply_read(qmat_context *context, const qmat_bytes *bytes, const 
   qmat_free(p.elements);
   return status;
 }
-
-/* ---- writing ---- */
-
-static void put_line_count(qmat_writer *writer, const char *element, size_t count) {
-  qmat_put_text(writer, "element ");
-  qmat_put_text(writer, element);
-  qmat_put_text(writer, " ");
-  qmat_put_integer(writer, (int64_t)count);
-  qmat_put_text(writer, "\n");
-}
-
-qmat_status qmat_ply_write_medial(qmat_context *context, const qmat_medial *medial, qmat_file **file) {
-  *file = NULL;
-  qmat_writer writer = {0};
-  qmat_put_text(&writer, "ply\nformat binary_little_endian 1.0\ncomment medial mesh\n");
-  put_line_count(&writer, "vertex", medial->sphere_count);
-  qmat_put_text(&writer, "property double x\nproperty double y\nproperty double z\nproperty double radius\n");
-  put_line_count(&writer, "edge", medial->edge_count);
-  qmat_put_text(&writer, "property int vertex1\nproperty int vertex2\n");
-  put_line_count(&writer, "face", medial->triangle_count);
-  qmat_put_text(&writer, "property list uchar int vertex_indices\nend_header\n");
-  for (size_t i = 0; i < 4 * medial->sphere_count; i++) qmat_put_f64(&writer, medial->spheres[i]);
-  for (size_t i = 0; i < 2 * medial->edge_count; i++) qmat_put_u32(&writer, medial->edges[i]);
-  for (size_t i = 0; i < medial->triangle_count; i++) {
-    qmat_put_u8(&writer, 3);
-    for (size_t k = 0; k < 3; k++) qmat_put_u32(&writer, medial->triangles[3 * i + k]);
-  }
-  return qmat_writer_to_file(context, &writer, "ply", file);
-}

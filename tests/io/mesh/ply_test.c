@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/mesh/mesh_formats.h"
+#include "io/mesh/ply_medial.h"
 #include "tests/io/files.h"
 
 /* One header for all three kinds; types and order are unusual on purpose. */
@@ -219,7 +220,7 @@ static void test_a_medial_mesh_is_written_with_radii_and_edges(void **state) {
   memcpy(medial->triangles, (const uint32_t[]){0, 1, 2}, 12);
   assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
   qmat_file *file;
-  assert_int_equal(qmat_ply_write_medial(&context, medial, &file), QMAT_OK);
+  assert_int_equal(qmat_ply_write_medial(&context, medial, NULL, &file), QMAT_OK);
   assert_true(file->base.sealed);
   assert_string_equal(file->format, "ply");
   assert_int_equal(file->part_count, 1);
