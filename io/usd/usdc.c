@@ -23,7 +23,8 @@ static bool repeats_tree(const char *name) {
   return false;
 }
 
-/* Sorts the prims among the children by the list; the others follow in their order. */
+/* Sorts the prims among the children by the list; the others follow in their order. No child may be added afterwards.
+ */
 static void order_children(const qmat_usdc *c, qmat_usd_spec *spec, const qmat_usd_value *names) {
   size_t count = 0;
   for (const qmat_usd_spec *child = spec->first_child; child; child = child->next) count++;
@@ -33,13 +34,12 @@ static void order_children(const qmat_usdc *c, qmat_usd_spec *spec, const qmat_u
     qmat_usd_spec *child = qmat_usd_child(c->layer, spec, QMAT_USD_PRIM, names->texts[i]);
     if (child) child->line = 1; /* marks children in the list */
   }
-  qmat_usd_spec *rest = NULL, **rest_end = &rest, *listed = NULL, **listed_end = &listed, *last = NULL;
+  qmat_usd_spec *rest = NULL, **rest_end = &rest, *listed = NULL, **listed_end = &listed;
   for (qmat_usd_spec *child = spec->first_child, *next; child; child = next) {
     next = child->next;
     if (child->line != 0) continue;
     *rest_end = child;
     rest_end = &child->next;
-    last = child;
   }
   *rest_end = NULL;
   for (size_t i = 0; i < count; i++) {
@@ -48,11 +48,9 @@ static void order_children(const qmat_usdc *c, qmat_usd_spec *spec, const qmat_u
     child->line = 0;
     *listed_end = child;
     listed_end = &child->next;
-    if (!rest) last = child;
   }
   *listed_end = rest;
   spec->first_child = listed;
-  spec->last_child = last;
 }
 
 /* Reads the fields of a spec; `*names` becomes the list of its prims, if it has one. */
@@ -188,8 +186,11 @@ qmat_status qmat_usdc_read(qmat_context *context, const qmat_bytes *bytes, const
   qmat_status status = qmat_usd_layer_init(context, layer, path, bytes->size);
   if (status == QMAT_OK) status = check_header(&c, bytes);
   if (status == QMAT_OK) status = qmat_usdc_read_tables(&c);
+  if (status == QMAT_OK && qmat_key_table_init(&values.known, 0) != 0) {
+    status = qmat_usd_layer_fail_memory(layer);
+  }
   if (status == QMAT_OK) status = make_specs(&c, &values);
-  qmat_free(values.known);
+  qmat_key_table_uninit(&values.known);
   qmat_arena_uninit(&c.scratch);
   return status;
 }

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/hash.h"
 #include "io/usd/usdc_pack.h"
 
 enum { FEWEST_PACKED = 16 }; /* elements of an array: shorter ones are never packed */
@@ -570,46 +569,25 @@ static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value 
   }
 }
 
-/* ---- known values ---- */
-
-static qmat_usdc_known *find_known(const qmat_usdc_values *v, uint64_t rep) {
-  size_t slot = qmat_hash_mix(rep) & (v->known_slots - 1);
-  while (v->known[slot].rep != 0 && v->known[slot].rep != rep) slot = (slot + 1) & (v->known_slots - 1);
-  return &v->known[slot];
-}
-
-static bool grow_known(qmat_usdc_values *v) {
-  const size_t count = v->known_slots ? 2 * v->known_slots : 256, older_count = v->known_slots;
-  qmat_usdc_known *older = v->known, *fresh = qmat_calloc(count, sizeof *fresh);
-  if (!fresh) return false;
-  v->known = fresh;
-  v->known_slots = count;
-  for (size_t i = 0; i < older_count; i++) {
-    if (older[i].rep != 0) *find_known(v, older[i].rep) = older[i];
-  }
-  qmat_free(older);
-  return true;
-}
-
 qmat_status qmat_usdc_value(qmat_usdc_values *v, uint64_t rep, const qmat_usd_value **value) {
   qmat_usd_layer *layer = v->crate->layer;
-  if (rep == 0) return fail_unknown(v->crate);
-  if (2 * v->known_count >= v->known_slots && !grow_known(v)) return qmat_usd_layer_fail_memory(layer);
-  qmat_usdc_known *known = find_known(v, rep);
-  if (known->rep == rep) {
-    *value = known->value;
-    return known->value ? QMAT_OK : fail(v->crate, "a value contains itself");
+  if (rep == 0 || rep == QMAT_NO_KEY) return fail_unknown(v->crate);
+  const qmat_key_slot *known = qmat_key_table_find(&v->known, rep);
+  if (known->key == rep) {
+    *value = known->pointer;
+    return *value ? QMAT_OK : fail(v->crate, "a value contains itself");
   }
   if (v->depth >= QMAT_USD_DEEPEST) return fail(v->crate, "values are nested too deep");
-  *known = (qmat_usdc_known){.rep = rep};
-  v->known_count++;
+  qmat_key_slot *added = qmat_key_table_add(&v->known, rep);
+  if (!added) return qmat_usd_layer_fail_memory(layer);
+  added->pointer = NULL; /* is being read */
   qmat_usd_value *made = qmat_usd_alloc(layer, 1, sizeof *made);
   if (!made) return qmat_usd_layer_error(layer);
   v->depth++;
   qmat_status status = read_value(v, rep, made);
   v->depth--;
   if (status != QMAT_OK) return status;
-  find_known(v, rep)->value = made; /* the table may have grown */
+  qmat_key_table_find(&v->known, rep)->pointer = made;
   *value = made;
   return QMAT_OK;
 }

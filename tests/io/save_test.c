@@ -99,6 +99,39 @@ static void test_a_side_file_with_the_same_bytes_is_left_alone(void **state) {
   assert_int_equal(rmdir(folder), 0);
 }
 
+static void test_side_parts_in_folders_are_saved_or_nothing_is_left(void **state) {
+  (void)state;
+  char folder[64], main_path[96], side_path[96], other_path[96];
+  make_folder(folder);
+  snprintf(main_path, sizeof main_path, "%s/main", folder);
+  snprintf(side_path, sizeof side_path, "%s/f/g/side", folder);
+  qmat_context context = {0};
+  qmat_file *file = make_file("f/g/side", 3);
+  assert_int_equal(qmat_file_save(&context, file, main_path), QMAT_OK);
+  assert_content(side_path, "sss");
+  qmat_value_release(&file->base);
+  unlink(main_path);
+  unlink(side_path);
+  *strrchr(side_path, '/') = '\0';
+  assert_int_equal(rmdir(side_path), 0);
+  *strrchr(side_path, '/') = '\0';
+  assert_int_equal(rmdir(side_path), 0);
+  /* The last part becomes a file where the one before needs a folder: it is removed again. */
+  file = make_file("f/side", 3);
+  qmat_file_part *parts = qmat_calloc(3, sizeof *parts);
+  memcpy(parts, file->parts, 2 * sizeof *parts);
+  qmat_free(file->parts);
+  parts[2] = (qmat_file_part){.name = qmat_strdup("f"), .size = 1, .bytes = qmat_calloc(1, 1)};
+  file->parts = parts;
+  file->part_count = 3;
+  snprintf(other_path, sizeof other_path, "%s/f/side", folder);
+  assert_int_equal(qmat_file_save(&context, file, main_path), QMAT_ERROR_IO);
+  assert_string_equal(context.error.file, other_path);
+  assert_int_equal(count_entries(folder), 0);
+  qmat_value_release(&file->base);
+  assert_int_equal(rmdir(folder), 0);
+}
+
 static void test_a_relative_name_is_saved_in_the_working_folder(void **state) {
   (void)state;
   char folder[64], before[4096];
@@ -202,6 +235,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_part_is_saved_and_permissions_stay),
       cmocka_unit_test(test_a_side_file_with_the_same_bytes_is_left_alone),
+      cmocka_unit_test(test_side_parts_in_folders_are_saved_or_nothing_is_left),
       cmocka_unit_test(test_a_relative_name_is_saved_in_the_working_folder),
       cmocka_unit_test(test_a_failed_save_names_the_file_and_leaves_nothing_behind),
       cmocka_unit_test(test_the_main_part_appears_last),

@@ -176,6 +176,9 @@ static void test_bad_files_are_refused_with_the_place(void **state) {
        "file:3: element 'vertex' has a count that the file cannot hold"},
       {ASCII VERTICES "element face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n",
        "file:7: element 'face' has a count that the file cannot hold"},
+      /* Each count alone would fit. */
+      {BINARY VERTICES "element face 13\nproperty list uchar uchar vertex_indices\nend_header\n1234567890123",
+       "file:7: element 'face' has a count that the file cannot hold"},
       {ASCII VERTICES FACES "end_header\n0 x 0\n3 0 0 0",
        "file:10:3: vertex 0: a coordinate of a vertex is 'x', not a number"},
       {ASCII VERTICES FACES "end_header\n0 0 0\n4000000000 0 0",

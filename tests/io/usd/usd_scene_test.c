@@ -305,6 +305,130 @@ static void test_strength_of_arcs_is_local_inherit_variant_reference_payload_spe
   }
 }
 
+/* Edits of a list of references in a layer and its sublayer; the first one that gives an x wins. */
+static void test_lists_of_references_are_edited_from_weak_to_strong(void **state) {
+  (void)state;
+  static const struct {
+    const char *weak, *strong;
+    double x;
+  } cases[] = {
+      {"references = [</a>, </b>]", "", 1},
+      {"references = [</a>, </b>]", "prepend references = </c>", 3},
+      {"references = [</a>, </b>]", "prepend references = </b>", 2},
+      {"references = [</a>, </b>]", "append references = </c>", 1},
+      {"references = [</a>, </b>]", "append references = </a>", 2},
+      {"references = [</a>, </b>]", "add references = </a>", 1},
+      {"references = [</a>, </b>]", "delete references = </a>", 2},
+      {"references = [</a>, </b>]", "references = </c>", 3},
+      {"prepend references = [</a>, </b>]", "delete references = [</b>, </a>]", 0},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    char text[2048];
+    snprintf(text, sizeof text,
+             "#usda 1.0\nclass \"a\" { double x = 1 double3 xformOp:translate = (1, 0, 0) }\n"
+             "class \"b\" { double3 xformOp:translate = (2, 0, 0) }\n"
+             "class \"c\" { double3 xformOp:translate = (3, 0, 0) }\n"
+             "def Mesh \"m\" ( %s ) {\n" TRIANGLE "uniform token[] xformOpOrder = [\"xformOp:translate\"] }",
+             cases[i].weak);
+    write_file(in_folder("weak.usda"), text, strlen(text));
+    snprintf(text, sizeof text, "#usda 1.0\n( subLayers = [@weak.usda@] )\nover \"m\" ( %s ) {}", cases[i].strong);
+    const double x = cases[i].x, expected[] = {x, 0, 0, x + 1, 0, 0, x, 1, 0};
+    assert_points(text, expected, 3);
+  }
+  unlink(in_folder("weak.usda"));
+}
+
+static void test_inheriting_from_a_class_defines_an_over(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup =
+      good_scene("#usda 1.0\nclass Mesh \"c\" {\n" TRIANGLE "}\nover \"m\" ( inherits = </c> ) {}\n", &report);
+  assert_int_equal(soup.facet_count, 1);
+  assert_string_equal(warning_of(report, 0), "");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_opinions_of_a_referring_layer_about_a_class_are_skipped_aloud(void **state) {
+  (void)state;
+  static const char other[] = "#usda 1.0\nclass Mesh \"c\" {\n" TRIANGLE "}\ndef \"p\" ( inherits = </c> ) {}\n";
+  json_t *report;
+  write_file(in_folder("other.usda"), other, strlen(other));
+  qmat_soup soup = good_scene(
+      "#usda 1.0\nclass \"c\" { token visibility = \"invisible\" }\ndef \"x\" ( references = @other.usda@</p> ) {}\n",
+      &report);
+  assert_int_equal(soup.facet_count, 1);
+  assert_string_equal(warning_of(report, 0), "/x: the opinions of a referring layer about the class </c> are skipped");
+  assert_string_equal(warning_of(report, 1), "");
+  unlink(in_folder("other.usda"));
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_sublayers_without_end_are_refused(void **state) {
+  (void)state;
+  enum { FILES = 70 };
+  char name[32], text[128];
+  for (int i = 0; i < FILES; i++) {
+    snprintf(name, sizeof name, "s%d.usda", i);
+    snprintf(text, sizeof text, "#usda 1.0\n( subLayers = [@s%d.usda@] )\n", i + 1);
+    write_file(in_folder(name), text, strlen(text));
+  }
+  assert_scene_refused("#usda 1.0\n( subLayers = [@s0.usda@] )\n", QMAT_ERROR_FORMAT,
+                       "/: sublayers are nested more than 64 deep");
+  for (int i = 0; i < FILES; i++) {
+    snprintf(name, sizeof name, "s%d.usda", i);
+    unlink(in_folder(name));
+  }
+}
+
+static void test_creases_have_one_sharpness_or_one_an_edge(void **state) {
+  (void)state;
+  static const struct {
+    const char *sharpness;
+    double expected[3];
+  } cases[] = {{"[2, 10]", {2, 2, 10}}, {"[3, 4, 5]", {3, 4, 5}}};
+  for (size_t i = 0; i < 2; i++) {
+    char text[1024];
+    json_t *report;
+    snprintf(text, sizeof text,
+             "#usda 1.0\ndef Mesh \"m\" {\npoint3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]\n"
+             "int[] faceVertexCounts = [4]\nint[] faceVertexIndices = [0, 1, 2, 3]\nint[] creaseLengths = [3, 2]\n"
+             "int[] creaseIndices = [0, 1, 2, 2, 3]\nfloat[] creaseSharpnesses = %s }",
+             cases[i].sharpness);
+    qmat_soup soup = good_scene(text, &report);
+    assert_int_equal(soup.cage.crease_count, 3);
+    assert_memory_equal(soup.cage.crease_sharpness, cases[i].expected, sizeof cases[i].expected);
+    qmat_soup_uninit(&soup);
+    json_decref(report);
+  }
+}
+
+static void test_members_of_a_package_that_overlap_are_refused(void **state) {
+  (void)state;
+  enum { COPIES = 9, END = 22 };
+  static const char text[] = "#usda 1.0\n" MESH("m", "");
+  qmat_writer writer = {0}, copies = {0};
+  qmat_context context = {0};
+  qmat_usdz package;
+  qmat_usdz_put(&writer, "a.usda", text, strlen(text));
+  const size_t end = writer.size - END;
+  qmat_byte_reader record = {.bytes = writer.bytes, .size = writer.size, .at = end + 16};
+  const size_t directory = qmat_take_u32(&record);
+  qmat_put_bytes(&copies, writer.bytes, directory);
+  for (int i = 0; i < COPIES; i++) qmat_put_bytes(&copies, writer.bytes + directory, end - directory);
+  qmat_put_bytes(&copies, writer.bytes + end, END);
+  copies.bytes[copies.size - END + 10] = COPIES;
+  qmat_bytes bytes = memory_file(copies.bytes, copies.size);
+  assert_int_equal(qmat_usdz_open(&context, &bytes, "a.usdz", &package), QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message, "members of the archive overlap");
+  qmat_usdz_uninit(&package);
+  free(bytes.data);
+  qmat_writer_uninit(&writer);
+  qmat_writer_uninit(&copies);
+  qmat_context_uninit(&context);
+}
+
 static void test_children_come_through_variants_nested_variants_and_references(void **state) {
   (void)state;
   /* Weaker opinions have their children first. */
@@ -465,7 +589,8 @@ static void test_a_package_is_read_and_its_members_refer_to_each_other(void **st
   json_t *report;
   write_file(in_folder("b.usdz"), writer.bytes, writer.size);
   soup = good_scene(
-      "#usda 1.0\ndef \"x\" ( references = @b.usdz@</m> ) {}\ndef \"y\" ( references = @./b.usdz@</m> ) {}\n", &report);
+      "#usda 1.0\ndef \"x\" ( references = @b.usdz@</m> ) {}\ndef \"y\" ( references = @none/.././b.usdz@</m> ) {}\n",
+      &report);
   assert_int_equal(soup.facet_count, 2);
   assert_int_equal(count_of(report, "layers_read"), 2);
   json_decref(report);
@@ -558,6 +683,12 @@ int main(void) {
       cmocka_unit_test(test_what_is_hidden_inactive_or_for_other_purposes_is_skipped),
       cmocka_unit_test(test_what_nothing_defines_is_read_where_there_is_nothing_else),
       cmocka_unit_test(test_strength_of_arcs_is_local_inherit_variant_reference_payload_specialize),
+      cmocka_unit_test(test_lists_of_references_are_edited_from_weak_to_strong),
+      cmocka_unit_test(test_inheriting_from_a_class_defines_an_over),
+      cmocka_unit_test(test_opinions_of_a_referring_layer_about_a_class_are_skipped_aloud),
+      cmocka_unit_test(test_sublayers_without_end_are_refused),
+      cmocka_unit_test(test_creases_have_one_sharpness_or_one_an_edge),
+      cmocka_unit_test(test_members_of_a_package_that_overlap_are_refused),
       cmocka_unit_test(test_children_come_through_variants_nested_variants_and_references),
       cmocka_unit_test(test_a_variant_that_is_not_selected_is_left_out_aloud),
       cmocka_unit_test(test_files_are_found_beside_the_layer_that_names_them),

@@ -46,7 +46,7 @@ static void test_values_of_every_shape(void **state) {
       "  half h = 0.1\n  float f = 0.1\n  double d = 0.1\n  double big = -inf\n  float none = nan\n  timecode t = 1.5\n"
       "  float3[] points = [(1, 2, 3), (4, 5, 6),]\n  point3f[] empty = []\n  quatf q = (1, 0, 0, 0.5)\n"
       "  matrix2d m = ((1, 2), (3, 4))\n  matrix2d[] ms = [((1, 2), (3, 4))]\n"
-      "  string s = \"a \\\"quoted\\\" \\x41\\n\"\n  token[] names = ['x', \"y\"]\n  asset file = @./a b.png@\n"
+      "  string s = \"a \\\"quoted\\\" \\x41\\102\\n\"\n  token[] names = ['x', \"y\"]\n  asset file = @./a b.png@\n"
       "  asset odd = @@@a@b\\@@@c@@@\n  int blocked = None\n  normal3d n\n  string[] several = [\"\"\"l1\nl2\"\"\", "
       "'']\n}\n");
   static const double bits[] = {0, 1, 0}, points[] = {1, 2, 3, 4, 5, 6}, quaternion[] = {1, 0, 0, 0.5},
@@ -68,7 +68,7 @@ static void test_values_of_every_shape(void **state) {
   assert_numbers(value_at(&layer, "/a.q", "default"), QMAT_USD_FLOAT, 4, false, 1, quaternion);
   assert_numbers(value_at(&layer, "/a.m", "default"), QMAT_USD_DOUBLE, 4, false, 1, matrix);
   assert_numbers(value_at(&layer, "/a.ms", "default"), QMAT_USD_DOUBLE, 4, true, 1, matrix);
-  assert_string_equal(qmat_usd_text(value_at(&layer, "/a.s", "default")), "a \"quoted\" A\n");
+  assert_string_equal(qmat_usd_text(value_at(&layer, "/a.s", "default")), "a \"quoted\" AB\n");
   assert_string_equal(value_at(&layer, "/a.names", "default")->texts[1], "y");
   assert_string_equal(qmat_usd_text(value_at(&layer, "/a.file", "default")), "./a b.png");
   assert_string_equal(qmat_usd_text(value_at(&layer, "/a.odd", "default")), "a@b@@@c");
