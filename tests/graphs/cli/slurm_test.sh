@@ -97,7 +97,7 @@ pids="$pids $two"
 tries=0
 until [ "$(timeout 5 sinfo --noheader --format=%t --states=idle -N 2>/dev/null | wc -l)" -eq 2 ]; do
   tries=$((tries + 1))
-  [ $tries -lt 60 ] || skip "the cluster does not start here"
+  [ $tries -lt 60 ] || skip "the cluster does not start here: $(sed -n "s/^.*error: //p" log/one | head -n 1)"
   sleep 1
 done
 
