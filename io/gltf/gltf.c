@@ -80,8 +80,8 @@ qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t 
 static void drop_empty(qmat_gltf_meshes *meshes) {
   size_t kept = 0;
   for (size_t i = 0; i < meshes->count; i++) {
-    const bool last_hope = i + 1 == meshes->count && kept == 0;
-    if (meshes->soups[i].facet_count == 0 && !last_hope) {
+    const bool only_one = i + 1 == meshes->count && kept == 0;
+    if (meshes->soups[i].facet_count == 0 && !only_one) {
       qmat_soup_uninit(&meshes->soups[i]);
       continue;
     }
