@@ -34,6 +34,14 @@ static qmat_status suggest_port(qmat_context *context, const char *text, const c
   return qmat_suggest_name(context, text, kind, &names);
 }
 
+/* Suggests one of `count` names, `stride` bytes apart: the ids or names of nodes, inputs or outputs. */
+static qmat_status suggest_member(qmat_context *context, const char *text, const char *kind, const char *first,
+                                  size_t stride, size_t count) {
+  qmat_name_list names = {0};
+  for (size_t i = 0; i < count; i++) qmat_name_list_add(&names, first + i * stride);
+  return qmat_suggest_name(context, text, kind, &names);
+}
+
 qmat_status qmat_suggest_nearest(qmat_context *context, const char *text, const char *const *names, size_t count,
                                  const char *otherwise) {
   const char *nearest = qmat_nearest_name(text, names, count);
@@ -71,9 +79,7 @@ qmat_status qmat_graph_find_node(qmat_context *context, const qmat_graph *graph,
   *node = find_node(graph, id);
   if (*node != SIZE_MAX) return QMAT_OK;
   qmat_fail(context, QMAT_ERROR_USAGE, "there is no node '%s'", qmat_show(id).text);
-  qmat_name_list names = {0};
-  for (size_t i = 0; i < graph->node_count; i++) qmat_name_list_add(&names, graph->nodes[i].id);
-  return qmat_suggest_name(context, id, "nodes", &names);
+  return suggest_member(context, id, "nodes", (const char *)graph->nodes, sizeof *graph->nodes, graph->node_count);
 }
 
 /* Splits "node.rest" and finds the node; `kind` says what `rest` names ("port", "parameter"). */
@@ -158,9 +164,8 @@ qmat_status qmat_graph_find_params(qmat_context *context, const qmat_graph *grap
     return qmat_graph_find_param(context, graph, name, single);
   }
   qmat_fail(context, QMAT_ERROR_USAGE, "the graph has no input '%s'", qmat_show(name).text);
-  qmat_name_list names = {0};
-  for (size_t i = 0; i < graph->input_count; i++) qmat_name_list_add(&names, graph->inputs[i].name);
-  return qmat_suggest_name(context, name, "inputs", &names);
+  return suggest_member(context, name, "inputs", (const char *)graph->inputs, sizeof *graph->inputs,
+                        graph->input_count);
 }
 
 qmat_status qmat_graph_find_output(qmat_context *context, const qmat_graph *graph, const char *name, size_t *output) {
@@ -170,7 +175,6 @@ qmat_status qmat_graph_find_output(qmat_context *context, const qmat_graph *grap
       return QMAT_OK;
     }
   qmat_fail(context, QMAT_ERROR_USAGE, "the graph has no output '%s'", qmat_show(name).text);
-  qmat_name_list names = {0};
-  for (size_t i = 0; i < graph->output_count; i++) qmat_name_list_add(&names, graph->outputs[i].name);
-  return qmat_suggest_name(context, name, "outputs", &names);
+  return suggest_member(context, name, "outputs", (const char *)graph->outputs, sizeof *graph->outputs,
+                        graph->output_count);
 }

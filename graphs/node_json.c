@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *qmat_param_type_name(qmat_param_type type) {
+static const char *type_name(qmat_param_type type) {
   static const char *const names[] = {
       [QMAT_PARAM_BOOL] = "bool", [QMAT_PARAM_INT] = "int",       [QMAT_PARAM_FLOAT] = "float",
       [QMAT_PARAM_ENUM] = "enum", [QMAT_PARAM_STRING] = "string", [QMAT_PARAM_PATH] = "path"};
@@ -43,8 +43,8 @@ json_t *qmat_param_json(const qmat_param *param, const void *params) {
 }
 
 static json_t *param_row(const qmat_param *param, const void *defaults) {
-  json_t *row = json_pack("{s:s, s:s, s:s?, s:s?, s:o}", "name", param->name, "type", qmat_param_type_name(param->type),
-                          "unit", param->unit, "doc", param->doc, "default", qmat_param_json(param, defaults));
+  json_t *row = json_pack("{s:s, s:s, s:s?, s:s?, s:o}", "name", param->name, "type", type_name(param->type), "unit",
+                          param->unit, "doc", param->doc, "default", qmat_param_json(param, defaults));
   if (!row) return NULL;
   if (param->type == QMAT_PARAM_INT || param->type == QMAT_PARAM_FLOAT) {
     bool whole = param->type == QMAT_PARAM_INT;

@@ -21,7 +21,4 @@ json_t *qmat_param_json(const qmat_param *param, const void *params);
  * (the type's params_size bytes); NULL: the type's own default. */
 void qmat_param_describe(const qmat_node *type, const qmat_param *param, const void *params, char *text, size_t size);
 
-/* "bool", "int", "float", "enum", "string", "path". */
-const char *qmat_param_type_name(qmat_param_type type);
-
 #endif

@@ -185,11 +185,11 @@ qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, b
 /* ---- results ---- */
 
 void qmat_asset_error(const qmat_asset *asset, char *text, size_t size) {
-  const char *told = json_string_value(json_object_get(json_object_get(asset->result, "error"), "text"));
+  const char *reported = json_string_value(json_object_get(json_object_get(asset->result, "error"), "text"));
   if (asset->state != QMAT_ASSET_FAILED)
     snprintf(text, size, "%s", asset->state == QMAT_ASSET_DONE ? "" : "not run");
-  else if (told)
-    snprintf(text, size, "%s", told);
+  else if (reported)
+    snprintf(text, size, "%s", reported);
   else if (asset->signal)
     snprintf(text, size, "ended by signal %d (%s)", asset->signal, strsignal(asset->signal));
   else

@@ -15,26 +15,13 @@ static const char *type_colour(qmat_value_type type) {
 
 /* Paths and texts of parameters may hold any character. */
 static void print_escaped(const char *text) {
+  static const char special[] = "&<>\"\\", *const escaped[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&#92;"};
   for (; *text; text++) {
-    switch (*text) {
-      case '&':
-        fputs("&amp;", stdout);
-        break;
-      case '<':
-        fputs("&lt;", stdout);
-        break;
-      case '>':
-        fputs("&gt;", stdout);
-        break;
-      case '"':
-        fputs("&quot;", stdout);
-        break;
-      case '\\':
-        fputs("&#92;", stdout);
-        break;
-      default:
-        putchar((unsigned char)*text < 0x20 ? ' ' : *text);
-    }
+    const char *found = strchr(special, *text);
+    if (found)
+      fputs(escaped[found - special], stdout);
+    else
+      putchar((unsigned char)*text < 0x20 ? ' ' : *text);
   }
 }
 

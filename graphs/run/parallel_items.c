@@ -10,7 +10,7 @@
 /* These are pthreads, since a parallel region of a node inside an OpenMP thread would get one thread only. */
 
 static const int64_t ASK_INTERVAL = 50000000; /* nanoseconds between two calls of the outer progress function */
-static const int TELL_AFTER = 20;             /* calls without news before progress is reported again */
+static const int REPORT_AFTER = 20;           /* calls without news before progress is reported again */
 
 typedef enum place_state { PLACE_FREE, PLACE_BUSY, PLACE_DONE } place_state;
 
@@ -37,8 +37,8 @@ struct item_pool {
   size_t done, failed; /* number of finished items; the first item that failed, SIZE_MAX: none */
   qmat_error error;    /* of that one */
   bool cancelled;
-  size_t told; /* the last number reported; used by the calling thread only, as the next */
-  int silent;  /* calls of the outer progress function since */
+  size_t reported; /* the last number reported; used by the calling thread only, as the next */
+  int silent;      /* calls of the outer progress function since */
 };
 
 /* Sorts by size, the largest first; equal sizes keep their order. */
@@ -59,13 +59,13 @@ static void ask_outer(item_pool *pool) {
   const bool cancelled = pool->cancelled;
   pthread_mutex_unlock(&pool->lock);
   if (cancelled) return;
-  const bool tell = done != pool->told || ++pool->silent == TELL_AFTER;
-  if (tell) {
-    pool->told = done;
+  const bool due = done != pool->reported || ++pool->silent == REPORT_AFTER;
+  if (due) {
+    pool->reported = done;
     pool->silent = 0;
   }
   const qmat_status status =
-      tell ? qmat_progress(pool->outer, done, pool->count, pool->unit) : qmat_progress(pool->outer, 0, 0, "");
+      due ? qmat_progress(pool->outer, done, pool->count, pool->unit) : qmat_progress(pool->outer, 0, 0, "");
   if (status == QMAT_OK) return;
   pthread_mutex_lock(&pool->lock);
   pool->cancelled = true;

@@ -65,6 +65,19 @@ void qmat_run_reset(qmat_run *run) {
   }
 }
 
+qmat_status qmat_step_init(qmat_context *context, const qmat_graph *graph, size_t node, const void *params, int format,
+                           qmat_run_step *step) {
+  const qmat_node *type = graph->nodes[node].type;
+  step->node = node;
+  step->format = format;
+  step->params = qmat_alloc(type->params_size, 1);
+  step->inputs = qmat_calloc(qmat_input_count(type), sizeof *step->inputs);
+  step->made = qmat_calloc(qmat_output_count(type), sizeof *step->made);
+  if (!step->params || !step->inputs || !step->made) return qmat_fail_memory(context, "plan");
+  if (type->params_size > 0) memcpy(step->params, params ? params : graph->nodes[node].params, type->params_size);
+  return QMAT_OK;
+}
+
 void qmat_run_uninit(qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) {
     qmat_free(run->steps[i].params);

@@ -73,7 +73,7 @@ typedef struct qmat_run_file {
   char *path;
   size_t bytes;       /* of the main part */
   qmat_digest sha256; /* of the main part's bytes */
-  qmat_file *written; /* what is saved, side files under their own names; NULL: a report, or nothing yet */
+  qmat_file *written; /* the file to save, with its side files; NULL: not made yet */
 } qmat_run_file;
 
 /* A file that a run reads, with its digest at the first reading. A file is hashed once. */
@@ -114,6 +114,10 @@ void qmat_run_release_unread(qmat_run *run);
 
 /* Discards all results, so that the run can be executed again. */
 void qmat_run_reset(qmat_run *run);
+
+/* Makes a zeroed step a step of `node`: its parameters (NULL: the node's), and arrays for its ports. */
+qmat_status qmat_step_init(qmat_context *context, const qmat_graph *graph, size_t node, const void *params, int format,
+                           qmat_run_step *step);
 
 /* Frees what the run holds. Works on a zeroed and on a failed run. */
 void qmat_run_uninit(qmat_run *run);

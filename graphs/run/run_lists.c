@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_lists.h"
 
-#include <string.h>
-
 #include "graphs/run/parallel_items.h"
 
 qmat_status qmat_count_lifted(qmat_context *context, const qmat_node *type, const qmat_value *const *inputs,
@@ -32,14 +30,11 @@ static qmat_status plan_item(qmat_context *context, const qmat_run *run, const q
   one->slots = qmat_calloc(output_count + input_count, sizeof *one->slots);
   if (!one->steps || !one->slots) return qmat_fail_memory(context, "plan");
   qmat_run_step *own = &one->steps[0];
-  *own = (qmat_run_step){.node = step->node, .format = step->format, .forced = step->forced};
+  own->forced = step->forced;
   one->step_count = 1;
   one->slot_count = output_count + input_count;
-  own->inputs = qmat_calloc(input_count, sizeof *own->inputs);
-  own->made = qmat_calloc(output_count, sizeof *own->made);
-  own->params = qmat_alloc(type->params_size, 1);
-  if (!own->inputs || !own->made || !own->params) return qmat_fail_memory(context, "plan");
-  if (type->params_size > 0) memcpy(own->params, step->params, type->params_size);
+  const qmat_status status = qmat_step_init(context, run->graph, step->node, step->params, step->format, own);
+  if (status != QMAT_OK) return status;
   for (size_t port = 0; port < output_count; port++) one->slots[port].kept = true;
   for (size_t port = 0; port < input_count; port++) {
     own->inputs[port] = SIZE_MAX;

@@ -136,15 +136,10 @@ static qmat_status add_step(run_planner *planner, size_t index, int format) {
   const qmat_graph_node *node = &planner->graph->nodes[index];
   qmat_run *run = planner->run;
   qmat_run_step *step = &run->steps[run->step_count++];
-  *step = (qmat_run_step){
-      .node = index, .format = format, .first_slot = run->slot_count, .forced = is_forced(planner->options, index)};
-  size_t outputs = qmat_output_count(node->type);
-  run->slot_count += outputs;
-  step->params = qmat_calloc(1, node->type->params_size);
-  step->inputs = qmat_calloc(qmat_input_count(node->type), sizeof *step->inputs);
-  step->made = qmat_calloc(outputs, sizeof *step->made);
-  if (!step->params || !step->inputs || !step->made) return qmat_fail_memory(planner->context, "plan");
-  if (node->type->params_size > 0) memcpy(step->params, node->params, node->type->params_size);
+  *step = (qmat_run_step){.first_slot = run->slot_count, .forced = is_forced(planner->options, index)};
+  run->slot_count += qmat_output_count(node->type);
+  const qmat_status status = qmat_step_init(planner->context, planner->graph, index, NULL, format, step);
+  if (status != QMAT_OK) return status;
   const qmat_param *param = qmat_output_format_param(node->type);
   if (param) memcpy((char *)step->params + param->offset, &format, sizeof format);
   step->missing = planner->options->may_lack_params ? qmat_graph_missing_param(node) : NULL;

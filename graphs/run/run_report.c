@@ -6,6 +6,7 @@
 #include "core/json_text.h"
 #include "graphs/cache/cache_key.h"
 #include "graphs/node_json.h"
+#include "graphs/run/run_outputs.h"
 #include "graphs/run/run_paths.h"
 #include "io/bytes.h"
 #include "io/save.h"
@@ -57,12 +58,11 @@ static json_t *step_json(const qmat_run *run, const qmat_run_step *step) {
 }
 
 static json_t *file_json(const qmat_run *run, const qmat_run_file *file) {
-  const qmat_value *value = run->slots[file->slot].value;
-  const qmat_file *made = file->written ? file->written : value->type == QMAT_FILE ? (const qmat_file *)value : NULL;
+  const qmat_file *made = file->written;
   json_t *json = json_object();
   json_object_set_new(json, "name", json_string(run->graph->outputs[file->output].name));
   json_object_set_new(json, "path", qmat_json_string(file->path));
-  json_object_set_new(json, "format", json_string(made ? made->format : "json"));
+  json_object_set_new(json, "format", json_string(made ? made->format : ""));
   json_object_set_new(json, "bytes", json_integer((json_int_t)file->bytes));
   json_object_set_new(json, "sha256", digest_json(&file->sha256));
   if (made && made->part_count > 1) {
@@ -155,14 +155,10 @@ json_t *qmat_error_report(const qmat_error *error) {
 }
 
 qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path) {
-  char *text = json ? qmat_json_text(json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
-  if (!text) return qmat_fail_memory(context, "report");
-  size_t length = strlen(text);
-  text[length] = '\n'; /* replaces the terminating zero */
-  qmat_file_part part = {.name = (char *)"", .size = length + 1, .bytes = (uint8_t *)text};
-  const qmat_file file = {.base = {.type = QMAT_FILE}, .part_count = 1, .parts = &part};
-  qmat_status status = qmat_file_save(context, &file, path);
-  qmat_free(text);
+  qmat_file *file = NULL;
+  qmat_status status = qmat_json_to_file(context, json, JSON_INDENT(2) | JSON_REAL_PRECISION(15), &file);
+  if (status == QMAT_OK) status = qmat_file_save(context, file, path);
+  if (file) qmat_value_release(&file->base);
   return status;
 }
 

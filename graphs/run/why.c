@@ -121,16 +121,17 @@ static json_t *describe_difference(const qmat_run *run, const qmat_run_step *ste
                                    const json_t *before) {
   const json_t *any = now ? now : before;
   const char *tag = group_of(any), *name = text_of(any, 1), *port;
-  if (strcmp(tag, "key") == 0)
-    return sentence("the format of keys is %s, was %s", shown_value(now), shown_value(before));
+  static const struct {
+    const char *tag, *subject;
+  } simple[] = {{"key", "the key"},
+                {"node", "the version of"},
+                {"library", "library"},
+                {"param", "parameter"},
+                {"name", "the file name of parameter"}};
+  for (size_t i = 0; i < sizeof simple / sizeof *simple; i++)
+    if (strcmp(tag, simple[i].tag) == 0)
+      return sentence("%s %s is %s, was %s", simple[i].subject, name, shown_value(now), shown_value(before));
   if (strcmp(tag, "program") == 0) return sentence("the program was built from other sources");
-  if (strcmp(tag, "node") == 0)
-    return sentence("the version of %s is %s, was %s", name, shown_value(now), shown_value(before));
-  if (strcmp(tag, "library") == 0) return sentence("%s is %s, was %s", name, shown_value(now), shown_value(before));
-  if (strcmp(tag, "param") == 0)
-    return sentence("parameter %s is %s, was %s", name, shown_value(now), shown_value(before));
-  if (strcmp(tag, "name") == 0)
-    return sentence("the file of parameter %s is called %s, was %s", name, shown_value(now), shown_value(before));
   if (strcmp(tag, "file") == 0) {
     const json_t *like = now ? json_pack("[s, s, s]", "name", name, "") : NULL;
     const json_t *file = like ? find_item(step->key_items, like) : NULL;

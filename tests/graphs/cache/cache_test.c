@@ -1024,7 +1024,7 @@ static void test_why_names_the_version_of_a_library(void **state) {
   strcpy(library_text, "1.0 avx512");
   foresee(f, "3");
   assert_string_equal(f->states, "hrd"); /* the reader does not use it */
-  assert_string_equal(f->why[1], "would run:|Ruler is 1.0 avx512, was 1.0");
+  assert_string_equal(f->why[1], "would run:|library Ruler is 1.0 avx512, was 1.0");
 }
 
 static void test_why_names_the_format_of_keys(void **state) {
@@ -1054,7 +1054,7 @@ static void test_why_names_the_format_of_keys(void **state) {
   qmat_cache_close(&cache);
   foresee(f, "3");
   assert_string_equal(f->states, "rdd");
-  assert_string_equal(f->why[0], "would run:|the format of keys is 2, was 0");
+  assert_string_equal(f->why[0], "would run:|the key format is 2, was 0");
 }
 
 /* ---- looking after it ---- */
