@@ -82,20 +82,12 @@ static qmat_result finish(qmat_job *job, qmat_status status) {
   return result;
 }
 
+static const qmat_job_problem no_problem = {QMAT_RESULT_OK, "ok", "", "", "", "", -1, "", 0, 0, "", "", ""};
+static const qmat_job_problem no_memory = {
+    QMAT_RESULT_FAILED,           "memory", "", "", "", "", -1, "", 0, 0, "not enough memory for a job", "",
+    "not enough memory for a job"};
+
 const qmat_job_problem *qmat_job_error(const qmat_job *job) {
-  static const qmat_job_problem no_memory = {
-      .result = QMAT_RESULT_FAILED,
-      .status = "memory",
-      .node = "",
-      .type = "",
-      .field = "",
-      .element_kind = "",
-      .element = -1,
-      .file = "",
-      .message = "not enough memory for a job",
-      .hint = "",
-      .text = "not enough memory for a job",
-  };
   return job ? &job->problem : &no_memory;
 }
 
@@ -103,17 +95,7 @@ const qmat_job_problem *qmat_job_error(const qmat_job *job) {
 
 static qmat_job *new_job(void) {
   qmat_job *job = qmat_calloc(1, sizeof *job);
-  if (job)
-    job->problem = (qmat_job_problem){.status = "ok",
-                                      .node = "",
-                                      .type = "",
-                                      .field = "",
-                                      .element_kind = "",
-                                      .element = -1,
-                                      .file = "",
-                                      .message = "",
-                                      .hint = "",
-                                      .text = ""};
+  if (job) job->problem = no_problem;
   return job;
 }
 

@@ -223,11 +223,12 @@ const qmat_command qmat_command_cache = {
     .arguments = "stats|ls|show KEY|verify|gc|clear",
     .summary = "List, check and clean the cache",
     .doc =
-        "stats: folder and size. ls: the results, with the start of their keys. show KEY: what a result depends on, "
-        "and "
-        "its outputs; the start of the key is enough. verify: checks every file; the exit code is 1 if one was "
-        "damaged. "
-        "gc: deletes unused files, and the least recently used results above the size. clear: deletes everything.",
+        "stats: folder and size.\n"
+        "ls: the results, with the start of their keys.\n"
+        "show KEY: what a result depends on, and its outputs; the start of the key is enough.\n"
+        "verify: checks every file; the exit code is 1 if one was damaged.\n"
+        "gc: deletes unused files, and the least recently used results above the size.\n"
+        "clear: deletes everything.",
     .options = options,
     .caching = qmat_cache_option_rows,
     .least = 1,

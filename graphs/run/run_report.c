@@ -105,53 +105,38 @@ static json_t *cache_json(const qmat_run *run) {
   return json;
 }
 
-/* jansson's setters refuse NULL, so only the outer object has to be checked for a shortage of memory. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
-  json_t *nodes = json_array(), *outputs = json_array(), *report = json_object();
+  json_t *nodes = json_array(), *outputs = json_array();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
   for (size_t i = 0; i < run->file_count; i++) json_array_append_new(outputs, file_json(run, &run->files[i]));
   char text[512];
-  json_t *brief = qmat_run_summarise(run, text, sizeof text);
-  if (brief)
-    json_object_set_new(brief, "text", qmat_json_string(text));
-  else
-    brief = json_null();
-  bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
-  if (json_object_set_new(report, "qmat", json_string(QMAT_VERSION)) != 0) whole = false;
-  if (json_object_set_new(report, "graph", qmat_json_string(run->graph->file)) != 0) whole = false;
-  if (json_object_set_new(report, "input", input_json(run)) != 0) whole = false;
-  if (json_object_set_new(report, "seconds", json_real(run->seconds)) != 0) whole = false;
-  if (json_object_set_new(report, "threads", json_integer(qmat_threads(context))) != 0) whole = false;
-  if (json_object_set_new(report, "cache", cache_json(run)) != 0) whole = false;
-  if (json_object_set_new(report, "nodes", nodes) != 0) whole = false;
-  if (json_object_set_new(report, "outputs", outputs) != 0) whole = false;
-  if (json_object_set_new(report, "summary", brief) != 0) whole = false;
+  json_t *summary = qmat_run_summarise(run, text, sizeof text);
+  if (summary) json_object_set_new(summary, "text", qmat_json_string(text));
+  const bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
+  json_t *report = json_pack("{s:s, s:o, s:o, s:f, s:i, s:o, s:o, s:o, s:o}", "qmat", QMAT_VERSION, "graph",
+                             qmat_json_string(run->graph->file), "input", input_json(run), "seconds", run->seconds,
+                             "threads", qmat_threads(context), "cache", cache_json(run), "nodes", nodes, "outputs",
+                             outputs, "summary", summary ? summary : json_null());
   if (whole) return report;
   json_decref(report);
   return NULL;
 }
 
+static json_t *text_or_null(const char *text) {
+  return *text ? qmat_json_string(text) : json_null();
+}
+
 json_t *qmat_error_report(const qmat_error *error) {
   char line[2048];
   qmat_error_format(error, line, sizeof line);
-  json_t *fields = json_object(), *report = json_object();
-  json_object_set_new(fields, "status", json_string(qmat_status_name(error->status)));
-  json_object_set_new(fields, "exit_code", json_integer(qmat_status_exit_code(error->status)));
-  json_object_set_new(fields, "node", error->node_id[0] ? qmat_json_string(error->node_id) : json_null());
-  json_object_set_new(fields, "type", error->node_type[0] ? qmat_json_string(error->node_type) : json_null());
-  json_object_set_new(fields, "field", error->field[0] ? qmat_json_string(error->field) : json_null());
-  json_object_set_new(fields, "element_kind",
-                      error->element_kind[0] ? qmat_json_string(error->element_kind) : json_null());
-  json_object_set_new(fields, "element", error->element >= 0 ? json_integer(error->element) : json_null());
-  json_object_set_new(fields, "file", error->file[0] ? qmat_json_string(error->file) : json_null());
-  json_object_set_new(fields, "line", error->line > 0 ? json_integer(error->line) : json_null());
-  json_object_set_new(fields, "column", error->column > 0 ? json_integer(error->column) : json_null());
-  json_object_set_new(fields, "message", qmat_json_string(error->message));
-  json_object_set_new(fields, "hint", error->hint[0] ? qmat_json_string(error->hint) : json_null());
-  json_object_set_new(fields, "text", qmat_json_string(line));
-  if (json_object_set_new(report, "error", fields) == 0) return report;
-  json_decref(report);
-  return NULL;
+  return json_pack("{s:{s:s, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}}", "error", "status",
+                   qmat_status_name(error->status), "exit_code", qmat_status_exit_code(error->status), "node",
+                   text_or_null(error->node_id), "type", text_or_null(error->node_type), "field",
+                   text_or_null(error->field), "element_kind", text_or_null(error->element_kind), "element",
+                   error->element >= 0 ? json_integer(error->element) : json_null(), "file", text_or_null(error->file),
+                   "line", error->line > 0 ? json_integer(error->line) : json_null(), "column",
+                   error->column > 0 ? json_integer(error->column) : json_null(), "message",
+                   qmat_json_string(error->message), "hint", text_or_null(error->hint), "text", qmat_json_string(line));
 }
 
 qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path) {

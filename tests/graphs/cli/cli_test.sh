@@ -102,6 +102,13 @@ expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
 expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5% $coarse
 expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
 holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
+cp "$source/examples/game/models/"roof.* .
+expect 0 "certified" "$qmat" mat roof.gltf -o listed.gltf --epsilon 10% $coarse --report report_of_files.json
+holds "a side file" test -s listed.bin
+for file in listed.*; do
+  holds "$file is listed" grep -qF -e "-> $file (" out.txt
+  holds "$file is in the report" grep -qF "\"$file\"" report_of_files.json
+done
 holds "the report names all" test "$(grep -c '"sha256"' report.json)" -eq 3
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
