@@ -6,7 +6,6 @@
 #include <CGAL/box_intersection_d.h>
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "nodes/mesh/union_mesh_cgal.h"
@@ -46,59 +45,17 @@ void for_each_box_pair(const UnionMesh &mesh, const std::vector<uint32_t> &trian
   });
 }
 
-/* Cuts triangles along their intersections, in exact arithmetic, into pieces that meet only along whole edges. */
-class Arrangement {
- public:
-  explicit Arrangement(const UnionMesh &mesh) : mesh_(mesh) {}
-
-  /* Cuts `triangles` (sorted) where the sorted pairs of them meet. Throws UnionRefused. */
-  void make(const std::vector<uint32_t> &triangles, const std::vector<Pair> &pairs);
-
-  std::vector<Piece> pieces;       /* in the order of their first triangle's plane */
+/* Triangles cut along their intersections into pieces that meet only along whole edges. The vertices are those of the
+ * mesh, then those on cuts. */
+struct Arrangement {
+  std::vector<Piece> pieces;
   std::vector<uint32_t> cancelled; /* triangles in whose plane other triangles cancel */
   size_t cut_count = 0;            /* triangles that are cut, or overlap others */
-
-  /* The vertices: those of the mesh, then those on cuts. */
-  size_t vertex_count() const {
-    return points_.size();
-  }
-  Point exact(uint32_t vertex) const {
-    return vertex < mesh_.vertex_count() ? mesh_.exact(vertex) : points_[vertex];
-  }
-  std::array<double, 3> rounded(uint32_t vertex) const;
-
- private:
-  struct View;
-  struct Cut { /* a segment that cuts a triangle; a point where both ends are equal */
-    uint32_t triangle, from, to;
-  };
-
-  void know(uint32_t vertex);
-  uint32_t id_of(const Point &point);
-  Exact::Triangle_3 exact_triangle(uint32_t triangle) const;
-  CGAL::Orientation turn_of(uint32_t triangle, const View &view) const;
-  View view_of(uint32_t triangle) const;
-  bool is_beside(uint32_t triangle, uint32_t other, const View &view, CGAL::Orientation turn) const;
-  bool do_overlap(uint32_t a, uint32_t b) const;
-  void add_cut(uint32_t triangle, uint32_t from, uint32_t to);
-  void meet(uint32_t a, uint32_t b);
-  Point lift(uint32_t triangle, const View &view, const Exact::Point_2 &seen) const;
-  void add_piece(uint32_t source, Corners corners, int layers);
-  template <class Plane, class VertexOf>
-  void count_layers(Plane &plane, const std::vector<uint32_t> &group, const View &view, const VertexOf &vertex) const;
-  template <class Plane>
-  void cut_plane(const std::vector<uint32_t> &group, const std::vector<Cut> &cuts, Plane &plane);
-  void cut_plane(const std::vector<uint32_t> &group, const std::vector<Cut> &cuts);
-  void cut_triangles(const std::vector<uint32_t> &triangles);
-
-  const UnionMesh &mesh_;
-  std::vector<Point> points_;
-  std::vector<bool> known_; /* per vertex of the mesh: whether points_ has it */
-  std::map<Point, uint32_t> ids_;
-  std::vector<uint32_t> same_; /* per vertex of the mesh: the first known vertex at the same point */
-  uint32_t *planes_ = nullptr; /* disjoint sets of triangles that overlap in a plane */
-  std::vector<Cut> cuts_;
+  std::vector<Point> points;       /* per vertex; those of mesh vertices are set only where triangles meet */
 };
+
+/* Cuts `triangles` (sorted) where the sorted `pairs` of them meet, in exact arithmetic. Throws UnionRefused. */
+Arrangement arrange(const UnionMesh &mesh, const std::vector<uint32_t> &triangles, const std::vector<Pair> &pairs);
 
 }  // namespace qmat
 

@@ -46,8 +46,6 @@ class Union {
   Union(qmat_context *context, const qmat_shells &shells)
       : mesh_(context, shells),
         winding_numbers_(mesh_),
-        arrangement_(mesh_),
-        pieces_(arrangement_.pieces),
         clusters_(mesh_.new_sets(mesh_.triangle_count())),
         active_(mesh_.triangle_count()) {}
 
@@ -58,7 +56,7 @@ class Union {
     std::vector<uint32_t> triangles;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
       if (is_active(t)) triangles.push_back(t);
-    arrangement_.make(triangles, find_pairs(triangles));
+    arrangement_ = arrange(mesh_, triangles, find_pairs(triangles));
     changed_.resize(mesh_.triangle_count());
     for (const uint32_t t : arrangement_.cancelled) changed_[cluster_of(t)] = true;
     find_regions();
@@ -70,7 +68,7 @@ class Union {
   UnionMesh mesh_;
   WindingNumbers winding_numbers_;
   Arrangement arrangement_;
-  std::vector<Piece> &pieces_;
+  std::vector<Piece> &pieces_ = arrangement_.pieces;
   uint32_t *clusters_;       /* disjoint sets of shells that meet, by their triangles */
   std::vector<bool> active_; /* per shell: it is cut, or may be left out */
   size_t active_count_ = 0;
@@ -154,7 +152,10 @@ class Union {
       const Piece &piece = pieces_[i];
       if (keeps < 0) {
         Point corner[3];
-        for (size_t k = 0; k < 3; k++) corner[k] = arrangement_.exact(piece.corners[k]);
+        for (size_t k = 0; k < 3; k++) {
+          const uint32_t id = piece.corners[k];
+          corner[k] = id < mesh_.vertex_count() ? mesh_.exact(id) : arrangement_.points[id];
+        }
         const int before = winding_numbers_.before(corner, piece.layers, QMAT_NO_SHELL);
         keeps = before <= 0 && before + piece.layers > 0;
       }
@@ -168,6 +169,16 @@ class Union {
 
   /* ---- rounding ---- */
 
+  /* The nearest doubles. They must not come from an interval, whose width depends on the computations before. */
+  std::array<double, 3> rounded(uint32_t vertex) const {
+    if (vertex < mesh_.vertex_count()) {
+      const double *p = mesh_.position(vertex);
+      return {p[0], p[1], p[2]};
+    }
+    const auto &p = CGAL::exact(arrangement_.points[vertex]);
+    return {CGAL::to_double(p.x()), CGAL::to_double(p.y()), CGAL::to_double(p.z())};
+  }
+
   /* Merges vertices that are equal after rounding, and drops the pieces that lose their area. */
   void merge_rounded() {
     std::vector<uint32_t> used;
@@ -175,8 +186,8 @@ class Union {
     std::sort(used.begin(), used.end());
     used.erase(std::unique(used.begin(), used.end()), used.end());
     std::map<std::array<double, 3>, uint32_t> places;
-    std::vector<uint32_t> merged(arrangement_.vertex_count());
-    for (const uint32_t v : used) merged[v] = places.emplace(arrangement_.rounded(v), v).first->second;
+    std::vector<uint32_t> merged(arrangement_.points.size());
+    for (const uint32_t v : used) merged[v] = places.emplace(rounded(v), v).first->second;
     for (Piece &piece : pieces_) {
       for (uint32_t &corner : piece.corners) corner = merged[corner];
       Corners &c = piece.corners;
@@ -231,7 +242,7 @@ class Union {
       }
     }
     if (triangles.empty()) throw UnionRefused{"they leave nothing of each other"};
-    std::vector<uint32_t> numbers(arrangement_.vertex_count(), kNone), used;
+    std::vector<uint32_t> numbers(arrangement_.points.size(), kNone), used;
     for (const uint32_t v : triangles) numbers[v] = 0;
     for (uint32_t v = 0; v < numbers.size(); v++) {
       if (numbers[v] == kNone) continue;
@@ -242,7 +253,7 @@ class Union {
     united->triangles = static_cast<uint32_t *>(qmat_alloc(triangles.size(), sizeof(uint32_t)));
     if (!united->positions || !united->triangles) throw std::bad_alloc();
     for (size_t i = 0; i < used.size(); i++) {
-      const std::array<double, 3> p = arrangement_.rounded(used[i]);
+      const std::array<double, 3> p = rounded(used[i]);
       std::copy(p.begin(), p.end(), united->positions + 3 * i);
     }
     for (size_t i = 0; i < triangles.size(); i++) united->triangles[i] = numbers[triangles[i]];
