@@ -261,8 +261,8 @@ const qmat_node qmat_node_medial_refine = {
     .version = 2,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
-        "Simplification cannot bring a medial mesh closer to the surface than the initial one. This node measures the "
-        "distance at all samples and at a grid of points between them. If a point is farther than the trigger, evenly "
+        "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
+        "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly "
         "spaced samples are added around all points farther than the target, and the medial mesh is made again. Each "
         "further round halves the spacing. The result is the round that comes closest.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "

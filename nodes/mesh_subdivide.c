@@ -522,13 +522,12 @@ const qmat_node qmat_node_mesh_subdivide = {
     .summary = "Replaces subdivision surfaces by triangles on their limit surface",
     .doc =
         "Subdivides the Catmull-Clark, Loop and bilinear surfaces of a USD file, with their creases, corners, boundary "
-        "rules and holes, and moves the vertices to the limit surface. Other surfaces stay as they are. A mesh without "
-        "subdivision surfaces passes through, unless a scheme is given: then its polygons, or its triangles in other "
-        "formats, are the cage.\n\n"
+        "rules and holes, and moves the vertices to the limit surface. Other surfaces pass through, unless a scheme is "
+        "given: then their polygons, or their triangles in other formats, are the cage.\n\n"
         "The deviation of a level is twice the largest distance between the mesh and the limits of edge midpoints and "
-        "face centres; semi-sharp edges add the distance to their neighbours. It is an estimate, not a bound.\n\n"
-        "The mesh carries its deviation along: medial.simplify keeps its errors below epsilon minus the deviation, and "
-        "medial.evaluate adds the deviation to the errors that it states.",
+        "face centres; semi-sharp edges add the distance to their neighbours. It is an estimate, not a bound. The mesh "
+        "carries it along: medial.simplify keeps its errors below epsilon minus the deviation, and medial.evaluate "
+        "adds it to the errors that it states.",
     .citation = "Catmull and Clark 1978; Loop 1987; DeRose et al. 1998, Subdivision surfaces in character animation",
     .params_size = sizeof(mesh_subdivide_params),
     .params = params,
