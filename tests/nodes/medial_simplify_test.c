@@ -649,6 +649,59 @@ static void test_isolated_spheres_stay_beside_what_collapses(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Four overlapping spheres in the capsule, whose ends are at 0 and 3; of `count` the first. */
+static qmat_medial *spheres_in_capsule(size_t count, const uint32_t *edges, size_t edge_count,
+                                       const uint32_t *triangles, size_t triangle_count) {
+  static const double spheres[] = {0, 0, 0, 0.95, 3, 0, 0, 0.95, 1.5, 0.1, 0, 0.9, 1.5, -0.1, 0.1, 0.9};
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  medial->sphere_count = count;
+  medial->spheres = qmat_alloc(count, 4 * sizeof(double));
+  assert_non_null(medial->spheres);
+  memcpy(medial->spheres, spheres, 4 * count * sizeof(double));
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return medial;
+}
+
+static void test_a_void_that_the_solid_does_not_have_is_opened(void **state) {
+  (void)state;
+  const pipeline *p = model(SMALL);
+  static const uint32_t edges[] = {0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3}, walls[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
+  qmat_medial *closed = spheres_in_capsule(4, edges, 6, walls, 4);
+  result guarded = simplify_medial(p, closed, "epsilon=8% vertices=4");
+  result any = simplify_medial(p, closed, "epsilon=8% vertices=4 topology=free");
+  assert_int_equal(pipeline_count(any.report, "voids"), 1);
+  assert_int_equal(guarded.medial->sphere_count, 4);
+  assert_int_equal(guarded.medial->triangle_count, 3);
+  check_topology(p, &guarded);
+  assert_int_equal(pipeline_count(guarded.report, "voids"), 0);
+  check_errors(p, &guarded, 0.08, true);
+  release(&any);
+  release(&guarded);
+  qmat_value_release(&closed->base);
+}
+
+static void test_a_loop_that_the_solid_does_not_have_is_closed(void **state) {
+  (void)state;
+  const pipeline *p = model(SMALL);
+  static const uint32_t edges[] = {0, 1, 0, 2, 1, 2};
+  qmat_medial *ring = spheres_in_capsule(3, edges, 3, NULL, 0);
+  result guarded = simplify_medial(p, ring, "epsilon=8% vertices=3");
+  result any = simplify_medial(p, ring, "epsilon=8% vertices=3 topology=free");
+  assert_int_equal(pipeline_count(any.report, "loops"), 1);
+  assert_int_equal(guarded.medial->sphere_count, 3);
+  assert_int_equal(guarded.medial->triangle_count, 1);
+  check_topology(p, &guarded);
+  assert_int_equal(pipeline_count(guarded.report, "loops"), 0);
+  check_errors(p, &guarded, 0.08, true);
+  release(&any);
+  release(&guarded);
+  qmat_value_release(&ring->base);
+}
+
 static void expect_error(const pipeline *p, const qmat_medial *medial, const char *field) {
   qmat_context context = {0};
   result r;
@@ -816,6 +869,8 @@ int main(void) {
       cmocka_unit_test(test_medial_mesh_without_regions_works),
       cmocka_unit_test(test_spheres_without_edges_stay_as_they_are),
       cmocka_unit_test(test_isolated_spheres_stay_beside_what_collapses),
+      cmocka_unit_test(test_a_void_that_the_solid_does_not_have_is_opened),
+      cmocka_unit_test(test_a_loop_that_the_solid_does_not_have_is_closed),
       cmocka_unit_test(test_inputs_of_another_mesh_are_named),
       cmocka_unit_test(test_progress_function_cancels),
       cmocka_unit_test(test_it_asks_whether_to_go_on_at_every_few_points_and_collapses),
