@@ -30,7 +30,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 
 const qmat_node qmat_node_medial_read = {
     .name = "medial.read",
-    .version = 1,
+    .version = 2,
     .summary = "Reads a medial mesh from a .ma file",
     .doc =
         "Checks numbers and indices. Sorts edges and triangles, leaves out duplicates, and adds the edges of triangles "
