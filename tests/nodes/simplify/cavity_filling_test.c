@@ -111,7 +111,7 @@ static void test_places_that_nothing_fits_are_left(void **state) {
   qmat_context_uninit(&context);
 }
 
-/* The notch that is found in the corners of a bar's envelope is filled, in a few steps, within epsilon. */
+/* The uncovered corners of a bar are filled in a few steps, within epsilon. */
 static void test_cavities_are_found_and_filled(void **state) {
   (void)state;
   bar b;

@@ -175,7 +175,7 @@ static void test_a_quarter_is_left_with_what_was_held(void **state) {
     assert_true(s->run.envelope_tracker.depths[v] <= depth + 1e-9);
     assert_true(c->spheres[4 * v + 3] - depth <= limit);
   }
-  /* What is known of an edge's protrusion is true all along it. */
+  /* The bound of an edge holds all along it. */
   for (size_t e = 0; e < c->edge_count; e++)
     for (int i = 1; i < 4; i++) {
       double sphere[4];
