@@ -19,13 +19,13 @@ static const qmat_param params[] = {
      .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
      .offset = offsetof(scene_read_params, path)},
     {.name = "mesh",
-     .doc = "Of glTF: all (each by itself, in its own space), merged (all placed as one), or a mesh's name or number",
+     .doc = "Which meshes of a glTF scene: all (each in its own space), merged (placed as one), or a name or number",
      .unit = "",
      .type = QMAT_PARAM_STRING,
      .default_text = "all",
      .offset = offsetof(scene_read_params, mesh)},
     {.name = "defects",
-     .doc = "What becomes of facets that name a vertex twice or repeat another facet's vertices",
+     .doc = "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped",
      .unit = "",
      .type = QMAT_PARAM_ENUM,
      .default_number = QMAT_DEFECTS_REFUSE,
@@ -38,12 +38,12 @@ enum { SCENE, MESH, REPORT };
 static const qmat_port outputs[] = {
     [SCENE] = {.name = "scene",
                .type = QMAT_SCENE,
-               .doc = "The model's name, format and unit; of glTF the whole asset"},
+               .doc = "The model's name, format and unit; for glTF also the whole asset"},
     [MESH] = {.name = "mesh",
               .type = QMAT_MESH,
-              .doc = "Its surface as triangles; of several meshes a list",
+              .doc = "The surface as triangles; a list where the scene has several meshes",
               .list = true},
-    [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "What was read and what was done to it"},
+    [REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "Counts of what was read and changed"},
     {0}};
 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
@@ -69,18 +69,16 @@ const qmat_node qmat_node_scene_read = {
     .version = 5,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF scene",
     .doc =
-        "The format is told by the file's first bytes and must agree with its ending. Vertices at equal positions "
-        "become one, polygons are cut into triangles, unused vertices are left out, and the triangles get one "
-        "orientation, outward where the surface is closed. The report counts all of this, border edges, "
-        "non-manifold edges, components and the Euler characteristic. A glTF scene is "
-        "kept whole, with the files that it refers to, for scene.write to hand on; its meshes are read one by one, as "
-        "they are stored: in their own spaces, in bind pose, without the transforms of the nodes that carry them, and "
-        "once, however many those are. Meshes that no node carries, and those without triangles, are left out. Nodes "
-        "that take a mesh then run once for each; where one of several meshes has no usable facets or no inside, the "
-        "others are described all the same. merged places all meshes as one surface in world space, skins in the "
-        "pose that their joints stand in. Of USD all meshes are placed as one; USD layers are composed from the files "
-        "beside them, and the report's warnings say what was left out. Subdivision surfaces are "
-        "placed as their control cages, which mesh.subdivide takes to the limit.",
+        "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
+        "removed, and triangles oriented, outward where the surface is closed. The report counts all of this.\n\n"
+        "A glTF scene is kept whole for scene.write, with its files; outside of its folder only images are read. Its "
+        "meshes are read one by one, in their own spaces and in bind pose, and later nodes run once for each. Meshes "
+        "on "
+        "no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
+        "space, "
+        "skins in their current pose.\n\n"
+        "The meshes of a USD scene are placed as one surface; warnings name what was left out. Subdivision surfaces "
+        "are read as control cages, for mesh.subdivide.",
     .citation = "",
     .params_size = sizeof(scene_read_params),
     .params = params,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* scene.write: a medial mesh, and what shows it, as a file in memory. */
+/* scene.write: a medial mesh and its skin as a file in memory. */
 #include <math.h>
 
 #include "core/node.h"
@@ -27,7 +27,7 @@ typedef struct scene_write_params {
 enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
 enum { OUT_FILE, OUT_REPORT };
 
-/* The diagonal of the box around all spheres: the model's own, up to the error of the medial mesh. */
+/* The diagonal of the box around all spheres, which is the model's up to the error of the medial mesh. */
 static double diagonal_of(const qmat_medial *medial) {
   double square = 0;
   for (size_t axis = 0; axis < 3; axis++) {
@@ -54,7 +54,7 @@ static qmat_certificate certificate_of(const qmat_report *report) {
   return json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
 }
 
-/* What is given for one mesh; NULL: nothing, or it could not be made. */
+/* The input for one mesh; NULL where there is none or it is a failure. */
 static const qmat_value *given_for(const qmat_value *value, size_t index) {
   const qmat_value *item = value ? qmat_value_at(value, index) : NULL;
   return item && !qmat_value_failure(item) ? item : NULL;
@@ -96,7 +96,7 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
                                           .stated = stated}};
 }
 
-/* Of a mesh among several its own, else the scene's; NULL: none. */
+/* The name of a mesh in a list, else that of the scene; NULL: none. */
 static const char *name_of(const qmat_scene *scene, const qmat_value *medial, size_t index) {
   if (medial->type == QMAT_LIST) return ((const qmat_list *)medial)->names[index];
   return scene ? scene->name : NULL;
@@ -110,7 +110,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
                expected = kept && scene->mesh_count > 0 ? scene->mesh_count : 1;
   if (count != expected) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes are given for %zu meshes", count, expected);
+    qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes for %zu meshes", count, expected);
     return qmat_fail_field(context, "medial");
   }
   qmat_gltf_addition *additions = qmat_calloc(count, sizeof *additions);
@@ -192,7 +192,7 @@ static qmat_status report_stated(qmat_context *context, const qmat_value *given,
   return done ? QMAT_OK : qmat_fail_memory(context, "the report");
 }
 
-/* What goes with a list of medial meshes is a list, too, of as many; not every format holds several. */
+/* The other lists have as many elements as that of medial meshes. Only glTF holds several. */
 static qmat_status check_counts(qmat_context *context, const void *data, const size_t counts[]) {
   static const int others[] = {IN_SKIN, IN_REPORT};
   static const char *const names[] = {"skin", "report"};
@@ -200,14 +200,14 @@ static qmat_status check_counts(qmat_context *context, const void *data, const s
   const bool is_gltf = params->format == FORMAT_GLB || params->format == FORMAT_GLTF;
   const size_t count = counts[IN_MEDIAL];
   if (!is_gltf && count > 1) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the format holds one medial mesh, and there are %zu", count);
+    qmat_fail(context, QMAT_ERROR_USAGE, "this format holds one medial mesh, not %zu", count);
     qmat_fail_field(context, "medial");
-    return qmat_fail_hint(context, "choose one by scene.read's parameter mesh, or set that to merged");
+    return qmat_fail_hint(context, "set mesh of scene.read to a name, a number or merged, or write glb or gltf");
   }
   for (size_t i = 0; i < 2; i++) {
     const size_t of_other = counts[others[i]];
     if (of_other == 0 || of_other == count) continue;
-    qmat_fail(context, QMAT_ERROR_USAGE, "%zu are given for %zu medial meshes", of_other, count);
+    qmat_fail(context, QMAT_ERROR_USAGE, "%zu values for %zu medial meshes", of_other, count);
     return qmat_fail_field(context, names[i]);
   }
   return QMAT_OK;
@@ -218,7 +218,7 @@ static qmat_status check_spheres(qmat_context *context, const qmat_value *const 
   for (size_t i = 0; i < count; i++) {
     const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
     if (!medial || medial->sphere_count > 0) continue;
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no sphere");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     if (count > 1) qmat_fail_within(context, ((const qmat_list *)inputs[IN_MEDIAL])->names[i]);
     return qmat_fail_field(context, "medial");
   }
@@ -270,7 +270,7 @@ static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz"
 static const qmat_param params[] = {
     {.name = "format",
      .unit = "",
-     .doc = "What file to make; the ending of an output path sets it",
+     .doc = "The format of the file; the ending of an output path sets it",
      .type = QMAT_PARAM_ENUM,
      .default_number = FORMAT_GLB,
      .choices = formats,
@@ -278,34 +278,34 @@ static const qmat_param params[] = {
      .offset = offsetof(scene_write_params, format)},
     {.name = "draco",
      .unit = "",
-     .doc = "Compress the skin too: smaller, but some engines refuse the file or show nothing (glb and gltf)",
+     .doc = "Compress the skin with Draco (glb, gltf). The file is smaller, but some engines refuse it or show nothing",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, draco)},
     {.name = "draco_meshes",
      .unit = "",
-     .doc = "Compress the triangles of a glTF scene that is handed on; as with draco, some engines refuse the file",
+     .doc = "Compress the triangles of a glTF scene with Draco (glb, gltf). Its move is part of the errors",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, draco_meshes)},
     {.name = "skin_beside",
      .unit = "",
-     .doc = "Add the skin to a glTF scene that is handed on, as a mesh beside the one that it describes",
+     .doc = "Add the skin to a glTF scene as a further mesh beside the one that it describes",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, skin_beside)},
     {.name = "side_files",
      .unit = "",
-     .doc = "Leave the buffers and images of a glTF scene in files beside a .glb instead of putting them into it",
+     .doc = "Keep the buffers and images of a glTF scene in files beside a .glb instead of inside it",
      .type = QMAT_PARAM_BOOL,
      .offset = offsetof(scene_write_params, side_files)},
     {.name = "position_bits",
      .unit = "bits",
-     .doc = "Quantisation of the spheres' centres (glb and gltf); 0 takes what epsilon asks for",
+     .doc = "Quantisation of the spheres' centres (glb, gltf); 0: chosen by epsilon",
      .type = QMAT_PARAM_INT,
      .min = 0,
      .max = 30,
      .offset = offsetof(scene_write_params, position_bits)},
     {.name = "radius_bits",
      .unit = "bits",
-     .doc = "Quantisation of the spheres' radii (glb and gltf); 0 takes what epsilon asks for",
+     .doc = "Quantisation of the spheres' radii (glb, gltf); 0: chosen by epsilon",
      .type = QMAT_PARAM_INT,
      .min = 0,
      .max = 30,
@@ -317,24 +317,26 @@ static const qmat_port inputs[] = {
     {.name = "scene",
      .type = QMAT_SCENE,
      .optional = true,
-     .doc = "Where the model came from: a glTF scene to hand on; else its name, and its unit (usda and usdz)"},
+     .doc = "The scene that the model was read from: a glTF scene to write back, else its name and unit"},
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh, or one for each mesh of the scene", .list = true},
     {.name = "skin",
      .type = QMAT_MESH,
      .optional = true,
-     .doc = "The surface that viewers show (not ma and ply)",
+     .doc = "The surface that viewers show; not in ma and ply",
      .list = true},
     {.name = "report",
      .type = QMAT_REPORT,
      .optional = true,
-     .doc = "From medial.evaluate or medial.simplify: epsilon and the errors",
+     .doc = "Epsilon and the errors, from medial.evaluate or medial.simplify",
      .list = true},
     {0},
 };
 
 static const qmat_port outputs[] = {
-    [OUT_FILE] = {.name = "file", .type = QMAT_FILE, .doc = "The finished file"},
-    [OUT_REPORT] = {.name = "report", .type = QMAT_REPORT, .doc = "What was compressed of the scene, and what was not"},
+    [OUT_FILE] = {.name = "file", .type = QMAT_FILE, .doc = "The file, with its side files"},
+    [OUT_REPORT] = {.name = "report",
+                    .type = QMAT_REPORT,
+                    .doc = "The errors that the file states, and what was compressed"},
     {0},
 };
 
@@ -345,29 +347,15 @@ const qmat_node qmat_node_scene_write = {
     .version = 4,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
-        "A scene that scene.read took from glTF goes on as glb or gltf with all that is in it: each mesh's medial mesh "
-        "is added to the extras of the nodes that carry it (a child of the node has them where its extras are no "
-        "object), in that mesh's own space; one of all meshes merged gets a node of its own. Nothing else changes: the "
-        "JSON only gains keys and members, buffers stay byte for byte, files that the asset refers to are written "
-        "beside the new one. A mesh that no medial mesh could be made of stays as it is. skin_beside adds the skins as "
-        "meshes. draco_meshes compresses the scene's own indexed triangle lists with all attributes "
-        "(KHR_draco_mesh_compression: positions with 14 bits or what a twentieth of epsilon asks for, normals with 10, "
-        "texture coordinates 12, colours 8, other floats 12) and takes their data out of a GLB's binary chunk; what "
-        "that moves the surface by is added to the stated errors. Primitives with morph targets, with shared data or "
-        "compressed ones stay as they are, and so does an asset with data elsewhere or with an extension that may "
-        "refer to them: the report's warnings tell. Of any other scene glb and gltf are made anew, and "
-        "hold the skin as an ordinary mesh, so that every client shows something. The medial mesh is "
-        "a Draco blob in base64, in the extras of a node, where clients keep it (qmat_data; triangles first, then "
-        "edges on no triangle as (i, j, j), then lone spheres as (i, i, i); the order of spheres is kept). Without "
-        "bits given, quantisation moves the solid by at most 5 % of the report's epsilon, or of 0.1 % of the diagonal "
-        "without a report, and by no more than what a certified error has left to epsilon; the measured move is in the "
-        "extras as qmat_quantisation, in model units. qmat_epsilon, qmat_error_out and qmat_error_in are fractions of "
-        "the diagonal: the report's epsilon, and its surface_to_envelope and envelope_to_surface with the measured "
-        "move added, so that they hold for what qmat_data decodes to; qmat_certified says that the report is certified "
-        "and both still are within epsilon. usda and "
-        "usdz hold the skin as a Mesh, and as guides the spheres as Points, the edges as BasisCurves and the triangles "
-        "as a Mesh, all with primvars:radius in single precision, and the same facts in the prim's customData. ma and "
-        "ply hold the medial mesh alone, unquantised. draco and the bits apply to glb and gltf only.",
+        "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
+        "gain its medial mesh. Any other model becomes a new asset that shows the skin. A .glb contains the scene's "
+        "buffers and images; those of a .gltf are files named after it.\n\n"
+        "qmat_data in the extras is the medial mesh, by Draco and in base64. qmat_error_out and qmat_error_in are the "
+        "errors of the report plus the distance by which storage moves the solid, at most 0.25 % of epsilon. "
+        "qmat_certified says whether both are proved to be within qmat_epsilon. Far from zero, the node is translated "
+        "to qmat_origin_x, _y and _z.\n\n"
+        "usda and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. ma and ply "
+        "hold the medial mesh alone.",
     .citation = "",
     .params_size = sizeof(scene_write_params),
     .params = params,

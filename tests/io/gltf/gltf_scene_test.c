@@ -381,6 +381,144 @@ static void test_a_long_name_of_a_missing_file_is_told_in_whole_characters(void 
   qmat_context_uninit(&context);
 }
 
+/* A buffer in a data URI comes first, the box in a file, one image twice, and one that is no image. */
+static const char outside_text[] =
+    "{'asset':{'version':'2.0'},'scene':0,'scenes':[{'nodes':[0]}],'nodes':[{'mesh':0}],"
+    "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+    "'images':[{'uri':'a%20b.png'},{'uri':'./a%20b.png','name':'twin'},{'uri':'../SECRET'},{'uri':'odd.png'}],"
+    "'accessors':[{'bufferView':1,'componentType':5126,'count':8,'type':'VEC3'},"
+    "{'bufferView':2,'componentType':5123,'count':36,'type':'SCALAR'}],"
+    "'bufferViews':[{'buffer':0,'byteLength':4},{'buffer':1,'byteOffset':0,'byteLength':96},"
+    "{'buffer':1,'byteOffset':96,'byteLength':72,'extensions':{'ACME_packed':{'buffer':1,'byteOffset':4}}}],"
+    "'buffers':[{'uri':'data:application/octet-stream;base64,AAAAAA==','byteLength':4},"
+    "{'uri':'box.bin','byteLength':168,'name':'box'}]}";
+
+static json_int_t number_at(const json_t *root, const char *array, size_t index, const char *key) {
+  return json_integer_value(json_object_get(json_array_get(json_object_get(root, array), index), key));
+}
+
+static void test_a_glb_takes_in_buffers_and_images_and_renumbers_them(void **state) {
+  (void)state;
+  static const char png[] = "\x89PNG\r\n\x1a\nxyz", secret[] = "no image";
+  qmat_context context = {0};
+  char folder[64], path[96], file_path[128], secret_path[128];
+  make_folder(folder);
+  snprintf(secret_path, sizeof secret_path, "%s.secret", folder);
+  write_file(secret_path, secret, sizeof secret - 1);
+  char *text = asset_replace(outside_text, "SECRET", strrchr(secret_path, '/') + 1), *json = asset_json(text);
+  qmat_writer data = box_data();
+  const struct {
+    const char *name;
+    const void *bytes;
+    size_t size;
+  } files[] = {{"scene.gltf", json, strlen(json)},
+               {"box.bin", data.bytes, 168},
+               {"a b.png", png, sizeof png - 1},
+               {"odd.png", "odd", 3}};
+  for (size_t i = 0; i < 4; i++) {
+    snprintf(file_path, sizeof file_path, "%s/%s", folder, files[i].name);
+    write_file(file_path, files[i].bytes, files[i].size);
+  }
+  snprintf(path, sizeof path, "%s/scene.gltf", folder);
+  qmat_scene *scene;
+  qmat_value *mesh;
+  qmat_report *report;
+  const qmat_read_options options = {0};
+  assert_int_equal(qmat_model_read_meshes(&context, path, &options, "all", &scene, &mesh, &report), QMAT_OK);
+  assert_int_equal(scene->part_count, 4); /* not the one that lies outside and is no image */
+  assert_int_equal(json_array_size(json_object_get(report->root, "warnings")), 1);
+
+  qmat_medial *medial = example_medial(3);
+  const qmat_gltf_addition addition = {.medial = medial,
+                                       .options = {.binary = true, .embed = true, .quantisation = 1e-3}};
+  qmat_file *file;
+  assert_int_equal(qmat_gltf_enrich(&context, scene, &addition, 1, false, NULL, &file), QMAT_OK);
+  assert_int_equal(file->part_count, 2); /* what is no image stays outside */
+  assert_string_equal(file->parts[1].name, "odd.png");
+  qmat_gltf_asset after = open_part(&file->parts[0]);
+  const json_t *buffers = json_object_get(after.root, "buffers");
+  assert_int_equal(json_array_size(buffers), 2);
+  assert_null(json_object_get(json_array_get(buffers, 0), "uri"));
+  assert_string_equal(json_string_value(json_object_get(json_array_get(buffers, 0), "name")), "box");
+  assert_non_null(json_object_get(json_array_get(buffers, 1), "uri"));
+  assert_int_equal(number_at(after.root, "bufferViews", 0, "buffer"), 1);
+  assert_int_equal(number_at(after.root, "bufferViews", 1, "buffer"), 0);
+  const json_t *packed = json_object_get(
+      json_object_get(json_array_get(json_object_get(after.root, "bufferViews"), 2), "extensions"), "ACME_packed");
+  assert_int_equal(json_integer_value(json_object_get(packed, "buffer")), 0);
+  assert_int_equal(json_integer_value(json_object_get(packed, "byteOffset")), 4);
+  assert_int_equal(after.chunk_size, number_at(after.root, "buffers", 0, "byteLength"));
+  assert_memory_equal(after.chunk, data.bytes, 168);
+  const size_t view = (size_t)number_at(after.root, "images", 0, "bufferView");
+  assert_int_equal(number_at(after.root, "images", 1, "bufferView"), view);
+  assert_memory_equal(after.chunk + number_at(after.root, "bufferViews", view, "byteOffset"), png, sizeof png - 1);
+  const json_t *image = json_array_get(json_object_get(after.root, "images"), 1);
+  assert_string_equal(json_string_value(json_object_get(image, "mimeType")), "image/png");
+  assert_string_equal(json_string_value(json_object_get(image, "name")), "twin");
+  assert_null(json_object_get(image, "uri"));
+
+  /* The same surface is read from it, alone in another place. */
+  qmat_soup soup = {0};
+  assert_int_equal(qmat_gltf_parse(&context, file->parts[0].bytes, file->parts[0].size, "/nowhere/x.glb", &soup, NULL),
+                   QMAT_OK);
+  assert_int_equal(soup.facet_count, 12);
+  qmat_soup_uninit(&soup);
+  qmat_gltf_asset_uninit(&after);
+  for (size_t i = 0; i < 4; i++) {
+    snprintf(file_path, sizeof file_path, "%s/%s", folder, files[i].name);
+    assert_int_equal(unlink(file_path), 0);
+  }
+  assert_int_equal(unlink(secret_path), 0);
+  assert_int_equal(rmdir(folder), 0);
+  free(text);
+  free(json);
+  qmat_writer_uninit(&data);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&scene->base);
+  qmat_value_release(mesh);
+  qmat_value_release(&report->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_a_mesh_far_from_zero_has_its_medial_mesh_on_a_translated_child(void **state) {
+  (void)state;
+  fixture f;
+  assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
+  const double spheres[] = {4e5 + 0.1, 0, 5e6 + 0.3, 1, 4e5 + 1.3, 0, 5e6, 0.5};
+  qmat_medial *medial = example_build(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0), *back;
+  qmat_stated_errors stated;
+  const qmat_gltf_addition addition = {
+      .medial = medial,
+      .options = {.binary = true,
+                  .quantisation = 1e-4,
+                  .errors = {.diagonal = 4, .epsilon = 0.01, .error_out = 0.007, .error_in = 0.009},
+                  .stated = &stated}};
+  qmat_file *file;
+  assert_int_equal(qmat_gltf_enrich(&f.context, f.scene, &addition, 1, false, NULL, &file), QMAT_OK);
+  qmat_gltf_asset after = open_part(&file->parts[0]);
+  assert_null(data_of(node_of(&after, 2)));
+  const json_t *child = node_of(&after, 6), *translation = json_object_get(child, "translation");
+  assert_non_null(data_of(child));
+  assert_true(fabs(json_number_value(json_array_get(translation, 0)) - 4e5) <= 4);
+  assert_true(fabs(json_number_value(json_array_get(translation, 2)) - 5e6) <= 4);
+  char folder[64], path[96];
+  make_folder(folder);
+  snprintf(path, sizeof path, "%s/out.glb", folder);
+  write_file(path, file->parts[0].bytes, file->parts[0].size);
+  assert_int_equal(qmat_medial_extract(&f.context, path, NULL, &back, NULL), QMAT_OK);
+  const double moved = qmat_medial_move(medial, back);
+  assert_true(moved > 0 && moved <= 1e-4);
+  assert_true(stated.error_in >= 0.009 + moved / 4 && stated.error_in <= 0.009 + moved / 4 + 1e-12);
+  qmat_gltf_asset_uninit(&after);
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(rmdir(folder), 0);
+  qmat_value_release(&back->base);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&file->base);
+  release(&f);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_meshes_are_read_once_each_in_their_own_space),
@@ -389,6 +527,8 @@ int main(void) {
       cmocka_unit_test(test_what_comes_out_is_read_again_with_the_same_meshes),
       cmocka_unit_test(test_a_second_time_replaces_what_the_first_left),
       cmocka_unit_test(test_one_of_all_meshes_gets_a_node_of_the_scene),
+      cmocka_unit_test(test_a_glb_takes_in_buffers_and_images_and_renumbers_them),
+      cmocka_unit_test(test_a_mesh_far_from_zero_has_its_medial_mesh_on_a_translated_child),
       cmocka_unit_test(test_a_long_name_of_a_missing_file_is_told_in_whole_characters),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
