@@ -3,7 +3,7 @@
 #define QMAT_IO_GLTF_GLTF_CHECKER_H
 
 #include "io/gltf/gltf_asset.h"
-#include "io/gltf/gltf_check.h"
+#include "io/gltf/gltf_document.h"
 
 /* What the checks of a glTF asset share: their state, their errors, and typed access to its JSON. */
 
