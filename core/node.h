@@ -40,6 +40,28 @@ typedef struct qmat_param {
   size_t offset; /* in the node's parameter struct */
 } qmat_param;
 
+/* Rows of a parameter table. `params` is the node's parameter struct; `field` is its member and the parameter's name. A
+ * length is a share of the diagonal of the model's bounding box, which may be written "1%". The default of QMAT_BOOL is
+ * no. Rows with other flags are written out. */
+#define QMAT_NUMBER(params, field, kind, unit_text, value, least, most, text, set)                                    \
+  {                                                                                                                   \
+    .name = #field, .unit = unit_text, .doc = text, .type = kind, .default_number = value, .min = least, .max = most, \
+    .flags = set, .offset = offsetof(params, field)                                                                   \
+  }
+#define QMAT_FLOAT(params, field, unit, value, least, most, doc) \
+  QMAT_NUMBER(params, field, QMAT_PARAM_FLOAT, unit, value, least, most, doc, 0)
+#define QMAT_LENGTH(params, field, value, least, most, doc) \
+  QMAT_NUMBER(params, field, QMAT_PARAM_FLOAT, "diagonal", value, least, most, doc, QMAT_PARAM_RELATIVE)
+#define QMAT_INT(params, field, unit, value, least, most, doc) \
+  QMAT_NUMBER(params, field, QMAT_PARAM_INT, unit, value, least, most, doc, 0)
+#define QMAT_ENUM(params, field, choice_names, value, text)                                    \
+  {                                                                                            \
+    .name = #field, .unit = "", .doc = text, .type = QMAT_PARAM_ENUM, .default_number = value, \
+    .choices = choice_names, .offset = offsetof(params, field)                                 \
+  }
+#define QMAT_BOOL(params, field, text) \
+  { .name = #field, .unit = "", .doc = text, .type = QMAT_PARAM_BOOL, .offset = offsetof(params, field) }
+
 typedef struct qmat_port {
   const char *name;
   qmat_value_type type;

@@ -26,9 +26,8 @@ char *qmat_base64_encode(const uint8_t *bytes, size_t size) {
 qmat_status qmat_base64_decode(qmat_context *context, const char *text, size_t length, uint8_t **bytes, size_t *size) {
   *bytes = NULL;
   *size = 0;
-  if (length % 4 != 0) {
+  if (length % 4 != 0)
     return qmat_fail(context, QMAT_ERROR_FORMAT, "base64 text has %zu characters, which is no multiple of 4", length);
-  }
   size_t padding = 0;
   while (padding < 2 && padding < length && text[length - 1 - padding] == '=') padding++;
   /* OpenSSL skips blanks at both ends and takes '-' for an end mark; neither belongs here. */

@@ -62,9 +62,8 @@ qmat_status check_header(qmat_context *context, const uint8_t *bytes, size_t siz
   char magic[5];
   uint8_t major = 0, minor = 0, type = 0, method = 0;
   uint16_t flags = 0;
-  if (!buffer.Decode(magic, sizeof magic) || std::memcmp(magic, "DRACO", sizeof magic) != 0) {
+  if (!buffer.Decode(magic, sizeof magic) || std::memcmp(magic, "DRACO", sizeof magic) != 0)
     return qmat_fail(context, QMAT_ERROR_FORMAT, "not Draco data: it does not start with \"DRACO\"");
-  }
   if (!buffer.Decode(&major) || !buffer.Decode(&minor) || !buffer.Decode(&type) || !buffer.Decode(&method) ||
       !buffer.Decode(&flags)) {
     return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data ends within its header");
@@ -73,19 +72,16 @@ qmat_status check_header(qmat_context *context, const uint8_t *bytes, size_t siz
     return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco bitstream version %u.%u is not supported; glTF asks for 2.2",
                      major, minor);
   }
-  if (type != draco::TRIANGULAR_MESH) {
+  if (type != draco::TRIANGULAR_MESH)
     return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data holds a point cloud, not a triangle mesh");
-  }
-  if (method != draco::MESH_SEQUENTIAL_ENCODING && method != draco::MESH_EDGEBREAKER_ENCODING) {
+  if (method != draco::MESH_SEQUENTIAL_ENCODING && method != draco::MESH_EDGEBREAKER_ENCODING)
     return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data has the unknown mesh encoding %u", method);
-  }
   buffer.set_bitstream_version(draco::kDracoMeshBitstreamVersion);
   if (flags & METADATA_FLAG_MASK) {
     draco::GeometryMetadata metadata;
     draco::MetadataDecoder decoder;
-    if (!decoder.DecodeGeometryMetadata(&buffer, &metadata)) {
+    if (!decoder.DecodeGeometryMetadata(&buffer, &metadata))
       return qmat_fail(context, QMAT_ERROR_FORMAT, "the metadata in the Draco data is damaged");
-    }
   }
   uint32_t faces = 0, points = 0;
   bool read;
@@ -120,9 +116,7 @@ qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std
   mesh = std::move(result).value();
   if (!mesh) return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco cannot decode the data");
   const uint32_t points = mesh->num_points();
-  if (points == 0 || mesh->num_faces() == 0) {
-    return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data holds no faces");
-  }
+  if (points == 0 || mesh->num_faces() == 0) return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data holds no faces");
   for (uint32_t f = 0; f < mesh->num_faces(); f++) {
     for (const draco::PointIndex &corner : mesh->face(draco::FaceIndex(f))) {
       if (corner.value() >= points) {
@@ -140,9 +134,7 @@ qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std
                  (attribute->is_mapping_identity() || attribute->indices_map_size() >= points);
     const uint64_t held =
         sound ? attribute->buffer()->data_size() / static_cast<uint64_t>(attribute->byte_stride()) : 0;
-    for (uint32_t p = 0; sound && p < points; p++) {
-      sound = attribute->mapped_index(draco::PointIndex(p)).value() < held;
-    }
+    for (uint32_t p = 0; sound && p < points; p++) sound = attribute->mapped_index(draco::PointIndex(p)).value() < held;
     if (!sound) {
       qmat_fail(context, QMAT_ERROR_FORMAT, "not every point has a value of this attribute in the Draco data");
       return qmat_fail_element(context, "attribute", static_cast<int64_t>(attribute->unique_id()));
@@ -260,9 +252,8 @@ qmat_status encode(qmat_context *context, const qmat_draco_attribute *attributes
   }
   draco::EncoderBuffer buffer;
   const draco::Status result = encoder.EncodeToBuffer(&buffer);
-  if (!result.ok()) {
+  if (!result.ok())
     return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Draco cannot encode: %s", result.error_msg_string().c_str());
-  }
   *bytes = static_cast<uint8_t *>(qmat_alloc(buffer.size(), 1));
   if (!*bytes) return qmat_fail_memory(context, "Draco data");
   std::memcpy(*bytes, buffer.data(), buffer.size());
@@ -278,16 +269,14 @@ qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute 
   *bytes = nullptr;
   *size = 0;
   constexpr size_t most = std::numeric_limits<uint32_t>::max() / 3;
-  if (point_count == 0 || face_count == 0) {
+  if (point_count == 0 || face_count == 0)
     return qmat_fail(context, QMAT_ERROR_USAGE, "Draco is given a mesh without faces");
-  }
   if (point_count > most || face_count > most) return qmat_fail_memory(context, "the faces of a Draco mesh");
   for (size_t a = 0; a < attribute_count; a++) {
     const int least = attributes[a].meaning == QMAT_DRACO_NORMAL ? 2 : 1;
     if (attributes[a].number != QMAT_DRACO_FLOAT) continue;
-    if (attributes[a].bits < least || attributes[a].bits > 30) {
+    if (attributes[a].bits < least || attributes[a].bits > 30)
       return qmat_fail(context, QMAT_ERROR_USAGE, "%d quantisation bits: must be %d to 30", attributes[a].bits, least);
-    }
   }
   try {
     return encode(context, attributes, attribute_count, static_cast<uint32_t>(point_count), faces,

@@ -87,9 +87,8 @@ static void set_triangle(uint32_t *triangle, uint32_t a, uint32_t b, uint32_t c)
 }
 
 static void fan(uint32_t apex, size_t count, uint32_t *triangles) {
-  for (size_t i = 1; i + 1 < count; i++) {
+  for (size_t i = 1; i + 1 < count; i++)
     set_triangle(triangles + 3 * (i - 1), apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count));
-  }
 }
 
 /* Turns left everywhere, once around: all the way there are only two changes between going up and down. */
@@ -113,9 +112,8 @@ static uint32_t best_fan(const double *flat, size_t count) {
   double best_shape = 0;
   for (uint32_t apex = 0; apex < count; apex++) {
     double worst = INFINITY;
-    for (size_t i = 1; i + 1 < count; i++) {
+    for (size_t i = 1; i + 1 < count; i++)
       worst = fmin(worst, shape(flat, apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count)));
-    }
     if (apex == 0 || is_better(worst, best_shape)) {
       best_shape = worst;
       best = apex;

@@ -46,9 +46,8 @@ bool qmat_file_holds(const char *path, const qmat_file_part *part) {
 /* Whether the part can be written, and whether its file already has the same bytes. */
 static qmat_status check_target(qmat_context *context, const qmat_file_part *bytes, bool is_side, saved_part *part) {
   struct stat about;
-  if (stat(part->final, &about) != 0) {
+  if (stat(part->final, &about) != 0)
     return errno == ENOENT ? QMAT_OK : qmat_fail_io(context, part->final, "cannot write the file", errno);
-  }
   if (!S_ISREG(about.st_mode)) {
     return qmat_fail_file(context, QMAT_ERROR_IO, part->final, "cannot write the file: %s has this name",
                           S_ISDIR(about.st_mode) ? "a folder" : "a pipe or device");
@@ -103,9 +102,8 @@ static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes
   if (file < 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
 
   struct stat about;
-  if (part->replaces && stat(part->final, &about) == 0 && fchmod(file, about.st_mode & 0777) != 0) {
+  if (part->replaces && stat(part->final, &about) == 0 && fchmod(file, about.st_mode & 0777) != 0)
     status = qmat_fail_io(context, part->final, "cannot copy the old file's permissions", errno);
-  }
   for (size_t at = 0; status == QMAT_OK && at < bytes->size;) {
     size_t chunk = bytes->size - at < (size_t)1 << 30 ? bytes->size - at : (size_t)1 << 30;
     ssize_t done = write(file, bytes->bytes + at, chunk);
@@ -115,9 +113,8 @@ static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes
       status = qmat_fail_io(context, part->final, "cannot write the file", errno);
     }
   }
-  if (status == QMAT_OK && fsync(file) != 0 && errno != EINVAL) {
+  if (status == QMAT_OK && fsync(file) != 0 && errno != EINVAL)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
-  }
   if (close(file) != 0 && status == QMAT_OK)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
   return status;
@@ -135,9 +132,8 @@ static void flush_folder(const char *path, size_t folder_length) {
 }
 
 static qmat_status check_part_names(qmat_context *context, const qmat_file *file, const char *main_name) {
-  if (file->part_count == 0 || file->parts[0].name[0] != '\0') {
+  if (file->part_count == 0 || file->parts[0].name[0] != '\0')
     return qmat_fail(context, QMAT_ERROR_INTERNAL, "the file to be saved has no main part");
-  }
   for (size_t i = 1; i < file->part_count; i++) {
     const char *name = file->parts[i].name;
     if (!qmat_is_part_name(name))
@@ -155,9 +151,8 @@ static qmat_status check_part_names(qmat_context *context, const qmat_file *file
 qmat_status qmat_file_save(qmat_context *context, const qmat_file *file, const char *path) {
   const char *slash = strrchr(path, '/');
   size_t folder_length = slash ? (size_t)(slash - path) + 1 : 0;
-  if (path[folder_length] == '\0') {
+  if (path[folder_length] == '\0')
     return qmat_fail_file(context, QMAT_ERROR_IO, path, "'%s' is not the name of an output file", path);
-  }
   qmat_status status = check_part_names(context, file, path + folder_length);
   if (status != QMAT_OK) return status;
 

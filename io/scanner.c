@@ -265,9 +265,8 @@ qmat_status qmat_scan_integer(qmat_scanner *scanner, const char *what, int64_t l
   } else {
     double real;
     at = qmat_scan_double(scanner->at, scanner->end, &real);
-    if (!at || !ends_token(scanner, at) || !(fabs(real) <= 9.0e15) || real != floor(real)) {
+    if (!at || !ends_token(scanner, at) || !(fabs(real) <= 9.0e15) || real != floor(real))
       return fail_token(scanner, what, "not a whole number");
-    }
     value = (int64_t)real;
   }
   if (value < least || value > most) {
@@ -299,9 +298,8 @@ qmat_status qmat_scan_count(qmat_scanner *scanner, const char *what, size_t byte
   int64_t number = 0;
   qmat_status status = qmat_scan_integer(scanner, what, 0, UINT32_MAX - 1, &number);
   if (status != QMAT_OK) return status;
-  if ((uint64_t)number > (qmat_scan_left(scanner) + 1) / bytes_each) {
+  if ((uint64_t)number > (qmat_scan_left(scanner) + 1) / bytes_each)
     return qmat_scan_fail(scanner, "%s is %lld, more than the file can hold", what, (long long)number);
-  }
   *count = (size_t)number;
   return QMAT_OK;
 }

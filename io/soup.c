@@ -99,14 +99,12 @@ static void move_ids(uint32_t *ids, size_t count, size_t by) {
 
 qmat_status qmat_soup_add_cage(qmat_context *context, qmat_soup *soup, const qmat_cage *cage) {
   qmat_cage *to = &soup->cage;
-  if (cage->vertex_count > UINT32_MAX - to->vertex_count || cage->face_count > UINT32_MAX - to->face_count) {
+  if (cage->vertex_count > UINT32_MAX - to->vertex_count || cage->face_count > UINT32_MAX - to->face_count)
     return qmat_fail_memory(context, "more than 2^32 - 1 vertices of cages");
-  }
   for (size_t row = 0; row < QMAT_CAGE_ARRAYS; row++) {
     const size_t before = cage_count(to, row), more = cage_count(cage, row), bytes = cage_arrays[row].bytes;
-    if (qmat_grow(cage_array(to, row), &soup->cage_capacities[row], before + more, bytes) != 0) {
+    if (qmat_grow(cage_array(to, row), &soup->cage_capacities[row], before + more, bytes) != 0)
       return qmat_fail_memory(context, "the cages of subdivision surfaces");
-    }
     if (more > 0) memcpy((char *)*cage_array(to, row) + before * bytes, cage_items(cage, row), more * bytes);
   }
   move_ids(to->corners + to->corner_count, cage->corner_count, to->vertex_count);
@@ -264,9 +262,8 @@ static qmat_status check_facets(conversion *c) {
       hash += qmat_hash_mix(corners[k] + UINT64_C(0x9e3779b97f4a7c15)); /* the same in any order */
     }
     if (twice != NONE) {
-      if (!c->drops_defects) {
+      if (!c->drops_defects)
         qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet names vertex %u twice (counted from 0)", twice);
-      }
       qmat_status status = refuse_or_drop(c, f);
       if (status != QMAT_OK) return status;
       continue;
@@ -368,9 +365,7 @@ static qmat_status triangulate(conversion *c) {
       qmat_status status = qmat_progress(c->context, f, soup->facet_count, "facets");
       if (status != QMAT_OK) return status;
     }
-    for (size_t k = 0; k < count; k++) {
-      memcpy(points + 3 * k, soup->positions + 3 * (size_t)ids[k], 3 * sizeof *points);
-    }
+    for (size_t k = 0; k < count; k++) memcpy(points + 3 * k, soup->positions + 3 * (size_t)ids[k], 3 * sizeof *points);
     if (!qmat_polygon_triangulate(points, ids, count, flat, links, cuts)) {
       qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet is a concave polygon of %zu corners; at most %d are cut",
                 count, QMAT_LARGEST_CONCAVE_POLYGON);

@@ -87,14 +87,9 @@ static const char *const exceed_choices[] = {"stop", "raise", NULL};
 
 static const qmat_param params[] = {
     QMAT_ERROR_PARAM,
-    {.name = "on_exceed",
-     .unit = "",
-     .doc = "When the threshold rises: for the cheapest collapse that exceeds it (as in the paper), or when no other "
-            "is left",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_EXCEED_RAISE - QMAT_EXCEED_STOP,
-     .choices = exceed_choices,
-     .offset = offsetof(qmat_simplify_params, on_exceed)},
+    QMAT_ENUM(qmat_simplify_params, on_exceed, exceed_choices, QMAT_EXCEED_RAISE - QMAT_EXCEED_STOP,
+              "When the threshold rises: for the cheapest collapse that exceeds it (as in the paper), or when no other "
+              "is left"),
     QMAT_COLLAPSE_PARAMS,
     {0},
 };

@@ -51,23 +51,10 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 }
 
 static const qmat_param params[] = {
-    {.name = "vertices",
-     .unit = "spheres",
-     .doc = "The least number of medial spheres; 0: any number",
-     .type = QMAT_PARAM_INT,
-     .default_number = 0,
-     .min = 0,
-     .max = 4294967294.0,
-     .offset = offsetof(medial_lod_params, vertices)},
-    {.name = "epsilon",
-     .unit = "diagonal",
-     .doc = "The largest distance between surface and envelope; 0: no bound",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.01,
-     .min = 0,
-     .max = 1,
-     .flags = QMAT_PARAM_RELATIVE,
-     .offset = offsetof(medial_lod_params, epsilon)},
+    QMAT_INT(medial_lod_params, vertices, "spheres", 0, 0, 4294967294.0,
+             "The least number of medial spheres; 0: any number"),
+    QMAT_LENGTH(medial_lod_params, epsilon, 0.01, 0, 1,
+                "The largest distance between surface and envelope; 0: no bound"),
     {0},
 };
 

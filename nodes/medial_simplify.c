@@ -617,44 +617,18 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
 }
 
 static const char *const exceed_rules[] = {"skip", "stop", "raise", NULL};
-#define AT(field) offsetof(qmat_simplify_params, field)
-
 static const qmat_param params[] = {
-    {.name = "epsilon",
-     .unit = "diagonal",
-     .doc = "The largest distance between the surface and the envelope, either way; 0: no bound",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.01,
-     .min = 0,
-     .max = 1,
-     .flags = QMAT_PARAM_RELATIVE,
-     .offset = AT(epsilon)},
-    {.name = "vertices",
-     .unit = "spheres",
-     .doc = "Stop at this number of medial spheres; 0: no such stop",
-     .type = QMAT_PARAM_INT,
-     .default_number = 0,
-     .min = 0,
-     .max = 4294967294.0,
-     .offset = AT(vertices)},
+    QMAT_LENGTH(qmat_simplify_params, epsilon, 0.01, 0, 1,
+                "The largest distance between the surface and the envelope, either way; 0: no bound"),
+    QMAT_INT(qmat_simplify_params, vertices, "spheres", 0, 0, 4294967294.0,
+             "Stop at this number of medial spheres; 0: no such stop"),
     QMAT_ERROR_PARAM,
-    {.name = "on_exceed",
-     .unit = "",
-     .doc =
-         "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise the threshold up to it",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_EXCEED_SKIP,
-     .choices = exceed_rules,
-     .offset = AT(on_exceed)},
+    QMAT_ENUM(
+        qmat_simplify_params, on_exceed, exceed_rules, QMAT_EXCEED_SKIP,
+        "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise the threshold up to it"),
     QMAT_COLLAPSE_PARAMS,
-    {.name = "refits",
-     .unit = "passes",
-     .doc = "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses",
-     .type = QMAT_PARAM_INT,
-     .default_number = 8,
-     .min = 0,
-     .max = 1000,
-     .offset = AT(refits)},
+    QMAT_INT(qmat_simplify_params, refits, "passes", 8, 0, 1000,
+             "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses"),
     {0},
 };
 

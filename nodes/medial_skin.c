@@ -273,9 +273,8 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
                                     (json_int_t)s->grid.refined_cell_count, "smallest_radius", s->grid.smallest_radius,
                                     "raised_radii", (json_int_t)s->grid.raised_sphere_count)
                         : json_pack("{s:I}", "balls", (json_int_t)s->ball_count);
-  if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details)) {
+  if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details))
     status = qmat_fail_memory(s->context, "the report");
-  }
   json_decref(root);
   json_decref(details);
   return status;
@@ -327,53 +326,18 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 static const char *const methods[] = {"envelope", "skin_surface", NULL};
 
 static const qmat_param params[] = {
-    {.name = "method",
-     .unit = "",
-     .doc = "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = METHOD_ENVELOPE,
-     .choices = methods,
-     .offset = offsetof(medial_skin_params, method)},
-    {.name = "resolution",
-     .unit = "cells",
-     .doc = "envelope: largest cells along the diagonal of the envelope's bounding box",
-     .type = QMAT_PARAM_INT,
-     .default_number = 128,
-     .min = 8,
-     .max = 2048,
-     .offset = offsetof(medial_skin_params, resolution)},
-    {.name = "detail",
-     .unit = "halvings",
-     .doc = "envelope: cells are halved up to this many times where medial radii are small",
-     .type = QMAT_PARAM_INT,
-     .default_number = 3,
-     .min = 0,
-     .max = 6,
-     .offset = offsetof(medial_skin_params, detail)},
-    {.name = "shrink",
-     .unit = "1",
-     .doc = "skin_surface: near 1 the union of the balls, near 0 smoother and fuller between them",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.5,
-     .min = 0.05,
-     .max = 0.95,
-     .offset = offsetof(medial_skin_params, shrink)},
-    {.name = "spacing",
-     .unit = "radius",
-     .doc = "skin_surface: the largest step between balls along cones and slabs, relative to their radius",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.75,
-     .min = 0.02,
-     .max = 10,
-     .offset = offsetof(medial_skin_params, spacing)},
-    {.name = "subdivisions",
-     .unit = "steps",
-     .doc = "skin_surface: refinement steps of the mesh; each makes four times as many triangles",
-     .type = QMAT_PARAM_INT,
-     .default_number = 0,
-     .min = 0,
-     .max = 4,
-     .offset = offsetof(medial_skin_params, subdivisions)},
+    QMAT_ENUM(medial_skin_params, method, methods, METHOD_ENVELOPE,
+              "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it"),
+    QMAT_INT(medial_skin_params, resolution, "cells", 128, 8, 2048,
+             "envelope: largest cells along the diagonal of the envelope's bounding box"),
+    QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
+             "envelope: cells are halved up to this many times where medial radii are small"),
+    QMAT_FLOAT(medial_skin_params, shrink, "1", 0.5, 0.05, 0.95,
+               "skin_surface: near 1 the union of the balls, near 0 smoother and fuller between them"),
+    QMAT_FLOAT(medial_skin_params, spacing, "radius", 0.75, 0.02, 10,
+               "skin_surface: the largest step between balls along cones and slabs, relative to their radius"),
+    QMAT_INT(medial_skin_params, subdivisions, "steps", 0, 0, 4,
+             "skin_surface: refinement steps of the mesh; each makes four times as many triangles"),
     {0},
 };
 

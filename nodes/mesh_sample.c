@@ -120,9 +120,8 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
   double *scratch = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *scratch);
   smallest_areas *at_vertices = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *at_vertices);
   if (!scratch || !at_vertices) return qmat_fail_memory(context, "the areas around vertices");
-  for (size_t i = 0; i < mesh->vertex_count; i++) {
+  for (size_t i = 0; i < mesh->vertex_count; i++)
     at_vertices[i] = (smallest_areas){{INFINITY, INFINITY}, {UINT32_MAX, UINT32_MAX}};
-  }
   for (size_t i = 0; i < mesh->triangle_count; i++) {
     const uint32_t *ids = mesh->triangles + 3 * i;
     for (int k = 0; k < 3 && areas[i] > 0; k++) note_area(at_vertices + ids[k], areas[i], (uint32_t)i);
@@ -366,63 +365,18 @@ done:
 }
 
 static const qmat_param params[] = {
-    {.name = "spacing",
-     .unit = "diagonal",
-     .doc = "The largest distance between neighbouring samples on long sides and large facets; 0: eq. 7 alone",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.02,
-     .min = 0,
-     .max = 1,
-     .flags = QMAT_PARAM_RELATIVE,
-     .offset = offsetof(mesh_sample_params, spacing)},
-    {.name = "theta",
-     .unit = "1",
-     .doc = "A facet is thin if its thickness is at most this ratio of the mean (eq. 8)",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.5,
-     .min = 0,
-     .max = 10,
-     .offset = offsetof(mesh_sample_params, theta)},
-    {.name = "n_f",
-     .unit = "samples",
-     .doc = "Extra samples for each thin facet (eq. 7)",
-     .type = QMAT_PARAM_INT,
-     .default_number = 1,
-     .min = 0,
-     .max = 16,
-     .offset = offsetof(mesh_sample_params, n_f)},
-    {.name = "lloyd_rounds",
-     .unit = "rounds",
-     .doc = "Rounds of Lloyd's relaxation on each facet",
-     .type = QMAT_PARAM_INT,
-     .default_number = 5,
-     .min = 0,
-     .max = 100,
-     .offset = offsetof(mesh_sample_params, lloyd_rounds)},
-    {.name = "max_per_facet",
-     .unit = "samples",
-     .doc = "The most samples added to one facet by eq. 7",
-     .type = QMAT_PARAM_INT,
-     .default_number = QMAT_MOST_FACET_SAMPLES,
-     .min = 0,
-     .max = QMAT_MOST_FACET_SAMPLES,
-     .offset = offsetof(mesh_sample_params, max_per_facet)},
-    {.name = "max_samples",
-     .unit = "samples",
-     .doc = "The most samples in all. Beyond it all facets get proportionally fewer; the vertices always stay",
-     .type = QMAT_PARAM_INT,
-     .default_number = 4000000,
-     .min = 0,
-     .max = 100000000,
-     .offset = offsetof(mesh_sample_params, max_samples)},
-    {.name = "seed",
-     .unit = "1",
-     .doc = "Seed of the random points that the relaxation starts from",
-     .type = QMAT_PARAM_INT,
-     .default_number = 0,
-     .min = 0,
-     .max = UINT32_MAX,
-     .offset = offsetof(mesh_sample_params, seed)},
+    QMAT_LENGTH(mesh_sample_params, spacing, 0.02, 0, 1,
+                "The largest distance between neighbouring samples on long sides and large facets; 0: eq. 7 alone"),
+    QMAT_FLOAT(mesh_sample_params, theta, "1", 0.5, 0, 10,
+               "A facet is thin if its thickness is at most this ratio of the mean (eq. 8)"),
+    QMAT_INT(mesh_sample_params, n_f, "samples", 1, 0, 16, "Extra samples for each thin facet (eq. 7)"),
+    QMAT_INT(mesh_sample_params, lloyd_rounds, "rounds", 5, 0, 100, "Rounds of Lloyd's relaxation on each facet"),
+    QMAT_INT(mesh_sample_params, max_per_facet, "samples", QMAT_MOST_FACET_SAMPLES, 0, QMAT_MOST_FACET_SAMPLES,
+             "The most samples added to one facet by eq. 7"),
+    QMAT_INT(mesh_sample_params, max_samples, "samples", 4000000, 0, 100000000,
+             "The most samples in all. Beyond it all facets get proportionally fewer; the vertices always stay"),
+    QMAT_INT(mesh_sample_params, seed, "1", 0, 0, UINT32_MAX,
+             "Seed of the random points that the relaxation starts from"),
     {0},
 };
 

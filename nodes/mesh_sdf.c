@@ -131,9 +131,8 @@ static qmat_status collect_vertex_facets(qmat_context *context, const qmat_mesh 
   size_t *offsets = around->offsets;
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) offsets[mesh->triangles[i] + 2]++;
   for (size_t v = 0; v < mesh->vertex_count; v++) offsets[v + 2] += offsets[v + 1];
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
     around->facets[offsets[mesh->triangles[i] + 1]++] = (uint32_t)(i / 3);
-  }
   return QMAT_OK;
 }
 
@@ -329,33 +328,12 @@ done:
 }
 
 static const qmat_param params[] = {
-    {.name = "cone_angle",
-     .unit = "degrees",
-     .doc = "Full angle of the cone of rays around the inward normal",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 120,
-     .min = 10,
-     .max = 170,
-     .offset = offsetof(mesh_sdf_params, cone_angle)},
-    {.name = "rays",
-     .unit = "rays",
-     .doc = "Rays per facet; a single one follows the inward normal",
-     .type = QMAT_PARAM_INT,
-     .default_number = 30,
-     .min = 1,
-     .max = MOST_RAYS,
-     .offset = offsetof(mesh_sdf_params, rays)},
-    {.name = "spacing",
-     .unit = "diagonal",
-     .doc =
-         "Coplanar facets with centroids nearer than this share one value if the solid is at least ten times as thick "
-         "as their distance; 0: every facet is measured",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 0.002,
-     .min = 0,
-     .max = 0.1,
-     .flags = QMAT_PARAM_RELATIVE,
-     .offset = offsetof(mesh_sdf_params, spacing)},
+    QMAT_FLOAT(mesh_sdf_params, cone_angle, "degrees", 120, 10, 170,
+               "Full angle of the cone of rays around the inward normal"),
+    QMAT_INT(mesh_sdf_params, rays, "rays", 30, 1, MOST_RAYS, "Rays per facet; a single one follows the inward normal"),
+    QMAT_LENGTH(mesh_sdf_params, spacing, 0.002, 0, 0.1,
+                "Coplanar facets with centroids nearer than this share one value if the solid is at least ten times as "
+                "thick as their distance; 0: every facet is measured"),
     {0},
 };
 

@@ -275,13 +275,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 static const char *const choices[] = {[PARTS_UNION] = "union", [PARTS_KEEP] = "keep", NULL};
 
 static const qmat_param params[] = {
-    {.name = "parts",
-     .unit = "",
-     .doc = "Closed parts that intersect are replaced by their union, or kept as they are",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = PARTS_UNION,
-     .choices = choices,
-     .offset = offsetof(mesh_unite_params, parts)},
+    QMAT_ENUM(mesh_unite_params, parts, choices, PARTS_UNION,
+              "Closed parts that intersect are replaced by their union, or kept as they are"),
     {0},
 };
 

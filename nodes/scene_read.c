@@ -24,13 +24,8 @@ static const qmat_param params[] = {
      .type = QMAT_PARAM_STRING,
      .default_text = "all",
      .offset = offsetof(scene_read_params, mesh)},
-    {.name = "defects",
-     .doc = "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped",
-     .unit = "",
-     .type = QMAT_PARAM_ENUM,
-     .default_number = QMAT_DEFECTS_REFUSE,
-     .choices = defects_choices,
-     .offset = offsetof(scene_read_params, defects)},
+    QMAT_ENUM(scene_read_params, defects, defects_choices, QMAT_DEFECTS_REFUSE,
+              "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped"),
     {0}};
 
 enum { SCENE, MESH, REPORT };

@@ -40,14 +40,8 @@ done:
 }
 
 static const qmat_param params[] = {
-    {.name = "factor",
-     .unit = "1",
-     .doc = "What lengths are multiplied by: 0.001 turns millimetres into metres",
-     .type = QMAT_PARAM_FLOAT,
-     .default_number = 1,
-     .min = 1e-12,
-     .max = 1e12,
-     .offset = offsetof(mesh_scale_params, factor)},
+    QMAT_FLOAT(mesh_scale_params, factor, "1", 1, 1e-12, 1e12,
+               "What lengths are multiplied by: 0.001 turns millimetres into metres"),
     {0},
 };
 

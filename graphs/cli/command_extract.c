@@ -20,9 +20,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has none of the known endings: .ma, .ply", qmat_show(to).text);
     return qmat_fail_field(context, "--output");
   }
-  if (qmat_same_file(from, to)) {
+  if (qmat_same_file(from, to))
     return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' would overwrite the file that is read", qmat_show(to).text);
-  }
   qmat_medial *medial;
   qmat_file *file = NULL;
   qmat_status status = qmat_medial_extract(context, from, qmat_invocation_value(invocation, "node"), &medial, NULL);

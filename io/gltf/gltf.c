@@ -52,9 +52,8 @@ static qmat_status read_triangles(qmat_context *context, const qmat_gltf_documen
   qmat_gltf_counts counts;
   qmat_gltf_bytes *buffers = qmat_alloc(document->buffer_count, sizeof *buffers);
   if (!buffers) return qmat_fail_memory(context, "a glTF asset");
-  for (size_t i = 0; i < document->buffer_count; i++) {
+  for (size_t i = 0; i < document->buffer_count; i++)
     buffers[i] = (qmat_gltf_bytes){.bytes = document->buffers[i].bytes, .size = document->buffers[i].size};
-  }
   target to = {.context = context, .soups = soups};
   size_t most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * document->data_size;
   qmat_status status = qmat_gltf_triangles(context, document->text, document->text_length, buffers, most, meshes,

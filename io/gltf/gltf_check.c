@@ -71,12 +71,10 @@ static qmat_status check_asset(const qmat_gltf_checker *check) {
   const char *version = json_string_value(json_object_get(asset, "version"));
   const char *least = json_string_value(json_object_get(asset, "minVersion"));
   if (!version) return qmat_gltf_fail(check, NULL, 0, "not a glTF asset: asset.version is missing");
-  if (strncmp(version, "2.", 2) != 0) {
+  if (strncmp(version, "2.", 2) != 0)
     return qmat_gltf_fail(check, NULL, 0, "glTF version %.20s is not supported; 2.0 is", version);
-  }
-  if (least && strcmp(least, "2.0") != 0) {
+  if (least && strcmp(least, "2.0") != 0)
     return qmat_gltf_fail(check, NULL, 0, "the asset asks for glTF %.20s; 2.0 is supported", least);
-  }
   return check_extensions(check);
 }
 
@@ -120,9 +118,8 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
   if (status == QMAT_OK) status = qmat_gltf_asset_init(context, bytes, size, path, &check.asset);
   check.root = check.asset.root;
   if (status == QMAT_OK) status = check_asset(&check);
-  for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++) {
+  for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++)
     status = check_root_array(&check, arrays[i][0], arrays[i][1]);
-  }
   if (status == QMAT_OK) status = qmat_gltf_check_data(&check);
   if (status == QMAT_OK) status = qmat_gltf_check_meshes(&check);
   if (status == QMAT_OK) status = qmat_gltf_check_skins(&check);

@@ -46,9 +46,8 @@ static qmat_status load_external(const qmat_gltf_checker *check, size_t index, c
 static qmat_status load_data_uri(const qmat_gltf_checker *check, size_t index, const char *uri, size_t uri_length) {
   qmat_gltf_buffer *buffer = &check->document->buffers[index];
   const char *comma = memchr(uri, ',', uri_length);
-  if (!comma || comma - uri < 12 || memcmp(comma - 7, ";base64", 7) != 0) {
+  if (!comma || comma - uri < 12 || memcmp(comma - 7, ";base64", 7) != 0)
     return qmat_gltf_fail(check, "buffer", index, "its data URI is not base64");
-  }
   size_t length = uri_length - (size_t)(comma + 1 - uri);
   qmat_status status = qmat_base64_decode(check->context, comma + 1, length, &buffer->owned, &buffer->size);
   if (status != QMAT_OK) {
@@ -105,15 +104,12 @@ static qmat_status check_views(qmat_gltf_checker *check) {
     int64_t buffer = 0, offset = 0, length = 0, stride = 0;
     bool present;
     qmat_status status = qmat_gltf_take_id(check, object, "buffer", "bufferView", i, "buffers", &buffer, NULL);
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = qmat_gltf_take_whole(check, object, "byteOffset", "bufferView", i, 0, UINT32_MAX, &offset, &present);
-    }
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = qmat_gltf_take_whole(check, object, "byteLength", "bufferView", i, 1, UINT32_MAX, &length, NULL);
-    }
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = qmat_gltf_take_whole(check, object, "byteStride", "bufferView", i, 4, 252, &stride, &present);
-    }
     if (status != QMAT_OK) return status;
     if (stride % 4 != 0)
       return qmat_gltf_fail(check, "bufferView", i, "byteStride %lld is no multiple of 4", (long long)stride);
@@ -164,23 +160,20 @@ static qmat_status check_sparse(const qmat_gltf_checker *check, size_t index, js
   for (int k = 0; k < 2 && status == QMAT_OK; k++) {
     json_t *part = k ? values : indices;
     status = qmat_gltf_take_id(check, part, "bufferView", "accessor", index, "bufferViews", &view_id[k], NULL);
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = qmat_gltf_take_whole(check, part, "byteOffset", "accessor", index, 0, INT32_MAX, &offset[k], &present);
-    }
   }
   if (status == QMAT_OK) {
     status = qmat_gltf_take_whole(check, indices, "componentType", "accessor", index, QMAT_GLTF_BYTE, QMAT_GLTF_FLOAT,
                                   &type, NULL);
   }
   if (status != QMAT_OK) return status;
-  if (type != QMAT_GLTF_UNSIGNED_BYTE && type != QMAT_GLTF_UNSIGNED_SHORT && type != QMAT_GLTF_UNSIGNED_INT) {
+  if (type != QMAT_GLTF_UNSIGNED_BYTE && type != QMAT_GLTF_UNSIGNED_SHORT && type != QMAT_GLTF_UNSIGNED_INT)
     return qmat_gltf_fail(check, "accessor", index, "sparse.indices.componentType must be 5121, 5123 or 5125");
-  }
   int64_t index_size = (int64_t)qmat_gltf_component_size(type);
   status = check_range(check, index, "sparse.indices: ", view_id[0], offset[0], count, index_size, index_size);
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = check_range(check, index, "sparse.values: ", view_id[1], offset[1], count, size, size);
-  }
   qmat_gltf_keep_keys(sparse, keys);
   qmat_gltf_keep_keys(indices, part_keys);
   qmat_gltf_keep_keys(values, part_keys);
@@ -210,15 +203,12 @@ static qmat_status check_accessor(const qmat_gltf_checker *check, size_t index, 
   bool present;
   qmat_status status = qmat_gltf_take_whole(check, object, "componentType", "accessor", index, QMAT_GLTF_BYTE,
                                             QMAT_GLTF_FLOAT, &out->component_type, NULL);
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_gltf_take_whole(check, object, "count", "accessor", index, 1, UINT32_MAX, &out->count, NULL);
-  }
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_gltf_take_whole(check, object, "byteOffset", "accessor", index, 0, UINT32_MAX, &offset, &present);
-  }
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_gltf_take_id(check, object, "bufferView", "accessor", index, "bufferViews", &view_id, &out->has_view);
-  }
   if (status != QMAT_OK) return status;
   if (out->component_type == 5124)
     return qmat_gltf_fail(check, "accessor", index, "componentType 5124 is not allowed in glTF");
@@ -289,8 +279,7 @@ qmat_status qmat_gltf_check_use(const qmat_gltf_checker *check, int64_t id, cons
     return qmat_gltf_fail(check, "accessor", (size_t)id, "its type of %lld components of %lld cannot be %s",
                           (long long)of->components, (long long)of->component_type, what);
   }
-  if (!compressed && !of->has_view && (uint64_t)of->count > check->document->data_size + FREE_ZEROS) {
+  if (!compressed && !of->has_view && (uint64_t)of->count > check->document->data_size + FREE_ZEROS)
     return qmat_gltf_fail(check, "accessor", (size_t)id, "asks for %lld elements without data", (long long)of->count);
-  }
   return QMAT_OK;
 }

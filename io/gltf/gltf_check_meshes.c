@@ -29,9 +29,8 @@ static qmat_status check_draco(const qmat_gltf_checker *check, size_t mesh, size
   json_t *extensions, *attributes;
   *draco = NULL;
   qmat_status status = qmat_gltf_take_object(check, primitive, "extensions", "mesh", mesh, &extensions);
-  if (status == QMAT_OK && extensions) {
+  if (status == QMAT_OK && extensions)
     status = qmat_gltf_take_object(check, extensions, "KHR_draco_mesh_compression", "mesh", mesh, draco);
-  }
   if (status != QMAT_OK) return status;
   if (!*draco) {
     json_object_del(primitive, "extensions");
@@ -97,9 +96,8 @@ static qmat_status check_attributes(const qmat_gltf_checker *check, size_t mesh,
     char partner[16];
     snprintf(partner, sizeof partner, "%s_%s", joints ? "WEIGHTS" : "JOINTS",
              is_position ? "" : strrchr(name, '_') + 1);
-    if (!is_position && !json_object_get(attributes, partner)) {
+    if (!is_position && !json_object_get(attributes, partner))
       return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: %.40s without %s", index, name, partner);
-    }
   }
   return QMAT_OK;
 }
@@ -111,9 +109,8 @@ static qmat_status check_targets(const qmat_gltf_checker *check, size_t mesh, si
   qmat_status status = qmat_gltf_take_array(check, primitive, "targets", "mesh", mesh, &targets);
   for (size_t t = 0; t < json_array_size(targets) && status == QMAT_OK; t++) {
     json_t *target = json_array_get(targets, t);
-    if (!json_is_object(target)) {
+    if (!json_is_object(target))
       return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: morph target %zu must be an object", index, t);
-    }
     int64_t id = 0;
     bool present;
     status = qmat_gltf_take_id(check, target, "POSITION", "mesh", mesh, "accessors", &id, &present);
@@ -161,9 +158,8 @@ static qmat_status check_primitive(const qmat_gltf_checker *check, size_t mesh, 
     status = qmat_gltf_check_use(check, indices, "indices", 1,
                                  QMAT_GLTF_ALLOW_BYTES | QMAT_GLTF_ALLOW_SHORTS | QMAT_GLTF_ALLOW_UINTS, false);
     if (status != QMAT_OK) return status;
-    if (!check->accessors[indices].has_view) {
+    if (!check->accessors[indices].has_view)
       return qmat_gltf_fail(check, "accessor", (size_t)indices, "holds indices but has no bufferView");
-    }
   }
   status = check_attributes(check, mesh, index, attributes, json_object_get(draco, "attributes"), position);
   if (status == QMAT_OK) status = check_targets(check, mesh, index, primitive, position);

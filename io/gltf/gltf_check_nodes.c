@@ -13,12 +13,10 @@ static qmat_status check_node_ids(const qmat_gltf_checker *check, json_t *object
   qmat_status status = qmat_gltf_take_array(check, object, key, kind, element, ids);
   for (size_t i = 0; i < json_array_size(*ids) && status == QMAT_OK; i++) {
     int64_t id;
-    if (!qmat_gltf_whole(json_array_get(*ids, i), 0, INT64_MAX, &id)) {
+    if (!qmat_gltf_whole(json_array_get(*ids, i), 0, INT64_MAX, &id))
       return qmat_gltf_fail(check, kind, element, "%s must hold whole numbers from 0", key);
-    }
-    if ((uint64_t)id >= count) {
+    if ((uint64_t)id >= count)
       return qmat_gltf_fail(check, kind, element, "%s names node %lld, but there are %zu", key, (long long)id, count);
-    }
     if (json_array_set_new(*ids, i, json_integer(id)) != 0) return qmat_gltf_fail_memory(check);
   }
   return status;
@@ -32,9 +30,8 @@ qmat_status qmat_gltf_check_skins(const qmat_gltf_checker *check) {
     int64_t matrices = 0;
     bool present;
     qmat_status status = check_node_ids(check, skin, "joints", "skin", i, &joints);
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = qmat_gltf_take_id(check, skin, "inverseBindMatrices", "skin", i, "accessors", &matrices, &present);
-    }
     if (status != QMAT_OK) return status;
     if (json_array_size(joints) == 0) return qmat_gltf_fail(check, "skin", i, "has no joints");
     if (present) {
@@ -99,9 +96,8 @@ static qmat_status check_trees(const qmat_gltf_checker *check, uint8_t *has_pare
     marks[node] = 1;
     reached++;
     json_t *children = json_object_get(json_array_get(nodes, node), "children");
-    for (size_t k = 0; k < json_array_size(children); k++) {
+    for (size_t k = 0; k < json_array_size(children); k++)
       stack[waiting++] = (size_t)json_integer_value(json_array_get(children, k));
-    }
   }
   size_t missed = 0;
   while (missed < count && marks[missed]) missed++;
@@ -134,9 +130,8 @@ static qmat_status choose_scene(const qmat_gltf_checker *check, uint8_t *has_par
     }
   } else {
     for (size_t i = 0; i < json_array_size(nodes) && status == QMAT_OK; i++) {
-      if (!has_parent[i] && json_array_append_new(roots, json_integer((json_int_t)i)) != 0) {
+      if (!has_parent[i] && json_array_append_new(roots, json_integer((json_int_t)i)) != 0)
         status = qmat_gltf_fail_memory(check);
-      }
     }
   }
   if (status != QMAT_OK) {

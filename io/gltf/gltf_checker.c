@@ -60,9 +60,8 @@ qmat_status qmat_gltf_take_id(const qmat_gltf_checker *check, json_t *object, co
       qmat_gltf_take_whole(check, object, key, kind, element, 0, INT64_MAX, &number, present ? &there : NULL);
   if (present) *present = there;
   if (status != QMAT_OK || !there) return status;
-  if ((uint64_t)number >= count) {
+  if ((uint64_t)number >= count)
     return qmat_gltf_fail(check, kind, element, "%s is %lld, but there are %zu %s", key, (long long)number, count, of);
-  }
   *id = number;
   return QMAT_OK;
 }

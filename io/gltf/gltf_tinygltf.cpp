@@ -77,9 +77,8 @@ Matrix multiply(const Matrix &a, const Matrix &b) {
 
 /* Adds weight * (m * point) to `to`. */
 void add_transformed(const Matrix &m, const double *point, double weight, double *to) {
-  for (size_t row = 0; row < 3; row++) {
+  for (size_t row = 0; row < 3; row++)
     to[row] += weight * (m[row] * point[0] + m[4 + row] * point[1] + m[8 + row] * point[2] + m[12 + row]);
-  }
 }
 
 bool mirrors(const Matrix &m) {
@@ -273,9 +272,8 @@ class Reader {
                     accessor.count);
           fail("accessor", static_cast<size_t>(id));
         }
-        for (size_t c = 0; c < components; c++) {
+        for (size_t c = 0; c < components; c++)
           values[element * components + c] = component_at(from + (i * components + c) * width, type);
-        }
       }
     }
     normalise(accessor, fractions, values);
@@ -325,9 +323,8 @@ class Reader {
         continue;
       }
       const uint32_t a = v[i], b = v[i + 1 + i % 2], c = v[i + 2 - i % 2];
-      if (!same_place(shape, a, b) && !same_place(shape, b, c) && !same_place(shape, a, c)) {
+      if (!same_place(shape, a, b) && !same_place(shape, b, c) && !same_place(shape, a, c))
         add_triangle(shape, a, b, c);
-      }
     }
   }
 
@@ -519,9 +516,8 @@ qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t 
     qmat_tinygltf::Model model;
     qmat_tinygltf::TinyGLTF loader;
     std::string errors, warnings;
-    if (!loader.LoadASCIIFromString(&model, &errors, &warnings, text, static_cast<unsigned int>(text_length), "")) {
+    if (!loader.LoadASCIIFromString(&model, &errors, &warnings, text, static_cast<unsigned int>(text_length), ""))
       return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "tinygltf: %s", errors.c_str());
-    }
     Reader reader(context, model, buffers, most, sink, user, counts);
     if (meshes) {
       reader.read_meshes(meshes, mesh_count);

@@ -50,9 +50,8 @@ static qmat_status read_rows(qmat_scanner *scanner, const size_t counts[3], doub
                             "the file ends after %zu of %zu spheres, %zu of %zu edges and %zu of %zu triangles",
                             read[0], counts[0], read[1], counts[1], read[2], counts[2]);
     }
-    if (read[kind] == counts[kind]) {
+    if (read[kind] == counts[kind])
       return qmat_scan_fail(scanner, "there are more than the %zu %ss of the header", counts[kind], names[kind]);
-    }
     size_t row = read[kind]++;
     qmat_status status = kind == 0   ? read_sphere(scanner, spheres + 4 * row)
                          : kind == 1 ? read_simplex(scanner, names[1], 2, counts[0], edges + 2 * row)

@@ -44,9 +44,8 @@ static qmat_status read_facet(qmat_scanner *scanner, qmat_soup *soup, uint32_t *
     const qmat_scanner here = *scanner;
     size_t length;
     const char *token = qmat_scan_token_on_line(scanner, &length);
-    if (qmat_grow((void **)corners, capacity, count + 1, sizeof **corners) != 0) {
+    if (qmat_grow((void **)corners, capacity, count + 1, sizeof **corners) != 0)
       return qmat_fail_memory(scanner->context, "the corners of a facet");
-    }
     qmat_status status = read_corner(&here, token, length, soup->vertex_count, &(*corners)[count++]);
     if (status != QMAT_OK) return qmat_fail_element(scanner->context, "facet", (int64_t)soup->facet_count);
   }

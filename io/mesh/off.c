@@ -28,9 +28,8 @@ static qmat_status read_keyword(qmat_scanner *scanner) {
                           four ? "4" : "n");
   }
   qmat_scanner ahead = *scanner;
-  if (qmat_scan_find_on_line(&ahead) && qmat_scan_word(&ahead, "BINARY")) {
+  if (qmat_scan_find_on_line(&ahead) && qmat_scan_word(&ahead, "BINARY"))
     return qmat_scan_fail(scanner, "binary OFF is not supported");
-  }
   return QMAT_OK;
 }
 
@@ -59,9 +58,8 @@ static qmat_status read_facets(qmat_scanner *scanner, size_t count, qmat_soup *s
     size_t size = 0;
     status = qmat_scan_count(scanner, "the number of corners of a facet", 2, &size);
     const int line = scanner->line;
-    if (status == QMAT_OK && qmat_grow((void **)&corners, &capacity, size, sizeof *corners) != 0) {
+    if (status == QMAT_OK && qmat_grow((void **)&corners, &capacity, size, sizeof *corners) != 0)
       status = qmat_fail_memory(scanner->context, "the corners of a facet");
-    }
     for (size_t k = 0; k < size && status == QMAT_OK; k++) {
       int64_t vertex = 0;
       status = qmat_scan_integer(scanner, "a vertex index", 0, (int64_t)soup->vertex_count - 1, &vertex);

@@ -73,9 +73,8 @@ static qmat_status read_format(ply *p) {
   const char *token = qmat_scan_token_on_line(&p->scanner, &length);
   p->ascii = qmat_is_word(token, length, "ascii");
   p->reader.big_endian = qmat_is_word(token, length, "binary_big_endian");
-  if (!p->ascii && !p->reader.big_endian && !qmat_is_word(token, length, "binary_little_endian")) {
+  if (!p->ascii && !p->reader.big_endian && !qmat_is_word(token, length, "binary_little_endian"))
     return expected(p, token, "ascii, binary_little_endian or binary_big_endian");
-  }
   token = qmat_scan_token_on_line(&p->scanner, &length);
   if (!qmat_is_word(token, length, "1.0")) return expected(p, token, "version 1.0");
   return QMAT_OK;
@@ -85,14 +84,12 @@ static qmat_status read_element(ply *p) {
   size_t length;
   const char *token = qmat_scan_token_on_line(&p->scanner, &length);
   if (length == 0) return expected(p, token, "the name of an element");
-  if (qmat_grow((void **)&p->elements, &p->element_capacity, p->element_count + 1, sizeof *p->elements) != 0) {
+  if (qmat_grow((void **)&p->elements, &p->element_capacity, p->element_count + 1, sizeof *p->elements) != 0)
     return qmat_fail_memory(p->context, "the header");
-  }
   element *e = &p->elements[p->element_count];
   *e = (element){.first_property = p->property_count, .line = p->scanner.line};
-  for (size_t i = 0; i < length && i < sizeof e->name - 1; i++) {
+  for (size_t i = 0; i < length && i < sizeof e->name - 1; i++)
     e->name[i] = token[i] >= ' ' && token[i] <= '~' ? token[i] : '?';
-  }
   if (qmat_is_word(token, length, "vertex")) e->kind = VERTEX;
   if (qmat_is_word(token, length, "face")) e->kind = FACE;
   if (qmat_is_word(token, length, "tristrips")) e->kind = STRIPS;
@@ -125,21 +122,18 @@ static qmat_status read_property(ply *p) {
   if (property.type == NO_SCALAR) return expected(p, token, "a type");
   token = qmat_scan_token_on_line(&p->scanner, &length);
   if (length == 0) return expected(p, token, "the name of a property");
-  if (e->kind == VERTEX && !list && length == 1 && token[0] >= 'x' && token[0] <= 'z') {
+  if (e->kind == VERTEX && !list && length == 1 && token[0] >= 'x' && token[0] <= 'z')
     property.role = (role)(X + (token[0] - 'x'));
-  }
   if ((e->kind == FACE || e->kind == STRIPS) && list &&
       (qmat_is_word(token, length, "vertex_indices") || qmat_is_word(token, length, "vertex_index"))) {
     property.role = CORNERS;
   }
   for (size_t i = e->first_property; property.role != OTHER && i < p->property_count; i++) {
-    if (p->properties[i].role == property.role) {
+    if (p->properties[i].role == property.role)
       return qmat_scan_fail(&p->scanner, "duplicate property '%.*s'", (int)length, token);
-    }
   }
-  if (qmat_grow((void **)&p->properties, &p->property_capacity, p->property_count + 1, sizeof *p->properties) != 0) {
+  if (qmat_grow((void **)&p->properties, &p->property_capacity, p->property_count + 1, sizeof *p->properties) != 0)
     return qmat_fail_memory(p->context, "the header");
-  }
   p->properties[p->property_count++] = property;
   e->property_count++;
   e->has_list = e->has_list || list;
@@ -180,9 +174,8 @@ static qmat_status check_header(ply *p, uint64_t left) {
     for (int k = X; e->kind == VERTEX && k <= Z; k++) {
       if (!has_role(p, e, (role)k)) return fail_element(p, e, "lacks one of the properties x, y and z");
     }
-    if ((e->kind == FACE || e->kind == STRIPS) && !has_role(p, e, CORNERS)) {
+    if ((e->kind == FACE || e->kind == STRIPS) && !has_role(p, e, CORNERS))
       return fail_element(p, e, "lacks the list property vertex_indices");
-    }
     vertices = vertices || e->kind == VERTEX;
     facets = facets || e->kind == FACE || e->kind == STRIPS;
   }
@@ -307,15 +300,13 @@ static qmat_status read_list(ply *p, const element *e, uint64_t index, const pro
   const size_t count = (size_t)number;
   if (q->role != CORNERS) {
     if (!p->ascii) qmat_take_bytes(&p->reader, count * size);
-    for (size_t i = 0; p->ascii && i < count && status == QMAT_OK; i++) {
+    for (size_t i = 0; p->ascii && i < count && status == QMAT_OK; i++)
       status = qmat_scan_number(&p->scanner, "an item of a list", &number);
-    }
     return status == QMAT_OK ? status : qmat_fail_element(p->context, e->name, (int64_t)index);
   }
 
-  if (qmat_grow((void **)&p->corners, &p->corner_capacity, count, sizeof *p->corners) != 0) {
+  if (qmat_grow((void **)&p->corners, &p->corner_capacity, count, sizeof *p->corners) != 0)
     return qmat_fail_memory(p->context, "the corners of a facet");
-  }
   for (size_t i = 0; i < count; i++) {
     status = next_scalar(p, q->type, "a vertex index", &number);
     if (status != QMAT_OK) return qmat_fail_element(p->context, e->name, (int64_t)index);
@@ -354,9 +345,8 @@ static qmat_status read_body(ply *p) {
     const element *e = &p->elements[i];
     const uint64_t size = least_size(p, e);
     if (e->kind == ELSE && (size == 0 || (!p->ascii && !e->has_list))) {
-      if (!qmat_take_bytes(&p->reader, (size_t)(size * e->count))) {
+      if (!qmat_take_bytes(&p->reader, (size_t)(size * e->count)))
         return fail_body(p, e, 0, "the file ends within the elements");
-      }
       continue;
     }
     /* Reserves for facets of 4 bytes or more: shorter ones have no valid corners. */
@@ -367,15 +357,12 @@ static qmat_status read_body(ply *p) {
     for (uint64_t k = 0; k < e->count && status == QMAT_OK; k++) status = read_one(p, e, k);
     if (status != QMAT_OK) return status;
   }
-  if (p->ascii) {
-    return qmat_scan_find(&p->scanner) ? qmat_scan_expected(&p->scanner, "the end of the file") : QMAT_OK;
-  }
+  if (p->ascii) return qmat_scan_find(&p->scanner) ? qmat_scan_expected(&p->scanner, "the end of the file") : QMAT_OK;
   /* A line end or zero bytes may follow. Anything else means that the header is wrong. */
   while (qmat_bytes_left(&p->reader) > 0) {
     const uint8_t byte = qmat_take_u8(&p->reader);
-    if (byte != 0 && byte != '\n' && byte != '\r') {
+    if (byte != 0 && byte != '\n' && byte != '\r')
       return qmat_fail_file(p->context, QMAT_ERROR_FORMAT, p->path, "the file continues after its last element");
-    }
   }
   return QMAT_OK;
 }

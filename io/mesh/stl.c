@@ -60,9 +60,8 @@ static qmat_status read_facet(qmat_scanner *scanner, qmat_soup *soup) {
   const int line = scanner->line;
   double points[9], normal;
   qmat_status status = expect(scanner, "normal");
-  for (int k = 0; k < 3 && status == QMAT_OK; k++) {
+  for (int k = 0; k < 3 && status == QMAT_OK; k++)
     status = qmat_scan_number(scanner, "a coordinate of a normal", &normal);
-  }
   if (status == QMAT_OK) status = expect(scanner, "outer");
   if (status == QMAT_OK) status = expect(scanner, "loop");
   for (int k = 0; k < 3 && status == QMAT_OK; k++) {

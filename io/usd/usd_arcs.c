@@ -16,9 +16,8 @@ typedef qmat_usd_node node;
 
 qmat_status qmat_usd_new_node(qmat_usd_composer *c, node *parent, qmat_usd_arc arc, size_t stack, size_t most_specs,
                               node **made) {
-  if (*c->nodes_made >= FREE_NODES + NODES_PER_SPEC * c->files->specs_read || c->node_count >= MOST_ARCS_OF_PRIM) {
+  if (*c->nodes_made >= FREE_NODES + NODES_PER_SPEC * c->files->specs_read || c->node_count >= MOST_ARCS_OF_PRIM)
     return qmat_usd_prim_fail(c->prim, "the scene is larger than its files justify: references multiply");
-  }
   qmat_arena *arena = &c->prim->arena;
   *made = qmat_arena_calloc(arena, 1, sizeof **made);
   if (!*made) return qmat_usd_fail_prim_memory(c->prim);
@@ -106,9 +105,8 @@ static void remove_item(edited_list *list, qmat_usd_type type, const void *item)
 
 /* Inserts items at the front or the end of a list. Items that it already has move, or stay with `only_new`. */
 static bool insert_items(edited_list *list, const qmat_usd_value *items, bool at_front, bool only_new) {
-  if (qmat_grow((void **)&list->items, &list->capacity, list->count + items->count, sizeof *list->items) != 0) {
+  if (qmat_grow((void **)&list->items, &list->capacity, list->count + items->count, sizeof *list->items) != 0)
     return false;
-  }
   for (size_t i = 0; i < items->count && !only_new; i++) remove_item(list, items->type, item_at(items, i));
   size_t at = at_front ? 0 : list->count;
   memmove(list->items + at + items->count, list->items + at, (list->count - at) * sizeof *list->items);
@@ -140,16 +138,14 @@ static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const c
       total += items->count;
     }
     if (!good) return qmat_usd_prim_fail(c->prim, "%s has a value of the wrong type", field);
-    if (total + list->count > MOST_ARCS_OF_PRIM) {
+    if (total + list->count > MOST_ARCS_OF_PRIM)
       return qmat_usd_prim_fail(c->prim, "%s has more than %d items", field, MOST_ARCS_OF_PRIM);
-    }
     if (op->is_explicit) {
       list->count = 0;
       good = insert_items(list, &op->lists[QMAT_USD_EXPLICIT], false, false);
     } else {
-      for (size_t k = 0; k < op->lists[QMAT_USD_DELETED].count; k++) {
+      for (size_t k = 0; k < op->lists[QMAT_USD_DELETED].count; k++)
         remove_item(list, wanted, item_at(&op->lists[QMAT_USD_DELETED], k));
-      }
       good = insert_items(list, &op->lists[QMAT_USD_ADDED], false, true) &&
              insert_items(list, &op->lists[QMAT_USD_PREPENDED], true, false) &&
              insert_items(list, &op->lists[QMAT_USD_APPENDED], false, false);
@@ -184,12 +180,10 @@ static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, 
     const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
     if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
   }
-  if (made->spec_count == 0) {
+  if (made->spec_count == 0)
     return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: there is no such prim", what, qmat_usd_shown(path));
-  }
-  if (made->arcs_deep > QMAT_USD_DEEPEST_ARCS || is_on_the_way(at, made->specs[0])) {
+  if (made->arcs_deep > QMAT_USD_DEEPEST_ARCS || is_on_the_way(at, made->specs[0]))
     return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: it leads back to itself", what, qmat_usd_shown(path));
-  }
   link_node(at, made);
   return qmat_usd_add_arcs(c, made);
 }
@@ -226,9 +220,8 @@ static qmat_status add_references(qmat_usd_composer *c, node *at, qmat_usd_arc a
                                   const char *what) {
   edited_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_REFERENCE, &list);
-  for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
+  for (size_t i = 0; i < list.count && status == QMAT_OK; i++)
     status = add_reference(c, at, arc, field, list.items[i], what);
-  }
   qmat_free(list.items);
   return status;
 }
@@ -301,14 +294,11 @@ static bool has_variant(const node *at, const char *set, const char *name) {
 
 static qmat_status add_variant(qmat_usd_composer *c, node *at, const char *set) {
   bool is_there = false;
-  for (size_t i = 0; i < at->spec_count; i++) {
+  for (size_t i = 0; i < at->spec_count; i++)
     is_there = is_there || qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
-  }
   if (!is_there) return QMAT_OK;
   const char *selection = find_selection(c->prim->tree, set);
-  if (!selection) {
-    return qmat_usd_warn(c->prim, "no variant of '%s' is selected: all are skipped", qmat_usd_shown(set));
-  }
+  if (!selection) return qmat_usd_warn(c->prim, "no variant of '%s' is selected: all are skipped", qmat_usd_shown(set));
   node *made;
   qmat_status status = qmat_usd_new_node(c, at, QMAT_USD_ARC_VARIANT, at->stack, at->spec_count, &made);
   if (status != QMAT_OK) return status;

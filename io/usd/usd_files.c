@@ -144,9 +144,8 @@ static qmat_status open_package(qmat_usd_files *files, const qmat_usd_prim *prim
   if (!made->path) return fail_memory(prim);
   qmat_status status = qmat_usdz_open(prim->log->context, bytes, path, &made->archive);
   if (status != QMAT_OK) return status;
-  if (made->archive.member_count == 0) {
+  if (made->archive.member_count == 0)
     return qmat_fail_file(prim->log->context, QMAT_ERROR_FORMAT, path, "the archive is empty");
-  }
   const qmat_usdz_member *first = &made->archive.members[0];
   *opened = add_file(files, qmat_strdup(first->name), number);
   return *opened ? read_member(files, prim, made, first, *opened) : fail_memory(prim);
@@ -160,9 +159,8 @@ static qmat_status open_member(qmat_usd_files *files, const qmat_usd_prim *prim,
   file *added = add_file(files, path, beside->package);
   if (!added) return fail_memory(prim);
   added->is_missing = !member || is_package(member->bytes, member->size);
-  if (added->is_missing) {
+  if (added->is_missing)
     return qmat_usd_warn(prim, "the %s @%s@ is skipped: it is not in the package", what, qmat_usd_shown(asset));
-  }
   *opened = added;
   return read_member(files, prim, from, member, added);
 }
@@ -219,9 +217,8 @@ static qmat_status find_asset(qmat_usd_files *files, const qmat_usd_prim *prim, 
   }
   qmat_free(path);
   if (!known) return qmat_usd_prim_fail(prim, "the scene has more than %d files", MOST_FILES);
-  if (known->is_missing) {
+  if (known->is_missing)
     return qmat_usd_warn(prim, "the %s @%s@ is skipped: there is no such file", what, qmat_usd_shown(asset));
-  }
   *found = known->first ? known->first : known;
   return QMAT_OK;
 }
@@ -234,12 +231,10 @@ static qmat_status add_to_stack(qmat_usd_files *files, const qmat_usd_prim *prim
   for (size_t i = 0; i < stack->count; i++) {
     if (stack->layers[i] == layer) return QMAT_OK;
   }
-  if (depth > QMAT_USD_DEEPEST_ARCS) {
+  if (depth > QMAT_USD_DEEPEST_ARCS)
     return qmat_usd_prim_fail(prim, "sublayers are nested more than %d deep", QMAT_USD_DEEPEST_ARCS);
-  }
-  if (qmat_grow((void **)&stack->layers, &stack->capacity, stack->count + 1, sizeof *stack->layers) != 0) {
+  if (qmat_grow((void **)&stack->layers, &stack->capacity, stack->count + 1, sizeof *stack->layers) != 0)
     return fail_memory(prim);
-  }
   stack->layers[stack->count++] = layer;
   const qmat_usd_value *names = qmat_usd_field_value(layer->root, "subLayers");
   if (!names || !names->is_array || !qmat_usd_is_text(names->type)) return QMAT_OK;
@@ -258,9 +253,8 @@ static qmat_status find_stack(qmat_usd_files *files, const qmat_usd_prim *prim, 
   for (*found = 0; *found < files->stack_count; ++*found) {
     if (files->stacks[*found].layers[0] == layer) return QMAT_OK;
   }
-  if (qmat_grow((void **)&files->stacks, &files->stack_capacity, files->stack_count + 1, sizeof *files->stacks) != 0) {
+  if (qmat_grow((void **)&files->stacks, &files->stack_capacity, files->stack_count + 1, sizeof *files->stacks) != 0)
     return fail_memory(prim);
-  }
   qmat_usd_stack *stack = &files->stacks[files->stack_count++];
   *stack = (qmat_usd_stack){0};
   return add_to_stack(files, prim, stack, layer, 0);

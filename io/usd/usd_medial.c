@@ -91,9 +91,8 @@ static qmat_status read_simplices(reader *r, qmat_usd_prim *prim) {
   size_t edge_count = 0, triangle_count = 0;
   qmat_status status = read_ids(r, prim, "cones", "primvars:qmat:sphere", 2, &edges, &edge_count);
   if (status == QMAT_OK) status = read_ids(r, prim, "slabs", "faceVertexIndices", 3, &triangles, &triangle_count);
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_medial_set_simplices(r->context, r->medial, edges, edge_count, triangles, triangle_count);
-  }
   qmat_free(edges);
   qmat_free(triangles);
   return status;
@@ -110,9 +109,8 @@ static qmat_status read_facts(reader *r, const qmat_usd_value *data) {
                    : qmat_usd_is_integer(value->type) && is_single ? json_integer(value->integers[0])
                    : qmat_usd_is_number(value->type) && is_single  ? json_real(value->numbers[0])
                                                                    : NULL;
-    if (json && json_object_set_new(r->facts, data->entries[i].name, json) != 0) {
+    if (json && json_object_set_new(r->facts, data->entries[i].name, json) != 0)
       return qmat_fail_memory(r->context, "the facts about a medial mesh");
-    }
   }
   return QMAT_OK;
 }
@@ -121,9 +119,8 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
   qmat_usd_prim spheres = {0};
   bool found;
   qmat_status status = find_child(r, prim, "spheres", &spheres, &found);
-  if (status == QMAT_OK && !found) {
+  if (status == QMAT_OK && !found)
     status = qmat_usd_prim_fail(prim, "the prim has qmat_version in its customData, but no child 'spheres'");
-  }
   if (status == QMAT_OK) {
     r->medial = qmat_medial_new();
     status = r->medial ? read_spheres(r, &spheres, data) : qmat_fail_memory(r->context, "a medial mesh");

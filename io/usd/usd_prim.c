@@ -95,9 +95,8 @@ static bool is_below(const qmat_usd_prim *prim, size_t first_opinion, const char
 qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **names, size_t *count) {
   size_t most = 0;
   for (size_t i = 0; i < prim->opinion_count; i++) {
-    for (const qmat_usd_spec *child = prim->opinions[i].spec->first_child; child; child = child->next) {
+    for (const qmat_usd_spec *child = prim->opinions[i].spec->first_child; child; child = child->next)
       most += child->kind == QMAT_USD_PRIM;
-    }
   }
   const char **made = qmat_arena_alloc(&prim->arena, most, sizeof *made);
   if (!made) return qmat_usd_fail_prim_memory(prim);

@@ -91,9 +91,8 @@ static qmat_status read_sharpness(const qmat_usd_prim *prim, usd_mesh *mesh) {
   size_t total = 0;
   for (size_t i = 0; i < lengths; i++) {
     const int64_t length = mesh->crease_lengths->integers[i];
-    if (length < 2 || (uint64_t)length > indices - total) {
+    if (length < 2 || (uint64_t)length > indices - total)
       return qmat_usd_prim_fail(prim, "crease %zu has %lld vertices", i, (long long)length);
-    }
     total += (size_t)length;
   }
   if (total != indices || (values != lengths && values != indices - lengths)) {
@@ -132,9 +131,8 @@ static qmat_status read_mesh(const qmat_usd_prim *prim, usd_mesh *mesh) {
   if (status == QMAT_OK) status = read_array(prim, "faceVertexIndices", false, 1, &mesh->indices);
   if (status == QMAT_OK) status = read_array(prim, "holeIndices", false, 1, &mesh->holes);
   if (status == QMAT_OK) status = read_token(prim, "orientation", "rightHanded", &handedness);
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = read_choice(prim, "subdivisionScheme", schemes, QMAT_SCHEME_COUNT, QMAT_SCHEME_CATMULL_CLARK, &scheme);
-  }
   if (status == QMAT_OK) {
     status = read_choice(prim, "interpolateBoundary", boundaries, QMAT_BOUNDARY_COUNT, QMAT_BOUNDARY_EDGE_AND_CORNER,
                          &boundary);
@@ -197,9 +195,8 @@ static qmat_status add_faces(reader *r, const usd_mesh *mesh, size_t first_verte
   bool *is_hole = qmat_calloc(faces, sizeof *is_hole);
   uint32_t *corners = qmat_alloc(most, sizeof *corners);
   qmat_status status = is_hole && corners ? QMAT_OK : qmat_fail_memory(r->context, "the faces of a mesh");
-  for (size_t i = 0; status == QMAT_OK && mesh->holes && i < mesh->holes->count; i++) {
+  for (size_t i = 0; status == QMAT_OK && mesh->holes && i < mesh->holes->count; i++)
     is_hole[mesh->holes->integers[i]] = true;
-  }
   for (size_t f = 0; f < faces && status == QMAT_OK; f++) {
     const size_t count = (size_t)mesh->counts->integers[f];
     for (size_t k = 0; k < count; k++) {
@@ -255,9 +252,8 @@ static qmat_status add_cage(reader *r, const usd_mesh *mesh, size_t first_vertex
   for (size_t f = 0; f < faces; f++) {
     const size_t count = (size_t)mesh->counts->integers[f];
     cage.face_sizes[f] = (uint32_t)count;
-    for (size_t k = 0; k < count; k++) {
+    for (size_t k = 0; k < count; k++)
       cage.corners[at + k] = (uint32_t)mesh->indices->integers[at + (turned ? count - 1 - k : k)];
-    }
     at += count;
   }
   for (size_t i = 0; i < holes; i++) cage.holes[i] = (uint32_t)mesh->holes->integers[i];
@@ -300,13 +296,11 @@ static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inheri
   }
   r->elements += elements;
   if (mesh.scheme != QMAT_SCHEME_NONE) r->cages++;
-  if (qmat_usd_prim_has_relationship(prim, "skel:skeleton")) {
+  if (qmat_usd_prim_has_relationship(prim, "skel:skeleton"))
     status = qmat_usd_warn(prim, "its skeleton is ignored: the mesh keeps its modelled pose");
-  }
   r->meshes++;
-  if (status == QMAT_OK) {
+  if (status == QMAT_OK)
     status = qmat_soup_reserve(r->context, r->soup, mesh.points->count, mesh.counts->count, mesh.indices->count);
-  }
   if (status == QMAT_OK) status = add_points(r, &mesh, &state->world);
   /* A mirror turns a left-handed mesh into a right-handed one. */
   const bool turned = mesh.is_left_handed != qmat_usd_mirrors(&state->world);
@@ -423,9 +417,8 @@ static qmat_status fill_report(const reader *r, json_t *report) {
       {"shapes_skipped", r->shapes_skipped},
   };
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-    if (json_object_set_new(report, rows[i].key, json_integer((json_int_t)rows[i].count)) != 0) {
+    if (json_object_set_new(report, rows[i].key, json_integer((json_int_t)rows[i].count)) != 0)
       return qmat_fail_memory(r->context, "a report");
-    }
   }
   /* The defaults are those of USD. */
   const double unit = qmat_usd_number(qmat_usd_field_value(root, "metersPerUnit"), 0.01);

@@ -115,12 +115,10 @@ static void list_opinions(const node *at, bool inherited, bool specialized, bool
                           size_t *count) {
   inherited = inherited || at->arc == QMAT_USD_ARC_INHERIT || at->arc == QMAT_USD_ARC_SPECIALIZE;
   specialized = specialized || at->arc == QMAT_USD_ARC_SPECIALIZE;
-  for (size_t i = 0; i < at->spec_count && specialized == wanted; i++) {
+  for (size_t i = 0; i < at->spec_count && specialized == wanted; i++)
     opinions[(*count)++] = (qmat_usd_opinion){.layer = at->layers[i], .spec = at->specs[i], .is_inherited = inherited};
-  }
-  for (const node *child = at->first_child; child; child = child->next) {
+  for (const node *child = at->first_child; child; child = child->next)
     list_opinions(child, inherited, specialized, wanted, opinions, count);
-  }
 }
 
 static qmat_status finish_prim(composer *c) {
@@ -148,13 +146,11 @@ qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *pare
                                 qmat_usd_prim *child) {
   *child = (qmat_usd_prim){.log = &stage->log, .parent = parent, .name = name, .depth = parent->depth + 1};
   composer c = {.files = &stage->files, .prim = child, .nodes_made = &stage->nodes_made};
-  if (child->depth > QMAT_USD_DEEPEST) {
+  if (child->depth > QMAT_USD_DEEPEST)
     return qmat_usd_prim_fail(child, "prims are nested more than %d deep", QMAT_USD_DEEPEST);
-  }
   qmat_status status = copy_tree(&c, parent->tree, NULL, name, &child->tree);
-  if (status == QMAT_OK && !child->tree) {
+  if (status == QMAT_OK && !child->tree)
     return qmat_fail(stage->log.context, QMAT_ERROR_INTERNAL, "a prim of USD has no opinions");
-  }
   if (status == QMAT_OK) status = add_arcs_of_copies(&c, child->tree);
   if (status == QMAT_OK) status = qmat_usd_add_variants(&c);
   return status == QMAT_OK ? finish_prim(&c) : status;

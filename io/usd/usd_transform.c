@@ -160,18 +160,14 @@ static qmat_status read_operation(const qmat_usd_prim *prim, const char *name, t
   const bool inverted = strncmp(name, invert, sizeof invert - 1) == 0;
   if (inverted) name += sizeof invert - 1;
   *result = qmat_usd_identity();
-  if (strncmp(name, prefix, sizeof prefix - 1) != 0) {
+  if (strncmp(name, prefix, sizeof prefix - 1) != 0)
     return qmat_usd_prim_fail(prim, "'%.80s' is not a transform operation", qmat_usd_shown(name));
-  }
   const char *kind = name + sizeof prefix - 1;
   const size_t length = strcspn(kind, ":"), count = sizeof operations / sizeof operations[0];
   size_t row = 0;
-  while (row < count && (strlen(operations[row].name) != length || memcmp(kind, operations[row].name, length) != 0)) {
+  while (row < count && (strlen(operations[row].name) != length || memcmp(kind, operations[row].name, length) != 0))
     row++;
-  }
-  if (row == count) {
-    return qmat_usd_prim_fail(prim, "'%.80s' is not a transform operation", qmat_usd_shown(name));
-  }
+  if (row == count) return qmat_usd_prim_fail(prim, "'%.80s' is not a transform operation", qmat_usd_shown(name));
   const qmat_usd_value *value;
   qmat_status status = qmat_usd_prim_attribute(prim, name, &value);
   if (status != QMAT_OK) return status;
@@ -189,12 +185,10 @@ qmat_status qmat_usd_read_transform(const qmat_usd_prim *prim, const char *type,
   const qmat_usd_value *order;
   qmat_status status = qmat_usd_prim_attribute(prim, "xformOpOrder", &order);
   if (status != QMAT_OK || !order || order->count == 0) return status;
-  if (!order->is_array || !qmat_usd_is_text(order->type)) {
+  if (!order->is_array || !qmat_usd_is_text(order->type))
     return qmat_usd_prim_fail(prim, "xformOpOrder has a value of the wrong type");
-  }
-  if (type[0] == '\0' || strcmp(type, "Scope") == 0) {
+  if (type[0] == '\0' || strcmp(type, "Scope") == 0)
     return qmat_usd_warn(prim, "its transform is ignored: %s has none", type[0] ? "a Scope" : "a prim without a type");
-  }
   transform local = qmat_usd_identity();
   for (size_t i = 0; i < order->count && status == QMAT_OK; i++) {
     if (strcmp(order->texts[i], "!resetXformStack!") == 0) {

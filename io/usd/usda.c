@@ -36,9 +36,8 @@ static qmat_status take_edit(qmat_usda *p, qmat_usd_spec *spec, const char *name
   if (older && older->type == QMAT_USD_LIST_OP && edit != QMAT_USD_EXPLICIT) {
     *op = *older->list_op;
   } else {
-    for (int i = 0; i < QMAT_USD_EDIT_COUNT; i++) {
+    for (int i = 0; i < QMAT_USD_EDIT_COUNT; i++)
       op->lists[i] = (qmat_usd_value){.type = type, .is_array = true, .components = 1};
-    }
   }
   if (edit == QMAT_USD_EXPLICIT) op->is_explicit = true;
   const qmat_usd_value value = {.type = QMAT_USD_LIST_OP, .components = 1, .count = 1, .list_op = op};
@@ -153,14 +152,11 @@ static qmat_status take_relationship(qmat_usda *p, const statement *s, const qua
   qmat_usd_spec *spec;
   qmat_status status = take_property_name(p, s, q, QMAT_USD_RELATIONSHIP, &spec);
   if (status != QMAT_OK) return status;
-  if (p->scanner.at[0] == '[') {
-    return qmat_scan_fail(&p->scanner, "attributes of relationships are not supported");
-  }
+  if (p->scanner.at[0] == '[') return qmat_scan_fail(&p->scanner, "attributes of relationships are not supported");
   if (p->scanner.at[0] == '.') {
     p->scanner.at++;
-    if (!qmat_usda_accept_word(p, "timeSamples") && !qmat_usda_accept_word(p, "default")) {
+    if (!qmat_usda_accept_word(p, "timeSamples") && !qmat_usda_accept_word(p, "default"))
       return qmat_usda_expected(p, "timeSamples or default");
-    }
     qmat_usd_value value;
     status = qmat_usda_expect(p, '=');
     if (status == QMAT_OK) status = qmat_usda_skip(p, "targets over time", &value);
@@ -182,17 +178,14 @@ static qmat_status take_attribute(qmat_usda *p, const statement *s, const qualif
     p->scanner.at++;
     const bool connect = qmat_usda_accept_word(p, "connect"),
                samples = !connect && qmat_usda_accept_word(p, "timeSamples");
-    if (!connect && !samples && !qmat_usda_accept_word(p, "spline")) {
+    if (!connect && !samples && !qmat_usda_accept_word(p, "spline"))
       return qmat_usda_expected(p, "connect, timeSamples or spline");
-    }
     status = qmat_usda_expect(p, '=');
     if (status == QMAT_OK && connect) {
       status = take_edit(p, spec, "connectionPaths", q->edit, QMAT_USD_PATH);
     } else if (status == QMAT_OK) {
       status = samples ? qmat_usda_take_samples(p, &type, &value) : qmat_usda_skip(p, "spline", &value);
-      if (status == QMAT_OK) {
-        status = qmat_usd_set_field(p->layer, spec, samples ? "timeSamples" : "spline", &value);
-      }
+      if (status == QMAT_OK) status = qmat_usd_set_field(p->layer, spec, samples ? "timeSamples" : "spline", &value);
     }
   } else if (qmat_usda_accept(p, '=')) {
     status = qmat_usda_take_typed(p, &type, &value);
@@ -234,9 +227,8 @@ static qmat_status take_prim(qmat_usda *p, const statement *s, const char *speci
   if (!qmat_usda_at_string(p)) {
     size_t length;
     const char *text = qmat_usda_peek_name(p, &length);
-    while (p->scanner.at + length < p->scanner.end && (qmat_usda_is_name_part(text[length]) || text[length] == '.')) {
+    while (p->scanner.at + length < p->scanner.end && (qmat_usda_is_name_part(text[length]) || text[length] == '.'))
       length++;
-    }
     if (length == 0) return qmat_usda_expected(p, "the type or the name of a prim");
     type_name = qmat_usd_copy(p->layer, text, length);
     if (!type_name) return qmat_usd_layer_error(p->layer);
@@ -248,9 +240,8 @@ static qmat_status take_prim(qmat_usda *p, const statement *s, const char *speci
   for (const char *c = name; *c && good; c++) good = qmat_usda_is_name_part(*c);
   const char *shown = qmat_is_utf8(name) ? name : "?";
   if (!good) return qmat_scan_fail(&s->start, "'%.40s' is not a valid name of a prim", shown);
-  if (qmat_usd_child(p->layer, s->owner, QMAT_USD_PRIM, name)) {
+  if (qmat_usd_child(p->layer, s->owner, QMAT_USD_PRIM, name))
     return qmat_scan_fail(&s->start, "duplicate prim '%.200s'", shown);
-  }
   status = find_or_add(p, s, QMAT_USD_PRIM, name, &spec);
   if (status == QMAT_OK) status = set_text(p, spec, "specifier", specifier);
   if (status == QMAT_OK && type_name) status = set_text(p, spec, "typeName", type_name);
@@ -298,14 +289,12 @@ static qmat_status take_contents(qmat_usda *p, qmat_usd_spec *spec) {
 static qmat_status take_layer(qmat_usda *p) {
   qmat_scanner *scanner = &p->scanner;
   qmat_usd_spec *root = p->layer->root;
-  if (qmat_scan_left(scanner) < 6 || memcmp(scanner->at, "#usda ", 6) != 0) {
+  if (qmat_scan_left(scanner) < 6 || memcmp(scanner->at, "#usda ", 6) != 0)
     return qmat_scan_fail(scanner, "a text layer of USD must start with '#usda 1.0'");
-  }
   double version;
   const char *end = qmat_scan_double(scanner->at + 6, scanner->end, &version);
-  if (!end || !(version >= 1 && version < 2)) {
+  if (!end || !(version >= 1 && version < 2))
     return qmat_scan_fail(scanner, "only version 1 of the text form of USD is supported");
-  }
   scanner->at = end;
   qmat_scan_next_line(scanner);
 

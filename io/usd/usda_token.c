@@ -124,9 +124,8 @@ static qmat_status take_escape(qmat_usda *p, char *c) {
       code = 16 * code + value;
     }
   } else if (*scanner->at >= '0' && *scanner->at <= '7') {
-    for (int i = 0; i < 3 && *scanner->at >= '0' && *scanner->at <= '7'; i++) {
+    for (int i = 0; i < 3 && *scanner->at >= '0' && *scanner->at <= '7'; i++)
       code = 8 * code + (unsigned)(*scanner->at++ - '0');
-    }
   } else {
     *c = *scanner->at;
     step(p);
@@ -156,9 +155,8 @@ qmat_status qmat_usda_take_string(qmat_usda *p, const char **text) {
   scanner->at += triple ? 3 : 1;
   p->text.count = 0;
   for (;;) {
-    if (scanner->at >= scanner->end || (!triple && (*scanner->at == '\n' || *scanner->at == '\r'))) {
+    if (scanner->at >= scanner->end || (!triple && (*scanner->at == '\n' || *scanner->at == '\r')))
       return qmat_scan_fail(&start, "this text has no end");
-    }
     char c = *scanner->at;
     if (c == quote && (!triple || (scanner->at[1] == quote && scanner->at[2] == quote))) break;
     step(p);
@@ -193,9 +191,7 @@ qmat_status qmat_usda_take_asset(qmat_usda *p, const char **asset) {
   p->text.count = 0;
   for (;;) {
     char c = *scanner->at;
-    if (scanner->at >= scanner->end || c == '\0' || c == '\n') {
-      return qmat_scan_fail(&start, "this asset has no end");
-    }
+    if (scanner->at >= scanner->end || c == '\0' || c == '\n') return qmat_scan_fail(&start, "this asset has no end");
     if (!triple && c == '@') break;
     if (triple && strncmp(scanner->at, "@@@", 3) == 0) break;
     scanner->at++;

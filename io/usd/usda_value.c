@@ -54,9 +54,8 @@ static qmat_status take_items(qmat_usda *p, bool is_array, take_item *take, cons
   qmat_status status = qmat_usda_expect(p, '[');
   while (status == QMAT_OK && !qmat_usda_accept(p, ']')) {
     status = take(p, data, list);
-    if (status == QMAT_OK && !qmat_usda_accept(p, ',') && qmat_usda_peek(p) != ']') {
+    if (status == QMAT_OK && !qmat_usda_accept(p, ',') && qmat_usda_peek(p) != ']')
       status = qmat_usda_expected(p, "',' or ']'");
-    }
   }
   return status;
 }
@@ -98,9 +97,8 @@ static bool read_integer(const char *text, const char *end, qmat_usd_type type, 
   if (text == end) return false;
   for (; text < end; text++) {
     if (*text < '0' || *text > '9') return false;
-    if (__builtin_mul_overflow(value, 10, &value) || __builtin_add_overflow(value, (uint64_t)(*text - '0'), &value)) {
+    if (__builtin_mul_overflow(value, 10, &value) || __builtin_add_overflow(value, (uint64_t)(*text - '0'), &value))
       return false;
-    }
   }
   if (type == QMAT_USD_UINT64 && !negative) {
     *integer = (int64_t)value;
@@ -154,9 +152,8 @@ static qmat_status take_tuple(qmat_usda *p, const qmat_usda_type *shape, unsigne
   unsigned items = in_rows ? shape->rows : count;
   for (unsigned i = 0; i < items && status == QMAT_OK; i++) {
     if (i > 0) status = qmat_usda_expect(p, ',');
-    if (status == QMAT_OK) {
+    if (status == QMAT_OK)
       status = in_rows ? take_tuple(p, shape, count / shape->rows, false) : take_number(p, shape->type);
-    }
   }
   if (status == QMAT_OK) qmat_usda_accept(p, ',');
   return status == QMAT_OK ? qmat_usda_expect(p, ')') : status;
@@ -338,9 +335,8 @@ qmat_status qmat_usda_take_any(qmat_usda *p, qmat_usd_value *value) {
   if (c == '(') return qmat_usda_skip(p, "tuple", value);
   if (c == '[') return take_untyped_array(p, value);
   const char *name = qmat_usda_peek_name(p, &length);
-  if (length == 0 || qmat_is_word(name, length, "inf") || qmat_is_word(name, length, "nan")) {
+  if (length == 0 || qmat_is_word(name, length, "inf") || qmat_is_word(name, length, "nan"))
     return take_untyped_number(p, value);
-  }
   if (qmat_usda_accept_word(p, "None")) {
     *value = (qmat_usd_value){.type = QMAT_USD_BLOCK};
     return QMAT_OK;

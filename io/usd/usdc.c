@@ -104,9 +104,8 @@ static qmat_usd_spec *make_variant(const qmat_usdc *c, qmat_usd_spec *parent, co
   qmat_usd_spec *set = qmat_usd_child(c->layer, parent, QMAT_USD_VARIANT_SET, set_name);
   if (!set) set = qmat_usd_add_child(c->layer, parent, QMAT_USD_VARIANT_SET, set_name);
   if (!set || !*name) return set;
-  if (!qmat_usd_child(c->layer, set, QMAT_USD_VARIANT, name)) {
+  if (!qmat_usd_child(c->layer, set, QMAT_USD_VARIANT, name))
     return qmat_usd_add_child(c->layer, set, QMAT_USD_VARIANT, name);
-  }
   fail(c, "two specs have the same path");
   return NULL;
 }
@@ -168,9 +167,8 @@ bool qmat_usdc_is_crate(const qmat_bytes *bytes) {
 }
 
 static qmat_status check_header(qmat_usdc *c, const qmat_bytes *bytes) {
-  if (bytes->size < HEADER_BYTES || !qmat_usdc_is_crate(bytes)) {
+  if (bytes->size < HEADER_BYTES || !qmat_usdc_is_crate(bytes))
     return fail(c, "a binary layer of USD must start with PXR-USDC");
-  }
   const int major = bytes->data[8], minor = bytes->data[9];
   c->version = minor;
   if (major == 0 && minor >= OLDEST_VERSION && minor <= NEWEST_VERSION) return QMAT_OK;
@@ -186,9 +184,7 @@ qmat_status qmat_usdc_read(qmat_context *context, const qmat_bytes *bytes, const
   qmat_status status = qmat_usd_layer_init(context, layer, path, bytes->size);
   if (status == QMAT_OK) status = check_header(&c, bytes);
   if (status == QMAT_OK) status = qmat_usdc_read_tables(&c);
-  if (status == QMAT_OK && qmat_key_table_init(&values.known, 0) != 0) {
-    status = qmat_usd_layer_fail_memory(layer);
-  }
+  if (status == QMAT_OK && qmat_key_table_init(&values.known, 0) != 0) status = qmat_usd_layer_fail_memory(layer);
   if (status == QMAT_OK) status = make_specs(&c, &values);
   qmat_key_table_uninit(&values.known);
   qmat_arena_uninit(&c.scratch);

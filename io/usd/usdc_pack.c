@@ -20,9 +20,8 @@ qmat_status qmat_usdc_unpack(const qmat_usd_layer *layer, const uint8_t *packed,
     size_t block_size = blocks > 0 ? qmat_take_u32(&reader) : qmat_bytes_left(&reader);
     const uint8_t *block = qmat_take_bytes(&reader, block_size);
     size_t room = capacity - *made;
-    if (!block || block_size > LZ4_MAX_INPUT_SIZE) {
+    if (!block || block_size > LZ4_MAX_INPUT_SIZE)
       return qmat_usd_layer_fail(layer, "a packed table or array does not fit into the file");
-    }
     int got = LZ4_decompress_safe((const char *)block, (char *)bytes + *made, (int)block_size,
                                   room < INT32_MAX ? (int)room : INT32_MAX);
     if (got < 0) return qmat_usd_layer_fail(layer, "a packed table or array cannot be unpacked");
@@ -74,9 +73,8 @@ qmat_status qmat_usdc_take_integers(const qmat_usd_layer *layer, qmat_byte_reade
   qmat_status status = qmat_usdc_unpack(layer, packed, packed_size, bytes, most, &size);
   qmat_byte_reader codes = {.bytes = bytes, .size = size}, differences = {.bytes = bytes, .size = size, .at = least};
   if (status == QMAT_OK && size >= least) decode(&codes, &differences, count, width, integers);
-  if (status == QMAT_OK && (size < least || differences.failed)) {
+  if (status == QMAT_OK && (size < least || differences.failed))
     status = qmat_usd_layer_fail(layer, "packed integers unpack to fewer than their count");
-  }
   qmat_free(bytes);
   return status;
 }

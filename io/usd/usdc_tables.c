@@ -24,9 +24,8 @@ static qmat_status open_table(const qmat_usdc *c, const char *name, qmat_byte_re
   if (contents >= c->size) return qmat_usdc_fail_short(c);
   reader.at = (size_t)contents;
   const uint64_t sections = qmat_take_u64(&reader);
-  if (reader.failed || sections > MOST_SECTIONS || qmat_bytes_left(&reader) / SECTION_BYTES < sections) {
+  if (reader.failed || sections > MOST_SECTIONS || qmat_bytes_left(&reader) / SECTION_BYTES < sections)
     return qmat_usdc_fail_short(c);
-  }
   for (uint64_t i = 0; i < sections; i++) {
     const uint8_t *title = qmat_take_bytes(&reader, 16);
     const uint64_t start = qmat_take_u64(&reader), size = qmat_take_u64(&reader);
@@ -42,9 +41,8 @@ static qmat_status open_table(const qmat_usdc *c, const char *name, qmat_byte_re
 /* Takes packed indices into the scratch memory. */
 static qmat_status take_indices(qmat_usdc *c, qmat_byte_reader *table, size_t count, uint32_t **indices) {
   /* Each index takes at least two bits. */
-  if (count / 4 > qmat_usdc_largest_unpacked(qmat_bytes_left(table)) || count > c->layer->allowance / sizeof(int64_t)) {
+  if (count / 4 > qmat_usdc_largest_unpacked(qmat_bytes_left(table)) || count > c->layer->allowance / sizeof(int64_t))
     return fail(c, "a table is longer than the file justifies");
-  }
   int64_t *wide = qmat_alloc(count, sizeof *wide);
   *indices = qmat_arena_alloc(&c->scratch, count, sizeof **indices);
   qmat_status status = wide && *indices ? qmat_usdc_take_integers(c->layer, table, count, 4, wide)
@@ -126,9 +124,8 @@ static qmat_status read_field_sets(qmat_usdc *c) {
   if (status == QMAT_OK) status = take_indices(c, &table, count, &c->field_sets);
   if (status != QMAT_OK) return status;
   for (uint64_t i = 0; i < count; i++) {
-    if (c->field_sets[i] != QMAT_USDC_NONE && c->field_sets[i] >= c->field_count) {
+    if (c->field_sets[i] != QMAT_USDC_NONE && c->field_sets[i] >= c->field_count)
       return fail(c, "a set of fields refers to a missing field");
-    }
   }
   if (count == 0 || c->field_sets[count - 1] != QMAT_USDC_NONE) return fail(c, "the last set of fields has no end");
   c->field_set_length = count;
@@ -250,9 +247,8 @@ const char *qmat_usdc_path_text(const qmat_usdc *c, uint32_t index) {
   if (path->text) return path->text;
   if (path->parent == QMAT_USDC_NONE) return path->text = "/";
   size_t length = 0;
-  for (const qmat_usdc_path *p = path; p->parent != QMAT_USDC_NONE; p = &c->paths[p->parent]) {
+  for (const qmat_usdc_path *p = path; p->parent != QMAT_USDC_NONE; p = &c->paths[p->parent])
     length += strlen(p->element) + strlen(separator(c, p));
-  }
   char *text = qmat_usd_alloc(c->layer, length + 1, 1);
   if (!text) return NULL;
   char *at = text + length;

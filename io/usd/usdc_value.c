@@ -448,15 +448,13 @@ static qmat_status take_samples(qmat_usdc_values *v, qmat_byte_reader *reader, q
   qmat_status status = qmat_usdc_value(v, rep, &times);
   if (status != QMAT_OK) return status;
   if (!take_rep(reader, &count) || qmat_bytes_left(reader) / 8 < count) return qmat_usdc_fail_short(v->crate);
-  if (times->type != QMAT_USD_DOUBLE || !times->is_array || times->components != 1 || times->count != count) {
+  if (times->type != QMAT_USD_DOUBLE || !times->is_array || times->components != 1 || times->count != count)
     return fail(v->crate, "the numbers of times and values of samples differ");
-  }
   qmat_usd_samples *samples = qmat_usd_alloc(layer, 1, sizeof *samples);
   const qmat_usd_value **values = samples ? qmat_usd_alloc(layer, count, sizeof *values) : NULL;
   if (!values) return qmat_usd_layer_error(layer);
-  for (uint64_t i = 0; i < count && status == QMAT_OK; i++) {
+  for (uint64_t i = 0; i < count && status == QMAT_OK; i++)
     status = qmat_usdc_value(v, qmat_take_u64(reader), &values[i]);
-  }
   *samples = (qmat_usd_samples){.count = count, .times = times->numbers, .values = values};
   *value = (qmat_usd_value){.type = QMAT_USD_TIME_SAMPLES, .components = 1, .count = 1, .samples = samples};
   return status;
@@ -466,9 +464,8 @@ static qmat_status take_samples(qmat_usdc_values *v, qmat_byte_reader *reader, q
 static qmat_status take_payload(qmat_usdc_values *v, qmat_byte_reader *reader, qmat_usd_value *value) {
   qmat_usd_list_op *op = qmat_usd_alloc(v->crate->layer, 1, sizeof *op);
   if (!op) return qmat_usd_layer_error(v->crate->layer);
-  for (int i = 0; i < QMAT_USD_EDIT_COUNT; i++) {
+  for (int i = 0; i < QMAT_USD_EDIT_COUNT; i++)
     op->lists[i] = (qmat_usd_value){.type = QMAT_USD_REFERENCE, .is_array = true, .components = 1};
-  }
   op->is_explicit = true;
   *value = (qmat_usd_value){.type = QMAT_USD_LIST_OP, .components = 1, .count = 1, .list_op = op};
   qmat_usd_value *list = &op->lists[QMAT_USD_EXPLICIT];

@@ -49,9 +49,8 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
   qmat_byte_reader local = {.bytes = bytes->data, .size = bytes->size, .at = qmat_take_u32(central)};
   const uint8_t *name = qmat_take_bytes(central, name_length);
   qmat_take_bytes(central, (size_t)extra + comment);
-  if (central->failed || signature != CENTRAL_SIGNATURE || local.at > bytes->size) {
+  if (central->failed || signature != CENTRAL_SIGNATURE || local.at > bytes->size)
     return fail(context, path, "the directory of the archive is damaged");
-  }
   member->name = qmat_alloc((size_t)name_length + 1, 1);
   if (!member->name) return qmat_fail_memory(context, "a USDZ package");
   memcpy(member->name, name, name_length);
@@ -64,12 +63,10 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
   if (method != 0) return fail(context, path, "a member of the archive is compressed, which USDZ forbids");
   member->bytes = qmat_take_bytes(&local, size);
   member->size = size;
-  if (local_signature != LOCAL_SIGNATURE || !member->bytes || packed != size) {
+  if (local_signature != LOCAL_SIGNATURE || !member->bytes || packed != size)
     return fail(context, path, "a member of the archive is damaged");
-  }
-  if (checksum(member->bytes, size) != crc) {
+  if (checksum(member->bytes, size) != crc)
     return fail(context, path, "the checksum of a member of the archive is wrong");
-  }
   return QMAT_OK;
 }
 
@@ -81,9 +78,8 @@ qmat_status qmat_usdz_open(qmat_context *context, const qmat_bytes *bytes, const
   const size_t count = qmat_take_u16(&record);
   qmat_take_u32(&record);
   const size_t start = qmat_take_u32(&record);
-  if (start > end || (end - start) / CENTRAL_SIZE < count) {
+  if (start > end || (end - start) / CENTRAL_SIZE < count)
     return fail(context, path, "the directory of the archive is damaged");
-  }
   package->members = qmat_calloc(count, sizeof *package->members);
   if (!package->members) return qmat_fail_memory(context, "a USDZ package");
   qmat_byte_reader central = {.bytes = bytes->data, .size = end, .at = start};

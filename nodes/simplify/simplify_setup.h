@@ -29,95 +29,35 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
                                                                                        *const qmat_feature_choices[];
 
 /* The rows of the parameters that both nodes have. */
-#define QMAT_ERROR_PARAM                                                                                              \
-  {                                                                                                                   \
-    .name = "error", .unit = "",                                                                                      \
-    .doc = "The errors that are bounded: both, or surface to envelope only as in the paper", .type = QMAT_PARAM_ENUM, \
-    .default_number = QMAT_ERROR_TWO_SIDED, .choices = qmat_error_choices,                                            \
-    .offset = offsetof(qmat_simplify_params, error)                                                                   \
-  }
+#define QMAT_ERROR_PARAM                                                           \
+  QMAT_ENUM(qmat_simplify_params, error, qmat_error_choices, QMAT_ERROR_TWO_SIDED, \
+            "The errors that are bounded: both, or surface to envelope only as in the paper")
 #define QMAT_COLLAPSE_PARAMS                                                                                           \
-  {.name = "cost",                                                                                                     \
-   .unit = "",                                                                                                         \
-   .doc =                                                                                                              \
-       "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or nearest to a "       \
-       "sphere within another (PMAT)",                                                                                 \
-   .type = QMAT_PARAM_ENUM,                                                                                            \
-   .default_number = QMAT_COST_SLAB,                                                                                   \
-   .choices = qmat_cost_choices,                                                                                       \
-   .offset = offsetof(qmat_simplify_params, cost)},                                                                    \
-      {.name = "finest",                                                                                               \
-       .unit = "diagonal",                                                                                             \
-       .doc = "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer",   \
-       .type = QMAT_PARAM_FLOAT,                                                                                       \
-       .default_number = 0.0025,                                                                                       \
-       .min = 1e-5,                                                                                                    \
-       .max = 1,                                                                                                       \
-       .flags = QMAT_PARAM_RELATIVE,                                                                                   \
-       .offset = offsetof(qmat_simplify_params, finest)},                                                              \
-      {.name = "most_cost",                                                                                            \
-       .unit = "1",                                                                                                    \
-       .doc = "Stop when the cheapest collapse costs more than this; 0: no such stop",                                 \
-       .type = QMAT_PARAM_FLOAT,                                                                                       \
-       .default_number = 0,                                                                                            \
-       .min = 0,                                                                                                       \
-       .max = 1e9,                                                                                                     \
-       .offset = offsetof(qmat_simplify_params, most_cost)},                                                           \
-      {.name = "compat",                                                                                               \
-       .unit = "",                                                                                                     \
-       .doc =                                                                                                          \
-           "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "          \
-           "features; the stop is vertices",                                                                           \
-       .type = QMAT_PARAM_ENUM,                                                                                        \
-       .default_number = QMAT_COMPAT_OFF,                                                                              \
-       .choices = qmat_compat_choices,                                                                                 \
-       .offset = offsetof(qmat_simplify_params, compat)},                                                              \
-      {.name = "topology",                                                                                             \
-       .unit = "",                                                                                                     \
-       .doc =                                                                                                          \
-           "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, loops "     \
-           "and voids of the result are made those of the solid. preserve: collapses keep the topology of the "        \
-           "initial mesh (link condition)",                                                                            \
-       .type = QMAT_PARAM_ENUM,                                                                                        \
-       .default_number = QMAT_TOPOLOGY_GUARD,                                                                          \
-       .choices = qmat_topology_choices,                                                                               \
-       .offset = offsetof(qmat_simplify_params, topology)},                                                            \
-      {.name = "protect",                                                                                              \
-       .unit = "",                                                                                                     \
-       .doc = "Keep thin tubular features at any cost: never, at the late stage, or from the start",                   \
-       .type = QMAT_PARAM_ENUM,                                                                                        \
-       .default_number = QMAT_PROTECT_OFF,                                                                             \
-       .choices = qmat_protect_choices,                                                                                \
-       .offset = offsetof(qmat_simplify_params, protect)},                                                             \
-      {.name = "features",                                                                                             \
-       .unit = "",                                                                                                     \
-       .doc = "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases", \
-       .type = QMAT_PARAM_ENUM,                                                                                        \
-       .default_number = QMAT_FEATURES_SHARP,                                                                          \
-       .choices = qmat_feature_choices,                                                                                \
-       .offset = offsetof(qmat_simplify_params, features)},                                                            \
-      {.name = "crease",                                                                                               \
-       .unit = "epsilon",                                                                                              \
-       .doc = "The largest distance of a crease from its remaining points, as a share of the threshold",               \
-       .type = QMAT_PARAM_FLOAT,                                                                                       \
-       .default_number = 0.25,                                                                                         \
-       .min = 0.01,                                                                                                    \
-       .max = 1,                                                                                                       \
-       .offset = offsetof(qmat_simplify_params, crease)},                                                              \
-      {.name = "theta",                                                                                                \
-       .unit = "mean thickness",                                                                                       \
-       .doc =                                                                                                          \
-           "A feature is thin when all of its responsible region is at most this thick, relative to the "              \
-           "mean",                                                                                                     \
-       .type = QMAT_PARAM_FLOAT,                                                                                       \
-       .default_number = 0.5,                                                                                          \
-       .min = 0,                                                                                                       \
-       .max = 10,                                                                                                      \
-       .offset = offsetof(qmat_simplify_params, theta)},                                                               \
-  {                                                                                                                    \
-    .name = "k", .unit = "1", .doc = "The constant of the collapse cost (eq. 6)", .type = QMAT_PARAM_FLOAT,            \
-    .default_number = 1e-5, .min = 0, .max = 1, .offset = offsetof(qmat_simplify_params, k)                            \
-  }
+  QMAT_ENUM(qmat_simplify_params, cost, qmat_cost_choices, QMAT_COST_SLAB,                                             \
+            "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or nearest to a "  \
+            "sphere within another (PMAT)"),                                                                           \
+      QMAT_LENGTH(                                                                                                     \
+          qmat_simplify_params, finest, 0.0025, 1e-5, 1,                                                               \
+          "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer"),      \
+      QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                      \
+                 "Stop when the cheapest collapse costs more than this; 0: no such stop"),                             \
+      QMAT_ENUM(qmat_simplify_params, compat, qmat_compat_choices, QMAT_COMPAT_OFF,                                    \
+                "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "     \
+                "features; the stop is vertices"),                                                                     \
+      QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                            \
+                "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, "      \
+                "loops and voids of the result are made those of the solid. preserve: collapses keep the topology of " \
+                "the initial mesh (link condition)"),                                                                  \
+      QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                 \
+                "Keep thin tubular features at any cost: never, at the late stage, or from the start"),                \
+      QMAT_ENUM(                                                                                                       \
+          qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                   \
+          "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases"),    \
+      QMAT_FLOAT(qmat_simplify_params, crease, "epsilon", 0.25, 0.01, 1,                                               \
+                 "The largest distance of a crease from its remaining points, as a share of the threshold"),           \
+      QMAT_FLOAT(qmat_simplify_params, theta, "mean thickness", 0.5, 0, 10,                                            \
+                 "A feature is thin when all of its responsible region is at most this thick, relative to the mean"),  \
+      QMAT_FLOAT(qmat_simplify_params, k, "1", 1e-5, 0, 1, "The constant of the collapse cost (eq. 6)")
 
 /* The inputs of both nodes. */
 #define QMAT_SIMPLIFY_INPUTS                                                \

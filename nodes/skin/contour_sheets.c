@@ -42,9 +42,8 @@ qmat_status qmat_contour_find_sheets(qmat_contour *c) {
           leave = face == 0 ? x->count - 1 : face - 1;
         } else {
           slot = leave = face + 1 == x->count ? 0 : face + 1;
-          if (x->cells[slot] != cell) {
+          if (x->cells[slot] != cell)
             return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "A sheet of the surface leaves its cell");
-          }
         }
       }
       c->sheet_items[++c->sheet_count] = filled;
@@ -209,9 +208,8 @@ done:
 }
 
 qmat_status qmat_contour_place_sheets(qmat_contour *c) {
-  if (qmat_grow((void **)&c->positions, &c->vertex_capacity, 3 * c->sheet_count, sizeof *c->positions)) {
+  if (qmat_grow((void **)&c->positions, &c->vertex_capacity, 3 * c->sheet_count, sizeof *c->positions))
     return qmat_fail_memory(c->context, "surface vertices");
-  }
 #pragma omp parallel for num_threads(c->threads) schedule(dynamic, 128)
   for (size_t i = 0; i < c->sheet_count; i++) place_sheet(c, i);
   return QMAT_OK;

@@ -310,9 +310,8 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_
   for (size_t first = 0; first < parents->count;) {
     size_t end = first, entries = 0;
     /* Chunks are filled in parallel and emptied in order, so that the result does not depend on their number. */
-    while (end < parents->count && entries < BLOCK_ENTRIES && end - first < MOST_CHUNKS * CHUNK_CHILDREN / 8) {
+    while (end < parents->count && entries < BLOCK_ENTRIES && end - first < MOST_CHUNKS * CHUNK_CHILDREN / 8)
       entries += parents->cells[end++].list_count;
-    }
     size_t children = 8 * (end - first), per_chunk = children / 64 + 1;
     per_chunk = per_chunk < CHUNK_CHILDREN ? per_chunk : CHUNK_CHILDREN;
     size_t chunk_count = (children + per_chunk - 1) / per_chunk;
@@ -369,9 +368,7 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
   uint32_t size = cells->base;
   while (size * cells->finest < extent + 3 * base && size < (uint32_t)1 << 18) size *= 2;
   static const double shift[3] = {0.137, 0.271, 0.389};
-  for (int k = 0; k < 3; k++) {
-    cells->origin[k] = 0.5 * (low[k] + high[k]) - (0.5 * size + shift[k]) * cells->finest;
-  }
+  for (int k = 0; k < 3; k++) cells->origin[k] = 0.5 * (low[k] + high[k]) - (0.5 * size + shift[k]) * cells->finest;
   if (size * cells->finest < extent + 3 * base) return too_many(context);
 
   uint32_t *all = qmat_alloc(count, sizeof *all);

@@ -35,13 +35,10 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
   qmat_contour c = {.context = context, .threads = qmat_threads(context)};
   *grid = (qmat_envelope_grid){.base = base, .finest = ldexp(base, -detail)};
   grid->smallest_radius = RADIUS_FLOOR * grid->finest;
-  for (size_t i = 0; i < sphere_count; i++) {
-    grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
-  }
+  for (size_t i = 0; i < sphere_count; i++) grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
   qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, &c.cells);
-  if (status == QMAT_OK && c.cells.count == 0) {
+  if (status == QMAT_OK && c.cells.count == 0)
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
-  }
   grid->cell_count = c.cells.count;
   grid->refined_cell_count = c.cells.refined_count;
   qmat_status (*const steps[])(qmat_contour *) = {qmat_contour_number_corners,   qmat_contour_find_split_edges,
