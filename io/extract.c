@@ -18,12 +18,12 @@ static qmat_status take_facts(qmat_context *context, const json_t *extras, json_
   if (!facts) return QMAT_OK;
   json_object_foreach((json_t *)(uintptr_t)extras, key, value) {
     if (strncmp(key, "qmat_", 5) != 0 || strcmp(key, "qmat_data") == 0) continue;
-    if (json_object_set(facts, key, value) != 0) return qmat_fail_memory(context, "what a file says of itself");
+    if (json_object_set(facts, key, value) != 0) return qmat_fail_memory(context, "the facts of a file");
   }
   return QMAT_OK;
 }
 
-/* Whether a node is called `name`, or has that number and no node is called so. */
+/* Whether `name` is the node's name, or its number where no node has this name. */
 static bool is_called(const json_t *nodes, size_t index, const char *name) {
   const char *own = json_string_value(json_object_get(json_array_get(nodes, index), "name"));
   if (own && strcmp(own, name) == 0) return true;
@@ -42,7 +42,7 @@ static const json_t *data_of(const json_t *node) {
   return json_is_string(data) ? data : NULL;
 }
 
-/* Where the spheres of a node count from, in the space of the model that was read. */
+/* The origin of a node's sphere coordinates, in the frame of the model. */
 static void take_origin(const json_t *extras, double origin[3]) {
   static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   for (int k = 0; k < 3; k++) origin[k] = json_number_value(json_object_get(extras, axes[k]));
@@ -59,7 +59,7 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
     if (!data) continue;
     carriers++;
     if (name && !is_called(nodes, i, name)) continue;
-    /* Nodes that share a mesh share its medial mesh. */
+    /* Nodes that share a mesh carry the same medial mesh. */
     different += !found || !json_equal((json_t *)(uintptr_t)data_of(found), (json_t *)(uintptr_t)data);
     if (found) continue;
     found = node;
@@ -72,9 +72,9 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
                        carriers > 0 ? "no node of this name has a medial mesh" : "no node has a medial mesh");
     qmat_fail_at(context, path, 0, 0);
   } else if (status == QMAT_OK && different > 1) {
-    status = qmat_fail(context, QMAT_ERROR_USAGE, "%zu nodes have a medial mesh: one has to be named", carriers);
+    status = qmat_fail(context, QMAT_ERROR_USAGE, "%zu nodes have a medial mesh; choose one", carriers);
     qmat_fail_at(context, path, 0, 0);
-    qmat_fail_hint(context, "by its name or its number; qmat info lists them");
+    qmat_fail_hint(context, "give the name or number of the node; qmat info lists them");
   } else if (status == QMAT_OK) {
     const json_t *data = data_of(found);
     double origin[3];
@@ -90,7 +90,7 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
   return status;
 }
 
-/* The counts that the file states are those of what it holds. */
+/* Compares the counts stated in the file with the actual ones. */
 static qmat_status check_counts(qmat_context *context, const qmat_medial *medial, const json_t *facts,
                                 const char *path) {
   const struct {
@@ -102,7 +102,7 @@ static qmat_status check_counts(qmat_context *context, const qmat_medial *medial
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
     const json_t *stated = json_object_get(facts, rows[i].key);
     if (!stated || (json_is_integer(stated) && json_integer_value(stated) == (json_int_t)rows[i].count)) continue;
-    qmat_fail(context, QMAT_ERROR_FORMAT, "%s is not the %zu that the file holds", rows[i].key, rows[i].count);
+    qmat_fail(context, QMAT_ERROR_FORMAT, "%s differs from the actual count, %zu", rows[i].key, rows[i].count);
     return qmat_fail_at(context, path, 0, 0);
   }
   return QMAT_OK;
@@ -139,7 +139,7 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
   return status;
 }
 
-/* How many nodes have each name, by name; NULL when memory is short. */
+/* The number of nodes with each name, by name; NULL if memory is short. */
 static json_t *count_names(const json_t *nodes) {
   json_t *counts = json_object();
   bool done = counts != NULL;
@@ -154,7 +154,7 @@ static json_t *count_names(const json_t *nodes) {
   return NULL;
 }
 
-/* What is said of a carrier; NULL when memory is short. */
+/* The entry of a node in qmat_medial_carriers; NULL if memory is short. */
 static json_t *describe_carrier(const json_t *root, size_t index, const json_t *name_counts) {
   const json_t *node = json_array_get(json_object_get(root, "nodes"), index);
   const char *name = json_string_value(json_object_get(node, "name"));

@@ -6,21 +6,21 @@
 
 #include "core/value.h"
 
-/* Takes the medial mesh back out of a file that carries one: glTF (qmat_data in the extras of a node), USD (as
- * io/usd/usd_write.h writes it), PLY (as io/mesh/ply_medial.h writes it), or .ma. It is in the space of the model or
- * mesh that was described: the node's or prim's own, moved by the origin that the file states. `name` is that node's or
- * prim's name, or NULL where there is one only; it does not apply to PLY and .ma. `facts` (a JSON object, may be NULL)
- * gains what the file says of it: the extras or customData that start with qmat_, without the data. Stated counts are
- * checked against what is there. `*medial` is sealed and released by the caller; NULL on failure. QMAT_ERROR_FORMAT,
- * QMAT_ERROR_GEOMETRY where there is none, QMAT_ERROR_USAGE where there are several and none is named, QMAT_ERROR_IO,
- * QMAT_ERROR_MEMORY. One thread; linear. */
+/* Extracts the medial mesh from a file: glTF (qmat_data in the extras of a node), USD (as io/usd/usd_write.h writes
+ * it), PLY (as io/mesh/ply_medial.h writes it), or .ma. Its frame is that of the original model or mesh: the local
+ * frame of the node or prim, translated by the origin stated in the file. `name` is the name of the node or prim, NULL
+ * if there is only one; PLY and .ma ignore it. `facts` (a JSON object, may be NULL) gains the extras or customData
+ * whose keys start with qmat_, except the data. Stated counts are checked against the actual ones. `*medial` is sealed;
+ * the caller releases it; NULL on failure. QMAT_ERROR_FORMAT; QMAT_ERROR_GEOMETRY: there is no medial mesh;
+ * QMAT_ERROR_USAGE: there are several and `name` is NULL; QMAT_ERROR_IO; QMAT_ERROR_MEMORY. One thread. Cost: linear.
+ */
 qmat_status qmat_medial_extract(qmat_context *context, const char *path, const char *name, qmat_medial **medial,
                                 json_t *facts);
 
-/* The nodes of a glTF asset whose medial meshes differ, each by what qmat_medial_extract takes as `name`: its name, or
- * its number where it has none or shares it. An array of objects with "node" and, where it carries one, the number of
- * its "mesh"; of other formats empty. NULL on failure, with the error recorded. The caller calls json_decref. Linear.
- */
+/* Lists the nodes of a glTF asset with different medial meshes. The result is an array of objects with "node", the
+ * `name` for qmat_medial_extract (the node's number if its name is missing or not unique), and "mesh", the number of
+ * its mesh, if it has one that is not a skin. Empty for other formats. NULL on failure, with the error recorded. The
+ * caller calls json_decref. Cost: linear. */
 json_t *qmat_medial_carriers(qmat_context *context, const char *path);
 
 #endif

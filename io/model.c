@@ -12,8 +12,8 @@
 #include "io/usd/usd_scene.h"
 
 static const struct {
-  const char *title; /* as people write it */
-  const char *name;  /* as scenes and reports have it */
+  const char *title; /* the usual name */
+  const char *name;  /* in scenes and reports */
 } formats[QMAT_FORMAT_COUNT] = {
     [QMAT_FORMAT_UNKNOWN] = {"unknown", ""},    [QMAT_FORMAT_OFF] = {"OFF", "off"},
     [QMAT_FORMAT_OBJ] = {"OBJ", "obj"},         [QMAT_FORMAT_PLY] = {"PLY", "ply"},
@@ -40,7 +40,7 @@ static const char *base_name(const char *path) {
   return slash ? slash + 1 : path;
 }
 
-/* The ending's dot, or the end of the name; a dot at the start is part of the name. */
+/* The extension with its dot, or the end of the name. A leading dot is part of the name. */
 static const char *ending_of(const char *base) {
   const char *dot = strrchr(base, '.');
   return dot && dot != base ? dot : base + strlen(base);
@@ -102,19 +102,17 @@ qmat_status qmat_format_choose(qmat_context *context, const char *path, const qm
   const bool both = named != QMAT_FORMAT_UNKNOWN && found != QMAT_FORMAT_UNKNOWN;
   *format = found != QMAT_FORMAT_UNKNOWN ? found : named;
   if (both && named != found) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "the name says %s, but the file holds %s", formats[named].title,
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the extension says %s, but the content is %s", formats[named].title,
               formats[found].title);
     qmat_fail_at(context, path, 0, 0);
-    return qmat_fail_hint(context, "rename it or convert it");
+    return qmat_fail_hint(context, "rename or convert the file");
   }
   if (*format == QMAT_FORMAT_ZIP || *format == QMAT_FORMAT_UNKNOWN) {
     qmat_fail(context, QMAT_ERROR_FORMAT,
-              *format == QMAT_FORMAT_ZIP ? "archives are not read"
-                                         : "neither the bytes nor the ending of the file "
-                                           "show a format that is read");
+              *format == QMAT_FORMAT_ZIP ? "archives are not supported"
+                                         : "neither the content nor the extension is of a supported format");
     qmat_fail_at(context, path, 0, 0);
-    return qmat_fail_hint(context,
-                          "models are read from .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc and .usdz");
+    return qmat_fail_hint(context, "use .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc or .usdz");
   }
   return QMAT_OK;
 }
@@ -152,9 +150,9 @@ static qmat_status read_surface(qmat_context *context, qmat_format format, const
     case QMAT_FORMAT_USD:
       return qmat_usd_read(context, bytes, path, soup, report);
     default:
-      qmat_fail(context, QMAT_ERROR_FORMAT, "the file holds a medial mesh, not a surface");
+      qmat_fail(context, QMAT_ERROR_FORMAT, "the file has a medial mesh, not a surface");
       qmat_fail_at(context, path, 0, 0);
-      return qmat_fail_hint(context, "the node medial.read reads it");
+      return qmat_fail_hint(context, "read it with the node medial.read");
   }
 }
 
@@ -168,7 +166,7 @@ static qmat_scene *make_scene(const char *path, qmat_format format) {
   return NULL;
 }
 
-/* Takes over what the reader found out about the unit of length. */
+/* Sets the unit of length and the up axis that the reader reported. */
 static void set_units(qmat_scene *scene, qmat_format format, const json_t *report) {
   if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) scene->meters_per_unit = 1;
   if (format != QMAT_FORMAT_USD) return;
@@ -189,14 +187,14 @@ static qmat_status read_whole(qmat_context *context, qmat_format format, const c
   return status;
 }
 
-/* What the report says of a mesh before it is made: a member of its list "meshes". NULL when memory is short. */
+/* Appends an entry for a mesh to the report's list "meshes". NULL if memory is short. */
 static json_t *add_mesh_report(json_t *report, const json_t *root, const char *name, uint32_t id) {
   json_t *of_mesh = json_pack("{s:s, s:I, s:I}", "name", name, "mesh", (json_int_t)id, "nodes",
                               (json_int_t)qmat_gltf_mesh_carriers(root, id));
   return json_array_append_new(json_object_get(report, "meshes"), of_mesh) == 0 ? of_mesh : NULL;
 }
 
-/* One of several meshes; a failure where its facets make none. */
+/* Makes one of several meshes, or a failure value if its facets make no valid mesh. */
 static qmat_status make_mesh(qmat_context *context, const char *path, const qmat_soup *soup,
                              const qmat_read_options *options, qmat_value **mesh, json_t *report) {
   qmat_mesh *made = NULL;
@@ -209,7 +207,7 @@ static qmat_status make_mesh(qmat_context *context, const char *path, const qmat
   return failed ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
-/* The meshes that were read as one value. */
+/* Makes one value of the meshes: a mesh, or a list of several. */
 static qmat_status make_meshes(qmat_context *context, const char *path, const json_t *root, qmat_gltf_meshes *from,
                                const qmat_read_options *options, qmat_value **mesh, json_t *report) {
   qmat_status status = QMAT_OK;
@@ -249,7 +247,7 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const js
   return status;
 }
 
-/* Tells of nodes whose extras cannot take a medial mesh. */
+/* Warns of nodes whose extras cannot store a medial mesh. */
 static qmat_status warn_of_extras(qmat_context *context, const json_t *root, const qmat_gltf_meshes *meshes,
                                   json_t *warnings) {
   const json_t *nodes = json_object_get(root, "nodes");
@@ -259,7 +257,7 @@ static qmat_status warn_of_extras(qmat_context *context, const json_t *root, con
     bool chosen = false;
     for (size_t k = 0; k < meshes->count && !chosen; k++) chosen = mesh == (int64_t)meshes->ids[k];
     if (!chosen || !extras || json_is_object(extras)) continue;
-    json_t *text = json_sprintf("node %zu has extras that are no object: a child of it takes the medial mesh", i);
+    json_t *text = json_sprintf("the extras of node %zu are not an object: its medial mesh goes to a child node", i);
     if (json_array_append_new(warnings, text) != 0) return qmat_fail_memory(context, "the report");
   }
   return QMAT_OK;
@@ -319,7 +317,7 @@ qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, cons
   if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) {
     status = read_gltf(context, format, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
   } else if (strcmp(choice, "all") != 0 && strcmp(choice, "merged") != 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "meshes are chosen of glTF only; %s is read as a whole",
+    qmat_fail(context, QMAT_ERROR_USAGE, "only glTF has a choice of meshes; %s is read as a whole",
               formats[format].title);
     qmat_fail_at(context, path, 0, 0);
     status = qmat_fail_field(context, "mesh");
@@ -359,7 +357,7 @@ qmat_status qmat_medial_read(qmat_context *context, const char *path, qmat_media
   if (status != QMAT_OK) return status;
   const qmat_format found = qmat_format_of_bytes(&bytes);
   if (found != QMAT_FORMAT_UNKNOWN) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "the file holds %s, not a medial mesh (MA)", formats[found].title);
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the content is %s, not a medial mesh (MA)", formats[found].title);
     status = qmat_fail_at(context, path, 0, 0);
   } else {
     status = qmat_ma_read(context, &bytes, path, medial);

@@ -7,32 +7,32 @@
 #include "core/disjoint_sets.h"
 #include "core/geometry/vector.h"
 
-/* Half-edge 3 * t + k goes from corner k to corner k + 1 of triangle t. */
+/* Half-edge 3 * t + k goes from corner k to corner (k + 1) % 3 of triangle t. */
 
 #define NONE UINT32_MAX
 
-typedef struct patch {
-  double reference[3]; /* mean of the border's corners, or the first vertex */
-  double volume;       /* six times what is enclosed, seen from the reference, in units of the mesh's size */
-  double magnitude;    /* the same sum without signs: what rounding is relative to */
+typedef struct piece {
+  double reference[3]; /* the mean of the border's vertices; its first vertex if it has no border */
+  double volume;       /* six times the volume enclosed together with the reference, in the unit box */
+  double magnitude;    /* the same sum of absolute values, the scale of rounding errors */
   size_t triangles, disagreeing;
   size_t border_corners;
   uint32_t first_triangle;
-  bool conflicting; /* one-sided, as a Moebius strip */
+  bool conflicting; /* not orientable, as a Moebius strip */
   bool open;
-} patch;
+} piece;
 
 typedef struct work {
   const double *positions;
   const uint32_t *triangles;
   size_t vertex_count, triangle_count;
-  double low[3], size; /* corner and largest side of the bounding box, halved */
-  uint32_t *order;     /* half-edges, those of one edge next to each other */
-  uint32_t *mate;      /* per half-edge the other one at an edge of two triangles, else NONE */
-  uint32_t *patch_of;  /* per triangle */
-  uint8_t *turned;     /* per triangle: 1 when it is to be turned over */
-  patch *patches;      /* grown on the heap */
-  size_t patch_count, patch_capacity;
+  double low[3], size; /* low corner and longest side of the bounding box, halved */
+  uint32_t *order;     /* half-edges sorted by edge */
+  uint32_t *mate;      /* per half-edge: the other one of an edge with two triangles, else NONE */
+  uint32_t *piece_of;  /* per triangle */
+  uint8_t *turned;     /* per triangle: 1 if it will be flipped */
+  piece *pieces;       /* grown on the heap */
+  size_t piece_count, piece_capacity;
 } work;
 
 static uint32_t start_of(const work *w, uint32_t half_edge) {
@@ -57,19 +57,19 @@ static bool same_edge(const work *w, uint32_t a, uint32_t b) {
   return low_end(w, a) == low_end(w, b) && high_end(w, a) == high_end(w, b);
 }
 
-/* Runs upwards, with what is to be turned over taken into account. */
+/* Whether the half-edge leads from its lower to its higher vertex once the triangles are flipped. */
 static bool runs_up(const work *w, uint32_t half_edge) {
   return (start_of(w, half_edge) < end_of(w, half_edge)) != (w->turned[half_edge / 3] != 0);
 }
 
-/* The end of the run of half-edges at one edge that starts at `first`. */
+/* The half-edges of one edge are order[first] to order[edge_end - 1]. */
 static size_t edge_end(const work *w, size_t first) {
   size_t last = first + 1;
   while (last < 3 * w->triangle_count && same_edge(w, w->order[first], w->order[last])) last++;
   return last;
 }
 
-/* Two stable counting passes leave the half-edges sorted by lower, then higher vertex, then number. */
+/* Two stable counting passes sort the half-edges by lower vertex, higher vertex and number. */
 static void sort_half_edges(work *w, uint32_t *swap, uint32_t *starts) {
   size_t count = 3 * w->triangle_count;
   for (int pass = 0; pass < 2; pass++) {
@@ -84,7 +84,7 @@ static void sort_half_edges(work *w, uint32_t *swap, uint32_t *starts) {
   }
 }
 
-/* A vertex within the unit box of the mesh; halves keep the largest doubles from overflowing. */
+/* The position of a vertex in the unit box of the mesh. Halved numbers cannot overflow. */
 static void local_point(const work *w, uint32_t vertex, double point[3]) {
   for (size_t k = 0; k < 3; k++) point[k] = (w->positions[3 * (size_t)vertex + k] * 0.5 - w->low[k]) / w->size;
 }
@@ -101,18 +101,18 @@ static void measure_box(work *w) {
   if (!(w->size > 0)) w->size = 1;
 }
 
-/* Walks over the edges of two triangles from each triangle that has no patch yet. */
-static bool find_patches(work *w, uint32_t *queue) {
-  memset(w->patch_of, 0xFF, w->triangle_count * sizeof *w->patch_of);
+/* Grows a piece across the edges with two triangles from each triangle that has no piece yet. */
+static bool find_pieces(work *w, uint32_t *queue) {
+  memset(w->piece_of, 0xFF, w->triangle_count * sizeof *w->piece_of);
   for (uint32_t seed = 0; seed < w->triangle_count; seed++) {
-    if (w->patch_of[seed] != NONE) continue;
-    if (qmat_grow((void **)&w->patches, &w->patch_capacity, w->patch_count + 1, sizeof *w->patches) != 0) return false;
-    uint32_t number = (uint32_t)w->patch_count++;
-    patch *p = &w->patches[number];
-    *p = (patch){.first_triangle = seed};
+    if (w->piece_of[seed] != NONE) continue;
+    if (qmat_grow((void **)&w->pieces, &w->piece_capacity, w->piece_count + 1, sizeof *w->pieces) != 0) return false;
+    uint32_t number = (uint32_t)w->piece_count++;
+    piece *p = &w->pieces[number];
+    *p = (piece){.first_triangle = seed};
     size_t head = 0, tail = 0;
     queue[tail++] = seed;
-    w->patch_of[seed] = number;
+    w->piece_of[seed] = number;
     while (head < tail) {
       uint32_t t = queue[head++];
       p->triangles++;
@@ -121,10 +121,10 @@ static bool find_patches(work *w, uint32_t *queue) {
         uint32_t mate = w->mate[h];
         if (mate == NONE) continue;
         uint32_t other = mate / 3;
-        /* The two must run against each other. */
+        /* Consistent triangles traverse their common edge in opposite directions. */
         uint8_t wanted = (start_of(w, h) == start_of(w, mate)) != (w->turned[t] != 0);
-        if (w->patch_of[other] == NONE) {
-          w->patch_of[other] = number;
+        if (w->piece_of[other] == NONE) {
+          w->piece_of[other] = number;
           w->turned[other] = wanted;
           queue[tail++] = other;
         } else if (w->turned[other] != wanted) {
@@ -140,18 +140,18 @@ static bool find_patches(work *w, uint32_t *queue) {
   return true;
 }
 
-/* Borders of the patches, also at edges where an odd number of the triangles belongs to one patch. */
+/* Finds the borders of the pieces: the edges where a piece has an odd number of triangles. */
 static void find_borders(work *w, uint8_t *odd) {
-  memset(odd, 0, w->patch_count);
+  memset(odd, 0, w->piece_count);
   for (size_t first = 0, last; first < 3 * w->triangle_count; first = last) {
     last = edge_end(w, first);
     if (last - first == 2) continue;
-    for (size_t i = first; i < last; i++) odd[w->patch_of[w->order[i] / 3]] ^= 1;
+    for (size_t i = first; i < last; i++) odd[w->piece_of[w->order[i] / 3]] ^= 1;
     for (size_t i = first; i < last; i++) {
-      uint32_t number = w->patch_of[w->order[i] / 3];
+      uint32_t number = w->piece_of[w->order[i] / 3];
       if (!odd[number]) continue;
       odd[number] = 0;
-      patch *p = &w->patches[number];
+      piece *p = &w->pieces[number];
       p->open = true;
       const uint32_t ends[2] = {low_end(w, w->order[i]), high_end(w, w->order[i])};
       for (size_t k = 0; k < 2; k++) {
@@ -182,9 +182,9 @@ static double triangle_volume(const work *w, size_t t, const double from[3]) {
   return w->turned[t] ? -volume : volume;
 }
 
-static void measure_patches(work *w) {
-  for (size_t i = 0; i < w->patch_count; i++) {
-    patch *p = &w->patches[i];
+static void measure_pieces(work *w) {
+  for (size_t i = 0; i < w->piece_count; i++) {
+    piece *p = &w->pieces[i];
     if (!p->open) {
       local_point(w, w->triangles[3 * (size_t)p->first_triangle], p->reference);
     } else {
@@ -192,38 +192,37 @@ static void measure_patches(work *w) {
     }
   }
   for (size_t t = 0; t < w->triangle_count; t++) {
-    patch *p = &w->patches[w->patch_of[t]];
+    piece *p = &w->pieces[w->piece_of[t]];
     double volume = triangle_volume(w, t, p->reference);
     p->volume += volume;
     p->magnitude += fabs(volume);
   }
 }
 
-static void choose_sides(work *w, uint8_t *turn_patch) {
+static void choose_sides(work *w, uint8_t *turn_piece) {
   const double tolerance = 1e-12;
   double kept_volume = 0, kept_magnitude = 0;
-  for (size_t i = 0; i < w->patch_count; i++) {
-    const patch *p = &w->patches[i];
-    turn_patch[i] = 0;
+  for (size_t i = 0; i < w->piece_count; i++) {
+    const piece *p = &w->pieces[i];
+    turn_piece[i] = 0;
     if (p->conflicting) continue;
     if (p->disagreeing > 0) {
       bool flat = !(fabs(p->volume) > tolerance * p->magnitude);
-      turn_patch[i] = flat ? p->disagreeing > p->triangles - p->disagreeing : p->volume < 0;
+      turn_piece[i] = flat ? p->disagreeing > p->triangles - p->disagreeing : p->volume < 0;
     } else if (!p->open) {
       kept_volume += p->volume;
       kept_magnitude += p->magnitude;
     }
   }
   bool inside_out = kept_volume < -tolerance * kept_magnitude;
-  for (size_t i = 0; i < w->patch_count; i++) {
-    const patch *p = &w->patches[i];
-    if (inside_out && !p->conflicting && p->disagreeing == 0 && !p->open) turn_patch[i] = 1;
+  for (size_t i = 0; i < w->piece_count; i++) {
+    const piece *p = &w->pieces[i];
+    if (inside_out && !p->conflicting && p->disagreeing == 0 && !p->open) turn_piece[i] = 1;
   }
-  for (size_t t = 0; t < w->triangle_count; t++) w->turned[t] ^= turn_patch[w->patch_of[t]];
+  for (size_t t = 0; t < w->triangle_count; t++) w->turned[t] ^= turn_piece[w->piece_of[t]];
 }
 
-/* Counts edges and components of the triangles as they will be. `parents` and `open` (per vertex) and `volumes` (per
- * vertex) are scratch. */
+/* Counts edges and components with the flips applied. `parents`, `open` and `volumes` (per vertex) are scratch. */
 static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *volumes, qmat_connectivity *result) {
   size_t edges = 0;
   result->closed = result->oriented = true;
@@ -267,7 +266,7 @@ qmat_status qmat_orient_triangles(qmat_context *context, const double *positions
                                   uint32_t *triangles, size_t triangle_count, qmat_connectivity *connectivity) {
   qmat_status status = QMAT_OK;
   *connectivity = (qmat_connectivity){0};
-  qmat_arena arena = {0}; /* freed here, before the mesh goes on */
+  qmat_arena arena = {0}; /* separate, so that scratch memory is freed on return */
   size_t half_edges = 3 * triangle_count;
   size_t rows = vertex_count + 2 > triangle_count ? vertex_count + 2 : triangle_count;
   work w = {.positions = positions,
@@ -276,12 +275,12 @@ qmat_status qmat_orient_triangles(qmat_context *context, const double *positions
             .triangle_count = triangle_count,
             .order = qmat_arena_alloc(&arena, half_edges, sizeof(uint32_t)),
             .mate = qmat_arena_alloc(&arena, half_edges, sizeof(uint32_t)),
-            .patch_of = qmat_arena_alloc(&arena, triangle_count, sizeof(uint32_t)),
+            .piece_of = qmat_arena_alloc(&arena, triangle_count, sizeof(uint32_t)),
             .turned = qmat_arena_calloc(&arena, triangle_count, 1)};
   uint32_t *scratch = qmat_arena_alloc(&arena, rows, sizeof *scratch);
   uint8_t *flags = qmat_arena_alloc(&arena, rows, 1);
   double *volumes = qmat_arena_alloc(&arena, vertex_count, sizeof *volumes);
-  if (!w.order || !w.mate || !w.patch_of || !w.turned || !scratch || !flags || !volumes) goto shortage;
+  if (!w.order || !w.mate || !w.piece_of || !w.turned || !scratch || !flags || !volumes) goto shortage;
 
   measure_box(&w);
   sort_half_edges(&w, w.mate, scratch);
@@ -292,9 +291,9 @@ qmat_status qmat_orient_triangles(qmat_context *context, const double *positions
     w.mate[w.order[first]] = w.order[first + 1];
     w.mate[w.order[first + 1]] = w.order[first];
   }
-  if (!find_patches(&w, scratch)) goto shortage;
+  if (!find_pieces(&w, scratch)) goto shortage;
   find_borders(&w, flags);
-  measure_patches(&w);
+  measure_pieces(&w);
   choose_sides(&w, flags);
   count_all(&w, scratch, flags, volumes, connectivity);
 
@@ -309,7 +308,7 @@ qmat_status qmat_orient_triangles(qmat_context *context, const double *positions
 shortage:
   status = qmat_fail_memory(context, "the edges of the mesh");
 done:
-  qmat_free(w.patches);
+  qmat_free(w.pieces);
   qmat_arena_uninit(&arena);
   return status;
 }

@@ -6,8 +6,8 @@
 
 #include "core/geometry/vector.h"
 
-enum { LARGEST_BEST_FAN = 64, MOST_LOOKS = 64 };
-/* Bounds the time for polygons that cross themselves; what is left of one is then cut without looking. */
+enum { LARGEST_BEST_FAN = 64, MOST_PASSES = 64 };
+/* Limits the time for self-intersecting polygons. After this many tests, ears are clipped without a test. */
 static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28;
 
 /* Twice the signed area of the corners a b c in the plane. */
@@ -21,14 +21,14 @@ static double square_distance(const double *flat, uint32_t a, uint32_t b) {
   return x * x + y * y;
 }
 
-/* Area by squared sides: largest for equilateral triangles, 0 for slivers, negative for turned-over ones. */
+/* Twice the signed area over the sum of squared sides: largest for equilateral triangles, negative for flipped ones. */
 static double shape(const double *flat, uint32_t a, uint32_t b, uint32_t c) {
   double sides = square_distance(flat, a, b) + square_distance(flat, b, c) + square_distance(flat, c, a);
   return sides > 0 ? area(flat, a, b, c) / sides : 0;
 }
 
-/* Brings the corners into [-0.5, 0.5] without overflow, then into the plane of Newell's area vector. False when that
- * vector is zero: the polygon has no plane. `flat` holds 3 * count numbers, of which 2 * count are left. */
+/* Scales the corners to [-0.5, 0.5] without overflow, and projects them to the plane of Newell's area vector. False if
+ * that vector is zero: the polygon has no plane. `flat` has 3 * count numbers; the result uses the first 2 * count. */
 static bool flatten(const double *points, size_t count, double *flat) {
   double low[3], high[3], size = 0;
   for (int k = 0; k < 3; k++) low[k] = high[k] = points[k] * 0.5;
@@ -58,7 +58,7 @@ static bool flatten(const double *points, size_t count, double *flat) {
   if (!(length > 1e-300)) return false;
   for (int k = 0; k < 3; k++) normal[k] /= length;
 
-  /* u is at right angles to the normal, v = normal x u. */
+  /* u is perpendicular to the normal, v = normal x u. */
   int least = fabs(normal[0]) <= fabs(normal[1]) ? 0 : 1;
   if (fabs(normal[2]) < fabs(normal[least])) least = 2;
   double u[3] = {-normal[least] * normal[0], -normal[least] * normal[1], -normal[least] * normal[2]};
@@ -75,7 +75,7 @@ static bool flatten(const double *points, size_t count, double *flat) {
   return true;
 }
 
-/* Clearly better, so that rounding does not choose between equals. */
+/* The margin keeps rounding errors from choosing between equal shapes. */
 static bool is_better(double shape, double than) {
   return shape > than + 1e-9 * fabs(than);
 }
@@ -91,7 +91,7 @@ static void fan(uint32_t apex, size_t count, uint32_t *triangles) {
     set_triangle(triangles + 3 * (i - 1), apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count));
 }
 
-/* Turns left everywhere, once around: all the way there are only two changes between going up and down. */
+/* Whether all turns are left and the polygon winds around once: it changes between up and down at most twice. */
 static bool is_convex(const double *flat, size_t count) {
   int turns = 0;
   double before = 0;
@@ -106,7 +106,7 @@ static bool is_convex(const double *flat, size_t count) {
   return turns <= 2;
 }
 
-/* The apex whose worst triangle is best; the first of equals. */
+/* The apex of the fan whose worst triangle has the best shape; the first of equals. */
 static uint32_t best_fan(const double *flat, size_t count) {
   uint32_t best = 0;
   double best_shape = 0;
@@ -122,22 +122,21 @@ static uint32_t best_fan(const double *flat, size_t count) {
   return best;
 }
 
-/* The corners that are not cut off yet, as a ring, and what is known of each as the tip of an ear. */
+/* The remaining corners as a ring, and the state of each as the tip of an ear. */
 typedef struct ears {
   const double *flat;
   const uint32_t *ids;
   size_t count;
-  uint32_t *next, *previous, *reflex; /* reflex: a list of the corners that may block an ear */
+  uint32_t *next, *previous, *reflex; /* reflex: the corners that may block an ear */
   uint32_t *state;
-  double
-      *worth; /* of cutting a corner off next: its shape, to 24 bits so that equals are equal, ears above all others */
-  uint32_t *best; /* a knock-out among the corners: best[1] wins, best[i] the better of best[2 i] and best[2 i + 1] */
-  size_t leaves;  /* of the knock-out: a power of two; leaf i is corner i */
+  double *worth;  /* per corner: its shape in 24 bits, so that equal shapes tie; plus 1 for an ear */
+  uint32_t *best; /* a tournament tree: best[1] is the winner, best[i] the better of best[2 i] and best[2 i + 1] */
+  size_t leaves;  /* of the tree: a power of two; leaf i is corner i */
   size_t reflex_count;
   uint64_t tests_left;
 } ears;
 
-enum { CUT_OFF, NO_EAR, EAR };
+enum { CLIPPED, NO_EAR, EAR };
 
 static bool is_reflex(const ears *e, uint32_t corner) {
   return !(area(e->flat, e->previous[corner], corner, e->next[corner]) > 0);
@@ -158,7 +157,7 @@ static bool is_blocked(ears *e, uint32_t a, uint32_t b, uint32_t c) {
   for (size_t i = 0; i < e->reflex_count && e->tests_left > 0; e->tests_left--) {
     const uint32_t corner = e->reflex[i];
     const double *at = e->flat + 2 * (size_t)corner;
-    if (e->state[corner] == CUT_OFF) {
+    if (e->state[corner] == CLIPPED) {
       e->reflex[i] = e->reflex[--e->reflex_count];
       continue;
     }
@@ -166,7 +165,7 @@ static bool is_blocked(ears *e, uint32_t a, uint32_t b, uint32_t c) {
       i++;
       continue;
     }
-    if (!is_reflex(e, corner)) { /* it became convex, and stays so */
+    if (!is_reflex(e, corner)) { /* it became convex and stays convex */
       e->reflex[i] = e->reflex[--e->reflex_count];
       continue;
     }
@@ -180,7 +179,7 @@ static bool is_blocked(ears *e, uint32_t a, uint32_t b, uint32_t c) {
   return false;
 }
 
-/* The one of greater worth, of equals the first. */
+/* The corner of greater worth; the first of equals. */
 static uint32_t winner(const ears *e, uint32_t a, uint32_t b) {
   return b < e->count && e->worth[b] > e->worth[a] ? b : a;
 }
@@ -194,16 +193,16 @@ static void set_state(ears *e, uint32_t corner, uint32_t state, double worth) {
   e->worth[corner] = worth;
 }
 
-static void look_at(ears *e, uint32_t corner) {
+static void evaluate(ears *e, uint32_t corner) {
   uint32_t a = e->previous[corner], c = e->next[corner];
   double worth = (double)(float)shape(e->flat, a, corner, c); /* within [-0.3, 0.3] */
   bool ear = worth > 0 && !is_blocked(e, a, corner, c);
   set_state(e, corner, ear ? EAR : NO_EAR, ear ? worth + 1 : worth);
 }
 
-static void look_at_all(ears *e) {
+static void evaluate_all(ears *e) {
   for (uint32_t i = 0; i < e->count; i++) {
-    if (e->state[i] != CUT_OFF) look_at(e, i);
+    if (e->state[i] != CLIPPED) evaluate(e, i);
   }
   for (size_t i = 0; i < e->leaves; i++) e->best[e->leaves + i] = (uint32_t)i;
   for (size_t i = e->leaves; i-- > 1;) e->best[i] = winner(e, e->best[2 * i], e->best[2 * i + 1]);
@@ -219,20 +218,20 @@ static void clip_ears(ears *e, uint32_t *triangles) {
   for (uint32_t i = 0; i < count; i++) {
     if (is_reflex(e, i)) e->reflex[e->reflex_count++] = i;
   }
-  look_at_all(e);
+  evaluate_all(e);
 
-  int looks_left = MOST_LOOKS;
+  int passes_left = MOST_PASSES;
   for (size_t left = e->count; left > 3; left--) {
-    /* What blocked an ear may be gone by now. If there is none still, the polygon crosses itself. */
-    if (e->state[e->best[1]] != EAR && looks_left-- > 0) look_at_all(e);
+    /* Corners that blocked an ear may be clipped by now. If no ear is found, the polygon intersects itself. */
+    if (e->state[e->best[1]] != EAR && passes_left-- > 0) evaluate_all(e);
     uint32_t tip = e->best[1], a = e->previous[tip], c = e->next[tip];
     set_triangle(triangles, a, tip, c);
     triangles += 3;
-    set_state(e, tip, CUT_OFF, -INFINITY);
+    set_state(e, tip, CLIPPED, -INFINITY);
     e->next[a] = c;
     e->previous[c] = a;
-    look_at(e, a);
-    look_at(e, c);
+    evaluate(e, a);
+    evaluate(e, c);
     replay(e, tip);
     replay(e, a);
     replay(e, c);
@@ -253,8 +252,7 @@ bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t 
     fan(0, count, triangles);
     return true;
   }
-  /* Of a concave quadrilateral only one diagonal leaves both shapes positive, and a fan over either of its ends is it.
-   */
+  /* In a concave quadrilateral, only one diagonal gives two positive shapes; the best fan uses it. */
   if (count == 4 || (convex && count <= LARGEST_BEST_FAN)) {
     fan(best_fan(flat, count), count, triangles);
     return true;

@@ -15,7 +15,7 @@ static const char *base_of(const char *path) {
   return slash ? slash + 1 : path;
 }
 
-/* The ending of a base name with its dot, or its end. */
+/* The extension of a base name with its dot, or the end of the name. */
 static const char *ending_of(const char *base) {
   const char *dot = strrchr(base, '.');
   return dot && dot != base ? dot : base + strlen(base);
@@ -23,7 +23,7 @@ static const char *ending_of(const char *base) {
 
 /* ---- names ---- */
 
-/* The longest name that file systems take. */
+/* The longest file name that file systems support. */
 enum { LONGEST_NAME = 255 };
 
 typedef struct namer {
@@ -40,7 +40,7 @@ static bool is_taken(const namer *n, const char *name) {
   return false;
 }
 
-/* "out_t.png", or "out_t-2.png"; a base name that is too long is shortened at its front. NULL when memory is short. */
+/* Makes "out_t.png" or "out_t-2.png". A long base name loses its first characters. NULL if memory is short. */
 static char *make_name(const namer *n, const char *base) {
   char name[LONGEST_NAME + 1];
   const char *ending = ending_of(base);
@@ -50,14 +50,14 @@ static char *make_name(const namer *n, const char *base) {
     const size_t used = n->stem_length + 1 + strlen(base) + strlen(number);
     size_t surplus = used > LONGEST_NAME ? used - LONGEST_NAME : 0;
     const char *from = base + (surplus < (size_t)(ending - base) ? surplus : (size_t)(ending - base));
-    while (((unsigned char)*from & 0xC0) == 0x80) from++; /* not within a character */
+    while (((unsigned char)*from & 0xC0) == 0x80) from++; /* not inside a UTF-8 character */
     snprintf(name, sizeof name, "%.*s_%.*s%s%s", (int)n->stem_length, n->stem, (int)(ending - from), from, number,
              ending);
     if (!is_taken(n, name)) return qmat_strdup(name);
   }
 }
 
-/* The part that a URI names; 0: none. */
+/* Finds the part that a URI refers to; 0: none. */
 static qmat_status find_part(const namer *n, const json_t *uri, size_t *part) {
   char *name;
   *part = 0;
@@ -94,7 +94,7 @@ static qmat_status rename_part(void *user, json_t *owner, const char *key, qmat_
   return done ? QMAT_OK : qmat_fail_memory(n->context, "the names of output files");
 }
 
-/* Names the parts, and writes the main part that says so. */
+/* Names the parts, and writes the main part with the new URIs. */
 static qmat_status rename_parts(namer *n, qmat_writer *out) {
   const qmat_file_part *main_part = &n->file->parts[0];
   qmat_gltf_asset asset;
@@ -138,7 +138,7 @@ qmat_status qmat_file_name_sides(qmat_context *context, const qmat_file *file, c
         status = qmat_fail_memory(context, "the output file");
       }
     } else if (status == QMAT_OK) {
-      status = qmat_fail(context, QMAT_ERROR_INTERNAL, "no URI names the part '%s'", file->parts[i].name);
+      status = qmat_fail(context, QMAT_ERROR_INTERNAL, "no URI refers to the part '%s'", file->parts[i].name);
     }
     qmat_free(n.names[i]);
   }
@@ -152,9 +152,9 @@ qmat_status qmat_file_name_sides(qmat_context *context, const qmat_file *file, c
   return status;
 }
 
-/* ---- what may be replaced ---- */
+/* ---- replacing files ---- */
 
-/* Whether the file `path` is there and has the text in quotes. */
+/* Whether the file `path` exists and contains the quoted text. */
 static bool mentions(const char *path, const char *text) {
   FILE *file = fopen(path, "rbe");
   if (!file) return false;

@@ -4,18 +4,17 @@
 
 #include "core/value.h"
 
-/* The files that are saved beside a main file. */
+/* Files that are saved next to a main file, such as glTF buffers and textures. */
 
-/* Names the side parts of a file after the path that its main part is saved as, so that two outputs in one folder never
- * share a side file: for "x/out.gltf" an only buffer becomes "out.bin", everything else "out_" and its base name, with
- * a number where two of them would be equal. The main part's URIs change with them. All lie in the main part's folder.
- * Files of other
- * formats than glTF keep their names. `*named` is not sealed and is released by the caller; it is `file` itself,
- * retained, where no name changes. NULL on failure. QMAT_ERROR_MEMORY. Linear. */
+/* Names the side parts of a file after the path of its main part, so that two outputs in one folder never share a side
+ * file. For "x/out.gltf" a single buffer becomes "out.bin"; other parts get the prefix "out_" and, if names are equal,
+ * a number. The URIs in the main part are updated. All parts are saved in the same folder. Formats other than glTF keep
+ * their names. `*named` is not sealed; the caller releases it. It is `file` itself, retained, if it is not glTF or has
+ * no side parts; NULL on failure. QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_file_name_sides(qmat_context *context, const qmat_file *file, const char *path, qmat_file **named);
 
-/* Refuses to replace a file that is not this output's: QMAT_ERROR_IO where a side part's name exists with other bytes,
- * unless the file `path` exists, too, and names it, as it does after an earlier run. Writes nothing. */
+/* Protects files that belong to other outputs. QMAT_ERROR_IO if a file with the name of a side part exists with other
+ * content, unless an existing file `path` refers to it, as after an earlier run. Writes nothing. */
 qmat_status qmat_file_check_sides(qmat_context *context, const qmat_file *named, const char *path);
 
 #endif

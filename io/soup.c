@@ -32,7 +32,7 @@ qmat_status qmat_soup_reserve(qmat_context *context, qmat_soup *soup, size_t ver
   return QMAT_OK;
 }
 
-/* Asks whether to go on where `count` comes past a multiple of so many by `more`. */
+/* Reports progress where `more` items take the count past a multiple of REPORT_EVERY. */
 static qmat_status report_progress(qmat_context *context, size_t count, size_t more, const char *unit) {
   enum { REPORT_EVERY = 1 << 15 };
   return count / REPORT_EVERY == (count + more) / REPORT_EVERY ? QMAT_OK : qmat_progress(context, count, 0, unit);
@@ -50,7 +50,7 @@ qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const
 
 qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const uint32_t *corners, size_t count,
                                 uint32_t ordinal, int line) {
-  /* facet_lines grows last of the arrays by facet. */
+  /* qmat_soup_reserve grows facet_lines last, so all arrays per facet have at least its capacity. */
   if (soup->facet_count >= soup->facet_line_capacity || count > soup->corner_capacity - soup->corner_count) {
     qmat_status status = qmat_soup_reserve(context, soup, 0, 1, count);
     if (status != QMAT_OK) return status;
@@ -64,7 +64,7 @@ qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const ui
   return report_progress(context, soup->facet_count - 1, 1, "facets read");
 }
 
-/* The arrays of a cage: where they and their counts stand, and the bytes per count. */
+/* The arrays of a cage: the offsets of array and count, and the bytes per item. */
 static const struct {
   size_t array, count, bytes;
 } cage_arrays[QMAT_CAGE_ARRAYS] = {
@@ -93,7 +93,7 @@ static const void *cage_items(const qmat_cage *cage, size_t row) {
   return *(void *const *)(const void *)((const char *)cage + cage_arrays[row].array);
 }
 
-static void move_ids(uint32_t *ids, size_t count, size_t by) {
+static void offset_ids(uint32_t *ids, size_t count, size_t by) {
   for (size_t i = 0; i < count; i++) ids[i] += (uint32_t)by;
 }
 
@@ -107,10 +107,10 @@ qmat_status qmat_soup_add_cage(qmat_context *context, qmat_soup *soup, const qma
       return qmat_fail_memory(context, "the cages of subdivision surfaces");
     if (more > 0) memcpy((char *)*cage_array(to, row) + before * bytes, cage_items(cage, row), more * bytes);
   }
-  move_ids(to->corners + to->corner_count, cage->corner_count, to->vertex_count);
-  move_ids(to->holes + to->hole_count, cage->hole_count, to->face_count);
-  move_ids(to->creases + 2 * to->crease_count, 2 * cage->crease_count, to->vertex_count);
-  move_ids(to->sharp_vertices + to->sharp_count, cage->sharp_count, to->vertex_count);
+  offset_ids(to->corners + to->corner_count, cage->corner_count, to->vertex_count);
+  offset_ids(to->holes + to->hole_count, cage->hole_count, to->face_count);
+  offset_ids(to->creases + 2 * to->crease_count, 2 * cage->crease_count, to->vertex_count);
+  offset_ids(to->sharp_vertices + to->sharp_count, cage->sharp_count, to->vertex_count);
   to->surface_count += cage->surface_count;
   to->vertex_count += cage->vertex_count;
   to->face_count += cage->face_count;
@@ -129,7 +129,7 @@ void qmat_soup_clear_cage(qmat_soup *soup) {
   soup->cage = (qmat_cage){0};
 }
 
-/* A copy whose arrays hold what they count. */
+/* Copies a cage without spare capacity. */
 static qmat_status copy_cage(qmat_context *context, const qmat_cage *from, qmat_cage *to) {
   if (from->surface_count == 0) return QMAT_OK;
   for (size_t row = 0; row < QMAT_CAGE_ARRAYS; row++) {
@@ -168,9 +168,9 @@ typedef struct conversion {
   const qmat_soup *soup;
   const char *path;
   bool drops_defects;
-  qmat_arena arena;    /* of its own, so that it can be emptied before the mesh goes on */
+  qmat_arena arena;    /* separate, so that scratch memory is freed before the mesh is oriented */
   uint8_t *dropped;    /* per facet */
-  uint32_t *welded;    /* per vertex: the first vertex at its place */
+  uint32_t *welded;    /* per vertex: the first vertex at the same position */
   uint32_t *triangles; /* 3 * triangle_count, on the heap */
   size_t triangle_count;
   counts counts;
@@ -181,7 +181,7 @@ static qmat_status fail_shortage(conversion *c) {
   return qmat_fail_at(c->context, c->path, 0, 0);
 }
 
-/* Completes the newest error with the facet's number and line. */
+/* Adds the facet's number and line to the newest error. */
 static qmat_status at_facet(conversion *c, size_t facet) {
   qmat_fail_at(c->context, c->path, c->soup->facet_lines[facet], 0);
   return qmat_fail_element(c->context, "facet", c->soup->facet_ordinals[facet]);
@@ -204,12 +204,12 @@ static qmat_status check_counts(conversion *c) {
   const qmat_soup *soup = c->soup;
   if (soup->facet_count == 0) {
     qmat_fail(c->context, QMAT_ERROR_GEOMETRY,
-              soup->vertex_count > 0 ? "the file holds vertices but no facets" : "the file holds no facets");
+              soup->vertex_count > 0 ? "the file has vertices but no facets" : "the file has no facets");
     return qmat_fail_at(c->context, c->path, 0, 0);
   }
   if (soup->corner_count > MOST_TRIANGLES || soup->facet_count > MOST_TRIANGLES) {
-    qmat_fail(c->context, QMAT_ERROR_MEMORY, "the facets have %zu corners; at most %zu can be held", soup->corner_count,
-              MOST_TRIANGLES);
+    qmat_fail(c->context, QMAT_ERROR_MEMORY, "the facets have %zu corners; at most %zu are supported",
+              soup->corner_count, MOST_TRIANGLES);
     return qmat_fail_at(c->context, c->path, 0, 0);
   }
   for (size_t i = 0; i < 3 * soup->vertex_count; i++) {
@@ -223,7 +223,7 @@ static qmat_status check_counts(conversion *c) {
 
 static qmat_status refuse_or_drop(conversion *c, size_t facet) {
   if (!c->drops_defects) {
-    qmat_fail_hint(c->context, "'defects: drop' (qmat mat: --set model.defects=drop) leaves such facets out");
+    qmat_fail_hint(c->context, "set 'defects: drop' to drop such facets (qmat mat: --set model.defects=drop)");
     return at_facet(c, facet);
   }
   c->dropped[facet] = 1;
@@ -231,7 +231,7 @@ static qmat_status refuse_or_drop(conversion *c, size_t facet) {
   return QMAT_OK;
 }
 
-/* Corners, and the defects: a vertex named twice, the vertices of an earlier facet. */
+/* Checks the corners of the facets, and finds defects: a vertex used twice, the same vertices as an earlier facet. */
 static qmat_status check_facets(conversion *c) {
   const qmat_soup *soup = c->soup;
   size_t size = table_size(soup->facet_count);
@@ -253,17 +253,17 @@ static qmat_status check_facets(conversion *c) {
     uint32_t twice = NONE;
     for (size_t k = 0; k < count; k++) {
       if (corners[k] >= soup->vertex_count) {
-        qmat_fail(c->context, QMAT_ERROR_FORMAT, "the facet names vertex %u, but there are only %zu (counted from 0)",
+        qmat_fail(c->context, QMAT_ERROR_FORMAT, "the facet uses vertex %u, but there are only %zu (counted from 0)",
                   corners[k], soup->vertex_count);
         return at_facet(c, f);
       }
       if (last_use[corners[k]] == stamp && twice == NONE) twice = corners[k];
       last_use[corners[k]] = stamp;
-      hash += qmat_hash_mix(corners[k] + UINT64_C(0x9e3779b97f4a7c15)); /* the same in any order */
+      hash += qmat_hash_mix(corners[k] + UINT64_C(0x9e3779b97f4a7c15)); /* a sum does not depend on the order */
     }
     if (twice != NONE) {
       if (!c->drops_defects)
-        qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet names vertex %u twice (counted from 0)", twice);
+        qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet uses vertex %u twice (counted from 0)", twice);
       qmat_status status = refuse_or_drop(c, f);
       if (status != QMAT_OK) return status;
       continue;
@@ -367,8 +367,9 @@ static qmat_status triangulate(conversion *c) {
     }
     for (size_t k = 0; k < count; k++) memcpy(points + 3 * k, soup->positions + 3 * (size_t)ids[k], 3 * sizeof *points);
     if (!qmat_polygon_triangulate(points, ids, count, flat, links, cuts)) {
-      qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet is a concave polygon of %zu corners; at most %d are cut",
-                count, QMAT_LARGEST_CONCAVE_POLYGON);
+      qmat_fail(c->context, QMAT_ERROR_GEOMETRY,
+                "the facet is a concave polygon of %zu corners; at most %d are supported", count,
+                QMAT_LARGEST_CONCAVE_POLYGON);
       return at_facet(c, f);
     }
     size_t before = c->triangle_count;
@@ -381,15 +382,15 @@ static qmat_status triangulate(conversion *c) {
   return QMAT_OK;
 }
 
-/* Starts the triangle at its lowest corner: equal triangles of equal orientation become the same three numbers. */
+/* Rotates the lowest corner to the front: triangles of equal corners and orientation become identical. */
 static void canonical(const uint32_t *triangle, uint32_t out[3]) {
   int first = triangle[0] < triangle[1] ? 0 : 1;
   if (triangle[2] < triangle[first]) first = 2;
   for (int k = 0; k < 3; k++) out[k] = triangle[(first + k) % 3];
 }
 
-/* Leaves out triangles that say again what an earlier one says, and counts those that face an earlier one. Both come
- * of welding: in the file their vertices differed. */
+/* Drops triangles that equal an earlier one, and counts those that are an earlier one with opposite orientation. Facets
+ * with equal vertices in the file are defects already, so these come mostly from welding. */
 static qmat_status drop_repeats(conversion *c) {
   size_t size = table_size(c->triangle_count), kept = 0;
   uint32_t *table = make_table(c, size);
@@ -420,14 +421,14 @@ static qmat_status drop_repeats(conversion *c) {
   return QMAT_OK;
 }
 
-/* Numbers the used vertices anew, in the file's order, and hands the arrays to the mesh. */
+/* Renumbers the used vertices in file order, and passes the arrays to the mesh. */
 static qmat_status fill_mesh(conversion *c, qmat_mesh *mesh) {
   const qmat_soup *soup = c->soup;
   if (c->triangle_count == 0) {
-    qmat_fail(c->context, QMAT_ERROR_GEOMETRY,
-              "no facet of the file is left: %zu collapsed when vertices at equal "
-              "positions were joined, %zu were dropped as defects",
-              c->counts.collapsed, c->counts.defects);
+    qmat_fail(
+        c->context, QMAT_ERROR_GEOMETRY,
+        "no facet remains: %zu collapsed when vertices of equal position were welded, %zu were dropped as defects",
+        c->counts.collapsed, c->counts.defects);
     return qmat_fail_at(c->context, c->path, 0, 0);
   }
   uint32_t *numbers = qmat_arena_alloc(&c->arena, soup->vertex_count, sizeof *numbers);

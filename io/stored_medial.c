@@ -6,15 +6,15 @@
 
 #include "core/geometry/vector.h"
 
-static double raised(double error, double by) {
+static double raise_error(double error, double by) {
   return nextafter(error + nextafter(by, INFINITY), INFINITY);
 }
 
 qmat_stated_errors qmat_errors_after_move(const qmat_stated_errors *errors, double moved) {
   qmat_stated_errors after = *errors;
   if (!(errors->diagonal > 0) || !(moved > 0)) return after;
-  after.error_out = raised(errors->error_out, moved / errors->diagonal);
-  after.error_in = raised(errors->error_in, moved / errors->diagonal);
+  after.error_out = raise_error(errors->error_out, moved / errors->diagonal);
+  after.error_in = raise_error(errors->error_in, moved / errors->diagonal);
   const bool holds = after.error_out <= after.epsilon && after.error_in <= after.epsilon;
   if (after.certified == QMAT_CERTIFICATE_YES && !holds) after.certified = QMAT_CERTIFICATE_NO;
   return after;
@@ -46,7 +46,7 @@ void qmat_storage_origin(const qmat_medial *medial, const qmat_mesh *skin, doubl
     largest = fmax(largest, fmax(fabs(low[k]), fabs(high[k])));
     side = fmax(side, high[k] - low[k]);
   }
-  /* Three coordinates and a radius, each rounded by half a unit in the last of 24 bits. */
+  /* Three coordinates and a radius are each rounded by half a unit in the last of 24 bits. */
   const bool is_far = (sqrt(3) + 1) * ldexp(largest, -24) > allowed / 4;
   int exponent;
   if (!(allowed > 0) || !is_far || !(side > 0) || !isfinite(side)) return;

@@ -4,7 +4,7 @@
 
 #include "core/value.h"
 
-/* What is true of a medial mesh once it is in a file whose numbers have less than double precision. */
+/* The effect of storing a medial mesh in a file with less than double precision. */
 
 typedef enum qmat_certificate { QMAT_CERTIFICATE_UNKNOWN, QMAT_CERTIFICATE_NO, QMAT_CERTIFICATE_YES } qmat_certificate;
 
@@ -17,17 +17,17 @@ typedef struct qmat_stated_errors {
   qmat_certificate certified;
 } qmat_stated_errors;
 
-/* The errors after no point of the envelope or of the surface moved by more than `moved` (model units), rounded up. A
- * certificate holds as long as both errors are at most epsilon. Without a diagonal nothing changes. */
+/* Upper bounds of the errors after points of the envelope moved by at most `moved` (model units). A certificate stays
+ * valid while both errors are at most epsilon. Without a diagonal the errors stay unchanged. */
 qmat_stated_errors qmat_errors_after_move(const qmat_stated_errors *errors, double moved);
 
-/* The largest |dc| + |dr| over the spheres of two medial meshes of equally many spheres, in model units. Cones and
- * slabs interpolate their spheres, so no point of the solid moves farther. */
+/* The largest |dc| + |dr| over the spheres of two medial meshes with the same number of spheres, in model units. Cones
+ * and slabs interpolate spheres, so this bounds the motion of every envelope point. */
 double qmat_medial_move(const qmat_medial *given, const qmat_medial *stored);
 
-/* Chooses the point that single-precision coordinates count from: zero where rounding moves no point of the medial mesh
- * and of `skin` (NULL: none) by more than a quarter of `allowed` (model units, above zero), else near the centre of
- * their box, at multiples of a power of two, so that single precision holds the point itself as far as it can. */
+/* Chooses the origin of single-precision coordinates. It is zero if rounding moves no point of the medial mesh and of
+ * `skin` (NULL: none) by more than a quarter of `allowed` (model units, above zero). Otherwise it is near the centre of
+ * their bounding box, at multiples of a power of two, which single precision can usually represent exactly. */
 void qmat_storage_origin(const qmat_medial *medial, const qmat_mesh *skin, double allowed, double origin[3]);
 
 #endif

@@ -74,7 +74,7 @@ static qmat_status fail(const reader *r, const char *what) {
   return qmat_fail_at(r->context, r->path, 0, 0);
 }
 
-/* Takes the text if it comes next. */
+/* Skips `text` if it comes next. */
 static bool take(reader *r, const char *text) {
   const size_t length = strlen(text);
   if ((size_t)(r->end - r->at) < length || memcmp(r->at, text, length) != 0) return false;
@@ -82,7 +82,7 @@ static bool take(reader *r, const char *text) {
   return true;
 }
 
-/* Takes the rest of the line with its end; false where there is none of at most 63 characters. */
+/* Reads the rest of the line and skips its end. False if it has no end or more than 63 characters. */
 static bool take_line(reader *r, char line[64]) {
   const char *end = memchr(r->at, '\n', (size_t)(r->end - r->at));
   if (!end || end - r->at > 63) return false;
@@ -92,7 +92,7 @@ static bool take_line(reader *r, char line[64]) {
   return true;
 }
 
-/* Takes "element vertex 12" and what follows it; a count is at most the bytes that are left. */
+/* Reads a header line such as "element vertex 12" and skips `tail`. A count is at most the number of bytes left. */
 static bool take_element(reader *r, const char *head, const char *tail, size_t *count) {
   char line[64];
   double number;
@@ -103,33 +103,33 @@ static bool take_element(reader *r, const char *head, const char *tail, size_t *
   return take(r, tail);
 }
 
-/* Takes the comments that state something. */
+/* Reads the comments with facts. */
 static qmat_status take_facts(reader *r, json_t *facts) {
   char line[64];
   double number;
   while (take(r, "comment ")) {
     char *value = take_line(r, line) ? strchr(line, ' ') : NULL;
-    if (!value || strncmp(line, "qmat_", 5) != 0) return fail(r, "a comment of the header is not what qmat writes");
+    if (!value || strncmp(line, "qmat_", 5) != 0) return fail(r, "a comment in the header was not written by qmat");
     *value++ = '\0';
     const char *after = qmat_scan_double(value, value + strlen(value), &number);
     const bool is_number = after && !*after && isfinite(number), is_true = strcmp(value, "true") == 0;
-    if (!is_number && !is_true && strcmp(value, "false") != 0) return fail(r, "a comment of the header has no value");
+    if (!is_number && !is_true && strcmp(value, "false") != 0) return fail(r, "a comment in the header has no value");
     if (facts && json_object_set_new(facts, line, is_number ? json_real(number) : json_boolean(is_true)) != 0)
       return qmat_fail_memory(r->context, "facts");
   }
   return QMAT_OK;
 }
 
-/* `count` ids of spheres, each of `corners` behind `skip` bytes. The caller frees them. */
+/* Reads `count` simplices of `corners` sphere ids each. A face has a leading byte, 3. The caller frees the ids. */
 static qmat_status take_ids(const reader *r, qmat_byte_reader *body, size_t count, size_t corners, size_t spheres,
                             uint32_t **ids) {
   *ids = qmat_alloc(count, corners * sizeof **ids);
   if (!*ids) return qmat_fail_memory(r->context, "a medial mesh");
   for (size_t i = 0; i < count; i++) {
-    if (corners == 3 && qmat_take_u8(body) != 3) return fail(r, "a face is no triangle");
+    if (corners == 3 && qmat_take_u8(body) != 3) return fail(r, "a face is not a triangle");
     for (size_t k = 0; k < corners; k++) {
       (*ids)[corners * i + k] = qmat_take_u32(body);
-      if ((*ids)[corners * i + k] >= spheres) return fail(r, "a simplex names a sphere that is not there");
+      if ((*ids)[corners * i + k] >= spheres) return fail(r, "an edge or face refers to a sphere that does not exist");
     }
   }
   return QMAT_OK;
@@ -138,7 +138,7 @@ static qmat_status take_ids(const reader *r, qmat_byte_reader *body, size_t coun
 static qmat_status read_body(reader *r, size_t spheres, size_t edges, size_t triangles, qmat_medial *medial) {
   const size_t left = (size_t)(r->end - r->at);
   if (left != SPHERE_SIZE * spheres + EDGE_SIZE * edges + TRIANGLE_SIZE * triangles)
-    return fail(r, "the data do not have the size that the header states");
+    return fail(r, "the size of the data differs from the header");
   qmat_byte_reader body = {.bytes = (const uint8_t *)r->at, .size = left};
   uint32_t *ends = NULL, *corners = NULL;
   medial->spheres = qmat_alloc(spheres, 4 * sizeof *medial->spheres);
@@ -163,14 +163,14 @@ qmat_status qmat_ply_read_medial(qmat_context *context, const qmat_bytes *bytes,
   size_t spheres = 0, edges = 0, triangles = 0;
   *medial = NULL;
   if (!take(&r, START)) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the PLY does not carry a medial mesh");
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the PLY file has no medial mesh");
     return qmat_fail_at(context, path, 0, 0);
   }
   qmat_status status = take_facts(&r, facts);
   if (status != QMAT_OK) return status;
   if (!take_element(&r, "element vertex ", VERTICES, &spheres) || !take_element(&r, "element edge ", EDGES, &edges) ||
       !take_element(&r, "element face ", FACES, &triangles))
-    return fail(&r, "the header is not what qmat writes for a medial mesh");
+    return fail(&r, "the header is not that of a medial mesh written by qmat");
   qmat_medial *made = qmat_medial_new();
   status = made ? read_body(&r, spheres, edges, triangles, made) : qmat_fail_memory(context, "a medial mesh");
   if (status == QMAT_OK) {

@@ -186,7 +186,7 @@ static void test_of_several_one_has_to_be_named(void **state) {
   qmat_value_release(&read->base);
   json_decref(other_root);
   qmat_value_release(&other->base);
-  assert_fails(root, NULL, QMAT_ERROR_USAGE, "2 nodes have a medial mesh: one has to be named");
+  assert_fails(root, NULL, QMAT_ERROR_USAGE, "2 nodes have a medial mesh; choose one");
   assert_fails(root, "third", QMAT_ERROR_GEOMETRY, "no node of this name has a medial mesh");
   assert_int_equal(extract_json(&context, root, "second", &read, NULL), QMAT_OK);
   qmat_value_release(&read->base);
@@ -200,7 +200,7 @@ static void test_broken_data_and_wrong_counts_are_errors(void **state) {
   qmat_medial *medial = example_medial(20);
   json_t *root = write_gltf(medial);
   char message[128];
-  snprintf(message, sizeof message, "qmat_edges is not the %zu that the file holds", medial->edge_count);
+  snprintf(message, sizeof message, "qmat_edges differs from the actual count, %zu", medial->edge_count);
   json_object_set_new(extras_of(root, 0), "qmat_edges", json_integer(77));
   assert_fails(root, NULL, QMAT_ERROR_FORMAT, message);
   json_object_set_new(extras_of(root, 0), "qmat_data", json_string("AAAA"));

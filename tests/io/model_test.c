@@ -143,26 +143,26 @@ static void assert_not_read(const char *name, const void *content, size_t size, 
   qmat_context_uninit(&context);
 }
 
-static void test_a_wrong_ending_is_an_error_that_says_what_the_file_holds(void **state) {
+static void test_a_wrong_extension_is_an_error_that_names_the_content(void **state) {
   (void)state;
-  static const char rename_it[] = "rename it or convert it";
-  assert_not_read("bunny.off", ply, strlen(ply), QMAT_ERROR_FORMAT, "the name says OFF, but the file holds PLY",
+  static const char rename_it[] = "rename or convert the file";
+  assert_not_read("bunny.off", ply, strlen(ply), QMAT_ERROR_FORMAT, "the extension says OFF, but the content is PLY",
                   rename_it);
-  assert_not_read("bunny.ply", off, strlen(off), QMAT_ERROR_FORMAT, "the name says PLY, but the file holds OFF",
+  assert_not_read("bunny.ply", off, strlen(off), QMAT_ERROR_FORMAT, "the extension says PLY, but the content is OFF",
                   rename_it);
-  assert_not_read("bunny.stl", obj, strlen(obj), QMAT_ERROR_FORMAT, "the name says STL, but the file holds OBJ",
+  assert_not_read("bunny.stl", obj, strlen(obj), QMAT_ERROR_FORMAT, "the extension says STL, but the content is OBJ",
                   rename_it);
   assert_not_read("bunny.glb", gltf, strlen(gltf), QMAT_ERROR_FORMAT,
-                  "the name says binary glTF, but the file holds glTF", rename_it);
+                  "the extension says binary glTF, but the content is glTF", rename_it);
   assert_not_read("bunny.gltf", "glTF\2\0\0\0", 8, QMAT_ERROR_FORMAT,
-                  "the name says glTF, but the file holds binary glTF", rename_it);
-  assert_not_read("bunny.ma", off, strlen(off), QMAT_ERROR_FORMAT, "the name says MA, but the file holds OFF",
+                  "the extension says glTF, but the content is binary glTF", rename_it);
+  assert_not_read("bunny.ma", off, strlen(off), QMAT_ERROR_FORMAT, "the extension says MA, but the content is OFF",
                   rename_it);
 }
 
 static void test_what_is_not_read_is_refused_by_name(void **state) {
   (void)state;
-  static const char known[] = "models are read from .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc and .usdz";
+  static const char known[] = "use .off, .obj, .ply, .stl, .gltf, .glb, .usd, .usda, .usdc or .usdz";
   assert_not_read("a.usda", "#usda 1.0\n", 10, QMAT_ERROR_GEOMETRY, "the scene has no mesh that can be read", "");
   assert_not_read("a.usd", "PXR-USDC\0\7", 10, QMAT_ERROR_FORMAT, "a binary layer of USD must start with PXR-USDC", "");
   assert_not_read("a.usd", "?", 1, QMAT_ERROR_FORMAT, "a text layer of USD must start with '#usda 1.0'", "");
@@ -172,12 +172,12 @@ static void test_what_is_not_read_is_refused_by_name(void **state) {
   assert_not_read("a.usdz", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may be incomplete", "");
   assert_not_read("a", zip, 64, QMAT_ERROR_FORMAT, "the archive has no directory: it may be incomplete", "");
   zip[30] = zip[33] = 'x';
-  assert_not_read("a.zip", zip, 64, QMAT_ERROR_FORMAT, "archives are not read", known);
-  assert_not_read("a", zip, 5, QMAT_ERROR_FORMAT, "archives are not read", known);
+  assert_not_read("a.zip", zip, 64, QMAT_ERROR_FORMAT, "archives are not supported", known);
+  assert_not_read("a", zip, 5, QMAT_ERROR_FORMAT, "archives are not supported", known);
   assert_not_read("a.txt", "hello", 5, QMAT_ERROR_FORMAT,
-                  "neither the bytes nor the ending of the file show a format that is read", known);
-  assert_not_read("a.ma", "1 0 0\nv 0 0 0 1\n", 16, QMAT_ERROR_FORMAT, "the file holds a medial mesh, not a surface",
-                  "the node medial.read reads it");
+                  "neither the content nor the extension is of a supported format", known);
+  assert_not_read("a.ma", "1 0 0\nv 0 0 0 1\n", 16, QMAT_ERROR_FORMAT, "the file has a medial mesh, not a surface",
+                  "read it with the node medial.read");
   assert_not_read("a.off", "", 0, QMAT_ERROR_FORMAT, "the file is empty", "");
 }
 
@@ -185,7 +185,7 @@ static void test_a_failure_after_reading_leaves_no_values(void **state) {
   (void)state;
   static const char nan[] = "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n";
   assert_not_read("a.obj", nan, strlen(nan), QMAT_ERROR_GEOMETRY, "the vertex has a coordinate that is not finite", "");
-  assert_not_read("a.obj", "v 0 0 0\n", 8, QMAT_ERROR_GEOMETRY, "the file holds vertices but no facets", "");
+  assert_not_read("a.obj", "v 0 0 0\n", 8, QMAT_ERROR_GEOMETRY, "the file has vertices but no facets", "");
 }
 
 static void test_a_medial_mesh_is_read_only_from_its_own_format(void **state) {
@@ -203,7 +203,7 @@ static void test_a_medial_mesh_is_read_only_from_its_own_format(void **state) {
   write_file(path, off, strlen(off));
   assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_ERROR_FORMAT);
   assert_null(medial);
-  assert_string_equal(context.error.message, "the file holds OFF, not a medial mesh (MA)");
+  assert_string_equal(context.error.message, "the content is OFF, not a medial mesh (MA)");
   unlink(path);
   qmat_context_uninit(&context);
 }
@@ -313,7 +313,7 @@ int main(void) {
       cmocka_unit_test(test_the_ending_decides_where_the_bytes_say_nothing),
       cmocka_unit_test(test_a_name_that_is_not_utf8_becomes_valid_utf8),
       cmocka_unit_test(test_a_scene_knows_its_unit_where_the_format_has_one),
-      cmocka_unit_test(test_a_wrong_ending_is_an_error_that_says_what_the_file_holds),
+      cmocka_unit_test(test_a_wrong_extension_is_an_error_that_names_the_content),
       cmocka_unit_test(test_what_is_not_read_is_refused_by_name),
       cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),
       cmocka_unit_test(test_a_medial_mesh_is_read_only_from_its_own_format),

@@ -257,8 +257,8 @@ static void test_what_welding_collapses_repeats_or_turns_back_to_back_is_counted
   const int changed[] = {0, 1, 2, -1, 0, 1, 4, -1, 4, 5, 3, -1, 0, 5, 4, -1};
   json_t *report;
   assert_soup_refused(make_soup(positions, 6, facets, 4), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
-                      "file:13: facet 3: the facet has the same vertices as facet 2 ('defects: drop' "
-                      "(qmat mat: --set model.defects=drop) leaves such facets out)");
+                      "file:13: facet 3: the facet has the same vertices as facet 2 (set 'defects: drop' "
+                      "to drop such facets (qmat mat: --set model.defects=drop))");
   qmat_mesh *mesh = convert(make_soup(positions, 6, changed, 4), QMAT_DEFECTS_REFUSE, &report);
   assert_int_equal(mesh->vertex_count, 3);
   assert_int_equal(mesh->triangle_count, 2);
@@ -273,12 +273,12 @@ static void test_defects_are_refused_with_facet_and_line_or_dropped_and_counted(
   (void)state;
   const int twice[] = {0, 3, 2, 1, -1, 4, 5, 4, -1, 4, 5, 6, 7, -1};
   assert_soup_refused(make_soup(cube, 8, twice, 3), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
-                      "file:11: facet 1: the facet names vertex 4 twice (counted from 0) ('defects: drop' "
-                      "(qmat mat: --set model.defects=drop) leaves such facets out)");
+                      "file:11: facet 1: the facet uses vertex 4 twice (counted from 0) (set 'defects: drop' "
+                      "to drop such facets (qmat mat: --set model.defects=drop))");
   const int repeated[] = {0, 3, 2, 1, -1, 4, 5, 6, 7, -1, 1, 2, 0, 3, -1, 0, 3, 2, -1};
   assert_soup_refused(make_soup(cube, 8, repeated, 4), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
-                      "file:12: facet 2: the facet has the same vertices as facet 0 ('defects: drop' "
-                      "(qmat mat: --set model.defects=drop) leaves such facets out)");
+                      "file:12: facet 2: the facet has the same vertices as facet 0 (set 'defects: drop' "
+                      "to drop such facets (qmat mat: --set model.defects=drop))");
   json_t *report;
   qmat_mesh *mesh = convert(make_soup(cube, 8, twice, 3), QMAT_DEFECTS_DROP, &report);
   assert_int_equal(mesh->triangle_count, 4);
@@ -289,21 +289,21 @@ static void test_defects_are_refused_with_facet_and_line_or_dropped_and_counted(
   assert_count(report, "facets_dropped_as_defects", 1);
   done(mesh, report);
   assert_soup_refused(make_soup(cube, 8, twice + 5, 1), QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY,
-                      "file: no facet of the file is left: 0 collapsed when vertices at equal positions were joined, 1 "
+                      "file: no facet remains: 0 collapsed when vertices of equal position were welded, 1 "
                       "were dropped as defects");
 }
 
-static void test_what_is_no_surface_is_refused(void **state) {
+static void test_a_file_without_a_surface_is_refused(void **state) {
   (void)state;
-  assert_soup_refused((qmat_soup){0}, QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY, "file: the file holds no facets");
+  assert_soup_refused((qmat_soup){0}, QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY, "file: the file has no facets");
   assert_soup_refused(make_soup(cube, 8, NULL, 0), QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY,
-                      "file: the file holds vertices but no facets");
+                      "file: the file has vertices but no facets");
   const int two[] = {0, 1, 2, -1, 0, 1, -1};
   assert_soup_refused(make_soup(cube, 8, two, 2), QMAT_DEFECTS_DROP, QMAT_ERROR_FORMAT,
                       "file:11: facet 1: the facet has 2 corners; at least 3 are needed");
   const int far[] = {0, 1, 8, -1};
   assert_soup_refused(make_soup(cube, 8, far, 1), QMAT_DEFECTS_DROP, QMAT_ERROR_FORMAT,
-                      "file:10: facet 0: the facet names vertex 8, but there are only 8 (counted from 0)");
+                      "file:10: facet 0: the facet uses vertex 8, but there are only 8 (counted from 0)");
   double bad[24];
   for (int k = 0; k < 3; k++) {
     memcpy(bad, cube, sizeof bad);
@@ -411,7 +411,7 @@ int main(void) {
       cmocka_unit_test(test_vertices_at_one_place_become_the_first_of_them),
       cmocka_unit_test(test_what_welding_collapses_repeats_or_turns_back_to_back_is_counted),
       cmocka_unit_test(test_defects_are_refused_with_facet_and_line_or_dropped_and_counted),
-      cmocka_unit_test(test_what_is_no_surface_is_refused),
+      cmocka_unit_test(test_a_file_without_a_surface_is_refused),
       cmocka_unit_test(test_coordinates_near_the_largest_double_do_no_harm),
       cmocka_unit_test(test_counts_agree_with_a_slow_count_on_random_soups),
   };
