@@ -9,7 +9,7 @@
 #include "core/geometry/medial_distance.h"
 #include "nodes/measure/envelope_to_surface.h"
 
-/* How far a new sphere may leave the solid, as shares of epsilon: the first that gives a cone within epsilon counts. */
+/* Distances a new sphere may protrude, as shares of epsilon. The first with a cone within epsilon is used. */
 static const double protruding_shares[] = {0.9, 0.6, 0.3, 0};
 enum { SHARES = sizeof protruding_shares / sizeof *protruding_shares };
 
@@ -57,7 +57,7 @@ static bool is_covered(const double *spheres, size_t count, const double *place)
   return false;
 }
 
-/* Finds the sphere at a point and the sphere to join it to. False: none is within epsilon. */
+/* Finds the new sphere at a point and the sphere to join it to. False if no cone is within epsilon. */
 static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_t count, const double *place,
                        double depth, double epsilon, double sphere[4], uint32_t *neighbour) {
   uint32_t nearest[MOST_NEIGHBOURS];

@@ -7,7 +7,7 @@
 
 enum { QMAT_MOST_CANDIDATES = 4 };
 
-/* Spheres that an edge may collapse to, least slab quadratic error first. */
+/* Spheres that an edge may collapse to, in the order of their errors. */
 typedef struct qmat_candidates {
   double spheres[QMAT_MOST_CANDIDATES][4], errors[QMAT_MOST_CANDIDATES];
   int count;
@@ -21,8 +21,8 @@ void qmat_candidates_insert(qmat_candidates *candidates, const double sphere[4],
 /* The same with its slab quadratic error. */
 void qmat_candidates_add(qmat_candidates *candidates, const qmat_quadric *quadric, const double sphere[4]);
 
-/* The candidates of an edge: the sphere of least error where there is one with a radius > 0 that does not run away
- * along a nearly flat direction, both ends, and the middle (section 3.1.2). */
+/* The candidates of an edge: both ends, the middle, and the sphere of least error (section 3.1.2). The last is left out
+ * if it does not exist, its radius is not positive, or it lies too far from the edge, as in nearly flat directions. */
 void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
                           qmat_candidates *candidates);
 

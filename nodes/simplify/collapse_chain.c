@@ -9,7 +9,7 @@ const double qmat_constraint_share = 0.975;
 
 void qmat_collapse_roots(const uint32_t *ends, size_t count, size_t sphere_count, uint32_t *roots) {
   for (size_t v = 0; v < sphere_count; v++) roots[v] = (uint32_t)v;
-  /* What the sphere that stays has become is known when the later collapses are. */
+  /* Backwards: when a collapse is reached, the root of its kept sphere is known. */
   for (size_t i = count; i-- > 0;) roots[ends[2 * i + 1]] = roots[ends[2 * i]];
 }
 
@@ -37,7 +37,7 @@ size_t qmat_chain_length(const qmat_chain *chain, size_t vertices, double epsilo
     if (most < high) high = most;
   }
   if (!(epsilon > 0)) return high;
-  while (low < high) { /* errors never fall */
+  while (low < high) { /* errors never decrease */
     const size_t middle = low + (high - low) / 2;
     if (chain->errors[middle] > qmat_constraint_share * epsilon)
       high = middle;
@@ -47,7 +47,7 @@ size_t qmat_chain_length(const qmat_chain *chain, size_t vertices, double epsilo
   return low;
 }
 
-/* Simplices of the spheres that their own have become, without those of which less is left. Returns how many. */
+/* Maps simplices to the merged spheres and drops degenerate ones. Returns the number of remaining ones. */
 static size_t map_simplices(const uint32_t *simplices, size_t count, size_t width, const uint32_t *ids,
                             uint32_t *mapped) {
   size_t kept = 0;

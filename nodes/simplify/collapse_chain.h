@@ -21,13 +21,13 @@ extern const double qmat_constraint_share;
  * collapse, as in qmat_chain); itself where it is not merged. `roots`: sphere_count. Cost: linear. */
 void qmat_collapse_roots(const uint32_t *ends, size_t count, size_t sphere_count, uint32_t *roots);
 
-/* Gives an unsealed medial mesh, whose spheres are counted, its responsible regions: `owners` (per sample) is a sphere,
+/* Sets the responsible regions of an unsealed medial mesh, whose sphere_count is set. `owners` (per sample) is a sphere
  * or QMAT_NONE. QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_medial_set_regions(qmat_context *context, const uint32_t *owners, size_t sample_count,
                                     qmat_medial *medial);
 
-/* How many collapses of a chain leave at least `vertices` spheres (0: any number) and errors up to `epsilon` diagonals
- * (0: any). Cost: logarithmic. */
+/* The largest number of collapses of a chain that leave at least `vertices` spheres (0: any number) and errors up to
+ * `epsilon` diagonals (0: any). Cost: logarithmic. */
 size_t qmat_chain_length(const qmat_chain *chain, size_t vertices, double epsilon);
 
 /* The medial mesh after the first `count` collapses of a chain, its spheres in the order of the initial one. `medial`

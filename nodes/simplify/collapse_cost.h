@@ -12,17 +12,17 @@ typedef enum qmat_cost_kind {
   QMAT_COST_PMAT       /* PMAT (Faraj et al. 2013): length of the edge against the difference of radii */
 } qmat_cost_kind;
 
-/* Eq. 6: `error` is the slab quadratic error of the merged sphere, the edge that between spheres `a` and `b` (4 doubles
- * each). 0 for a pure spike, whatever the error is. */
+/* Eq. 6 for an edge between spheres `a` and `b` (4 doubles each); `error` is the slab quadratic error of the merged
+ * sphere. 0 for a pure spike, whatever the error is. */
 double qmat_slab_cost(double error, double k, const double a[4], const double b[4]);
 
 /* The distance of the centres over the difference of the radii: below 1 where one sphere contains the other, INFINITY
  * for equal radii, 0 for equal centres. */
 double qmat_pmat_cost(const double a[4], const double b[4]);
 
-/* The candidate of the newest preview in HEM: the end of the edge for which the collapse leaves the least F, with that
- * F. F is the largest over the points of both ends, among the first `point_count` constraint points; -INFINITY where
- * there are none. Of equal ends the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
+/* The HEM candidate of the newest preview: the end of the edge with the smaller error after the collapse, and this
+ * error. The error is the largest F at the points of both ends among the first `point_count` constraint points;
+ * -INFINITY without points. Equal errors choose the larger sphere. QMAT_ERROR_MEMORY. Cost: points times both stars. */
 qmat_status qmat_hausdorff_candidates(qmat_context *context, qmat_surface_to_envelope *tracker,
                                       const qmat_complex *complex, const qmat_collapse *collapse, size_t point_count,
                                       qmat_candidates *candidates);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A tubular feature: an edge without slabs whose responsible region is all thin (section 3.4). */
+/* Whether the edge is a tubular feature: it has no slab, and all of its responsible region is thin (section 3.4). */
 static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   if (s->complex.edge_triangles[edge]) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
@@ -135,7 +135,7 @@ qmat_status qmat_decimation_test_sphere(qmat_decimation *s, const double *sphere
   return QMAT_OK;
 }
 
-/* The largest error recorded: more than the whole model. */
+/* The largest error recorded; it exceeds the size of the model. */
 static const double most_error = 2;
 
 static void record(qmat_decimation *s, const double *sphere) {

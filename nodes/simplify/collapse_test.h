@@ -26,8 +26,8 @@ typedef enum {
  * (section 3.4). */
 bool qmat_decimation_is_protected(const qmat_decimation *decimation, uint32_t vertex);
 
-/* Restricts the candidates of an edge: a protected end keeps its sphere, which `*bound` says. False where the edge must
- * stay. */
+/* Restricts the candidates of an edge if one end is protected: that end keeps its sphere, and `*bound` becomes true.
+ * False if the edge must not collapse. */
 bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_t edge, qmat_candidates *candidates,
                                       bool *bound);
 
@@ -40,7 +40,7 @@ bool qmat_decimation_keeps_topology(const qmat_decimation *decimation, int64_t *
 qmat_status qmat_decimation_test_sphere(qmat_decimation *decimation, const double *sphere, uint32_t first,
                                         qmat_collapse_outcome *result, double *needed);
 
-/* Does what the newest preview and the newest successful test allow. QMAT_ERROR_MEMORY. */
+/* Commits the newest preview with the sphere of its newest successful test. QMAT_ERROR_MEMORY. */
 qmat_status qmat_decimation_commit(qmat_decimation *decimation, const double *sphere);
 
 #endif

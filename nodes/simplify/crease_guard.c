@@ -72,7 +72,7 @@ qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *co
       if (!creases->is_corner[creases->points[i]]) places[creases->points[i]] = (uint32_t)i;
     }
     if (creases->is_corner[creases->points[first]]) continue;
-    /* A loop: its first point comes again at its end, which is not used. */
+    /* A loop repeats its first point at the end; that place is not used. */
     places[creases->points[first]] = (uint32_t)first;
     guard->previous[first] = (uint32_t)last - 1;
     guard->next[last - 1] = (uint32_t)first;
@@ -110,7 +110,7 @@ static double distance_to_segment(const double *p, const double *a, const double
   return qmat_point_distance(p, foot);
 }
 
-/* The largest distance of the initial points of a crease between two places from the segment between these. */
+/* The largest distance of the initial crease points between two places from the segment that joins the places. */
 static double deviation(const qmat_crease_guard *g, uint32_t from, uint32_t to) {
   const double *a = point_at(g, from), *b = point_at(g, to);
   double most = 0;
@@ -123,8 +123,8 @@ static uint32_t feature_at(const qmat_crease_guard *g, uint32_t place) {
   return place == QMAT_NONE ? QMAT_NONE : g->creases.points[place];
 }
 
-/* The distance of a crease from its remaining points when `feature` merges into `into`. INFINITY where it may not: it
- * is a corner, the two do not follow each other, or the crease would degenerate. */
+/* The distance of a crease from its remaining points when `feature` merges into `into`. INFINITY if it may not:
+ * it is a corner, the two are not neighbours on the crease, or the crease would degenerate. */
 static double error_without(const qmat_crease_guard *g, uint32_t feature, uint32_t into) {
   const uint32_t place = g->places[feature];
   if (place == QMAT_NONE) return INFINITY;

@@ -14,22 +14,22 @@
  *
  * The arrays live in the context's arena. Zeroed, it guards nothing. */
 typedef struct qmat_crease_guard {
-  size_t feature_count, left;   /* at first, and now */
-  uint32_t *features;           /* per vertex of the complex: its feature, or QMAT_NONE; NULL: there is none */
-  uint32_t *vertices;           /* per feature: the vertex whose sphere it is, or QMAT_NONE when it is gone */
+  size_t feature_count, left;   /* the initial and the present number */
+  uint32_t *features;           /* per vertex of the complex: its feature, or QMAT_NONE; NULL: no features */
+  uint32_t *vertices;           /* per feature: its vertex, or QMAT_NONE after it was merged */
   const double *points;         /* 3 per feature */
   const uint32_t *places;       /* per feature: its place along the creases, or QMAT_NONE for a corner */
   qmat_creases creases;         /* their points are features */
-  const uint32_t *initial_next; /* per place: the one that follows on its crease, QMAT_NONE beyond a corner */
-  uint32_t *next, *previous;    /* per place: that of the next feature which is left, QMAT_NONE beyond a corner */
+  const uint32_t *initial_next; /* per place: the next place on its crease, QMAT_NONE at its end */
+  uint32_t *next, *previous;    /* per place: that of the next remaining feature, QMAT_NONE at an end */
 } qmat_crease_guard;
 
-/* Guards the spheres of radius zero of a complex that is not yet changed, and the edges between two of them.
+/* Guards the spheres of radius zero of a complex without collapses, and the edges between two of them.
  * QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, qmat_crease_guard *guard);
 
-/* The same features in another complex: `ids` gives new numbers, of `vertex_count`, to the live vertices. `from` stays
- * as it is and has to live as long. QMAT_ERROR_MEMORY. */
+/* Makes a guard of the same features for another complex with `vertex_count` vertices: `ids` maps the live vertices to
+ * its vertices. `from` is unchanged and has to outlive `guard`. QMAT_ERROR_MEMORY. */
 qmat_status qmat_crease_guard_renumber(qmat_context *context, const qmat_crease_guard *from, const uint32_t *ids,
                                        size_t vertex_count, qmat_crease_guard *guard);
 
@@ -38,14 +38,14 @@ static inline bool qmat_crease_guard_is_feature(const qmat_crease_guard *guard, 
 }
 
 /* Restricts the candidates of an edge to its ends that preserve features, with their slab quadratic errors: none, one
- * or two. False, and nothing changed, where neither end is a feature. `tolerance` is the largest distance of crease
+ * or two. False, with unchanged candidates, if neither end is a feature. `tolerance` is the largest distance of crease
  * points from their crease; `*needed` gets the least tolerance that allows another candidate (INFINITY: none). Safe
  * from any thread. */
 bool qmat_crease_guard_restrict(const qmat_crease_guard *guard, const qmat_complex *complex,
                                 const qmat_quadric *quadrics, uint32_t edge, double tolerance,
                                 qmat_candidates *candidates, double *needed);
 
-/* Follows a collapse to `sphere`, one of those that were left: call it before the complex changes. */
+/* Updates the guard for a collapse to `sphere`, one of the restricted candidates. The complex changes afterwards. */
 void qmat_crease_guard_commit(qmat_crease_guard *guard, const qmat_complex *complex, const qmat_collapse *collapse,
                               const double sphere[4]);
 

@@ -16,7 +16,7 @@ static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
 }
 
-/* Twelve levels of the threshold to each doubling of the finest. Beyond the size of the model there is none. */
+/* The threshold doubles every twelve levels. It is INFINITY beyond the size of the model. */
 enum { LEVELS_TO_A_DOUBLING = 12 };
 
 static double threshold_at(const qmat_decimation *s, int level) {
@@ -25,8 +25,8 @@ static double threshold_at(const qmat_decimation *s, int level) {
   return error <= 1 ? qmat_constraint_share * error : INFINITY;
 }
 
-/* Sets the threshold of a level. Points that the initial medial mesh leaves farther away must not get worse. Interior
- * points deeper than the threshold must stay covered. */
+/* Sets the threshold of a level. Surface points with a larger initial distance must not get worse. Interior points
+ * deeper than the threshold must stay covered. */
 static void set_threshold(qmat_decimation *s, int level) {
   const qmat_constraint_points *constraints = s->constraints;
   s->level = level;
@@ -38,7 +38,7 @@ static void set_threshold(qmat_decimation *s, int level) {
   s->envelope_tracker.limit = qmat_decimation_is_two_sided(s) ? s->threshold : INFINITY;
 }
 
-/* Raises the threshold by a level. False where that is above the limit, or where there is no threshold. */
+/* Raises the threshold by a level. False if it would exceed the limit, or if there is no threshold. */
 static bool raise_threshold(qmat_decimation *s) {
   if (!(s->threshold < INFINITY) || threshold_at(s, s->level + 1) > s->rules.limit) return false;
   set_threshold(s, s->level + 1);
@@ -61,7 +61,7 @@ static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candi
   return QMAT_OK;
 }
 
-/* Restricts the candidates of an edge at sharp features, for any threshold; without an allowed one they stay. */
+/* Restricts the candidates of an edge at sharp features, for any threshold. Unchanged if none would remain. */
 static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
   double needed;
@@ -103,7 +103,7 @@ static qmat_status fill_heap(qmat_decimation *s) {
     s->failed_points[e] = QMAT_NONE;
     s->needed[e] = 0;
   }
-  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* uses the one preview */
+  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* serial: all costs use the same preview */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
       if (e % COSTS_A_REPORT == 0) status = qmat_progress(s->context, e, count, "costs");
       if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
@@ -117,7 +117,7 @@ static qmat_status fill_heap(qmat_decimation *s) {
   return status;
 }
 
-/* Makes room for every collapse, and records the owners of the samples before the first. */
+/* Allocates the log for every collapse, and records the initial owners of the samples. */
 static qmat_status start_log(qmat_decimation *s) {
   const size_t most = s->complex.vertex_count, samples = s->constraints->sample_count;
   qmat_arena *arena = &s->context->arena;
@@ -150,7 +150,7 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
       if (status != QMAT_OK) return status;
     }
   }
-  /* Points that the initial medial mesh leaves farther away must not get worse. */
+  /* Surface points with a larger initial distance must not get worse. */
   const double limit = s->rules.share * s->rules.limit;
   for (size_t i = 0; i < constraints->count; i++)
     limits[i] = i < constraints->surface_count ? fmax(limit, constraints->distances[i])
@@ -185,7 +185,7 @@ void qmat_decimation_uninit(qmat_decimation *s) {
 static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
   qmat_candidates c;
   *result = QMAT_COLLAPSE_REFUSED;
-  s->neighbourhood.count = 0; /* that of an edge tried before is none of this one's */
+  s->neighbourhood.count = 0; /* drops the neighbourhood of the edge tried before */
   qmat_status status = find_candidates(s, edge, &c);
   if (status != QMAT_OK) return status;
   double needed;
@@ -289,7 +289,7 @@ static qmat_status report_progress(const qmat_decimation *s) {
   return qmat_progress(s->context, initial - s->complex.live_vertices, initial, "collapses");
 }
 
-/* Tests and commits a sphere of the neighbourhood that is in place already, for its bounds and witnesses. */
+/* Tests and commits a sphere of the neighbourhood that is already in place, to update its bounds and witnesses. */
 static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   double sphere[4], needed;
   qmat_collapse_outcome result;
@@ -302,7 +302,7 @@ static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   return status;
 }
 
-/* Collapses until the heap is empty; `*ended` when the rules end it. */
+/* Collapses edges until the heap is empty or the rules end it; then `*ended` is true. */
 static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
@@ -393,7 +393,7 @@ static void queue_raised(qmat_decimation *s) {
 }
 
 qmat_status qmat_decimation_run(qmat_decimation *s) {
-  bool ended = s->threshold > s->rules.limit; /* even the lowest level is above it */
+  bool ended = s->threshold > s->rules.limit; /* even the lowest threshold exceeds the limit */
   qmat_status status = s->rules.neighbourhoods ? QMAT_OK : collapse_edges(s, &ended);
   while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
          raise_threshold(s)) {

@@ -5,8 +5,8 @@
 #include "nodes/simplify/decimation_state.h"
 
 /* Sets up the quadrics, the heap and both error trackers of a complex. The caller has made `complex` (unit frame) and
- * given context, rules and surface. `constraints` stays the caller's; its distances are limits for points that the
- * initial medial mesh leaves farther away. `depths`: per vertex. All memory is in the context's arena, except what
+ * given context, rules and surface. The caller keeps `constraints`. A surface point whose initial distance exceeds
+ * the limit has this distance as its limit. `depths`: per vertex. All memory is in the context's arena, except what
  * qmat_decimation_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                  const double *depths);

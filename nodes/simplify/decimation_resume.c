@@ -6,8 +6,8 @@
 #include "core/geometry/medial_build.h"
 #include "nodes/simplify/decimation.h"
 
-/* Where collapses come in order, the merged sphere inherits the regions of both ends (section 3.3), so that they do not
- * depend on the limits tested. */
+/* With collapses in order, a merged sphere inherits the regions of both ends (section 3.3). The regions then do not
+ * depend on the limits that are tested. */
 static qmat_status set_regions(const qmat_decimation *s, const uint32_t *ids, qmat_medial *medial) {
   const size_t samples = s->constraints->sample_count;
   uint32_t *owners = qmat_arena_alloc(&s->context->arena, samples, sizeof *owners);

@@ -8,10 +8,10 @@
  * responsible regions. `medial` is new and unsealed. QMAT_ERROR_MEMORY. */
 qmat_status qmat_decimation_extract(const qmat_decimation *decimation, qmat_medial *medial);
 
-/* Continues in `to` where `from` stopped: with `left`, which qmat_decimation_extract made of it, and with its quadrics,
- * bounds and witnesses. `left` may have further spheres at the end, joined by edges, and there may be `extra` points.
- * `to` has context, surface and rules. `constraints` gets its constraint points and has to live as long. `from` stays
- * as it is. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
+/* Sets up `to` to continue from `from`. `left` is the result of qmat_decimation_extract; spheres may have been
+ * appended, joined to it by edges. The quadrics, bounds and witnesses of `from` are carried over. `extra` are
+ * additional constraint points. The caller has given `to` its context, surface and rules. `constraints` gets all
+ * constraint points and has to outlive `to`. `from` is unchanged. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints, qmat_decimation *to);
 

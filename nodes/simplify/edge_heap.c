@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/simplify/edge_heap.h"
 
-/* Of two edges of the same cost. */
+/* Whether edge `a` comes before edge `b` of the same cost. */
 static bool decide_tie(const qmat_edge_heap *h, uint32_t a, uint32_t b) {
   if (h->errors[a] != h->errors[b]) return h->errors[a] < h->errors[b];
   const uint32_t *p = &h->complex->edges[2 * (size_t)a], *q = &h->complex->edges[2 * (size_t)b];
@@ -19,11 +19,11 @@ static void put(qmat_edge_heap *h, size_t place, qmat_heap_entry entry) {
   h->places[entry.edge] = (uint32_t)place;
 }
 
-enum { BELOW = 4 };
+enum { CHILDREN = 4 };
 
 static void sift_up(qmat_edge_heap *h, size_t place) {
   const qmat_heap_entry entry = h->entries[place];
-  for (size_t above; place > 0 && comes_first(h, &entry, &h->entries[above = (place - 1) / BELOW]); place = above)
+  for (size_t above; place > 0 && comes_first(h, &entry, &h->entries[above = (place - 1) / CHILDREN]); place = above)
     put(h, place, h->entries[above]);
   put(h, place, entry);
 }
@@ -31,7 +31,7 @@ static void sift_up(qmat_edge_heap *h, size_t place) {
 static void sift_down(qmat_edge_heap *h, size_t place) {
   const qmat_heap_entry entry = h->entries[place];
   for (;;) {
-    const size_t first = BELOW * place + 1, end = first + BELOW < h->count ? first + BELOW : h->count;
+    const size_t first = CHILDREN * place + 1, end = first + CHILDREN < h->count ? first + CHILDREN : h->count;
     if (first >= h->count) break;
     size_t least = first;
     for (size_t i = first + 1; i < end; i++)
@@ -81,5 +81,5 @@ void qmat_edge_heap_fill(qmat_edge_heap *h, const uint8_t *locked) {
     if (!locked || !(locked[ends[0]] || locked[ends[1]]))
       put(h, h->count++, (qmat_heap_entry){h->costs[e], (uint32_t)e});
   }
-  for (size_t i = (h->count + BELOW - 2) / BELOW; i-- > 0;) sift_down(h, i);
+  for (size_t i = (h->count + CHILDREN - 2) / CHILDREN; i-- > 0;) sift_down(h, i);
 }

@@ -4,28 +4,28 @@
 
 #include "core/geometry/medial_complex.h"
 
-/* The edges of a medial complex in a heap, cheapest first: by cost, then by error (eq. 6 gives every spike cost 0),
- * then by the ids of their ends, so that the order is one and the same in every run. The arrays live in the context's
- * arena that made them. */
+/* A heap of the edges of a medial complex, cheapest first. Edges of equal cost are ordered by error (eq. 6 gives every
+ * spike the cost 0), then by the ids of their ends, so that the order is deterministic. The arrays live in the arena of
+ * the context that qmat_edge_heap_init gets. */
 typedef struct qmat_edge_heap {
   const qmat_complex *complex;
-  double *costs, *errors;          /* per edge; set them before an edge is put in, and update it when they change */
-  struct qmat_heap_entry *entries; /* the heap: each has at most four below it */
-  uint32_t *places;                /* per edge: its place in the heap, QMAT_NONE when it is not in it */
+  double *costs, *errors;          /* per edge: set before the edge is inserted; update the edge after a change */
+  struct qmat_heap_entry *entries; /* the heap: each entry has at most four children */
+  uint32_t *places;                /* per edge: its place in the heap; QMAT_NONE: not in the heap */
   size_t count;
 } qmat_edge_heap;
 
-/* An edge in the heap, with its cost beside it, which decides nearly always. */
+/* An edge in the heap, with a copy of its cost: it decides most comparisons without another memory access. */
 typedef struct qmat_heap_entry {
   double cost;
   uint32_t edge;
 } qmat_heap_entry;
 
-/* Makes room for the complex's edges; the heap is empty. QMAT_ERROR_MEMORY. */
+/* Allocates an empty heap for the edges of the complex. QMAT_ERROR_MEMORY. */
 qmat_status qmat_edge_heap_init(qmat_context *context, qmat_edge_heap *heap, const qmat_complex *complex);
 
-/* Puts all edges in whose costs and errors are set; `locked` (per vertex; NULL: none) leaves out those that have a
- * locked end. Cost: linear. */
+/* Fills the heap with all edges, except those with a locked end (`locked`: per vertex; NULL: none). All costs and
+ * errors are set. Cost: linear. */
 void qmat_edge_heap_fill(qmat_edge_heap *heap, const uint8_t *locked);
 
 /* The cheapest edge; the heap is not empty. */
@@ -33,10 +33,10 @@ static inline uint32_t qmat_edge_heap_first(const qmat_edge_heap *heap) {
   return heap->entries[0].edge;
 }
 
-/* Takes an edge out; one that is not in it is left alone. Cost: logarithmic, as that of an update. */
+/* Removes an edge if it is in the heap. Cost: logarithmic. */
 void qmat_edge_heap_remove(qmat_edge_heap *heap, uint32_t edge);
 
-/* Puts an edge in, or in its new place. */
+/* Inserts an edge, or moves it to its new place. Cost: logarithmic. */
 void qmat_edge_heap_update(qmat_edge_heap *heap, uint32_t edge);
 
 #endif

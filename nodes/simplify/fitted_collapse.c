@@ -6,10 +6,10 @@
 
 #include "nodes/simplify/collapse_test.h"
 
-/* A sphere is tested up to this multiple of the threshold in its sampled error. */
+/* A sphere is tested only if its error at the sampled points is at most this multiple of the threshold. */
 static const double test_ratio = 1.1;
 
-/* In joint refits the spheres have been fitted before: a fit that starts badly ends at this share of the threshold. */
+/* In joint refits the spheres have been fitted before, so give_up_error of a fit is this share of the threshold. */
 static const double early_exit_share = 0.6;
 
 qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
@@ -87,10 +87,10 @@ static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphe
   return status;
 }
 
-/* A refused point becomes a target of the fit with this share of the threshold to spare. */
+/* A refused point becomes a target of the fit, with this share of the threshold as margin. */
 static const double margin = 0.02;
 
-/* Adds the place where the newest test failed to the targets of the fit. */
+/* Adds the place where the newest test failed to the targets; `*needed` is false where a fit cannot repair it. */
 static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
   const double *centre = s->refusal == QMAT_REFUSED_BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
   *needed = true;
@@ -120,8 +120,8 @@ static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int 
              : status;
 }
 
-/* Places and tests the spheres of the neighbourhood: `*last_refused` first, which becomes the one that fails, and the
- * collapse last, which is then the newest preview. */
+/* Places and tests the spheres of the neighbourhood. `*last_refused`, which a refusal updates, is tested first. The
+ * collapse is tested last, so that it is the newest preview. */
 static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_t removed, int *last_refused,
                                       qmat_collapse_outcome *result, bool *again) {
   qmat_neighbourhood_fit *neighbourhood = &s->neighbourhood;
@@ -148,13 +148,12 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
 /* A neighbourhood is fitted at most this often, each time with the newest failure as a target. */
 enum { MOST_FITS = 6 };
 
-/* The largest error of a sphere's own fit for which its neighbourhood is fitted, and the largest error of that fit for
- * which it is tested, as multiples of the threshold. */
+/* A neighbourhood is fitted only if the error of the single sphere's fit is at most the first multiple of the
+ * threshold, and tested only if the error of the joint fit is at most the second. */
 static const double neighbourhood_ratio = 1.3, placement_ratio = 1.02;
 
-/* Tries the newest preview with the sphere of its own fit, and unless `alone` with its neighbours fitted too. Where
- * `*result` allows it the spheres are in place, and the collapse is the newest preview and test; else nothing has
- * changed. */
+/* Tries the newest preview from its fitted sphere, refitted with its neighbours unless `alone`. If `*result` allows it,
+ * the spheres are in place, and the collapse is the newest preview and test. Otherwise nothing has changed. */
 static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
   const qmat_collapse *c = &s->collapse;
   uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];

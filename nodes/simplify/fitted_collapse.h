@@ -4,7 +4,7 @@
 
 #include "nodes/simplify/collapse_test.h"
 
-/* A fit of one sphere uses at most so many constraint points. */
+/* The largest number of constraint points in the fit of one sphere. */
 enum { QMAT_FITTED_POINTS = 256 };
 
 /* Tries the newest preview, of `edge`, with a sphere that is fitted to the surface from the best candidate, then with

@@ -15,7 +15,7 @@ double qmat_stability_ratio(const double a[4], const double b[4]) {
   return length > 0 && hyperbolic > 0 ? hyperbolic / length : 0;
 }
 
-/* A tangent plane of the cone of an edge that leans away from point `inner`: the rim of a sheet. */
+/* Adds the tangent plane of a rim edge's cone on the side that faces away from `inner`, a corner of its triangle. */
 static void add_rim(const qmat_complex *c, uint32_t edge, const double *inner, qmat_quadric *quadrics) {
   const uint32_t *ends = &c->edges[2 * (size_t)edge];
   const double *a = &c->spheres[4 * (size_t)ends[0]], *b = &c->spheres[4 * (size_t)ends[1]];
@@ -38,7 +38,7 @@ static void add_rim(const qmat_complex *c, uint32_t edge, const double *inner, q
   for (int e = 0; e < 2; e++) qmat_quadric_add_plane(&quadrics[ends[e]], n, e ? b : a, weight);
 }
 
-/* The plane at the tip of a chain: across the end of its last cone. */
+/* Adds the plane at the tip of a chain, perpendicular to its last cone. */
 static void add_tip(const qmat_complex *c, uint32_t vertex, uint32_t edge, qmat_quadric *quadrics) {
   const double *tip = &c->spheres[4 * (size_t)vertex];
   const double *base = &c->spheres[4 * (size_t)qmat_complex_other_end(c, edge, vertex)];
@@ -50,7 +50,7 @@ static void add_tip(const qmat_complex *c, uint32_t vertex, uint32_t edge, qmat_
   qmat_quadric_add_plane(&quadrics[vertex], n, tip, boundary_weight * gamma * gamma);
 }
 
-/* Adds the slabs to each of their corners, and the rims, each with the opposite corner. */
+/* Adds each slab to its corners, and each rim with the opposite corner of its triangle. */
 static void add_slabs(const qmat_complex *c, qmat_quadric *quadrics,
                       void (*add_rim_of)(const qmat_complex *c, uint32_t edge, const double *inner,
                                          qmat_quadric *quadrics)) {
@@ -81,7 +81,7 @@ void qmat_medial_quadrics_add(const qmat_complex *c, qmat_quadric *quadrics) {
     if (c->vertex_edges.counts[v] == 1) add_tip(c, v, c->vertex_edges.items[c->vertex_edges.starts[v]], quadrics);
 }
 
-/* The plane through a rim at right angles to its triangle; `n` is as long as the rim. */
+/* Adds the plane through a rim, perpendicular to its triangle; its normal `n` is as long as the rim. */
 static void add_published_rim(const qmat_complex *c, uint32_t edge, const double *inner, qmat_quadric *quadrics) {
   const uint32_t *ends = &c->edges[2 * (size_t)edge];
   const double *a = &c->spheres[4 * (size_t)ends[0]], *b = &c->spheres[4 * (size_t)ends[1]];

@@ -11,15 +11,14 @@ enum { MOST_TARGETS = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 /* A slab or loose cone of the neighbourhood, prepared with the spheres of the newest step, and a ball around it. */
 typedef struct qmat_fit_primitive {
   uint32_t vertices[3]; /* the third QMAT_NONE: a cone */
-  int moving[3];        /* which sphere of the fit each corner is, or -1 */
+  int moving[3];        /* the index of each corner in the fit, or -1 */
   qmat_primitive primitive;
   qmat_primitive_ball ball;
 } fit_primitive;
 
 typedef struct qmat_fit_target {
   double point[3];
-  double slack; /* the excess of the largest allowed F over `threshold`; for a border, of `threshold` over the allowed
-                   depth */
+  double slack; /* the largest allowed F minus `threshold`; for a border, `threshold` minus the allowed depth */
   qmat_target_kind kind;
   uint32_t nearest; /* the nearest primitive, of the newest step */
 } fit_target;
@@ -40,7 +39,7 @@ static bool has_corner(const fit_primitive *item, uint32_t vertex) {
   return item->vertices[0] == vertex || item->vertices[1] == vertex || item->vertices[2] == vertex;
 }
 
-/* Adds a simplex as it is after the collapse, unless it vanishes or is there already. */
+/* Adds a simplex with its corners after the collapse, unless it degenerates or is part of an added one. */
 static qmat_status add_primitive(qmat_context *context, qmat_neighbourhood_fit *fit, const qmat_collapse *collapse,
                                  const uint32_t *vertices, int count) {
   uint32_t corners[3] = {QMAT_NONE, QMAT_NONE, QMAT_NONE};
@@ -87,7 +86,7 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
   return QMAT_OK;
 }
 
-/* Whether this slot is the first of its point in the neighbourhood. */
+/* Whether this is the first slot of its point with a witness in the neighbourhood. */
 static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
                           uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
@@ -158,7 +157,7 @@ static double find_foot(const qmat_neighbourhood_fit *fit, fit_target *target, d
   return best;
 }
 
-/* The error of F at a target; above `threshold` in size where its condition fails. */
+/* The error at a target with value F. It exceeds `threshold` in size where the target's condition fails. */
 static double error_at(const fit_target *target, double f) {
   switch (target->kind) {
     case QMAT_TARGET_INSIDE:
@@ -203,7 +202,7 @@ static void add_target(const qmat_neighbourhood_fit *fit, const qmat_complex *co
   }
 }
 
-/* Keeps the spheres near where they are, with this share of the targets' weight. */
+/* The weight that keeps the spheres near their places, as a share of the targets' weight. */
 static const double damping = 1e-3;
 
 /* Solves by LDL'; b becomes the solution. */
@@ -231,8 +230,8 @@ static bool solve(equations *e) {
   return true;
 }
 
-/* The order of the norm in each step: the weight of a square is the error to this power. A full step would overshoot,
- * since the weights fall on the way; it is shortened by half of the power. */
+/* The order of the norm in each step: the weight of a square is the error to this power. A full step overshoots
+ * because the weights decrease with the error, so the step is divided by 1 + power / 2. */
 static const int powers[] = {0, 2, 2, 4, 4, 6, 6, 6};
 enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
 

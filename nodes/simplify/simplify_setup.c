@@ -14,7 +14,7 @@ const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
 const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
-/* The constraint points of collapses in order, which do not depend on epsilon, are made for this multiple of the finest
+/* Collapses in order do not depend on epsilon: their constraint points are made for this multiple of the finest
  * threshold. */
 static const double constraint_error = 2;
 

@@ -12,7 +12,7 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   *fit = (qmat_sphere_fit){0};
 }
 
-/* Whether this slot is the first of its point in the collapse. */
+/* Whether this is the first slot of its point with an end of the edge as witness. */
 static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
     if (tracker->witnesses[s] == collapse->kept || tracker->witnesses[s] == collapse->removed) return false;
@@ -78,7 +78,7 @@ static void add_residual(qmat_quadric *sum, const double *point, const double *f
   qmat_quadric_add_plane(sum, n, tangent, weight * share * share);
 }
 
-/* Keeps the sphere near where it is, with this share of the points' weight. */
+/* The weight that keeps the sphere near its place, as a share of the points' weight. */
 static const double damping = 1e-3;
 
 static void add_damping(qmat_quadric *sum, const double *sphere) {
