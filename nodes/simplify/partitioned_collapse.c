@@ -7,7 +7,7 @@
 
 #include "core/geometry/medial_build.h"
 
-/* The largest number of vertices of a piece, unless all lie in one place. */
+/* The largest number of vertices of a piece. A piece whose vertices coincide may be larger. */
 enum { MOST_PIECE_VERTICES = 1 << 14 };
 
 /* The share of the vertices of a piece that remains. */
@@ -25,27 +25,27 @@ bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qma
          (double)rules->vertices <= kept_share * (double)complex->vertex_count && !has_features(rules, complex);
 }
 
-/* Rows sorted by piece: those of piece p are items[starts[p]] to items[starts[p + 1]]. Rows between pieces follow the
- * last piece. */
+/* Row numbers sorted by piece: those of piece p are items[starts[p]] to items[starts[p + 1] - 1]. Rows with vertices of
+ * several pieces follow the last piece. */
 typedef struct piece_rows {
   size_t *starts;
   uint32_t *items;
 } piece_rows;
 
-/* The result of a piece: its edges and triangles by the numbers of the whole, and their bounds. */
+/* The result of a piece: its edges and triangles, with the vertex numbers of the whole, and their bounds. */
 typedef struct piece_result {
   size_t edge_count, triangle_count;
   uint32_t *edges, *triangles;
   double *edge_bounds, *triangle_bounds;
   qmat_collapse_counts counts;
-  size_t questions;
+  size_t queries;
 } piece_result;
 
 typedef struct partition {
   qmat_context *context;
   qmat_decimation *whole;
   qmat_constraint_points *constraints;
-  double *depths; /* per vertex, and so on */
+  double *depths; /* per vertex: of its centre */
   size_t piece_count;
   uint32_t *pieces;       /* per vertex */
   uint32_t *numbers;      /* per vertex: its number within its piece */
@@ -60,8 +60,8 @@ typedef struct partition {
 
 enum { BINS = 1024 };
 
-/* Moves the `vertices` in the lower half of the box, by number, before the others; returns their number. 0: all lie in
- * one place. */
+/* Splits the vertices along the longest side of their box into halves of about equal count: the lower half comes first.
+ * Returns its count; 0 if all vertices coincide. */
 static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uint32_t *upper) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < count; i++)
@@ -89,7 +89,7 @@ static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uin
   return kept;
 }
 
-/* Divides `count` vertices into pieces and numbers these. */
+/* Divides `count` vertices into pieces by repeated halving, and numbers the pieces. */
 static void divide_vertices(partition *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
   const size_t lower = count > MOST_PIECE_VERTICES ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
   if (lower > 0 && lower < count) {
@@ -101,7 +101,7 @@ static void divide_vertices(partition *d, uint32_t *vertices, size_t count, uint
   d->piece_count++;
 }
 
-/* The piece of all of a row's vertices, or the number of pieces. */
+/* The piece that has all vertices of a row; the number of pieces if there is none. */
 static size_t piece_of(const partition *d, const uint32_t *row, size_t size) {
   const uint32_t piece = d->pieces[row[0]];
   for (size_t k = 1; k < size && row[k] != QMAT_NONE; k++)
@@ -153,7 +153,7 @@ static qmat_status divide(partition *d) {
 
 /* ---- the collapses of one piece ---- */
 
-/* Rows of a piece by the piece's own numbers. NULL when memory is short. */
+/* The rows of a piece with vertex numbers within the piece. NULL if memory is short. */
 static uint32_t *renumber(qmat_arena *arena, const partition *d, const piece_rows *sorted, size_t piece,
                           const uint32_t *rows, size_t size) {
   const size_t first = sorted->starts[piece], count = sorted->starts[piece + 1] - first;
@@ -166,7 +166,7 @@ static uint32_t *renumber(qmat_arena *arena, const partition *d, const piece_row
   return own;
 }
 
-/* The constraint points whose witnesses lie in the piece. */
+/* Copies the constraint points whose witnesses all lie in the piece. */
 static qmat_status take_points(qmat_context *context, const partition *d, size_t piece, qmat_constraint_points *own) {
   const qmat_constraint_points *all = d->constraints;
   const size_t first = d->points.starts[piece];
@@ -192,7 +192,7 @@ static qmat_status take_points(qmat_context *context, const partition *d, size_t
   return QMAT_OK;
 }
 
-/* The part of a whole number for a piece, by its share of the vertices; the parts of all pieces sum to the number. */
+/* A piece's share of a number, in proportion to its vertices. The shares of all pieces sum to the number. */
 static int64_t share_of(const partition *d, size_t piece, int64_t number) {
   const double all = (double)d->whole->complex.vertex_count;
   const double before = (double)d->vertices.starts[piece] / all, after = (double)d->vertices.starts[piece + 1] / all;
@@ -235,7 +235,7 @@ static qmat_status start_piece(qmat_context *context, const partition *d, size_t
   return status;
 }
 
-/* The live rows of a piece by the numbers of the whole, and their bounds. Both are to be freed. */
+/* The live rows of a piece with the vertex numbers of the whole, and their bounds. The caller frees both. */
 static int take_rows(const uint32_t *vertices, const uint8_t *alive, const uint32_t *rows, const double *bounds,
                      size_t count, size_t size, size_t *left, uint32_t **rows_left, double **bounds_left) {
   *left = 0;
@@ -273,7 +273,7 @@ static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *
       d->constraints->weights[3 * (size_t)points[i] + k] = own->surface_tracker.weights[3 * i + k];
     }
   result->counts = own->counts;
-  result->questions = own->envelope_tracker.lattice.queries;
+  result->queries = own->envelope_tracker.lattice.queries;
   if (take_rows(vertices, c->edge_alive, c->edges, own->envelope_tracker.edge_bounds, c->edge_count, 2,
                 &result->edge_count, &result->edges, &result->edge_bounds) ||
       take_rows(vertices, c->triangle_alive, c->triangles, own->envelope_tracker.triangle_bounds, c->triangle_count, 3,
@@ -297,7 +297,7 @@ static qmat_status collapse_piece(qmat_context *context, partition *d, size_t pi
 /* Only the thread that runs the node may call the progress function of the run. */
 typedef struct progress_caller {
   partition *partition;
-  bool is_outside;
+  bool is_main_thread;
 } progress_caller;
 
 static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
@@ -307,7 +307,7 @@ static bool forward_progress(void *user, const char *node_id, const char *node_t
   (void)total;
   const progress_caller *here = user;
   partition *d = here->partition;
-  if (here->is_outside &&
+  if (here->is_main_thread &&
       qmat_progress(d->context, atomic_load(&d->done) + done, d->whole->complex.vertex_count, unit) != QMAT_OK)
     atomic_store(&d->ended, true);
   return !atomic_load(&d->ended);
@@ -322,14 +322,14 @@ static qmat_status collapse_pieces(partition *d) {
   qmat_error error = {.status = QMAT_OK};
 #pragma omp parallel num_threads(threads)
   {
-    progress_caller here = {.partition = d, .is_outside = false};
+    progress_caller here = {.partition = d, .is_main_thread = false};
     qmat_context own = {.progress = forward_progress,
                         .progress_user = &here,
                         .threads = 1,
                         .node_id = context->node_id,
                         .node_type = context->node_type};
 #pragma omp master
-    here.is_outside = true;
+    here.is_main_thread = true;
 #pragma omp for schedule(dynamic, 1)
     for (size_t piece = 0; piece < d->piece_count; piece++) {
       if (atomic_load(&d->ended)) continue;
@@ -365,7 +365,7 @@ static size_t put_rows_between(const partition *d, const piece_rows *sorted, con
   return count;
 }
 
-/* The medial mesh of all pieces, with the numbers that `ids` gives to the vertices. */
+/* Builds the medial mesh of all pieces; `ids` maps its vertices to their new numbers. */
 static qmat_status join(const partition *d, const uint32_t *ids, qmat_medial *medial) {
   const qmat_complex *c = &d->whole->complex;
   uint32_t *edges = qmat_arena_alloc(&d->context->arena, c->edge_count, 2 * sizeof *edges);
@@ -408,12 +408,12 @@ static void add_counts(const partition *d) {
     whole->counts.refused_by_surface_to_envelope += result->counts.refused_by_surface_to_envelope;
     whole->counts.refused_by_envelope_to_surface += result->counts.refused_by_envelope_to_surface;
     whole->counts.refused_by_topology += result->counts.refused_by_topology;
-    whole->envelope_tracker.lattice.queries += result->questions;
+    whole->envelope_tracker.lattice.queries += result->queries;
   }
 }
 
-/* Joins the results in place of the whole. */
-static qmat_status put_together(partition *d) {
+/* Replaces the whole by the joined results of the pieces. */
+static qmat_status join_pieces(partition *d) {
   qmat_decimation *whole = d->whole;
   qmat_arena *arena = &d->context->arena;
   const size_t before = whole->complex.vertex_count;
@@ -470,7 +470,7 @@ qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constrai
   decimation->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
   qmat_status status = divide(&d);
   if (status == QMAT_OK) status = collapse_pieces(&d);
-  if (status == QMAT_OK) status = put_together(&d);
+  if (status == QMAT_OK) status = join_pieces(&d);
   free_results(&d);
   return status;
 }

@@ -32,31 +32,31 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
 #define QMAT_ERROR_PARAM                                                           \
   QMAT_ENUM(qmat_simplify_params, error, qmat_error_choices, QMAT_ERROR_TWO_SIDED, \
             "The errors that are bounded: both, or surface to envelope only as in the paper")
-#define QMAT_COLLAPSE_PARAMS                                                                                           \
-  QMAT_ENUM(qmat_simplify_params, cost, qmat_cost_choices, QMAT_COST_SLAB,                                             \
-            "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or nearest to a "  \
-            "sphere within another (PMAT)"),                                                                           \
-      QMAT_LENGTH(                                                                                                     \
-          qmat_simplify_params, finest, 0.0025, 1e-5, 1,                                                               \
-          "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer"),      \
-      QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                      \
-                 "Stop when the cheapest collapse costs more than this; 0: no such stop"),                             \
-      QMAT_ENUM(qmat_simplify_params, compat, qmat_compat_choices, QMAT_COMPAT_OFF,                                    \
-                "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "     \
-                "features; the stop is vertices"),                                                                     \
-      QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                            \
-                "free: any collapse is allowed, as in the paper. guard: collapses are free, and the components, "      \
-                "loops and voids of the result are made those of the solid. preserve: collapses keep the topology of " \
-                "the initial mesh (link condition)"),                                                                  \
-      QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                 \
-                "Keep thin tubular features at any cost: never, at the late stage, or from the start"),                \
-      QMAT_ENUM(                                                                                                       \
-          qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                   \
-          "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases"),    \
-      QMAT_FLOAT(qmat_simplify_params, crease, "epsilon", 0.25, 0.01, 1,                                               \
-                 "The largest distance of a crease from its remaining points, as a share of the threshold"),           \
-      QMAT_FLOAT(qmat_simplify_params, theta, "mean thickness", 0.5, 0, 10,                                            \
-                 "A feature is thin when all of its responsible region is at most this thick, relative to the mean"),  \
+#define QMAT_COLLAPSE_PARAMS                                                                                          \
+  QMAT_ENUM(qmat_simplify_params, cost, qmat_cost_choices, QMAT_COST_SLAB,                                            \
+            "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or least ratio "  \
+            "of length to difference of radii (PMAT)"),                                                               \
+      QMAT_LENGTH(                                                                                                    \
+          qmat_simplify_params, finest, 0.0025, 1e-5, 1,                                                              \
+          "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer"),     \
+      QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                     \
+                 "Stop when the cheapest collapse costs more than this; 0: no limit"),                                \
+      QMAT_ENUM(qmat_simplify_params, compat, qmat_compat_choices, QMAT_COMPAT_OFF,                                   \
+                "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "    \
+                "features; the stop is vertices"),                                                                    \
+      QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                           \
+                "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
+                "loops and voids of the result are corrected to those of the solid. preserve: collapses keep the "    \
+                "topology of the initial mesh (link condition)"),                                                     \
+      QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                \
+                "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
+      QMAT_ENUM(                                                                                                      \
+          qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                  \
+          "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases"),   \
+      QMAT_FLOAT(qmat_simplify_params, crease, "epsilon", 0.25, 0.01, 1,                                              \
+                 "The largest distance of a crease from its remaining points, as a share of the threshold"),          \
+      QMAT_FLOAT(qmat_simplify_params, theta, "mean thickness", 0.5, 0, 10,                                           \
+                 "A feature is thin when all of its responsible region is at most this thick, relative to the mean"), \
       QMAT_FLOAT(qmat_simplify_params, k, "1", 1e-5, 0, 1, "The constant of the collapse cost (eq. 6)")
 
 /* The inputs of both nodes. */
@@ -72,8 +72,8 @@ typedef struct qmat_initial_medial {
   uint8_t *thin;   /* per sample: whether it lies on a thin feature */
 } qmat_initial_medial;
 
-/* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY names epsilon
- * where nothing remains. */
+/* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY if epsilon is
+ * not larger. */
 qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
                                           double *deviation);
 
@@ -91,7 +91,7 @@ qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_param
 /* Whether the parameters select collapses that do not depend on epsilon. */
 bool qmat_simplify_in_order(const qmat_simplify_params *params);
 
-/* Such collapses, and their result. */
+/* Collapses that do not depend on epsilon, and their result. */
 typedef struct qmat_ordered_collapses {
   qmat_simplify_params params; /* with what compat sets */
   qmat_surface *surface;
@@ -100,8 +100,8 @@ typedef struct qmat_ordered_collapses {
   qmat_decimation decimation;
 } qmat_ordered_collapses;
 
-/* Does them with the inputs of qmat_simplify_prepare. Free with qmat_ordered_collapses_uninit, also after a failure.
- * Statuses as there. */
+/* Does these collapses. Inputs and statuses are those of qmat_simplify_prepare. Free with
+ * qmat_ordered_collapses_uninit, also after a failure. */
 qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplify_params *params,
                                        const qmat_value *const inputs[], qmat_ordered_collapses *collapses);
 void qmat_ordered_collapses_uninit(qmat_ordered_collapses *collapses);
