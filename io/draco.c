@@ -7,7 +7,7 @@
 #include "core/node.h"
 #include "io/draco_draco.h"
 
-/* ---- how many bits ---- */
+/* ---- quantisation bits ---- */
 
 int qmat_draco_bits_for(int components, double range, double error) {
   if (!isfinite(range) || !(error > 0)) return 30;
@@ -37,7 +37,7 @@ static qmat_status check_bits(qmat_context *context, const char *field, int bits
 
 /* ---- medial meshes ---- */
 
-/* Where the sorted edges hold (a, b), a < b; edge_count when they do not. */
+/* The index of edge (a, b), a < b, in the sorted edges; edge_count if it is missing. */
 static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
   size_t low = 0, high = medial->edge_count;
   while (low < high) {
@@ -60,8 +60,8 @@ static void set_face(uint32_t *faces, size_t *count, uint32_t a, uint32_t b, uin
   (*count)++;
 }
 
-/* The faces that stand for the medial mesh; `faces` has room for one a triangle, edge and sphere. `edge_marks` holds
- * edge_count and `sphere_marks` sphere_count zero bytes. */
+/* Makes the faces that represent the medial mesh. `faces` has room for one face per triangle, edge and sphere.
+ * `edge_marks` has edge_count zero bytes, `sphere_marks` sphere_count. */
 static qmat_status make_faces(qmat_context *context, const qmat_medial *medial, uint8_t *edge_marks,
                               uint8_t *sphere_marks, uint32_t *faces, size_t *face_count) {
   size_t count = 0;
@@ -71,7 +71,7 @@ static qmat_status make_faces(qmat_context *context, const qmat_medial *medial, 
     for (int k = 0; k < 3; k++) {
       size_t edge = find_edge(medial, sides[k][0], sides[k][1]);
       if (edge == medial->edge_count) {
-        qmat_fail(context, QMAT_ERROR_GEOMETRY, "side (%u, %u) is not among the edges", sides[k][0], sides[k][1]);
+        qmat_fail(context, QMAT_ERROR_GEOMETRY, "side (%u, %u) is missing from the edges", sides[k][0], sides[k][1]);
         return qmat_fail_element(context, "triangle", (int64_t)t);
       }
       edge_marks[edge] = 1;
@@ -140,9 +140,9 @@ done:
   return status;
 }
 
-/* Sorts the faces into triangles and edges, in place: `faces` keeps the triangles, `edges` has room for one a face. */
-static void part_faces(uint32_t *faces, size_t face_count, size_t *triangle_count, uint32_t *edges,
-                       size_t *edge_count) {
+/* Separates triangles from edges: `faces` keeps the triangles; `edges` has room for one edge per face. */
+static void split_faces(uint32_t *faces, size_t face_count, size_t *triangle_count, uint32_t *edges,
+                        size_t *edge_count) {
   *triangle_count = *edge_count = 0;
   for (size_t f = 0; f < face_count; f++) {
     uint32_t a = faces[3 * f], b = faces[3 * f + 1], c = faces[3 * f + 2];
@@ -169,8 +169,8 @@ qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes
   if (!qmat_draco_mesh_find(mesh, QMAT_DRACO_POSITION, 3, &position) ||
       !qmat_draco_mesh_find(mesh, QMAT_DRACO_GENERIC, 1, &radius)) {
     status = qmat_fail(context, QMAT_ERROR_FORMAT,
-                       "the Draco data is no medial mesh: it needs one POSITION of 3 floats and one GENERIC attribute "
-                       "of 1 float");
+                       "the Draco data are not a medial mesh: it needs one POSITION of 3 floats and one "
+                       "GENERIC attribute of 1 float");
     goto done;
   }
 
@@ -194,7 +194,7 @@ qmat_status qmat_draco_decode_medial(qmat_context *context, const uint8_t *bytes
   }
   qmat_draco_mesh_faces(mesh, faces);
   size_t triangle_count, edge_count;
-  part_faces(faces, face_count, &triangle_count, edges, &edge_count);
+  split_faces(faces, face_count, &triangle_count, edges, &edge_count);
   status = qmat_medial_set_simplices(context, made, edges, edge_count, faces, triangle_count);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made->base);
   if (status == QMAT_OK) {
@@ -211,9 +211,9 @@ done:
   return status;
 }
 
-/* ---- triangle meshes, to be shown ---- */
+/* ---- triangle meshes for display ---- */
 
-/* The counts and bounds of what a viewer will decode. */
+/* Decodes the skin to get the counts and bounds that a viewer will see. */
 static qmat_status measure_skin(qmat_context *context, qmat_draco_skin *skin) {
   double *positions = NULL;
   qmat_draco_mesh *mesh = NULL;
@@ -221,7 +221,7 @@ static qmat_status measure_skin(qmat_context *context, qmat_draco_skin *skin) {
   if (status != QMAT_OK) goto done;
   if (!qmat_draco_mesh_find(mesh, QMAT_DRACO_POSITION, 3, &skin->position_id) ||
       !qmat_draco_mesh_find(mesh, QMAT_DRACO_NORMAL, 3, &skin->normal_id)) {
-    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "Draco gave back other attributes than it was given");
+    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the attributes that Draco decodes differ from the encoded ones");
     goto done;
   }
   size_t count = qmat_draco_mesh_point_count(mesh);

@@ -33,16 +33,16 @@ struct qmat_draco_mesh {
 
 namespace {
 
-/* Draco's entropy coder can describe many equal things in few bytes, so there is no exact bound on counts. Up to the
- * first number nothing is asked; beyond it, each byte may stand for the second number of faces or points. */
+/* Draco's entropy coder stores many equal values in few bytes, so the counts have no exact bound. We allow kFreeCount
+ * faces and points, plus kCountPerByte of each per byte of data. */
 constexpr uint64_t kFreeCount = 1u << 16;
 constexpr uint64_t kCountPerByte = 1024;
 
-/* Draco's entropy coder counts symbols in a table of 2^(bits + 1) numbers: 4 GiB for 30 bits. Beyond this many bits,
- * which are noise mostly, values are stored as they are. */
+/* Draco's entropy coder counts symbols in a table of 2^(bits + 1) numbers: 4 GiB for 30 bits. Above this number of
+ * bits, where the low bits are mostly noise, values are stored without entropy coding. */
 constexpr int kMostCodedBits = 20;
 
-/* To be called in a catch block: turns the exception in flight into a status. */
+/* Converts the current exception to a status. Call it in a catch block. */
 qmat_status caught(qmat_context *context, const char *what) {
   try {
     throw;
@@ -55,7 +55,7 @@ qmat_status caught(qmat_context *context, const char *what) {
   }
 }
 
-/* Reads the counts in front of the data and refuses those that the data's size does not justify. */
+/* Reads the counts in the header and rejects counts that are too large for the size of the data. */
 qmat_status check_header(qmat_context *context, const uint8_t *bytes, size_t size) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char *>(bytes), size);
@@ -94,14 +94,14 @@ qmat_status check_header(qmat_context *context, const uint8_t *bytes, size_t siz
   if (!read) return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data ends within its header");
   uint64_t most = kFreeCount + kCountPerByte * static_cast<uint64_t>(size);
   if (faces > most || points > most) {
-    return qmat_fail(context, QMAT_ERROR_FORMAT, "%zu bytes of Draco data claim to hold %u points and %u faces", size,
+    return qmat_fail(context, QMAT_ERROR_FORMAT, "%zu bytes of Draco data cannot hold %u points and %u faces", size,
                      points, faces);
   }
   if (points == 0 || faces == 0) return qmat_fail(context, QMAT_ERROR_FORMAT, "Draco data holds no faces");
   return QMAT_OK;
 }
 
-/* Decodes and checks that every face's corner is a point and every point has a value of every attribute. */
+/* Decodes the data. Checks that every corner is a valid point and that every point has a value of every attribute. */
 qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std::unique_ptr<draco::Mesh> &mesh) {
   qmat_status status = check_header(context, bytes, size);
   if (status != QMAT_OK) return status;
@@ -120,7 +120,7 @@ qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std
   for (uint32_t f = 0; f < mesh->num_faces(); f++) {
     for (const draco::PointIndex &corner : mesh->face(draco::FaceIndex(f))) {
       if (corner.value() >= points) {
-        qmat_fail(context, QMAT_ERROR_FORMAT, "a corner names point %u of %u in the Draco data", corner.value(),
+        qmat_fail(context, QMAT_ERROR_FORMAT, "a corner is point %u, but the Draco data have %u points", corner.value(),
                   points);
         return qmat_fail_element(context, "face", f);
       }
@@ -136,7 +136,7 @@ qmat_status decode(qmat_context *context, const uint8_t *bytes, size_t size, std
         sound ? attribute->buffer()->data_size() / static_cast<uint64_t>(attribute->byte_stride()) : 0;
     for (uint32_t p = 0; sound && p < points; p++) sound = attribute->mapped_index(draco::PointIndex(p)).value() < held;
     if (!sound) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, "not every point has a value of this attribute in the Draco data");
+      qmat_fail(context, QMAT_ERROR_FORMAT, "some points have no value of this attribute in the Draco data");
       return qmat_fail_element(context, "attribute", static_cast<int64_t>(attribute->unique_id()));
     }
   }
@@ -157,7 +157,7 @@ void copy_values(const draco::Mesh &mesh, const draco::PointAttribute &attribute
   }
 }
 
-/* False for a data type that holds no numbers. */
+/* Copies an attribute's values; false for an unsupported data type. */
 bool attribute_values(const draco::Mesh &mesh, const draco::PointAttribute &attribute, double *values) {
   const size_t components = attribute.num_components();
   switch (attribute.data_type()) {
@@ -270,7 +270,7 @@ qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute 
   *size = 0;
   constexpr size_t most = std::numeric_limits<uint32_t>::max() / 3;
   if (point_count == 0 || face_count == 0)
-    return qmat_fail(context, QMAT_ERROR_USAGE, "Draco is given a mesh without faces");
+    return qmat_fail(context, QMAT_ERROR_USAGE, "Draco cannot encode a mesh without faces");
   if (point_count > most || face_count > most) return qmat_fail_memory(context, "the faces of a Draco mesh");
   for (size_t a = 0; a < attribute_count; a++) {
     const int least = attributes[a].meaning == QMAT_DRACO_NORMAL ? 2 : 1;
@@ -335,7 +335,7 @@ qmat_status qmat_draco_mesh_attribute(qmat_context *context, const qmat_draco_me
                      unique_id, attribute->num_components(), components);
   }
   if (!attribute_values(*mesh->mesh, *attribute, values)) {
-    return qmat_fail(context, QMAT_ERROR_FORMAT, "attribute %u of the Draco data holds no 8, 16 or 32 bit numbers",
+    return qmat_fail(context, QMAT_ERROR_FORMAT, "attribute %u of the Draco data has an unsupported number type",
                      unique_id);
   }
   return QMAT_OK;

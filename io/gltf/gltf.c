@@ -46,7 +46,7 @@ static qmat_status add_report(qmat_context *context, const qmat_gltf_counts *cou
   return QMAT_OK;
 }
 
-/* The triangles of a checked document: of `meshes`, or of the scene where that is NULL. */
+/* Reads the triangles of `meshes` of a checked document; NULL: of its scene. */
 static qmat_status read_triangles(qmat_context *context, const qmat_gltf_document *document, const uint32_t *meshes,
                                   size_t mesh_count, qmat_soup *soups, json_t *report) {
   qmat_gltf_counts counts;
@@ -75,7 +75,7 @@ qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t 
   return status;
 }
 
-/* Leaves out the meshes without a triangle, unless there is no other. */
+/* Removes meshes without triangles. If all are empty, the last one stays. */
 static void drop_empty(qmat_gltf_meshes *meshes) {
   size_t kept = 0;
   for (size_t i = 0; i < meshes->count; i++) {

@@ -41,8 +41,8 @@ static qmat_status open_container(qmat_context *context, const uint8_t *bytes, s
   const size_t end = qmat_take_u32(&reader);
   asset->binary = true;
   if (size < 20) return fail(context, path, "the file ends within the GLB header");
-  if (version != 2) return fail(context, path, "GLB version %u is not supported; 2 is", version);
-  if (end > size) return fail(context, path, "the GLB header promises %zu bytes, the file has %zu", end, size);
+  if (version != 2) return fail(context, path, "GLB version %u is not supported (only 2 is)", version);
+  if (end > size) return fail(context, path, "the GLB header states %zu bytes, but the file has %zu", end, size);
   size_t chunk = 0;
   for (; reader.at < end; chunk++) {
     const size_t start = reader.at;
@@ -50,7 +50,7 @@ static qmat_status open_container(qmat_context *context, const uint8_t *bytes, s
     const size_t chunk_size = qmat_take_u32(&reader);
     const uint32_t type = qmat_take_u32(&reader);
     if (chunk_size > end - reader.at) {
-      fail(context, path, "has %zu bytes, but the GLB ends after %zu", chunk_size, end - reader.at);
+      fail(context, path, "needs %zu bytes, but only %zu follow in the GLB", chunk_size, end - reader.at);
       return qmat_fail_element(context, "chunk", (int64_t)chunk);
     }
     const uint8_t *data = qmat_take_bytes(&reader, chunk_size);
@@ -85,7 +85,7 @@ qmat_status qmat_gltf_asset_init(qmat_context *context, const uint8_t *bytes, si
     return qmat_fail_at(context, path, 0, 0);
   }
   if (!asset->root) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "the JSON is damaged: %s", error.text);
+    qmat_fail(context, QMAT_ERROR_FORMAT, "the JSON is invalid: %s", error.text);
     return qmat_fail_at(context, path, error.line > 0 ? error.line : 0, error.column > 0 ? error.column : 0);
   }
   return json_is_object(asset->root) ? QMAT_OK : fail(context, path, "the JSON is not an object");
@@ -108,7 +108,7 @@ static qmat_status put_glb(qmat_context *context, const qmat_gltf_asset *asset, 
   const bool has_chunk = asset->chunk || data_size > 0;
   const uint64_t total = 12 + 8 + (uint64_t)json_size + (has_chunk ? 8 + chunk_size : 0) + asset->more_size;
   if (total > UINT32_MAX) {
-    qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes is beyond the format's 4 GiB",
+    qmat_fail(context, QMAT_ERROR_MEMORY, "a .glb file of %llu bytes exceeds the format's limit of 4 GiB",
               (unsigned long long)total);
     return qmat_fail_hint(context, "set side_files to true, or write a .gltf");
   }
@@ -208,16 +208,16 @@ static qmat_status fail_choice(qmat_context *context, const char *path, const ch
                                size_t mesh_count) {
   if (named > 1) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu meshes have the name '%s'", named, choice);
-    qmat_fail_hint(context, "choose by number, from 0 to %zu", mesh_count - 1);
+    qmat_fail_hint(context, "type a mesh number from 0 to %zu", mesh_count - 1);
   } else {
-    qmat_fail(context, QMAT_ERROR_USAGE, "there is no mesh '%s' on a node of the scene", choice);
-    qmat_fail_hint(context, "all, merged, a mesh's name, or its number below %zu", mesh_count);
+    qmat_fail(context, QMAT_ERROR_USAGE, "no node references a mesh named or numbered '%s'", choice);
+    qmat_fail_hint(context, "type all, merged, a mesh's name, or a mesh number below %zu", mesh_count);
   }
   qmat_fail_at(context, path, 0, 0);
   return qmat_fail_field(context, "mesh");
 }
 
-/* The one mesh of that name or, without one, of that number; `*named` meshes have the name. */
+/* Finds the only mesh with that name; if no name matches, the mesh with that number. `*named` counts the matches. */
 static bool find_mesh(const json_t *meshes, const char *choice, size_t *mesh, size_t *named) {
   const size_t count = json_array_size(meshes);
   *named = 0;
@@ -261,7 +261,7 @@ qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, c
     for (size_t i = 0; i < mesh_count; i++)
       if (carried[i] && !qmat_gltf_is_skin(root, i)) chosen[(*count)++] = (uint32_t)i;
     if (*count == 0) {
-      status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "no node of the scene carries a mesh");
+      status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "no node references a mesh");
       qmat_fail_at(context, path, 0, 0);
     }
   }

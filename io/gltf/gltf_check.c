@@ -11,7 +11,7 @@
 /* ---- the asset and its extensions ---- */
 
 static bool geometry_is_safe_with(const char *extension) {
-  /* What changes only how a surface looks, or is read here. */
+  /* Extensions that this reader supports, or that leave the geometry unchanged. */
   static const char *const known[] = {
       "KHR_draco_mesh_compression",
       "KHR_mesh_quantization",
@@ -48,10 +48,10 @@ static qmat_status check_extensions(const qmat_gltf_checker *check) {
     const char *name = json_string_value(json_array_get(required, i));
     if (!name) return qmat_gltf_fail(check, NULL, 0, "extensionsRequired must hold strings only");
     if (!geometry_is_safe_with(name)) {
-      qmat_gltf_fail(check, NULL, 0, "the asset requires the extension %.100s, which is not supported", name);
+      qmat_gltf_fail(check, NULL, 0, "the required extension %.100s is not supported", name);
       return qmat_fail_hint(check->context,
-                            "supported: KHR_draco_mesh_compression, KHR_mesh_quantization, and those of materials, "
-                            "textures, lights and metadata");
+                            "supported: KHR_draco_mesh_compression, KHR_mesh_quantization, and extensions of "
+                            "materials, textures, lights and metadata");
     }
   }
   for (size_t i = 0; i < json_array_size(used); i++) {
@@ -72,15 +72,15 @@ static qmat_status check_asset(const qmat_gltf_checker *check) {
   const char *least = json_string_value(json_object_get(asset, "minVersion"));
   if (!version) return qmat_gltf_fail(check, NULL, 0, "not a glTF asset: asset.version is missing");
   if (strncmp(version, "2.", 2) != 0)
-    return qmat_gltf_fail(check, NULL, 0, "glTF version %.20s is not supported; 2.0 is", version);
+    return qmat_gltf_fail(check, NULL, 0, "glTF version %.20s is not supported (only 2.0 is)", version);
   if (least && strcmp(least, "2.0") != 0)
-    return qmat_gltf_fail(check, NULL, 0, "the asset asks for glTF %.20s; 2.0 is supported", least);
+    return qmat_gltf_fail(check, NULL, 0, "the asset requires glTF %.20s, but only 2.0 is supported", least);
   return check_extensions(check);
 }
 
 /* ---- the document ---- */
 
-/* The root's array of that name: missing, or an array of objects. `kind` names one of them. */
+/* The root's member `name` must be missing or an array of objects. `kind` names one object in errors. */
 static qmat_status check_root_array(const qmat_gltf_checker *check, const char *name, const char *kind) {
   json_t *array;
   qmat_status status = qmat_gltf_take_array(check, check->root, name, NULL, 0, &array);

@@ -4,17 +4,17 @@
 
 #include "io/gltf/gltf_document.h"
 
-/* Takes a .glb or .gltf apart: checks the container, the JSON, every id, offset, length, count and type that geometry
- * depends on, that the nodes are trees, and that required extensions are known; loads the buffers; and writes what
- * geometry needs as JSON again, in which everything below holds, so that its reader need not check:
- *  - keys: asset, bufferViews, accessors, meshes, nodes, skins, scenes; numbers that must be whole are written whole;
- *  - bufferViews lie inside their buffers, accessors (dense and sparse parts) inside their views;
- *  - primitives keep POSITION, JOINTS_n and WEIGHTS_n with types that glTF allows and equal counts, and the POSITION of
- *    their morph targets; those without POSITION, and points and lines, have an empty attributes object;
+/* Checks a .glb or .gltf and loads its buffers. The checks cover the container, the JSON, the required extensions, the
+ * node trees, and every id, offset, length, count and type that the geometry depends on. The document's text is JSON
+ * reduced to the geometry. Its reader can rely on this:
+ *  - keys: asset, bufferViews, accessors, meshes, nodes, skins, scenes; whole numbers are written without a fraction;
+ *  - bufferViews lie inside their buffers, dense and sparse accessor data inside their views;
+ *  - primitives have only POSITION, JOINTS_n and WEIGHTS_n, of valid types and equal counts, and the POSITION of their
+ *    morph targets; primitives without POSITION, points and lines have an empty attributes object;
  *  - KHR_draco_mesh_compression is the only extension; its primitives have no indices key;
  *  - nodes have finite transforms, at most one parent and no cycle; meshes, skins, joints and children exist;
- *  - exactly one scene, the one to be read.
- * `bytes` must outlive the document, which is freed with qmat_gltf_document_uninit also after a failure.
+ *  - there is exactly one scene: the scene to read.
+ * `bytes` must outlive the document. Free it with qmat_gltf_document_uninit, also after a failure.
  * QMAT_ERROR_FORMAT with the element, QMAT_ERROR_IO for external files, QMAT_ERROR_MEMORY. */
 qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
                                     qmat_gltf_document *document);

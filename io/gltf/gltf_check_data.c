@@ -8,8 +8,8 @@
 #include "io/gltf/gltf_uri.h"
 
 #define MOST_BUFFERS 4096
-/* An accessor without a buffer view stands for zeros without any bytes. Morph targets use it with as many elements as
- * the mesh has vertices, which other bytes account for. */
+/* An accessor without a buffer view means zeros and needs no bytes. It may have this many elements plus one per byte of
+ * data. Morph targets have one element per vertex, and the vertices themselves normally need more bytes. */
 #define FREE_ZEROS 65536
 
 /* ---- buffers ---- */
@@ -30,7 +30,7 @@ static qmat_status load_external(const qmat_gltf_checker *check, size_t index, c
   if (status != QMAT_OK) return status;
   if (!name || qmat_gltf_is_outside(name)) {
     qmat_free(name);
-    return qmat_gltf_fail(check, "buffer", index, "its uri \"%.100s\" is not a relative path inside the asset's folder",
+    return qmat_gltf_fail(check, "buffer", index, "uri \"%.100s\" is not a relative path inside the asset's folder",
                           uri);
   }
   char *path = qmat_gltf_beside(check->path, name);
@@ -47,7 +47,7 @@ static qmat_status load_data_uri(const qmat_gltf_checker *check, size_t index, c
   qmat_gltf_buffer *buffer = &check->document->buffers[index];
   const char *comma = memchr(uri, ',', uri_length);
   if (!comma || comma - uri < 12 || memcmp(comma - 7, ";base64", 7) != 0)
-    return qmat_gltf_fail(check, "buffer", index, "its data URI is not base64");
+    return qmat_gltf_fail(check, "buffer", index, "the data URI is not base64");
   size_t length = uri_length - (size_t)(comma + 1 - uri);
   qmat_status status = qmat_base64_decode(check->context, comma + 1, length, &buffer->owned, &buffer->size);
   if (status != QMAT_OK) {
@@ -61,7 +61,7 @@ static qmat_status load_data_uri(const qmat_gltf_checker *check, size_t index, c
 static qmat_status load_buffers(const qmat_gltf_checker *check) {
   json_t *array = json_object_get(check->root, "buffers");
   size_t count = json_array_size(array);
-  if (count > MOST_BUFFERS) return qmat_gltf_fail(check, NULL, 0, "%zu buffers are more than %d", count, MOST_BUFFERS);
+  if (count > MOST_BUFFERS) return qmat_gltf_fail(check, NULL, 0, "%zu buffers; the limit is %d", count, MOST_BUFFERS);
   check->document->buffers = qmat_calloc(count, sizeof *check->document->buffers);
   if (!check->document->buffers) return qmat_gltf_fail_memory(check);
   check->document->buffer_count = count;
@@ -73,8 +73,7 @@ static qmat_status load_buffers(const qmat_gltf_checker *check) {
     if (status != QMAT_OK) return status;
     if (uri && !json_is_string(uri)) return qmat_gltf_fail(check, "buffer", i, "uri must be a string");
     if (!uri) {
-      if (i > 0 || !check->asset.chunk)
-        return qmat_gltf_fail(check, "buffer", i, "has no uri, and there is no GLB chunk for it");
+      if (i > 0 || !check->asset.chunk) return qmat_gltf_fail(check, "buffer", i, "has no uri and no GLB chunk");
       buffer->bytes = check->asset.chunk;
       buffer->size = check->asset.chunk_size;
     } else if (strncmp(json_string_value(uri), "data:", 5) == 0) {
@@ -112,7 +111,7 @@ static qmat_status check_views(qmat_gltf_checker *check) {
       status = qmat_gltf_take_whole(check, object, "byteStride", "bufferView", i, 4, 252, &stride, &present);
     if (status != QMAT_OK) return status;
     if (stride % 4 != 0)
-      return qmat_gltf_fail(check, "bufferView", i, "byteStride %lld is no multiple of 4", (long long)stride);
+      return qmat_gltf_fail(check, "bufferView", i, "byteStride %lld is not a multiple of 4", (long long)stride);
     size_t size = check->document->buffers[buffer].size;
     if ((uint64_t)(offset + length) > size) {
       return qmat_gltf_fail(check, "bufferView", i, "bytes %lld to %lld lie outside buffer %lld of %zu bytes",
@@ -126,7 +125,7 @@ static qmat_status check_views(qmat_gltf_checker *check) {
 
 /* ---- accessors ---- */
 
-/* The bytes of one element; columns of matrices start at multiples of 4. */
+/* The size of one element in bytes; matrix columns are aligned to 4 bytes. */
 static int64_t element_size(int64_t component_type, int64_t components, bool matrix) {
   int64_t size = (int64_t)qmat_gltf_component_size(component_type);
   if (!matrix) return components * size;
@@ -134,14 +133,13 @@ static int64_t element_size(int64_t component_type, int64_t components, bool mat
   return rows * ((rows * size + 3) / 4 * 4);
 }
 
-/* Whether `count` elements fit into the view. */
+/* Checks that `count` elements fit into the view. */
 static qmat_status check_range(const qmat_gltf_checker *check, size_t index, const char *what, int64_t view_id,
                                int64_t offset, int64_t count, int64_t stride, int64_t size) {
   int64_t end = offset + (count - 1) * stride + size; /* all below 2^41 */
   if (end <= check->views[view_id].size) return QMAT_OK;
-  return qmat_gltf_fail(check, "accessor", index, "%s%lld elements need %lld bytes of bufferView %lld, which has %lld",
-                        what, (long long)count, (long long)end, (long long)view_id,
-                        (long long)check->views[view_id].size);
+  return qmat_gltf_fail(check, "accessor", index, "%s%lld elements need %lld bytes, but bufferView %lld has %lld", what,
+                        (long long)count, (long long)end, (long long)view_id, (long long)check->views[view_id].size);
 }
 
 static qmat_status check_sparse(const qmat_gltf_checker *check, size_t index, json_t *sparse,
@@ -189,7 +187,7 @@ static qmat_status check_accessor(const qmat_gltf_checker *check, size_t index, 
     int64_t components;
   } types[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}};
   const char *type = json_string_value(json_object_get(object, "type"));
-  if (!type) return qmat_gltf_fail(check, "accessor", index, "type is missing or no string");
+  if (!type) return qmat_gltf_fail(check, "accessor", index, "type must be a string");
   for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
     if (strcmp(types[i].name, type) == 0) out->components = types[i].components;
   }
@@ -218,7 +216,7 @@ static qmat_status check_accessor(const qmat_gltf_checker *check, size_t index, 
     if (stride == 0) stride = size;
     if (stride < size) {
       return qmat_gltf_fail(check, "accessor", index,
-                            "its elements of %lld bytes overlap in bufferView %lld of byteStride %lld", (long long)size,
+                            "elements of %lld bytes overlap: bufferView %lld has byteStride %lld", (long long)size,
                             (long long)view_id, (long long)stride);
     }
     status = check_range(check, index, "", view_id, offset, out->count, stride, size);
@@ -249,7 +247,7 @@ qmat_status qmat_gltf_check_data(qmat_gltf_checker *check) {
   return status == QMAT_OK ? check_accessors(check) : status;
 }
 
-/* ---- what accessors are used for ---- */
+/* ---- accessor uses ---- */
 
 qmat_status qmat_gltf_check_use(const qmat_gltf_checker *check, int64_t id, const char *what, int64_t components,
                                 unsigned allowed, bool compressed) {
@@ -276,10 +274,11 @@ qmat_status qmat_gltf_check_use(const qmat_gltf_checker *check, int64_t id, cons
       break;
   }
   if (!fits) {
-    return qmat_gltf_fail(check, "accessor", (size_t)id, "its type of %lld components of %lld cannot be %s",
+    return qmat_gltf_fail(check, "accessor", (size_t)id, "%lld components of type %lld cannot be %s",
                           (long long)of->components, (long long)of->component_type, what);
   }
   if (!compressed && !of->has_view && (uint64_t)of->count > check->document->data_size + FREE_ZEROS)
-    return qmat_gltf_fail(check, "accessor", (size_t)id, "asks for %lld elements without data", (long long)of->count);
+    return qmat_gltf_fail(check, "accessor", (size_t)id,
+                          "has %lld elements without data, too many for the size of the asset", (long long)of->count);
   return QMAT_OK;
 }

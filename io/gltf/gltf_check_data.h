@@ -4,11 +4,11 @@
 
 #include "io/gltf/gltf_checker.h"
 
-/* Loads the buffers of an asset, and checks its buffer views and accessors: every range lies inside what it is part of.
- * Sets check->views and check->accessors. QMAT_ERROR_FORMAT with the element, QMAT_ERROR_IO, QMAT_ERROR_MEMORY. */
+/* Loads the buffers of an asset and checks the types and byte ranges of its buffer views and accessors. Sets
+ * check->views and check->accessors. QMAT_ERROR_FORMAT with the element, QMAT_ERROR_IO, QMAT_ERROR_MEMORY. */
 qmat_status qmat_gltf_check_data(qmat_gltf_checker *check);
 
-/* Component types that a use of an accessor allows. */
+/* The component types that a use of an accessor allows, as bits. */
 enum {
   QMAT_GLTF_ALLOW_BYTES = 1,
   QMAT_GLTF_ALLOW_SHORTS = 2,
@@ -17,8 +17,8 @@ enum {
   QMAT_GLTF_ALLOW_FLOATS = 16
 };
 
-/* Whether accessor `id` may be used as `what`, which has that many components of an allowed type. With `compressed` its
- * data come from Draco. QMAT_ERROR_FORMAT. */
+/* Checks that accessor `id` has that number of components and an allowed component type. `what` names its use in
+ * errors. With `compressed`, its data come from Draco. QMAT_ERROR_FORMAT. */
 qmat_status qmat_gltf_check_use(const qmat_gltf_checker *check, int64_t id, const char *what, int64_t components,
                                 unsigned allowed, bool compressed);
 

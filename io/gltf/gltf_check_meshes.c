@@ -7,7 +7,7 @@
 
 #include "io/gltf/gltf_check_data.h"
 
-/* Takes the number off "JOINTS_12"; -1 when the name is not of that kind. */
+/* The number in a name like "JOINTS_12"; -1 for other names. */
 static int set_number(const char *name, const char *prefix) {
   size_t length = strlen(prefix);
   if (strncmp(name, prefix, length) != 0 || name[length] == '\0' || strlen(name + length) > 3) return -1;
@@ -21,7 +21,7 @@ static qmat_status check_same_count(const qmat_gltf_checker *check, int64_t id, 
                         (long long)check->accessors[id].count, (long long)check->accessors[position].count);
 }
 
-/* The Draco extension of a primitive, reduced to ids; NULL when there is none. */
+/* Checks a primitive's Draco extension and reduces it to its ids; `*draco` is NULL without one. */
 static qmat_status check_draco(const qmat_gltf_checker *check, size_t mesh, size_t index, json_t *primitive,
                                json_t **draco) {
   static const char *const keys[] = {"bufferView", "attributes", NULL};
@@ -54,18 +54,18 @@ static qmat_status check_draco(const qmat_gltf_checker *check, size_t mesh, size
                             index, name);
     }
     if (!json_object_get(plain, name)) {
-      return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: %.40s has a Draco id but is no attribute", index,
+      return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: %.40s has a Draco id but is not an attribute", index,
                             name);
     }
     if (json_object_set_new(attributes, name, json_integer(id)) != 0) return qmat_gltf_fail_memory(check);
   }
   qmat_gltf_keep_keys(*draco, keys);
-  /* Draco brings its own faces, and its accessor of indices need not have data. */
+  /* The Draco data contain the faces; the indices accessor needs no data. */
   json_object_del(primitive, "indices");
   return json_object_set_new(primitive, "mode", json_integer(4)) == 0 ? QMAT_OK : qmat_gltf_fail_memory(check);
 }
 
-/* The attributes that place vertices, checked; the others are deleted. */
+/* Checks the attributes that determine vertex positions and deletes all others. */
 static qmat_status check_attributes(const qmat_gltf_checker *check, size_t mesh, size_t index, json_t *attributes,
                                     const json_t *compressed, int64_t position) {
   const char *name;
@@ -97,7 +97,7 @@ static qmat_status check_attributes(const qmat_gltf_checker *check, size_t mesh,
     snprintf(partner, sizeof partner, "%s_%s", joints ? "WEIGHTS" : "JOINTS",
              is_position ? "" : strrchr(name, '_') + 1);
     if (!is_position && !json_object_get(attributes, partner))
-      return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: %.40s without %s", index, name, partner);
+      return qmat_gltf_fail(check, "mesh", mesh, "primitive %zu: has %.40s without %s", index, name, partner);
   }
   return QMAT_OK;
 }
@@ -148,7 +148,7 @@ static qmat_status check_primitive(const qmat_gltf_checker *check, size_t mesh, 
   bool has_indices;
   status = qmat_gltf_take_id(check, primitive, "indices", "mesh", mesh, "accessors", &indices, &has_indices);
   if (status != QMAT_OK) return status;
-  if (mode < 4 || position < 0) { /* nothing to show: left in as a mark that it was there */
+  if (mode < 4 || position < 0) { /* without triangles: stays, so that the reader counts it as skipped */
     json_object_clear(primitive);
     return json_object_set_new(primitive, "attributes", json_object()) == 0 ? QMAT_OK : qmat_gltf_fail_memory(check);
   }

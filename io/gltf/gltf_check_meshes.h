@@ -4,8 +4,8 @@
 
 #include "io/gltf/gltf_checker.h"
 
-/* Checks the primitives of all meshes and reduces them to what places vertices, as gltf_check.h describes. After
- * qmat_gltf_check_data. QMAT_ERROR_FORMAT with the mesh or accessor, QMAT_ERROR_MEMORY. */
+/* Checks the primitives of all meshes and reduces them as gltf_check.h describes. Call it after qmat_gltf_check_data.
+ * QMAT_ERROR_FORMAT with the mesh or accessor, QMAT_ERROR_MEMORY. */
 qmat_status qmat_gltf_check_meshes(const qmat_gltf_checker *check);
 
 #endif

@@ -6,7 +6,7 @@
 #include "core/arena.h"
 #include "io/gltf/gltf_check_data.h"
 
-/* An array of ids of nodes, written whole. */
+/* Checks an array of node ids and stores each as an integer. */
 static qmat_status check_node_ids(const qmat_gltf_checker *check, json_t *object, const char *key, const char *kind,
                                   size_t element, json_t **ids) {
   size_t count = json_array_size(json_object_get(check->root, "nodes"));
@@ -67,14 +67,14 @@ static qmat_status check_node(const qmat_gltf_checker *check, size_t index, json
   if (status != QMAT_OK) return status;
   if (present) {
     double length = hypot(hypot(numbers[0], numbers[1]), hypot(numbers[2], numbers[3]));
-    if (!(length > 0) || !isfinite(length)) return qmat_gltf_fail(check, "node", index, "rotation is no quaternion");
+    if (!(length > 0) || !isfinite(length)) return qmat_gltf_fail(check, "node", index, "rotation is not a quaternion");
   }
   qmat_gltf_keep_keys(node, keys);
   return QMAT_OK;
 }
 
-/* The nodes are trees: one parent at most, and every node is reached from a root. `has_parent` and `stack` hold one
- * element a node. */
+/* Checks that the nodes form trees: each has at most one parent and is reachable from a root. `has_parent` (zeroed) and
+ * `stack` hold one element per node. */
 static qmat_status check_trees(const qmat_gltf_checker *check, uint8_t *has_parent, size_t *stack) {
   json_t *nodes = json_object_get(check->root, "nodes");
   size_t count = json_array_size(nodes), waiting = 0, reached = 0;
@@ -106,7 +106,7 @@ static qmat_status check_trees(const qmat_gltf_checker *check, uint8_t *has_pare
   return QMAT_OK;
 }
 
-/* Leaves one scene: the one to be read. `has_parent` as made by check_trees. */
+/* Removes every scene except the one to read. `has_parent` comes from check_trees. */
 static qmat_status choose_scene(const qmat_gltf_checker *check, uint8_t *has_parent) {
   json_t *scenes = json_object_get(check->root, "scenes"), *nodes = json_object_get(check->root, "nodes");
   json_t *ids = NULL;
@@ -122,7 +122,7 @@ static qmat_status choose_scene(const qmat_gltf_checker *check, uint8_t *has_par
       json_t *value = json_array_get(ids, i);
       size_t id = (size_t)json_integer_value(value);
       if (has_parent[id]) {
-        status = qmat_gltf_fail(check, "scene", (size_t)scene, "names node %zu twice or below another node", id);
+        status = qmat_gltf_fail(check, "scene", (size_t)scene, "node %zu is listed twice or has a parent", id);
       } else if (json_array_append(roots, value) != 0) {
         status = qmat_gltf_fail_memory(check);
       }

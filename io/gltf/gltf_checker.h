@@ -5,9 +5,9 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_document.h"
 
-/* What the checks of a glTF asset share: their state, their errors, and typed access to its JSON. */
+/* Shared by all checks of a glTF asset: state, errors, and typed access to its JSON. */
 
-/* The properties of an accessor that its users depend on. */
+/* The properties of an accessor that later checks use. */
 typedef struct qmat_gltf_accessor {
   int64_t component_type, components, count;
   bool has_view, normalized;
@@ -32,19 +32,19 @@ qmat_status qmat_gltf_fail(const qmat_gltf_checker *check, const char *kind, siz
     __attribute__((format(printf, 4, 5)));
 qmat_status qmat_gltf_fail_memory(const qmat_gltf_checker *check);
 
-/* A whole number in [least, most], also when written 3.0; false otherwise. */
+/* Reads a whole number in [least, most], also if written as 3.0; false for anything else. */
 bool qmat_gltf_whole(const json_t *value, int64_t least, int64_t most, int64_t *number);
 
-/* Each of these reads object[key], and fails about the element when it has the wrong type or range. */
+/* Each of these reads object[key]. A wrong type or range is an error that names the element. */
 
-/* A whole number, which is written whole into the object. Without the key, `*number` stays and `*present` is false;
- * with `present` NULL the key is required. */
+/* A whole number; the object then holds it as an integer. Without the key, `*number` is unchanged and `*present` false;
+ * if `present` is NULL, the key is required. */
 qmat_status qmat_gltf_take_whole(const qmat_gltf_checker *check, json_t *object, const char *key, const char *kind,
                                  size_t element, int64_t least, int64_t most, int64_t *number, bool *present);
-/* The id of a member of the root's array `of`, otherwise as qmat_gltf_take_whole. */
+/* The index of a member of the root's array `of`; otherwise as qmat_gltf_take_whole. */
 qmat_status qmat_gltf_take_id(const qmat_gltf_checker *check, json_t *object, const char *key, const char *kind,
                               size_t element, const char *of, int64_t *id, bool *present);
-/* `count` numbers; with SIZE_MAX and `numbers` NULL, any number of them. */
+/* `count` numbers; any number of them if `count` is SIZE_MAX and `numbers` is NULL. */
 qmat_status qmat_gltf_take_numbers(const qmat_gltf_checker *check, const json_t *object, const char *key,
                                    const char *kind, size_t element, size_t count, double *numbers, bool *present);
 /* An object or an array; `*value` is NULL without the key. */

@@ -14,7 +14,7 @@
 enum { LEAST_POSITION_BITS = 14, NORMAL_BITS = 10, TEXCOORD_BITS = 12, COLOR_BITS = 8, OTHER_BITS = 12 };
 enum { MOST_ATTRIBUTES = 24 };
 
-/* Why a primitive stays as it is. */
+/* Why a primitive is not compressed. */
 typedef enum obstacle {
   OBSTACLE_NONE,
   OBSTACLE_COMPRESSED,
@@ -27,18 +27,18 @@ typedef enum obstacle {
 } obstacle;
 
 static const char *const obstacle_texts[OBSTACLE_COUNT] = {
-    [OBSTACLE_COMPRESSED] = "compressed already",
+    [OBSTACLE_COMPRESSED] = "already compressed",
     [OBSTACLE_NO_TRIANGLES] = "no indexed triangles",
-    [OBSTACLE_TARGETS] = "it has morph targets",
-    [OBSTACLE_SHARED] = "its data are used by something else, too",
-    [OBSTACLE_DATA] = "its data are sparse, outside the binary chunk, or not as glTF asks for",
-    [OBSTACLE_REFUSED] = "Draco cannot encode it",
+    [OBSTACLE_TARGETS] = "morph targets",
+    [OBSTACLE_SHARED] = "the data are also used by something else",
+    [OBSTACLE_DATA] = "the data are sparse, outside the binary chunk, invalid or unsupported",
+    [OBSTACLE_REFUSED] = "Draco cannot encode the data",
 };
 
-/* An accessor's numbers in the chunk. */
+/* The location and layout of an accessor's numbers in the chunk. */
 typedef struct accessor_view {
-  size_t count, components, width, stride; /* width: bytes of a component */
-  json_int_t type;                         /* of a component */
+  size_t count, components, width, stride; /* width: bytes per component */
+  json_int_t type;                         /* componentType */
   const uint8_t *bytes;
 } accessor_view;
 
@@ -49,19 +49,19 @@ typedef struct compressor {
   size_t size;
   double error;
   const json_t **users; /* per accessor: the first primitive that uses it */
-  bool *shared;         /* per accessor: something that is no copy of that primitive uses it, too */
+  bool *shared;         /* per accessor: other geometry, morph targets, skins or animations use it too */
   size_t accessor_count;
-  double *moved;     /* per accessor: how far the compression moves these positions; -1: they are not compressed */
-  bool *fresh;       /* per primitive, all meshes in a row: whether it was compressed here */
+  double *moved;     /* per accessor: bound on the movement of these positions; -1: not compressed */
+  bool *fresh;       /* per primitive, counted over all meshes: compressed in this call */
   qmat_writer blobs; /* the compressed data, each padded to 4 bytes */
-  json_t *new_views; /* of them, their offsets still within `blobs` */
+  json_t *new_views; /* their buffer views; offsets count from the start of `blobs` */
   qmat_gltf_compressed *result;
   size_t left[OBSTACLE_COUNT];
 } compressor;
 
 /* ---- reading the JSON ---- */
 
-/* A whole number, also when written 3.0; -1: it is none. The second: of an object, `missing` where there is none. */
+/* A whole number from 0, also if written as 3.0; else -1. whole() gives `missing` if the object lacks the key. */
 static json_int_t whole_of(const json_t *value) {
   const double number = json_number_value(value);
   return json_is_number(value) && number >= 0 && number < 0x1p53 && number == floor(number) ? (json_int_t)number : -1;
@@ -83,7 +83,7 @@ static size_t components_of(const char *type) {
   return 0;
 }
 
-/* False where the accessor's numbers are not all in the chunk, densely, as they are. */
+/* Locates an accessor's numbers. False unless they are dense, uncompressed and inside the chunk. */
 static bool view_accessor(const compressor *c, json_int_t index, accessor_view *view) {
   const json_t *accessor = member(c->root, "accessors", index);
   const json_t *buffer_view = member(c->root, "bufferViews", whole(accessor, "bufferView", -1));
@@ -107,9 +107,9 @@ static bool view_accessor(const compressor *c, json_int_t index, accessor_view *
   return true;
 }
 
-/* ---- who uses what ---- */
+/* ---- users of accessors ---- */
 
-/* Whether both have the same there, or nothing. */
+/* Whether both objects have equal members `key`, or neither has one. */
 static bool agree(const json_t *a, const json_t *b, const char *key) {
   const json_t *first = json_object_get(a, key), *second = json_object_get(b, key);
   return first && second ? json_equal(first, second) : first == second;
@@ -120,7 +120,7 @@ static bool same_geometry(const json_t *a, const json_t *b) {
          !json_object_get(b, "targets");
 }
 
-/* `primitive` NULL: something else. */
+/* `primitive` is NULL for morph targets, skins and animations. */
 static void note_user(compressor *c, const json_t *accessor, const json_t *primitive) {
   const json_int_t index = whole_of(accessor);
   if (index < 0 || (size_t)index >= c->accessor_count) return;
@@ -154,7 +154,7 @@ static void note_users(compressor *c) {
 
 /* ---- one primitive ---- */
 
-/* What is given to Draco for one primitive. */
+/* Draco's input for one primitive. */
 typedef struct packing {
   size_t attribute_count, vertex_count, triangle_count;
   const char *names[MOST_ATTRIBUTES];
@@ -162,7 +162,7 @@ typedef struct packing {
   qmat_draco_attribute attributes[MOST_ATTRIBUTES];
   void *values[MOST_ATTRIBUTES]; /* owned */
   uint32_t *corners;             /* owned */
-  size_t position;               /* which of the attributes */
+  size_t position;               /* index of POSITION among the attributes */
   double moved;
 } packing;
 
@@ -175,7 +175,7 @@ static bool starts_with(const char *text, const char *start) {
   return strncmp(text, start, strlen(start)) == 0;
 }
 
-/* The extent of the values over all components, and their largest size. */
+/* The largest extent of any component. `*largest` gets the largest absolute value. */
 static double range_of(const float *values, size_t count, size_t components, double *largest) {
   double range = 0;
   *largest = 0;
@@ -202,7 +202,7 @@ static void choose_bits(const compressor *c, packing *p, size_t index) {
     const int bits = qmat_draco_bits_for(3, range, c->error * range);
     attribute->meaning = QMAT_DRACO_POSITION;
     attribute->bits = bits > LEAST_POSITION_BITS ? bits : LEAST_POSITION_BITS;
-    /* Half a step along each axis, and what single precision rounds. */
+    /* Half a quantisation step along each axis, plus single-precision rounding. */
     p->moved = sqrt(3) * (range / 2 / (ldexp(1, attribute->bits) - 1) + ldexp(largest + range, -22));
     p->position = index;
   } else if (strcmp(name, "NORMAL") == 0 && attribute->number == QMAT_DRACO_FLOAT) {
@@ -225,7 +225,7 @@ static bool draco_number_of(json_int_t type, qmat_draco_number *number) {
   return type == QMAT_GLTF_FLOAT || type <= QMAT_GLTF_UNSIGNED_SHORT;
 }
 
-/* Takes an attribute's numbers, one vertex after the other. */
+/* Copies an attribute's numbers, tightly packed. `*why` says why it cannot be compressed. */
 static qmat_status take_attribute(compressor *c, packing *p, const char *name, const json_t *value, obstacle *why) {
   accessor_view view;
   qmat_draco_number number;
@@ -296,7 +296,7 @@ static qmat_status take_primitive(compressor *c, const json_t *primitive, packin
   return status;
 }
 
-/* What the accessors say of the decoded data. */
+/* Updates the accessors to the decoded data. */
 static qmat_status describe(compressor *c, const packing *p, const uint8_t *bytes, size_t size) {
   qmat_draco_mesh *mesh;
   qmat_status status = qmat_draco_mesh_new(c->context, bytes, size, &mesh);
@@ -333,7 +333,7 @@ static qmat_status describe(compressor *c, const packing *p, const uint8_t *byte
   return status == QMAT_OK && !done ? qmat_fail_memory(c->context, "a glTF file") : status;
 }
 
-/* The extension of a primitive; its buffer view counts from the first new one. */
+/* A primitive's Draco extension. `view` counts from the first new buffer view. */
 static json_t *make_extension(const packing *p, size_t view) {
   json_t *ids = json_object();
   bool done = ids != NULL;
@@ -350,7 +350,7 @@ static qmat_status pack(compressor *c, const packing *p, json_t **extension, obs
   *extension = NULL;
   qmat_status status = qmat_draco_encode(c->context, p->attributes, p->attribute_count, p->vertex_count, p->corners,
                                          p->triangle_count, false, &bytes, &size);
-  if (status == QMAT_ERROR_DEPENDENCY) { /* of nothing but degenerate triangles, say */
+  if (status == QMAT_ERROR_DEPENDENCY) { /* for example, all triangles are degenerate */
     *why = OBSTACLE_REFUSED;
     return QMAT_OK;
   }
@@ -374,14 +374,14 @@ static json_int_t position_of(const compressor *c, const json_t *primitive) {
   return position < (json_int_t)c->accessor_count ? position : -1;
 }
 
-/* The primitive of the same geometry that was compressed before; NULL: none. */
+/* A primitive of the same geometry that is already compressed; NULL: none. */
 static const json_t *find_twin(const compressor *c, const json_t *primitive) {
   const json_int_t position = position_of(c, primitive);
   return position >= 0 && c->moved[position] >= 0 && same_geometry(c->users[position], primitive) ? c->users[position]
                                                                                                   : NULL;
 }
 
-/* `number`: of the primitive, all meshes in a row. */
+/* `number` counts primitives over all meshes. */
 static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t mesh, size_t number) {
   packing p = {0};
   obstacle why = OBSTACLE_NONE;
@@ -416,7 +416,7 @@ static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t m
 
 /* ---- the chunk ---- */
 
-/* Extensions whose data are where the core of glTF has them, or that have none. */
+/* Extensions that refer to data only in places that this file handles, or not at all. */
 static bool is_harmless(const char *name) {
   static const char *const starts[] = {"KHR_materials_", "KHR_lights_punctual",   "KHR_texture_", "KHR_xmp",
                                        "EXT_texture_",   "KHR_animation_pointer", "KHR_node_",    QMAT_GLTF_DRACO};
@@ -425,7 +425,7 @@ static bool is_harmless(const char *name) {
   return false;
 }
 
-/* Calls `visit` for every number of a buffer view that the asset has but those of new data. */
+/* Calls `visit` for every object that may refer to an old buffer view. */
 static void for_each_view(const compressor *c, void (*visit)(void *user, json_t *owner), void *user) {
   size_t i, k, number = 0;
   json_t *item, *primitive;
@@ -444,11 +444,11 @@ static void for_each_view(const compressor *c, void (*visit)(void *user, json_t 
   }
 }
 
-/* The buffer views, and what becomes of them. */
+/* The old buffer views: used before, used after compression, and their new numbers. */
 typedef struct view_table {
   size_t count;
   bool *was_used, *is_used;
-  json_int_t *numbers; /* of those that stay */
+  json_int_t *numbers; /* of the views that stay */
   bool failed;
 } view_table;
 
@@ -474,7 +474,7 @@ static void renumber(void *user, json_t *owner) {
   if (json_object_set_new(owner, "bufferView", json_integer(table->numbers[view])) != 0) table->failed = true;
 }
 
-/* Marks the bytes of a view in the chunk. */
+/* Sets the marks of a view's bytes in the chunk. */
 static void mark_bytes(const compressor *c, const json_t *view, uint8_t *marks, uint8_t with) {
   const json_int_t start = whole(view, "byteOffset", 0), length = whole(view, "byteLength", -1),
                    most = (json_int_t)c->size;
@@ -482,8 +482,8 @@ static void mark_bytes(const compressor *c, const json_t *view, uint8_t *marks, 
   memset(marks + start, with, (size_t)length);
 }
 
-/* Takes the bytes that nothing uses any more out of the chunk, in steps of 4 so that all stays aligned; `moved_by` gets
- * for each 4 bytes how many were taken out before them. */
+/* Removes unused bytes from the chunk, 4 at a time to preserve alignment, and appends the new data. For each 4 bytes,
+ * `moved_by` gets the number of bytes removed before them. */
 static bool rebuild_chunk(compressor *c, const view_table *table, size_t *moved_by) {
   const json_t *views = json_object_get(c->root, "bufferViews");
   const size_t words = (c->size + 3) / 4;
@@ -498,7 +498,7 @@ static bool rebuild_chunk(compressor *c, const view_table *table, size_t *moved_
   for (size_t w = 0; w < words && done; w++) {
     moved_by[w] = taken;
     const uint8_t *word = gone + 4 * w;
-    /* The chunk's end may stand within the last word. */
+    /* The last word may be incomplete. */
     const size_t held = 4 * w + 4 <= c->size ? 4 : c->size - 4 * w;
     if (held == 4 && word[0] && word[1] && word[2] && word[3]) {
       taken += 4;
@@ -525,7 +525,7 @@ static bool rebuild_chunk(compressor *c, const view_table *table, size_t *moved_
   return done;
 }
 
-/* Leaves out the views that nothing uses any more, moves the others, and adds the new ones. */
+/* Removes views that are no longer used, moves the others, and adds the new ones. */
 static bool place_views(compressor *c, view_table *table, const size_t *moved_by) {
   json_t *views = json_object_get(c->root, "bufferViews"), *kept = json_array();
   bool done = kept != NULL;
@@ -594,14 +594,14 @@ static qmat_status add_notes(const compressor *c, json_t *notes) {
   for (size_t why = 0; why < OBSTACLE_COUNT; why++) {
     if (c->left[why] == 0) continue;
     const bool one = c->left[why] == 1;
-    json_t *text = json_sprintf("%zu primitive%s left as %s: %s", c->left[why], one ? " is" : "s are",
-                                one ? "it is" : "they are", obstacle_texts[why]);
+    json_t *text =
+        json_sprintf("%zu primitive%s unchanged: %s", c->left[why], one ? " is" : "s are", obstacle_texts[why]);
     if (json_array_append_new(notes, text) != 0) return qmat_fail_memory(c->context, "the report");
   }
   return QMAT_OK;
 }
 
-/* The first extension that may refer to the data in ways that are not known; NULL: none. */
+/* The first used extension that may refer to the data in an unknown way; NULL: none. */
 static const char *find_unknown(const json_t *root) {
   const json_t *names = json_object_get(root, "extensionsUsed");
   for (size_t i = 0; i < json_array_size(names); i++) {
@@ -617,8 +617,7 @@ qmat_status qmat_gltf_compress(qmat_context *context, json_t *root, const uint8_
   const char *unknown = find_unknown(root);
   if (unknown) {
     const int failed = json_array_append_new(
-        notes,
-        json_sprintf("the meshes are left as they are: the asset uses %s, which may refer to their data", unknown));
+        notes, json_sprintf("the meshes are unchanged: the extension %s may refer to their data", unknown));
     return failed ? qmat_fail_memory(context, "the report") : QMAT_OK;
   }
   compressor c = {.context = context, .root = root, .chunk = chunk, .size = size, .error = error, .result = compressed};

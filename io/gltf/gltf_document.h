@@ -18,12 +18,12 @@ typedef struct qmat_gltf_buffer {
   qmat_bytes file; /* of an external file */
 } qmat_gltf_buffer;
 
-/* A glTF asset that has been checked, reduced to its geometry. A zeroed one is empty and valid. */
+/* A checked glTF asset, reduced to its geometry. A zeroed one is empty and valid. */
 typedef struct qmat_gltf_document {
   size_t buffer_count;
   qmat_gltf_buffer *buffers;
   size_t data_size;           /* of all buffers */
-  json_t *extensions_ignored; /* names that the asset uses, but does not require, and that nothing here knows */
+  json_t *extensions_ignored; /* names of used extensions that the reader does not know */
   char *text;                 /* the reduced JSON, terminated, NUL-free */
   size_t text_length;
 } qmat_gltf_document;

@@ -10,16 +10,16 @@
 #include "io/gltf/gltf_keep.h"
 #include "io/gltf/gltf_uri.h"
 
-/* ---- into the chunk ---- */
+/* ---- embedding files in the chunk ---- */
 
 typedef struct embedder {
   qmat_context *context;
   const qmat_scene *scene;
   json_t *root;
   qmat_writer chunk;
-  size_t *offsets;    /* per part of the scene: where its bytes are in the chunk; SIZE_MAX: nowhere */
+  size_t *offsets;    /* per part of the scene: its offset in the chunk; SIZE_MAX: not in the chunk */
   json_int_t *views;  /* per part: the buffer view of an image; -1: none */
-  json_int_t *buffer; /* per buffer: its offset in the chunk; -1: it stays */
+  json_int_t *buffer; /* per buffer: its offset in the chunk; -1: not in the chunk */
   size_t buffer_count;
   bool any;
 } embedder;
@@ -82,7 +82,7 @@ static qmat_status embed_image(embedder *e, json_t *image) {
   return done ? QMAT_OK : qmat_fail_memory(e->context, "a glTF file");
 }
 
-/* Sets owner.buffer and owner.byteOffset of what is in a buffer of the old list. */
+/* Converts owner.buffer and owner.byteOffset from the old buffers to the new ones. */
 static bool renumber(const embedder *e, json_t *owner, const json_int_t *numbers) {
   const json_t *value = json_object_get(owner, "buffer");
   const double buffer = json_is_number(value) ? json_number_value(value) : -1;
@@ -94,7 +94,7 @@ static bool renumber(const embedder *e, json_t *owner, const json_int_t *numbers
   return qmat_gltf_set(owner, "byteOffset", json_integer(e->buffer[old] + offset));
 }
 
-/* Makes one buffer of those in the chunk and puts it first; views of images count from there already. */
+/* Merges the buffers in the chunk into one and puts it first. Views of images already refer to it. */
 static bool place_buffers(const embedder *e, size_t view_count, json_int_t *numbers) {
   const json_t *old = json_object_get(e->root, "buffers"), *views = json_object_get(e->root, "bufferViews");
   json_t *buffers = json_array(), *first = NULL;
@@ -156,14 +156,14 @@ qmat_status qmat_gltf_embed(qmat_context *context, const qmat_scene *scene, json
   return status;
 }
 
-/* ---- beside the file ---- */
+/* ---- side files ---- */
 
 typedef struct collector {
   qmat_context *context;
   const qmat_scene *scene;
   qmat_file_part *parts;
   size_t count, capacity;
-  size_t *place; /* per part of the scene: 1 + its place among `parts`; 0: not there yet */
+  size_t *place; /* per part of the scene: 1 + its index in `parts`; 0: not there yet */
 } collector;
 
 static bool is_taken(const collector *c, const char *name) {
@@ -174,7 +174,7 @@ static bool is_taken(const collector *c, const char *name) {
   return false;
 }
 
-/* The base name of a file from outside, with a number before its ending where another part has that name. */
+/* The base name of a file outside the asset's folder; if it is taken, a number is added before the ending. */
 static char *free_name(const collector *c, const char *name) {
   const char *base = strrchr(name, '/') + 1, *dot = strrchr(base, '.');
   if (!dot || dot == base) dot = base + strlen(base);
@@ -188,7 +188,7 @@ static char *free_name(const collector *c, const char *name) {
   return chosen;
 }
 
-/* Adds a part of the scene under `name`, which it takes over. */
+/* Copies a part of the scene and takes ownership of `name`. */
 static bool add_part(collector *c, size_t part, char *name) {
   const qmat_file_part *from = &c->scene->parts[part];
   if (!name || qmat_grow((void **)&c->parts, &c->capacity, c->count + 1, sizeof *c->parts) != 0) {

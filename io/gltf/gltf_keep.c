@@ -29,7 +29,7 @@ const char *qmat_gltf_image_type(const uint8_t *bytes, size_t size) {
   return NULL;
 }
 
-/* Adds a part under `name`, which it takes over. */
+/* Adds a part and takes ownership of `name`. */
 static qmat_status add_part(keeper *keeper, char *name, const uint8_t *bytes, size_t size) {
   qmat_scene *scene = keeper->scene;
   if (!name || qmat_grow((void **)&scene->parts, &keeper->capacity, scene->part_count + 1, sizeof *scene->parts) != 0) {
@@ -47,7 +47,7 @@ static qmat_status add_part(keeper *keeper, char *name, const uint8_t *bytes, si
 static qmat_status warn(const keeper *keeper, const char *uri, const char *what) {
   enum { MOST_BYTES = 200 };
   size_t length = strnlen(uri, MOST_BYTES);
-  while (length > 0 && ((unsigned char)uri[length] & 0xC0) == 0x80) length--; /* not within a character */
+  while (length > 0 && ((unsigned char)uri[length] & 0xC0) == 0x80) length--; /* not inside a UTF-8 character */
   json_t *text = json_sprintf("the file \"%.*s\" %s: it is not copied", (int)length, uri, what);
   return json_array_append_new(keeper->warnings, text) == 0
              ? QMAT_OK
@@ -74,8 +74,7 @@ qmat_status qmat_gltf_find_part(qmat_context *context, const qmat_scene *scene, 
   return failed ? qmat_fail_memory(context, "the name of a file") : QMAT_OK;
 }
 
-/* Reads a file and adds it as a part under `part_name`, which it takes over. A file that cannot be read is a warning.
- */
+/* Reads a file, adds it as a part and takes ownership of `part_name`. An unreadable file is a warning. */
 static qmat_status read_part(keeper *keeper, const char *uri, const char *name, char *part_name) {
   qmat_context *context = keeper->context;
   const qmat_error before = context->error;

@@ -14,7 +14,7 @@ enum { NORMAL_BITS = 10, ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
 
 /* ---- the data ---- */
 
-/* Writes 3 floats a vertex; QMAT_ERROR_GEOMETRY names the first that does not fit. */
+/* Writes 3 floats per vertex. QMAT_ERROR_GEOMETRY names the first vertex beyond single precision. */
 static qmat_status single_positions(qmat_context *context, const qmat_mesh *skin, const double origin[3],
                                     float *positions) {
   for (size_t i = 0; i < 3 * skin->vertex_count; i++) {
@@ -29,9 +29,8 @@ static qmat_status single_positions(qmat_context *context, const qmat_mesh *skin
   return QMAT_OK;
 }
 
-/* Unit normals, the sum of the facets' area vectors (cross products, whose length is twice the area). Vertices whose
- * sum vanishes get the z axis: glTF asks for unit length everywhere. `sums` is scratch of 3 doubles a vertex, zeroed.
- */
+/* Writes unit normals, weighted by facet area (a cross product is twice the area long). A vertex with a zero sum gets
+ * the z axis because glTF requires unit length. `sums` is scratch memory, 3 zeroed doubles per vertex. */
 static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
   for (size_t t = 0; t < skin->triangle_count; t++) {
     const uint32_t *corner = skin->triangles + 3 * t;
@@ -44,7 +43,7 @@ static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
   }
   for (size_t i = 0; i < skin->vertex_count; i++) {
     const double *sum = sums + 3 * i;
-    /* Scaled first: areas of tiny or huge models leave the range of squares. */
+    /* Scaling first keeps the squares in range for tiny and huge models. */
     double largest = fmax(fabs(sum[0]), fmax(fabs(sum[1]), fabs(sum[2])));
     float *normal = normals + 3 * i;
     normal[0] = normal[1] = 0;
@@ -63,7 +62,7 @@ static void put_plain_skin(const qmat_mesh *skin, const float *positions, const 
   size_t count = 3 * skin->vertex_count;
   data->vertex_count = skin->vertex_count;
   data->index_count = 3 * skin->triangle_count;
-  /* The largest index of a type means "restart", so 65535 vertices still fit. */
+  /* The largest value of an index type means "restart", so 16 bits suffice for 65535 vertices. */
   data->wide = skin->vertex_count > 65535;
   for (int k = 0; k < 3; k++) data->min[k] = data->max[k] = positions[k];
   for (size_t i = 0; i < count; i++) {
@@ -137,9 +136,9 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
 
 /* ---- the JSON ---- */
 
-/* NULL is carried through json_pack, which fails on it and frees the rest, so that one check at the end is enough. */
+/* json_pack fails on a NULL argument and frees the others, so one check at the end suffices. */
 
-/* Adds the buffer views of a skin whose data start at `offset`; `*first` is the number of the first. */
+/* Adds the buffer views of a skin whose data start at `offset`. `*first` gets the number of the first view. */
 static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset, json_int_t *first) {
   static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
   for (int i = 0; i < (data->compressed ? 1 : 3); i++) {
@@ -157,7 +156,7 @@ static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffe
   return true;
 }
 
-/* Adds positions, normals and indices, in this order. */
+/* Adds the accessors of positions, normals and indices, in this order. */
 static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t first_view, json_int_t *first) {
   json_t *position =
       json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", QMAT_GLTF_FLOAT, "count",

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <fstream> /* tiny_gltf.h forgets it without its file system */
+#include <fstream> /* tiny_gltf.h needs it but does not include it under TINYGLTF_NO_FS */
 #include <limits>
 #include <map>
 #include <memory>
@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-/* tinygltf turns the checked JSON into its model, and nothing more: buffers, files, Draco and images stay out of it.
- * Its own Draco path ignores failures, overruns its stack on attributes of more than 4 components, and leaves the
- * second of two primitives that share a buffer view empty; Debian's libtinygltf has no Draco, and libdraco exports
- * another copy of tinygltf, hence the renamed namespace. */
+/* tinygltf only converts the checked JSON to its model. It handles no buffers, files, Draco data or images: its own
+ * Draco code ignores failures, overruns its stack on attributes of more than 4 components, and leaves the second of two
+ * primitives that share a buffer view empty. Debian's libtinygltf has no Draco. The namespace is renamed because
+ * libdraco exports another copy of tinygltf. */
 #define tinygltf qmat_tinygltf
 #define TINYGLTF_IMPLEMENTATION
 #define TINYGLTF_NO_STB_IMAGE
@@ -41,9 +41,9 @@
 
 namespace {
 
-using Matrix = std::array<double, 16>; /* columns after one another, as in glTF */
+using Matrix = std::array<double, 16>; /* column-major, as in glTF */
 
-/* Thrown with an error that is recorded already. */
+/* Thrown after the error is recorded in the context. */
 struct Failed {
   qmat_status status;
 };
@@ -52,12 +52,12 @@ void must(qmat_status status) {
   if (status != QMAT_OK) throw Failed{status};
 }
 
-/* A primitive as it is stored: local positions, triangles, and what binds it to joints. */
+/* A primitive as stored: local positions, triangles and joint weights. */
 struct Shape {
   std::vector<double> positions;
   std::vector<uint32_t> corners;
-  size_t sets = 0;             /* of 4 joints a vertex */
-  std::vector<double> joints;  /* 4 * vertices a set, set after set */
+  size_t sets = 0;             /* number of sets; each has 4 joints per vertex */
+  std::vector<double> joints;  /* 4 * vertices per set, one set after the other */
   std::vector<double> weights; /* the same */
 };
 
@@ -149,7 +149,7 @@ double component_at(const uint8_t *from, int type) {
   }
 }
 
-/* What 1 is stored as in normalised whole numbers; 0 for types that are not normalised. */
+/* The integer that means 1 in a normalised type; 0 for types that cannot be normalised. */
 double normalised_one(int type) {
   switch (type) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
@@ -206,7 +206,7 @@ class Reader {
   }
 
  private:
-  /* World transforms of all nodes, also of those outside the scene: joints may be there. */
+  /* Computes world transforms of all nodes, because joints may lie outside the scene. */
   void find_globals() {
     const size_t count = model_.nodes.size();
     globals_.assign(count, kIdentity);
@@ -232,8 +232,7 @@ class Reader {
   void check_room(size_t vertices, size_t triangles) {
     if (vertices <= most_ - vertices_ && triangles <= most_ - triangles_) return;
     throw Failed{qmat_fail(context_, QMAT_ERROR_GEOMETRY,
-                           "the nodes' meshes come to more than %zu vertices or triangles, which the size of the asset "
-                           "does not justify",
+                           "the meshes have more than %zu vertices or triangles, too many for the size of the asset",
                            most_)};
   }
 
@@ -242,7 +241,7 @@ class Reader {
     return buffers_[static_cast<size_t>(view.buffer)].bytes + view.byteOffset;
   }
 
-  /* All numbers of an accessor, normalised ones as fractions. `fractions`: whole numbers are normalised in any case. */
+  /* All numbers of an accessor. Normalised integers become fractions; with `fractions`, all integers do. */
   std::vector<double> accessor_values(int id, bool fractions) {
     const qmat_tinygltf::Accessor &accessor = model_.accessors[static_cast<size_t>(id)];
     const int type = accessor.componentType;
@@ -268,7 +267,7 @@ class Reader {
       for (size_t i = 0; i < static_cast<size_t>(sparse.count); i++) {
         const size_t element = static_cast<size_t>(component_at(indices + i * index_width, index_type));
         if (element >= accessor.count) {
-          qmat_fail(context_, QMAT_ERROR_FORMAT, "its sparse index %zu names element %zu of %zu", i, element,
+          qmat_fail(context_, QMAT_ERROR_FORMAT, "sparse index %zu is %zu, but the element count is %zu", i, element,
                     accessor.count);
           fail("accessor", static_cast<size_t>(id));
         }
@@ -294,7 +293,8 @@ class Reader {
     std::vector<uint32_t> indices(values.size());
     for (size_t i = 0; i < values.size(); i++) {
       if (values[i] >= static_cast<double>(vertices)) {
-        qmat_fail(context_, QMAT_ERROR_FORMAT, "its index %zu names vertex %.0f of %zu", i, values[i], vertices);
+        qmat_fail(context_, QMAT_ERROR_FORMAT, "index %zu is %.0f, but the vertex count is %zu", i, values[i],
+                  vertices);
         fail("accessor", static_cast<size_t>(id));
       }
       indices[i] = static_cast<uint32_t>(values[i]);
@@ -311,7 +311,7 @@ class Reader {
                       &shape.positions[3 * size_t{b}]);
   }
 
-  /* Triangles of a list, strip or fan; those of a strip that only stitch are left out. */
+  /* Adds the triangles of a list, strip or fan, except degenerate triangles of strips. */
   static void add_triangles(Shape &shape, int mode, const std::vector<uint32_t> &v) {
     if (mode == TINYGLTF_MODE_TRIANGLES) {
       shape.corners.assign(v.begin(), v.end() - static_cast<std::ptrdiff_t>(v.size() % 3));
@@ -338,7 +338,7 @@ class Reader {
     return DracoMesh(mesh, qmat_draco_mesh_free);
   }
 
-  /* An attribute, out of Draco data when `unique_ids` names it there. */
+  /* An attribute's values: from the Draco data if `unique_ids` has its name, else from its accessor. */
   std::vector<double> attribute_values(const std::string &name, int accessor_id, const qmat_draco_mesh *draco,
                                        const std::map<std::string, int> &unique_ids, bool fractions) {
     const qmat_tinygltf::Accessor &accessor = model_.accessors[static_cast<size_t>(accessor_id)];
@@ -406,7 +406,7 @@ class Reader {
     }
   }
 
-  /* Where a skin takes its joints' vertices: global * inverse bind. */
+  /* The skinning matrix of each joint: world transform * inverse bind matrix. */
   std::vector<Matrix> joint_matrices(const qmat_tinygltf::Skin &skin) {
     std::vector<double> inverse;
     if (skin.inverseBindMatrices >= 0) inverse = accessor_values(skin.inverseBindMatrices, false);
@@ -419,7 +419,7 @@ class Reader {
     return matrices;
   }
 
-  void bend(const Shape &shape, size_t skin_id, const std::vector<double> &local) {
+  void apply_skin(const Shape &shape, size_t skin_id, const std::vector<double> &local) {
     const std::vector<Matrix> matrices = joint_matrices(model_.skins[skin_id]);
     const size_t vertices = local.size() / 3;
     for (size_t i = 0; i < vertices; i++) {
@@ -428,22 +428,22 @@ class Reader {
         for (size_t k = 4 * (s * vertices + i); k < 4 * (s * vertices + i) + 4; k++) {
           if (shape.weights[k] == 0) continue;
           if (shape.joints[k] >= static_cast<double>(matrices.size())) {
-            qmat_fail(context_, QMAT_ERROR_FORMAT, "vertex %zu of its mesh names joint %.0f of %zu", i, shape.joints[k],
-                      matrices.size());
+            qmat_fail(context_, QMAT_ERROR_FORMAT, "vertex %zu of the mesh uses joint %.0f, but the joint count is %zu",
+                      i, shape.joints[k], matrices.size());
             fail("skin", skin_id);
           }
           add_transformed(matrices[static_cast<size_t>(shape.joints[k])], &local[3 * i], shape.weights[k], sum);
           total += shape.weights[k];
         }
       }
-      /* Quantised weights do not add up to 1 exactly; without any, the first joint holds the vertex. */
+      /* Quantised weights do not sum to exactly 1. A vertex without weights follows the first joint. */
       if (total == 0) {
         total = 1;
         add_transformed(matrices[0], &local[3 * i], total, sum);
       }
       for (size_t k = 0; k < 3; k++) world_[3 * i + k] = sum[k] / total;
     }
-    turn_ = std::all_of(matrices.begin(), matrices.end(), mirrors);
+    mirrored_ = std::all_of(matrices.begin(), matrices.end(), mirrors);
   }
 
   void place_mesh(const qmat_tinygltf::Node &node, const Matrix &global) {
@@ -465,11 +465,11 @@ class Reader {
       add_targets(primitive, weights, local);
       world_.assign(local.size(), 0);
       if (node.skin >= 0 && shape->sets > 0) {
-        bend(*shape, static_cast<size_t>(node.skin), local);
+        apply_skin(*shape, static_cast<size_t>(node.skin), local);
         skinned = true;
       } else {
         for (size_t i = 0; i < local.size(); i += 3) add_transformed(global, &local[i], 1, &world_[i]);
-        turn_ = mirrors(global);
+        mirrored_ = mirrors(global);
       }
       emit(*shape);
     }
@@ -479,10 +479,10 @@ class Reader {
 
   void emit(const Shape &shape) {
     const std::vector<uint32_t> *corners = &shape.corners;
-    if (turn_) {
-      turned_ = shape.corners;
-      for (size_t i = 0; i + 2 < turned_.size(); i += 3) std::swap(turned_[i + 1], turned_[i + 2]);
-      corners = &turned_;
+    if (mirrored_) {
+      reversed_ = shape.corners;
+      for (size_t i = 0; i + 2 < reversed_.size(); i += 3) std::swap(reversed_[i + 1], reversed_[i + 2]);
+      corners = &reversed_;
     }
     must(sink_(user_, which_, world_.data(), world_.size() / 3, corners->data(), corners->size() / 3));
     vertices_ += world_.size() / 3;
@@ -498,10 +498,10 @@ class Reader {
   qmat_gltf_counts *counts_;
   std::vector<Matrix> globals_;
   std::vector<std::vector<std::unique_ptr<Shape>>> shapes_; /* by mesh and primitive, read when first placed */
-  size_t which_ = 0;                                        /* of the meshes that were asked for */
+  size_t which_ = 0;                                        /* index among the requested meshes */
   std::vector<double> world_;
-  std::vector<uint32_t> turned_;
-  bool turn_ = false; /* whether the placed triangles change their side */
+  std::vector<uint32_t> reversed_;
+  bool mirrored_ = false; /* whether the transform mirrors: triangles are reversed */
   size_t vertices_ = 0, triangles_ = 0;
 };
 

@@ -13,7 +13,7 @@ static int hex_digit(char c) {
   return -1;
 }
 
-/* Decodes a relative URI into `path`, which has room for it; false where it is none. */
+/* Decodes a relative URI into `path` (length + 1 bytes); false for any other URI. */
 static bool decode(const char *uri, size_t length, char *path) {
   size_t used = 0;
   for (size_t i = 0; i < length; i++) {
@@ -32,7 +32,7 @@ static bool decode(const char *uri, size_t length, char *path) {
   return used > 0 && path[0] != '/' && path[used - 1] != '/';
 }
 
-/* Removes the steps of a relative path that lead nowhere, and those that a ".." behind them takes back. */
+/* Removes empty steps and "." from a relative path, and each ".." together with the step before it. */
 static void normalise(char *path) {
   char *to = path;
   for (const char *from = path; *from;) {
@@ -130,7 +130,7 @@ static qmat_status visit_all(json_t *json, qmat_gltf_uri_kind kind, qmat_gltf_ur
     if (status != QMAT_OK) break;
     if (json_is_string(value) && is_uri(key)) {
       status = visit(user, json, key, strcmp(key, "uri") == 0 ? kind : QMAT_GLTF_OTHER_URI);
-    } else if (strcmp(key, "extras") != 0) { /* applications keep what they like there */
+    } else if (strcmp(key, "extras") != 0) { /* extras belong to the application */
       status = visit_all(value, QMAT_GLTF_OTHER_URI, visit, user);
     }
   }

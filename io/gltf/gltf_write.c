@@ -22,11 +22,11 @@
 typedef struct medial_text {
   char *base64;
   int position_bits, radius_bits;
-  const double *origin; /* that the spheres count from */
-  double loss;          /* as measured */
+  const double *origin; /* the spheres are relative to it */
+  double loss;          /* measured error of the encoding, model units */
 } medial_text;
 
-/* Encodes, decodes, and measures what was lost. */
+/* Encodes the medial mesh, decodes it again, and measures the loss. */
 static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *medial, medial_text *text,
                                       uint8_t **bytes, size_t *size) {
   qmat_medial *decoded = NULL;
@@ -37,7 +37,7 @@ static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *
   if (status == QMAT_OK &&
       (decoded->sphere_count != medial->sphere_count || decoded->edge_count != medial->edge_count ||
        decoded->triangle_count != medial->triangle_count)) {
-    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "Draco gave back another medial mesh than it was given");
+    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the medial mesh that Draco decodes differs from the encoded one");
   }
   if (status == QMAT_OK) text->loss = qmat_medial_move(medial, decoded);
   if (decoded) qmat_value_release(&decoded->base);
@@ -56,7 +56,7 @@ static qmat_status make_medial_text(qmat_context *context, const qmat_medial *me
   uint8_t *bytes = NULL;
   size_t size = 0;
   qmat_status status = encode_and_measure(context, medial, text, &bytes, &size);
-  /* The bound leaves out rounding to single precision, which a few more bits may make up for. */
+  /* The bound ignores single-precision rounding; a few more bits may compensate for it. */
   for (int tries = 0; tries < 3 && status == QMAT_OK && text->loss > allowed; tries++) {
     bool more_position = choose_position && text->position_bits < 30,
          more_radius = choose_radius && text->radius_bits < 30;
@@ -82,7 +82,7 @@ static bool is_zero(const double *origin) {
   return origin[0] == 0 && origin[1] == 0 && origin[2] == 0;
 }
 
-/* What is said of the medial mesh; NULL when memory is short. */
+/* The extras that describe a medial mesh; NULL when out of memory. */
 static json_t *make_extras(const qmat_medial *medial, const medial_text *text, const qmat_stated_errors *stated) {
   json_t *extras = json_object();
   bool done = extras && qmat_gltf_set(extras, "qmat_version", json_string(QMAT_VERSION)) &&
@@ -120,23 +120,23 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
 
 /* ---- JSON ---- */
 
-/* NULL is carried through json_pack, which fails on it and frees the rest, so that one check at the end is enough. */
+/* json_pack fails on a NULL argument and frees the others, so one check at the end suffices. */
 
-/* An asset on its way: new, or one that was read. */
+/* The asset under construction: new, or one that was read. */
 typedef struct document {
   json_t *root;
   bool binary;
-  qmat_gltf_asset asset;           /* that was read; else empty */
-  uint8_t *embedded;               /* its chunk with files in it, which then is the asset's; owned */
-  qmat_gltf_compressed compressed; /* its meshes, where they are to be; then its chunk is the asset's */
-  qmat_writer data;                /* what is added to its buffers */
-  bool in_chunk;                   /* that goes into the GLB's chunk, not into a buffer with a URI */
-  size_t data_start;               /* behind the bytes of the asset's own chunk, 0: in another buffer */
-  json_int_t buffer;               /* the number of the buffer */
-  json_int_t material;             /* of skins; -1: there is none yet */
+  qmat_gltf_asset asset;           /* the asset that was read, or empty */
+  uint8_t *embedded;               /* the chunk with embedded files, then also asset.chunk; owned; may be NULL */
+  qmat_gltf_compressed compressed; /* compressed meshes, or empty; its chunk, if any, is then also asset.chunk */
+  qmat_writer data;                /* bytes to add to the buffers */
+  bool in_chunk;                   /* `data` goes into the GLB's chunk, not into a buffer with a URI */
+  size_t data_start;               /* offset of `data` after the asset's own chunk; 0: in another buffer */
+  json_int_t buffer;               /* number of the buffer that holds `data` */
+  json_int_t material;             /* of the skins; -1: not created yet */
 } document;
 
-/* The bytes of `data` as a data URI; NULL when memory is short. */
+/* The bytes as a data URI; NULL when out of memory. */
 static json_t *data_uri(const uint8_t *bytes, size_t size) {
   char *base64 = qmat_base64_encode(bytes, size);
   json_t *uri = base64 ? json_sprintf("%s%s", DATA_URI, base64) : NULL;
@@ -144,23 +144,23 @@ static json_t *data_uri(const uint8_t *bytes, size_t size) {
   return uri;
 }
 
-/* ---- what is added to nodes ---- */
+/* ---- additions to nodes ---- */
 
 static bool set_extras(json_t *node, const json_t *extras) {
   json_t *own = json_object_get(node, "extras");
-  if (!own) { /* json_copy would lose keys in a shortage of memory and say nothing */
+  if (!own) { /* json_copy silently loses keys when out of memory */
     own = json_object();
     if (!qmat_gltf_set(node, "extras", own)) return false;
   }
   return json_object_update(own, (json_t *)(uintptr_t)extras) == 0;
 }
 
-/* Moves a node to where its data count from. */
+/* Translates a node to the origin of its data. */
 static bool set_translation(json_t *node, const double *origin) {
   return is_zero(origin) || qmat_gltf_set(node, "translation", json_pack("[f, f, f]", origin[0], origin[1], origin[2]));
 }
 
-/* Adds a child to a node, which is named so that people find it. */
+/* Adds a child to a node and names it after the node. */
 static bool add_child(json_t *root, json_t *node, json_t *child, const double *origin, const char *what) {
   const char *name = json_string_value(json_object_get(node, "name"));
   json_int_t number;
@@ -170,7 +170,7 @@ static bool add_child(json_t *root, json_t *node, json_t *child, const double *o
   return done && qmat_gltf_add(node, "children", json_integer(number), NULL);
 }
 
-/* Takes away what an earlier run left in a node's extras. */
+/* Removes the keys of an earlier run from a node's extras. */
 static void remove_extras(json_t *own) {
   const char *key;
   json_t *value;
@@ -180,8 +180,8 @@ static void remove_extras(json_t *own) {
   }
 }
 
-/* Puts a medial mesh, and its skin, on every node that carries the mesh. What counts from elsewhere than the node's own
- * origin is put on a child that is translated there, and so is a medial mesh where the node's extras are no object. */
+/* Adds a medial mesh and its skin to every node that references the mesh. The skin is always on a child. The medial
+ * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. */
 static bool add_to_carriers(document *document, json_int_t mesh, const json_t *extras, const double *origin,
                             json_int_t skin) {
   json_t *nodes = json_object_get(document->root, "nodes");
@@ -201,7 +201,7 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
   return done;
 }
 
-/* A node of its own for the one medial mesh of all: of a new asset its first, else one that is added to its scene. */
+/* Adds a node for the medial mesh of all meshes together, and adds the node to the scene. */
 static bool add_node(json_t *root, const json_t *extras, const double *origin, json_int_t skin, const char *name) {
   json_t *node = json_object();
   bool done = node && set_translation(node, origin);
@@ -259,15 +259,15 @@ static void close_document(document *document) {
   qmat_free(document->embedded);
 }
 
-/* Compresses the asset's own meshes; `report` gains what came of it. */
+/* Compresses the asset's own meshes and adds the result to `report`. */
 static qmat_status compress_meshes(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                    size_t count, document *document, json_t *report) {
   json_t *notes = json_array();
   if (!notes) return qmat_fail_memory(context, "the report");
   qmat_status status = QMAT_OK;
   if (scene->mesh_count == 0 || document->data_start == 0) {
-    const char *why = scene->mesh_count == 0 ? "they are described as one" : "their data are in no binary chunk";
-    if (json_array_append_new(notes, json_sprintf("the meshes are left as they are: %s", why)) != 0)
+    const char *why = scene->mesh_count == 0 ? "they share one medial mesh" : "their data are not in a GLB chunk";
+    if (json_array_append_new(notes, json_sprintf("the meshes are unchanged: %s", why)) != 0)
       status = qmat_fail_memory(context, "the report");
   } else {
     double error = 1;
@@ -292,7 +292,7 @@ static qmat_status compress_meshes(qmat_context *context, const qmat_scene *scen
   return status;
 }
 
-/* The options of a mesh whose surface has been moved: what is certified stays so where that can be. */
+/* The options after compression moved the mesh. A smaller quantisation preserves the certificate if possible. */
 static qmat_gltf_options options_after(const qmat_gltf_options *options, double moved) {
   qmat_gltf_options after = *options;
   after.errors = qmat_errors_after_move(&options->errors, moved);
@@ -308,7 +308,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   const bool of_mesh = scene && scene->mesh_count > 0, is_moved = of_mesh && document->compressed.moved;
   const qmat_gltf_options options =
       options_after(&addition->options, is_moved ? document->compressed.moved[scene->meshes[index]] : 0);
-  /* A file's name need not be UTF-8, JSON must. */
+  /* JSON must be UTF-8, but a file's name may be anything. */
   const char *name = options.name && options.name[0] && qmat_is_utf8(options.name) ? options.name : NULL;
   const qmat_mesh *mesh = addition->skin && addition->skin->triangle_count > 0 ? addition->skin : NULL;
   const size_t offset = document->data_start + document->data.size;
@@ -336,11 +336,11 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   return status;
 }
 
-/* Says in the JSON where the data are that were added, or that were in a chunk which the file will not have. */
+/* Records the location of the added data in the JSON. A .gltf gets the asset's own chunk as a data URI too. */
 static bool place_data(const document *document) {
   const size_t size = document->data.size;
   json_t *buffers = json_object_get(document->root, "buffers"), *first = json_array_get(buffers, 0);
-  if (document->data_start > 0) { /* behind what the GLB's chunk has */
+  if (document->data_start > 0) { /* after the asset's own chunk */
     if (size > 0 && !qmat_gltf_set(first, "byteLength", json_integer((json_int_t)(document->data_start + size))))
       return false;
     if (document->binary) return true;
@@ -405,7 +405,7 @@ static qmat_status make_file(qmat_context *context, const qmat_scene *scene, con
   return status;
 }
 
-/* `scene` NULL: an asset of its own. */
+/* `scene` is NULL for a new asset. */
 static qmat_status write_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                   size_t count, bool draco_meshes, json_t *report, qmat_file **file) {
   document document = {0};

@@ -268,7 +268,7 @@ static void test_a_skin_is_no_medial_mesh(void **state) {
   qmat_medial *medial;
   assert_int_equal(qmat_draco_decode_medial(&context, skin.bytes, skin.size, NULL, &medial), QMAT_ERROR_FORMAT);
   assert_null(medial);
-  assert_non_null(strstr(context.error.message, "no medial mesh"));
+  assert_non_null(strstr(context.error.message, "not a medial mesh"));
   qmat_draco_skin_uninit(&skin);
   free_ball(&b);
   qmat_context_uninit(&context);

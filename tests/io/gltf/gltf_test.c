@@ -493,7 +493,7 @@ static void test_hostile_skins_are_refused_by_name(void **state) {
       {"'joints':[1,2]", "'joints':[1,3]", "skin", 0, "node 3"},
       {"'joints':[1,2]", "'joints':[]", "skin", 0, "no joints"},
       {"'joints':[1,2]", "'joints':[1,2,0]", "skin", 0, "3 joints but 2"},
-      {"'joints':[1,2]", "'joints':[1]", "skin", 0, "joint 1 of 1"},
+      {"'joints':[1,2]", "'joints':[1]", "skin", 0, "joint 1, but the joint count is 1"},
       {"'inverseBindMatrices':1", "'inverseBindMatrices':4", "skin", 0, "is 4"},
       {"'inverseBindMatrices':1", "'inverseBindMatrices':0", "accessor", 0, "inverse bind"},
       {"'count':3,'type':'VEC4'}]", "'count':2,'type':'VEC4'}]", "accessor", 3, "2 elements, POSITION has 3"},
@@ -541,7 +541,7 @@ static void test_indices_beyond_the_vertices_are_refused(void **state) {
   assert_int_equal(read_asset(&r, SQUARE, &data, sizeof data), QMAT_ERROR_FORMAT);
   assert_string_equal(r.context.error.element_kind, "accessor");
   assert_int_equal(r.context.error.element, 1);
-  assert_string_equal(r.context.error.message, "its index 4 names vertex 4 of 4");
+  assert_string_equal(r.context.error.message, "index 4 is 4, but the vertex count is 4");
   done(&r);
 }
 
