@@ -82,7 +82,7 @@ static qmat_status read_part(keeper *keeper, const char *uri, const char *name, 
   char *path = qmat_gltf_beside(keeper->path, name);
   qmat_status status = path ? qmat_bytes_read_file(context, path, &bytes) : qmat_fail_memory(context, "a glTF asset");
   if (status == QMAT_OK && qmat_gltf_is_outside(name) && !qmat_gltf_image_type(bytes.data, bytes.size)) {
-    status = warn(keeper, uri, "lies outside of the asset's folder and holds no image");
+    status = warn(keeper, uri, "is outside the asset's folder and is not an image");
   } else if (status == QMAT_OK) {
     status = add_part(keeper, part_name, bytes.data, bytes.size);
     part_name = NULL;
@@ -105,7 +105,7 @@ static qmat_status keep_file(void *user, json_t *owner, const char *key, qmat_gl
   qmat_status status = qmat_gltf_file_name(keeper->context, uri, json_string_length(value), &name);
   if (status != QMAT_OK) return status;
   if (!name || (qmat_gltf_is_outside(name) && kind != QMAT_GLTF_IMAGE_URI)) {
-    status = warn(keeper, uri, name ? "lies outside of the asset's folder" : "is not named by a relative path");
+    status = warn(keeper, uri, name ? "is outside the asset's folder" : "is not named by a relative path");
   } else {
     char *part_name = qmat_gltf_part_name(name);
     if (!part_name) {

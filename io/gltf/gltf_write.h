@@ -10,7 +10,7 @@
 typedef struct qmat_gltf_options {
   bool binary;                /* write a .glb; else a .gltf with its data as base64 */
   bool embed;                 /* for a .glb: embed the files that a scene refers to */
-  bool compress_skin;         /* by KHR_draco_mesh_compression: smaller, but some engines reject it */
+  bool compress_skin;         /* require KHR_draco_mesh_compression: smaller, but some engines reject it */
   int position_bits;          /* 1 to 30; 0: chosen from `quantisation` */
   int radius_bits;            /* the same */
   double quantisation;        /* allowed error of storage, model units; used if bits are 0 */
