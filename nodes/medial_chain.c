@@ -112,8 +112,8 @@ const qmat_node qmat_node_medial_chain = {
         "Collapses as medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left. "
         "For each collapse it records the edge, the merged sphere and the threshold of both errors, which starts at "
         "finest.\n\n"
-        "medial.lod extracts medial meshes of any number of spheres or any error from the chain in milliseconds. "
-        "They are the ones that medial.simplify makes with that bound.\n\n"
+        "medial.lod extracts medial meshes of any number of spheres or any error from the chain in milliseconds. They "
+        "are the ones that medial.simplify makes with that bound.\n\n"
         "With compat=qmat no threshold applies; the recorded errors are those that would have been needed. With "
         "error=one_sided they are surface-to-envelope errors.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",

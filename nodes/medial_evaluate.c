@@ -269,17 +269,17 @@ const qmat_node qmat_node_medial_evaluate = {
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "
         "and slabs sweep (eq. 9 over all of the surface). envelope_to_surface bounds the distance from any point of "
-        "that solid's boundary to the surface, on either side. envelope_out_of_solid does so for the points outside "
-        "of the model. All lengths are fractions of the diagonal.\n\n"
-        "Bounds come from branch and bound and hold between samples. Keys with _at_least are lower bounds, attained "
-        "at a point. Keys with _sampled or _mean come from samples and bound nothing. The upper bounds of the "
-        "envelope's errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
+        "that solid's boundary to the surface, on either side. envelope_out_of_solid does so for the points outside of "
+        "the model. All lengths are fractions of the diagonal.\n\n"
+        "Bounds come from branch and bound and hold between samples. Keys with _at_least are lower bounds, attained at "
+        "a point. Keys with _sampled or _mean come from samples and bound nothing. The upper bounds of the envelope's "
+        "errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
         "certified means: the surface is closed and oriented, and both errors are at most epsilon. For an open "
-        "surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope fills, is "
-        "not bounded; surface_depth_in_envelope_sampled shows it.\n\n"
+        "surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope fills, is not "
+        "bounded; surface_depth_in_envelope_sampled shows it.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
-        "are Betti numbers over Z/2; those of the solid (_of_solid) are missing where the surface is open or has "
-        "an edge of more than two triangles.",
+        "are Betti numbers over Z/2; those of the solid (_of_solid) are missing where the surface is open or has an "
+        "edge of more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),
     .params = params,

@@ -74,9 +74,9 @@ const qmat_node qmat_node_medial_lod = {
     .version = 2,
     .summary = "Extracts a medial mesh of any number of spheres or any error from a chain",
     .doc =
-        "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at "
-        "the constraint points (2.5 % of it are a margin for the surface between them). With both parameters the "
-        "first limit that is reached ends it.\n\n"
+        "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at the "
+        "constraint points (2.5 % of it are a margin for the surface between them). With both parameters the first "
+        "limit that is reached ends it.\n\n"
         "The medial mesh and its responsible regions are, byte for byte, those that medial.simplify makes with the "
         "parameters of the chain and that bound. An epsilon below the chain's finest gives the initial medial mesh. "
         "The time is milliseconds and grows with the initial medial mesh.",

@@ -236,9 +236,9 @@ const qmat_node qmat_node_medial_refine = {
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
-        "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly "
-        "spaced samples are added around all points farther than the target, and the medial mesh is made again. Each "
-        "further round halves the spacing. The result is the round that comes closest.\n\n"
+        "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly spaced "
+        "samples are added around all points farther than the target, and the medial mesh is made again. Each further "
+        "round halves the spacing. The result is the round that comes closest.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "
         "before medial.simplify.\n\n"
         "The parameters after rounds are those of medial.delaunay. Set both nodes to the same values.",

@@ -655,10 +655,10 @@ const qmat_node qmat_node_medial_simplify = {
         "places beyond epsilon between the constraint points, and the collapses are repeated with these. Uncovered "
         "interior is filled with extra spheres. Spheres of radius zero are sharp features and stay on their creases. "
         "The deviation of a subdivision surface (mesh.subdivide) is subtracted from epsilon.\n\n"
-        "With on_exceed=stop or raise the threshold of both errors starts at finest and rises to epsilon; collapses "
-        "do not depend on epsilon, no sphere is fitted, and medial.chain records them. cost=hausdorff keeps the end "
-        "of the edge that leaves the surface nearest to the envelope; cost=pmat keeps the larger end. compat=qmat "
-        "follows the public Q-MAT code: its boundary terms, free topology, no inside test and no bound.",
+        "With on_exceed=stop or raise the threshold of both errors starts at finest and rises to epsilon; collapses do "
+        "not depend on epsilon, no sphere is fitted, and medial.chain records them. cost=hausdorff keeps the end of "
+        "the edge that leaves the surface nearest to the envelope; cost=pmat keeps the larger end. compat=qmat follows "
+        "the public Q-MAT code: its boundary terms, free topology, no inside test and no bound.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
     .params_size = sizeof(medial_simplify_params),
     .params = params,

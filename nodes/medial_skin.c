@@ -365,8 +365,8 @@ const qmat_node qmat_node_medial_skin = {
         "the report counts them. The mesh is always a closed 2-manifold.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
         "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
-        "The report has the largest distance from the envelope at vertices and at triangle centroids, as a fraction "
-        "of the diagonal of the envelope's bounding box.",
+        "The report has the largest distance from the envelope at vertices and at triangle centroids, as a fraction of "
+        "the diagonal of the envelope's bounding box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",

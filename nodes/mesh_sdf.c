@@ -355,15 +355,15 @@ const qmat_node qmat_node_mesh_sdf = {
     .summary = "Measures how thick a solid is at each facet",
     .doc =
         "Each facet casts a fixed pattern of rays from its centroid into the solid, within a cone around the inward "
-        "normal. Hits on surfaces that face the same way as the facet are ignored. The thickness is a weighted mean "
-        "of the ray lengths within 1.5 median absolute deviations of their median; the weight is the inverse of the "
-        "angle to the normal. It is neither smoothed nor normalised.\n\n"
+        "normal. Hits on surfaces that face the same way as the facet are ignored. The thickness is a weighted mean of "
+        "the ray lengths within 1.5 median absolute deviations of their median; the weight is the inverse of the angle "
+        "to the normal. It is neither smoothed nor normalised.\n\n"
         "Facets without a valid ray take the median of the facets at their corners, or the mean of all. Degenerate "
         "facets take the value of the nearest facet at their corners. On meshes much finer than the spacing only some "
         "facets are measured, and their neighbours take their values.",
     .citation =
-        "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape "
-        "diameter function",
+        "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape diameter "
+        "function",
     .params_size = sizeof(mesh_sdf_params),
     .params = params,
     .inputs = inputs,

@@ -296,7 +296,7 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
   qmat_limit_level limits[GROUPS] = {0};
   qmat_soup soup = {0};
   qmat_surface *surface = NULL;
-  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP}; /* scene.read has refused them where it should */
   *a = (attempt){.mesh = NULL};
   qmat_status status = add_unsubdivided(s, &soup);
   for (size_t i = 0; i < GROUPS && status == QMAT_OK; i++) {
@@ -493,7 +493,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_mesh_subdivide = {
     .name = "mesh.subdivide",
-    .version = 1,
+    .version = 2,
     .summary = "Replaces subdivision surfaces by triangles on their limit surface",
     .doc =
         "Subdivides the Catmull-Clark, Loop and bilinear surfaces of a USD file, with their creases, corners, boundary "

@@ -24,8 +24,8 @@ static const qmat_param params[] = {
      .type = QMAT_PARAM_STRING,
      .default_text = "all",
      .offset = offsetof(scene_read_params, mesh)},
-    QMAT_ENUM(scene_read_params, defects, defects_choices, QMAT_DEFECTS_REFUSE,
-              "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped"),
+    QMAT_ENUM(scene_read_params, defects, defects_choices, QMAT_DEFECTS_DROP,
+              "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped and counted"),
     {0}};
 
 enum { SCENE, MESH, REPORT };
@@ -61,17 +61,15 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 5,
+    .version = 6,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
         "removed, and triangles oriented, outward where the surface is closed. The report counts all of this.\n\n"
         "A glTF scene is kept whole for scene.write, with its files; outside of its folder only images are read. Its "
         "meshes are read one by one, in their own spaces and in bind pose, and later nodes run once for each. Meshes "
-        "on "
-        "no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
-        "space, "
-        "skins in their current pose.\n\n"
+        "on no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
+        "space, skins in their current pose.\n\n"
         "The meshes of a USD scene are placed as one surface; warnings name what was left out. Subdivision surfaces "
         "are read as control cages, for mesh.subdivide.",
     .citation = "",

@@ -186,7 +186,7 @@ refused "a count that overflows" overflow.off
 sed '$s/.*/3 0 0 1/' $model >degenerate.off
 refused "a facet that names a vertex twice" degenerate.off
 sed "\$s/.*/$(sed -n "$((vertices + 5))p" $model)/" $model >duplicate.off
-refused "a repeated facet" duplicate.off
+refused "a repeated facet" duplicate.off --set model.defects=refuse
 cp $model wrong.stl
 refused "an ending that disagrees with the content" wrong.stl
 cp $model model.xyz
@@ -230,8 +230,8 @@ else
   sed 's/^/        /' said.txt
 fi
 
-# model.defects=drop leaves defects out.
-holds "defects are dropped with model.defects=drop" qmat mat duplicate.off -o dropped.ma --set model.defects=drop
+# Without it they are left out.
+holds "a repeated facet is dropped by default" qmat mat duplicate.off -o dropped.ma
 
 # misused WHAT TEXT ARGUMENT...: exit code 2, and the text on stderr.
 misused() {
@@ -325,7 +325,7 @@ if [ -d "$data/surfaces" ]; then
   # Open surfaces have no inside: qmat gives a result or one line of error, and does not crash.
   for surface in "$data"/dirty/*; do
     name=$(basename "$surface")
-    qmat mat "$surface" -o real.ma --epsilon 2% --set model.defects=drop >said.txt 2>complaints.txt
+    qmat mat "$surface" -o real.ma --epsilon 2% >said.txt 2>complaints.txt
     code=$?
     if { [ $code -eq 0 ] && [ -s real.ma ]; } || { [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ]; }; then
       pass "$name: open: exit code $code $(cut -c 1-150 complaints.txt)"

@@ -80,19 +80,23 @@ static void test_equal_files_give_equal_digests(void **state) {
   qmat_context_uninit(&context);
 }
 
-static void test_defects_are_refused_unless_they_are_to_be_dropped(void **state) {
+static void test_defects_are_dropped_unless_they_are_to_be_refused(void **state) {
   (void)state;
   qmat_context context = {0};
   qmat_value *outputs[3];
-  assert_int_equal(run(&context, repeated, NULL, outputs), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(run(&context, repeated, "refuse", outputs), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.message, "the facet has the same vertices as facet 0");
   assert_string_equal(context.error.file, path);
   assert_int_equal(context.error.line, 6);
   for (int i = 0; i < 3; i++) assert_null(outputs[i]);
-  assert_int_equal(run(&context, repeated, "refuse", outputs), QMAT_ERROR_GEOMETRY);
-  assert_int_equal(run(&context, repeated, "drop", outputs), QMAT_OK);
-  assert_int_equal(((const qmat_mesh *)outputs[1])->triangle_count, 1);
-  release(outputs);
+  static const char *const dropping[] = {NULL, "drop"};
+  for (int i = 0; i < 2; i++) {
+    assert_int_equal(run(&context, repeated, dropping[i], outputs), QMAT_OK);
+    assert_int_equal(((const qmat_mesh *)outputs[1])->triangle_count, 1);
+    const json_t *report = ((const qmat_report *)outputs[2])->root;
+    assert_int_equal(json_integer_value(json_object_get(report, "facets_dropped_as_defects")), 1);
+    release(outputs);
+  }
   qmat_context_uninit(&context);
 }
 
@@ -123,7 +127,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_node_gives_scene_mesh_and_report),
       cmocka_unit_test(test_equal_files_give_equal_digests),
-      cmocka_unit_test(test_defects_are_refused_unless_they_are_to_be_dropped),
+      cmocka_unit_test(test_defects_are_dropped_unless_they_are_to_be_refused),
       cmocka_unit_test(test_a_missing_file_is_named),
       cmocka_unit_test(test_an_unknown_choice_is_refused),
   };
