@@ -184,7 +184,7 @@ refused "a count of vertices that the file cannot hold" counts.off
 sed '2s/.*/99999999999999999999999 5 0/' $model >overflow.off
 refused "a count that overflows" overflow.off
 sed '$s/.*/3 0 0 1/' $model >degenerate.off
-refused "a facet that names a vertex twice" degenerate.off
+refused "a facet that names a vertex twice" degenerate.off --set model.defects=refuse
 sed "\$s/.*/$(sed -n "$((vertices + 5))p" $model)/" $model >duplicate.off
 refused "a repeated facet" duplicate.off --set model.defects=refuse
 cp $model wrong.stl
