@@ -518,16 +518,19 @@ static qmat_status simplify_and_mend(simplifier *s, medial_simplify_params *para
     if (status == QMAT_OK) status = open_voids(s, &a);
     if (status == QMAT_OK) status = close_loops(s, &a);
     if (status == QMAT_OK && a.topology_faults > 0) status = judge_topology(s, &a);
-    const bool is_right = a.topology_faults == 0 && (a.within_epsilon || !best->within_epsilon);
-    const bool counts = !guarded || (is_right && (double)a.medial->sphere_count <=
-                                                     most_spheres_for_topology * (double)best->medial->sphere_count);
-    if (status == QMAT_OK && counts) {
+    if (status != QMAT_OK) {
+      release(&a);
+      return status;
+    }
+    const double most_spheres = most_spheres_for_topology * (double)(best->medial ? best->medial->sphere_count : 0);
+    if (!guarded || (a.topology_faults == 0 && (a.within_epsilon || !best->within_epsilon) &&
+                     (double)a.medial->sphere_count <= most_spheres)) {
       release(best);
       *best = a;
     } else {
       release(&a);
     }
-    if (status != QMAT_OK || best->topology_faults == 0) return status;
+    if (best->topology_faults == 0) break;
   }
   return QMAT_OK;
 }
