@@ -62,14 +62,18 @@ typedef struct qmat_scene {
   uint32_t *meshes;       /* mesh_count: indices of the asset's meshes that were read, each in its own coordinates */
 } qmat_scene;
 
-/* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. */
+/* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. The first triangles bound solids; the last ones may
+ * be sheets, surfaces without volume. */
 typedef struct qmat_mesh {
   qmat_value base;
   size_t vertex_count, triangle_count;
-  double *positions;   /* 3 * vertex_count: x y z */
-  uint32_t *triangles; /* 3 * triangle_count */
-  bool closed;         /* every edge has two triangles, or an even number where surfaces touch */
-  bool oriented;       /* neighbouring triangles agree on which side is outside */
+  double *positions;           /* 3 * vertex_count: x y z */
+  uint32_t *triangles;         /* 3 * triangle_count */
+  size_t sheet_triangle_count; /* the last so many triangles are sheets; 0 for a mesh with a cage */
+  double sheet_thickness;      /* of sheets, in model units; 0: none */
+  /* Of the triangles that bound solids. */
+  bool closed;      /* every edge has two triangles, or an even number where surfaces touch */
+  bool oriented;    /* neighbouring triangles agree on which side is outside */
   double deviation; /* bound on the distance to the surface that the triangles approximate, in model units; 0: exact */
   qmat_cage cage;   /* the subdivision cage; empty when nothing is to be subdivided */
 } qmat_mesh;

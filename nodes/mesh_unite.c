@@ -30,6 +30,7 @@ typedef struct sheet {
 typedef struct unison {
   qmat_context *context;
   const qmat_mesh *mesh;
+  size_t solid_count;        /* triangles that bound solids, the first ones */
   uint32_t *shells, *sheets; /* disjoint sets of triangles */
   uint8_t *is_open;          /* per shell, by its leader */
   size_t shell_count, open_count;
@@ -50,7 +51,7 @@ static int compare_keys(const void *left, const void *right) {
 static qmat_status find_shells(unison *u) {
   const qmat_mesh *mesh = u->mesh;
   qmat_arena *arena = &u->context->arena;
-  const size_t corners = 3 * mesh->triangle_count;
+  const size_t corners = 3 * u->solid_count;
   u->shells = qmat_sets_new(u->context, mesh->triangle_count);
   u->sheets = qmat_sets_new(u->context, mesh->triangle_count);
   u->is_open = qmat_arena_calloc(arena, mesh->triangle_count, 1);
@@ -82,12 +83,13 @@ static qmat_status find_shells(unison *u) {
       if (balance != 0) is_uneven[triangle] = 1;
     }
   }
-  for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+  for (uint32_t t = 0; t < u->solid_count; t++) {
     const uint32_t shell = qmat_set_leader(u->shells, t);
     if (is_uneven[t]) u->is_open[shell] = 1;
     u->shell_count += shell == t;
   }
-  for (size_t t = 0; t < mesh->triangle_count; t++) u->open_count += u->is_open[t];
+  for (size_t t = 0; t < u->solid_count; t++) u->open_count += u->is_open[t];
+  memset(u->is_open + u->solid_count, 1, mesh->sheet_triangle_count);
   return QMAT_OK;
 }
 
@@ -209,6 +211,8 @@ static qmat_status make_mesh(qmat_context *context, const qmat_mesh *from, qmat_
   mesh->triangles = united->triangles;
   united->positions = NULL;
   united->triangles = NULL;
+  mesh->sheet_triangle_count = from->sheet_triangle_count;
+  mesh->sheet_thickness = from->sheet_thickness;
   mesh->closed = from->closed;
   mesh->oriented = from->oriented;
   mesh->deviation = from->deviation;
@@ -244,7 +248,8 @@ static qmat_status fill_report(const unison *u, const qmat_united *united, bool 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const mesh_unite_params *params = data;
-  unison u = {.context = context, .mesh = (const qmat_mesh *)inputs[0]};
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  unison u = {.context = context, .mesh = mesh, .solid_count = mesh->triangle_count - mesh->sheet_triangle_count};
   qmat_united united = {.changed = false};
   qmat_mesh *made = NULL;
   const bool keep = params->parts == PARTS_KEEP;

@@ -447,14 +447,17 @@ static void test_empty_values_are_valid(void **state) {
 static void test_every_bit_of_content_moves_the_digest(void **state) {
   (void)state;
   qmat_context context = {0};
-  qmat_digest digests[6];
-  for (int change = 0; change < 6; change++) {
+  enum { CHANGES = 8 };
+  qmat_digest digests[CHANGES];
+  for (int change = 0; change < CHANGES; change++) {
     qmat_mesh *mesh = mesh_example();
     if (change == 1) mesh->closed = false;
     if (change == 2) mesh->oriented = false;
     if (change == 3) mesh->positions[0] = -0.0;
     if (change == 4) mesh->triangles[11] = 0;
     if (change == 5) mesh->triangle_count = 3;
+    if (change == 6) mesh->sheet_triangle_count = 1;
+    if (change == 7) mesh->sheet_thickness = 1;
     assert_sealed(&context, &mesh->base);
     digests[change] = mesh->base.digest;
     qmat_value_release(&mesh->base);
@@ -540,6 +543,9 @@ static void test_bad_meshes_name_the_first_bad_element(void **state) {
     mesh = mesh_example();
     mesh->deviation = no_lengths[i];
     assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "deviation: it is negative or not finite");
+    mesh = mesh_example();
+    mesh->sheet_thickness = no_lengths[i];
+    assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "sheet_thickness: it is negative or not finite");
   }
 }
 
@@ -564,6 +570,33 @@ static qmat_mesh *cage_example(void) {
   ASSIGN(cage->sharp_vertices, (uint32_t[]){3});
   ASSIGN(cage->vertex_sharpness, (double[]){10});
   return mesh;
+}
+
+static void test_sheets_come_back_and_are_no_more_than_the_triangles_and_not_of_a_cage(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *read;
+  qmat_mesh *mesh = mesh_example();
+  mesh->sheet_triangle_count = 4;
+  mesh->sheet_thickness = 0.125;
+  assert_sealed(&context, &mesh->base);
+  assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &read), QMAT_OK);
+  assert_int_equal(((qmat_mesh *)read)->sheet_triangle_count, 4);
+  assert_true(((qmat_mesh *)read)->sheet_thickness == 0.125);
+  qmat_free(bytes);
+  qmat_value_release(read);
+  qmat_value_release(&mesh->base);
+  mesh = mesh_example();
+  mesh->sheet_triangle_count = 5;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "sheet_triangle_count: 5 of 4 triangles");
+  mesh = cage_example();
+  mesh->sheet_triangle_count = 1;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY,
+                    "sheet_triangle_count: 1 of 4 triangles of a mesh that is to be subdivided");
+  qmat_context_uninit(&context);
 }
 
 static void test_cages_come_back_and_bad_ones_name_the_first_bad_element(void **state) {
@@ -1127,6 +1160,7 @@ int main(void) {
       cmocka_unit_test(test_an_open_value_cannot_be_serialized),
       cmocka_unit_test(test_missing_arrays_and_texts_are_internal_errors),
       cmocka_unit_test(test_bad_meshes_name_the_first_bad_element),
+      cmocka_unit_test(test_sheets_come_back_and_are_no_more_than_the_triangles_and_not_of_a_cage),
       cmocka_unit_test(test_cages_come_back_and_bad_ones_name_the_first_bad_element),
       cmocka_unit_test(test_bad_scenes_and_fields_are_refused),
       cmocka_unit_test(test_bad_samples_name_the_first_bad_element),

@@ -310,6 +310,35 @@ static void test_parts_are_kept_when_asked(void **state) {
   release(&r);
 }
 
+/* Two cubes that overlap, and a sheet through both, which shares an edge with one. */
+static void test_sheets_stay_the_last_triangles_and_cut_nothing(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 2, 2, 2, false);
+  shape_add_box(mesh, 1, 1, 1, 3, 3, 3, false);
+  shape_triangle(mesh, 0, 1, shape_vertex(mesh, 1, 4, 4));
+  mesh->sheet_triangle_count = 1;
+  mesh->sheet_thickness = 0.25;
+  mesh->closed = mesh->oriented = true;
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_OK);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "mesh.unite", "", (const qmat_value *[]){&mesh->base}, outputs);
+  const qmat_mesh *united = (const qmat_mesh *)outputs[0];
+  assert_int_equal(pipeline_count((qmat_report *)outputs[1], "parts_united"), 2);
+  assert_int_equal(pipeline_count((qmat_report *)outputs[1], "parts_open"), 0);
+  assert_int_equal(united->sheet_triangle_count, 1);
+  assert_near(united->sheet_thickness, 0.25, 0);
+  assert_true(united->closed && united->oriented);
+  assert_near(volume_of(united), 15, 1e-12); /* the sheet's plane contains the origin */
+  const double *top = united->positions + 3 * (size_t)united->triangles[3 * united->triangle_count - 1];
+  assert_true(top[0] == 1 && top[1] == 4 && top[2] == 4);
+  qmat_value_release(&mesh->base);
+  qmat_value_release(outputs[0]);
+  qmat_value_release(outputs[1]);
+  qmat_context_uninit(&context);
+}
+
 static void test_open_parts_stay_and_do_not_keep_others_from_uniting(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_box(2, 2, 2);
@@ -629,6 +658,7 @@ int main(void) {
       cmocka_unit_test(test_parts_that_touch_in_points_and_lines_stay),
       cmocka_unit_test(test_one_part_and_parts_apart_pass),
       cmocka_unit_test(test_parts_are_kept_when_asked),
+      cmocka_unit_test(test_sheets_stay_the_last_triangles_and_cut_nothing),
       cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
       cmocka_unit_test(test_parts_that_meet_themselves),
       cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),
