@@ -17,6 +17,31 @@ qmat_status qmat_check_finite(qmat_context *context, const double *numbers, size
   return QMAT_OK;
 }
 
+qmat_status qmat_check_length(qmat_context *context, double length, const char *field) {
+  if (length >= 0 && isfinite(length)) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is negative or not finite");
+  return qmat_fail_field(context, field);
+}
+
+qmat_status qmat_check_skin(qmat_context *context, const uint32_t *joints, const double *weights, size_t skinned_count,
+                            size_t count, const char *kind) {
+  enum { JOINTS = 65536 }; /* glTF stores joints in 16 bits at most */
+  if (skinned_count != 0 && skinned_count != count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu of %zu elements have joints and weights", skinned_count, count);
+    return qmat_fail_field(context, "joints");
+  }
+  qmat_status status = qmat_check_ids(context, joints, 4 * skinned_count, JOINTS, kind, 4, "joint");
+  if (status == QMAT_OK) status = qmat_check_finite(context, weights, skinned_count, 4, kind, "weight");
+  for (size_t i = 0; i < skinned_count && status == QMAT_OK; i++) {
+    const double *w = weights + 4 * i;
+    const bool is_positive = w[0] >= 0 && w[1] >= 0 && w[2] >= 0 && w[3] >= 0;
+    if (is_positive && fabs(w[0] + w[1] + w[2] + w[3] - 1) <= 1e-9) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its weights are negative or do not sum to 1");
+    status = qmat_fail_element(context, kind, (int64_t)i);
+  }
+  return status;
+}
+
 qmat_status qmat_check_u32_count(qmat_context *context, size_t count, const char *what) {
   if (count <= UINT32_MAX) return QMAT_OK;
   return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu %s are more than 32-bit indices can address", count, what);

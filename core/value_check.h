@@ -12,6 +12,14 @@
 qmat_status qmat_check_finite(qmat_context *context, const double *numbers, size_t count, size_t components,
                               const char *kind, const char *what);
 
+/* The number is finite and not negative. `field` names it. */
+qmat_status qmat_check_length(qmat_context *context, double length, const char *field);
+
+/* Joints and weights of none of the elements or of all: 4 joints below 65536 each, and weights that are not negative
+ * and sum to 1. */
+qmat_status qmat_check_skin(qmat_context *context, const uint32_t *joints, const double *weights, size_t skinned_count,
+                            size_t count, const char *kind);
+
 /* 32-bit indices can address `count` elements; QMAT_ERROR_MEMORY otherwise. */
 qmat_status qmat_check_u32_count(qmat_context *context, size_t count, const char *what);
 

@@ -51,6 +51,9 @@ static const qmat_value_row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vert
                                            ARRAY(qmat_mesh, cage.crease_sharpness, F64, cage.crease_count, 1),
                                            ARRAY(qmat_mesh, cage.sharp_vertices, U32, cage.sharp_count, 1),
                                            ARRAY(qmat_mesh, cage.vertex_sharpness, F64, cage.sharp_count, 1),
+                                           SCALAR(qmat_mesh, meters_per_unit, NUMBER),
+                                           ARRAY(qmat_mesh, joints, U32, skinned_count, 4),
+                                           ARRAY(qmat_mesh, weights, F64, skinned_count, 4),
                                            END};
 
 static qmat_status check_sharpness(qmat_context *context, const double *sharpness, size_t count, const char *kind) {
@@ -102,14 +105,10 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
   if (status == QMAT_OK)
     status = qmat_check_finite(context, mesh->positions, mesh->vertex_count, 3, "vertex", "position");
   if (status != QMAT_OK) return status;
-  if (!(mesh->deviation >= 0 && isfinite(mesh->deviation))) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is negative or not finite");
-    return qmat_fail_field(context, "deviation");
-  }
-  if (!(mesh->sheet_thickness >= 0 && isfinite(mesh->sheet_thickness))) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it is negative or not finite");
-    return qmat_fail_field(context, "sheet_thickness");
-  }
+  status = qmat_check_length(context, mesh->deviation, "deviation");
+  if (status == QMAT_OK) status = qmat_check_length(context, mesh->sheet_thickness, "sheet_thickness");
+  if (status == QMAT_OK) status = qmat_check_length(context, mesh->meters_per_unit, "meters_per_unit");
+  if (status != QMAT_OK) return status;
   if (mesh->sheet_triangle_count > (mesh->cage.face_count > 0 ? 0 : mesh->triangle_count)) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu of %zu triangles%s", mesh->sheet_triangle_count, mesh->triangle_count,
               mesh->cage.face_count > 0 ? " of a mesh that is to be subdivided" : "");
@@ -121,7 +120,9 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
               mesh->vertex_count);
     return qmat_fail_element(context, "facet", (int64_t)(i / 3));
   }
-  return check_cage(context, &mesh->cage);
+  status = check_cage(context, &mesh->cage);
+  if (status != QMAT_OK) return status;
+  return qmat_check_skin(context, mesh->joints, mesh->weights, mesh->skinned_count, mesh->vertex_count, "vertex");
 }
 
 static const qmat_value_row field_rows[] = {ARRAY(qmat_field, values, F64, count, 1), SCALAR(qmat_field, domain, ENUM),
@@ -172,6 +173,8 @@ static const qmat_value_row medial_rows[] = {ARRAY(qmat_medial, spheres, F64, sp
                                              ARRAY(qmat_medial, triangles, U32, triangle_count, 3),
                                              ARRAY(qmat_medial, region_offsets, U32, region_offset_count, 1),
                                              ARRAY(qmat_medial, region_samples, U32, region_sample_count, 1),
+                                             ARRAY(qmat_medial, joints, U32, skinned_count, 4),
+                                             ARRAY(qmat_medial, weights, F64, skinned_count, 4),
                                              END};
 
 static qmat_status check_regions(qmat_context *context, const qmat_medial *medial) {
@@ -218,14 +221,21 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
   }
   if (status == QMAT_OK)
     status = qmat_check_sides(context, medial->edges, medial->edge_count, medial->triangles, medial->triangle_count);
-  return status == QMAT_OK ? check_regions(context, medial) : status;
+  if (status == QMAT_OK) status = check_regions(context, medial);
+  if (status != QMAT_OK) return status;
+  return qmat_check_skin(context, medial->joints, medial->weights, medial->skinned_count, medial->sphere_count,
+                         "sphere");
 }
 
-static const qmat_value_row chain_rows[] = {
-    ARRAY(qmat_chain, spheres, F64, sphere_count, 4),     ARRAY(qmat_chain, edges, U32, edge_count, 2),
-    ARRAY(qmat_chain, triangles, U32, triangle_count, 3), ARRAY(qmat_chain, owners, U32, sample_count, 1),
-    ARRAY(qmat_chain, ends, U32, collapse_count, 2),      ARRAY(qmat_chain, merged, F64, collapse_count, 4),
-    ARRAY(qmat_chain, errors, F64, collapse_count, 1),    END};
+static const qmat_value_row chain_rows[] = {ARRAY(qmat_chain, spheres, F64, sphere_count, 4),
+                                            ARRAY(qmat_chain, edges, U32, edge_count, 2),
+                                            ARRAY(qmat_chain, triangles, U32, triangle_count, 3),
+                                            ARRAY(qmat_chain, owners, U32, sample_count, 1),
+                                            ARRAY(qmat_chain, ends, U32, collapse_count, 2),
+                                            ARRAY(qmat_chain, merged, F64, collapse_count, 4),
+                                            ARRAY(qmat_chain, errors, F64, collapse_count, 1),
+                                            SCALAR(qmat_chain, meters_per_diagonal, NUMBER),
+                                            END};
 
 /* Every collapse joins two different spheres that no earlier collapse has removed. */
 static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
@@ -271,6 +281,7 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
   if (status == QMAT_OK) status = qmat_check_spheres(context, chain->merged, chain->collapse_count, "collapse");
   if (status == QMAT_OK)
     status = qmat_check_finite(context, chain->errors, chain->collapse_count, 1, "collapse", "error");
+  if (status == QMAT_OK) status = qmat_check_length(context, chain->meters_per_diagonal, "meters_per_diagonal");
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < chain->collapse_count; i++) {
     if (chain->errors[i] >= (i == 0 ? 0 : chain->errors[i - 1])) continue;

@@ -76,6 +76,12 @@ typedef struct qmat_mesh {
   bool oriented;    /* neighbouring triangles agree on which side is outside */
   double deviation; /* bound on the distance to the surface that the triangles approximate, in model units; 0: exact */
   qmat_cage cage;   /* the subdivision cage; empty when nothing is to be subdivided */
+  /* Metres per unit of its positions, where its nodes make it largest; 0: unknown. */
+  double meters_per_unit;
+  /* The skin: 4 joints per vertex and their weights, as in qmat_medial. */
+  size_t skinned_count; /* vertex_count, or 0 without a skin */
+  uint32_t *joints;     /* 4 * skinned_count */
+  double *weights;      /* 4 * skinned_count */
 } qmat_mesh;
 
 typedef enum qmat_domain { QMAT_PER_FACET, QMAT_PER_VERTEX } qmat_domain;
@@ -111,6 +117,11 @@ typedef struct qmat_medial {
   size_t region_offset_count, region_sample_count; /* sphere_count + 1, or 0; the length of region_samples */
   uint32_t *region_offsets;
   uint32_t *region_samples;
+  /* The skin: up to 4 joints per sphere, numbered as in the skin of the model. Weights descend and sum to 1. An unused
+   * place has joint 0 and weight 0. A pose moves the centre c to the sum of weight * joint matrix * c. */
+  size_t skinned_count; /* sphere_count, or 0 without a skin */
+  uint32_t *joints;     /* 4 * skinned_count */
+  double *weights;      /* 4 * skinned_count */
 } qmat_medial;
 
 /* A medial mesh and the sequence of edge collapses that simplifies it. Applying the first n leaves sphere_count - n
@@ -124,9 +135,10 @@ typedef struct qmat_chain {
   size_t sample_count;
   uint32_t *owners; /* sample_count: the initial sphere whose region contains a sample; UINT32_MAX: none */
   size_t collapse_count;
-  uint32_t *ends; /* 2 * collapse_count: the sphere that stays, then the sphere that is removed */
-  double *merged; /* 4 * collapse_count: the sphere that stays, after the collapse */
-  double *errors; /* collapse_count: the tolerance of each collapse, in diagonals; never decreases */
+  uint32_t *ends;             /* 2 * collapse_count: the sphere that stays, then the sphere that is removed */
+  double *merged;             /* 4 * collapse_count: the sphere that stays, after the collapse */
+  double *errors;             /* collapse_count: the tolerance of each collapse, in diagonals; never decreases */
+  double meters_per_diagonal; /* the length of the surface's diagonal in metres; 0: unknown */
 } qmat_chain;
 
 /* Named counts and errors as a JSON object. It never contains times, so equal results have equal digests. */

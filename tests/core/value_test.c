@@ -41,6 +41,10 @@ static qmat_mesh *mesh_example(void) {
   ASSIGN(mesh->positions, (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
   ASSIGN(mesh->triangles, (uint32_t[]){0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3});
   mesh->closed = mesh->oriented = true;
+  mesh->meters_per_unit = 0.01;
+  mesh->skinned_count = 4;
+  ASSIGN(mesh->joints, (uint32_t[]){0, 0, 0, 0, 7, 1, 0, 0, 65535, 0, 0, 0, 3, 2, 1, 0});
+  ASSIGN(mesh->weights, (double[]){1, 0, 0, 0, 0.75, 0.25, 0, 0, 1, 0, 0, 0, 0.25, 0.25, 0.25, 0.25});
   return mesh;
 }
 
@@ -79,6 +83,9 @@ static qmat_medial *medial_example(void) {
   ASSIGN(medial->triangles, (uint32_t[]){0, 1, 2});
   ASSIGN(medial->region_offsets, (uint32_t[]){0, 2, 2, 5, 6});
   ASSIGN(medial->region_samples, (uint32_t[]){4, 1, 0, 2, 3, 5});
+  medial->skinned_count = 4;
+  ASSIGN(medial->joints, (uint32_t[]){0, 0, 0, 0, 7, 1, 0, 0, 65535, 0, 0, 0, 3, 2, 1, 0});
+  ASSIGN(medial->weights, (double[]){1, 0, 0, 0, 0.75, 0.25, 0, 0, 1, 0, 0, 0, 0.25, 0.25, 0.25, 0.25});
   return medial;
 }
 
@@ -98,6 +105,7 @@ static qmat_chain *chain_example(void) {
   ASSIGN(chain->ends, (uint32_t[]){1, 3, 0, 1});
   ASSIGN(chain->merged, (double[]){1, 0, 4, 0.25, 0.5, 0, 0, 1});
   ASSIGN(chain->errors, (double[]){0.25, 0.5});
+  chain->meters_per_diagonal = 2.5;
   return chain;
 }
 
@@ -266,10 +274,10 @@ static void test_half_filled_values_are_released_whole(void **state) {
 static void test_bytes_count_what_the_arrays_hold(void **state) {
   (void)state;
   const size_t expected[] = {[QMAT_SCENE] = 6 + 3,
-                             [QMAT_MESH] = 12 * 8 + 12 * 4,
+                             [QMAT_MESH] = 12 * 8 + 12 * 4 + 16 * 4 + 16 * 8,
                              [QMAT_FIELD] = 3 * 8 + 10,
                              [QMAT_SAMPLES] = 6 * 8 + 2 * 4 + 6 * 8,
-                             [QMAT_MEDIAL] = 16 * 8 + 8 * 4 + 3 * 4 + 5 * 4 + 6 * 4,
+                             [QMAT_MEDIAL] = 16 * 8 + 8 * 4 + 3 * 4 + 5 * 4 + 6 * 4 + 16 * 4 + 16 * 8,
                              [QMAT_CHAIN] = 16 * 8 + 8 * 4 + 3 * 4 + 3 * 4 + 4 * 4 + 8 * 8 + 2 * 8,
                              [QMAT_REPORT] = strlen("{\"error\":0.10000000000000001,\"spheres\":100,"
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
@@ -328,6 +336,9 @@ static void test_the_content_comes_back_field_by_field(void **state) {
   assert_memory_equal(again->triangles, medial->triangles, 3 * sizeof(uint32_t));
   assert_memory_equal(again->region_offsets, medial->region_offsets, 5 * sizeof(uint32_t));
   assert_memory_equal(again->region_samples, medial->region_samples, 6 * sizeof(uint32_t));
+  assert_int_equal(again->skinned_count, 4);
+  assert_memory_equal(again->joints, medial->joints, 16 * sizeof(uint32_t));
+  assert_memory_equal(again->weights, medial->weights, 16 * sizeof(double));
   assert_int_equal((uintptr_t)again->spheres % 64, 0);
   qmat_free(bytes);
   qmat_value_release(value);
@@ -711,6 +722,32 @@ static void test_bad_medial_meshes_name_the_first_bad_element(void **state) {
   medial = medial_example();
   medial->edge_count = 2;
   assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "triangle 0: its side (1, 2) is not among the edges");
+}
+
+static void test_bad_skins_and_units_are_refused(void **state) {
+  (void)state;
+  qmat_medial *medial = medial_example();
+  medial->skinned_count = 3;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "joints: 3 of 4 elements have joints and weights");
+  medial = medial_example();
+  medial->joints[9] = 65536;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "sphere 2: it names joint 65536 of 65536");
+  medial = medial_example();
+  medial->weights[15] = (double)NAN;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "sphere 3: the weight is not finite");
+  medial = medial_example();
+  medial->weights[4] = 0.5;
+  assert_not_sealed(&medial->base, QMAT_ERROR_GEOMETRY, "sphere 1: its weights are negative or do not sum to 1");
+  qmat_mesh *mesh = mesh_example();
+  mesh->weights[2] = -0.5;
+  mesh->weights[3] = 0.5;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "vertex 0: its weights are negative or do not sum to 1");
+  mesh = mesh_example();
+  mesh->meters_per_unit = (double)INFINITY;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "meters_per_unit: it is negative or not finite");
+  qmat_chain *chain = chain_example();
+  chain->meters_per_diagonal = -1;
+  assert_not_sealed(&chain->base, QMAT_ERROR_GEOMETRY, "meters_per_diagonal: it is negative or not finite");
 }
 
 static void test_bad_regions_are_refused(void **state) {
@@ -1166,6 +1203,7 @@ int main(void) {
       cmocka_unit_test(test_bad_samples_name_the_first_bad_element),
       cmocka_unit_test(test_barycentrics_may_be_off_by_rounding),
       cmocka_unit_test(test_bad_medial_meshes_name_the_first_bad_element),
+      cmocka_unit_test(test_bad_skins_and_units_are_refused),
       cmocka_unit_test(test_bad_regions_are_refused),
       cmocka_unit_test(test_bad_chains_name_the_first_bad_element),
       cmocka_unit_test(test_part_names_stay_below_the_folder_and_are_unique),
