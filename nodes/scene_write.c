@@ -79,9 +79,9 @@ static double storage_of(const qmat_stated_errors *errors) {
 }
 
 /* What is written of one medial mesh; NULL: none. */
-static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_medial *medial,
-                                      const qmat_mesh *skin, const qmat_report *report, const char *name,
-                                      qmat_stated_errors *stated) {
+static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_scene *scene,
+                                      const qmat_medial *medial, const qmat_mesh *skin, const qmat_report *report,
+                                      const char *name, qmat_stated_errors *stated) {
   const qmat_stated_errors errors = errors_of(medial, report);
   return (qmat_gltf_addition){.medial = medial,
                               .skin = skin,
@@ -92,6 +92,8 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
                                           .radius_bits = (int)params->radius_bits,
                                           .quantisation = storage_of(&errors),
                                           .name = name,
+                                          .meters_per_unit = scene ? scene->meters_per_unit : 0,
+                                          .is_z_up = scene && scene->is_z_up,
                                           .errors = errors,
                                           .stated = stated}};
 }
@@ -117,7 +119,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   if (!additions) return qmat_fail_memory(context, "a glTF file");
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
-    additions[i] = addition_of(params, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
+    additions[i] = addition_of(params, scene, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
                                shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
                                (const qmat_report *)given_for(inputs[IN_REPORT], i),
                                name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);
@@ -323,11 +325,13 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 4,
+    .version = 5,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
-        "gain its medial mesh. Any other model becomes a new asset that shows the skin. A .glb contains the scene's "
+        "gain its medial mesh. Any other model becomes a new asset that shows the skin; one in other units than "
+        "metres, or "
+        "with z up, below a node that converts it. A .glb contains the scene's "
         "buffers and images; those of a .gltf are files named after it.\n\n"
         "qmat_data in the extras is the medial mesh, by Draco and in base64. qmat_error_out and qmat_error_in are the "
         "errors of the report plus the distance by which storage moves the solid, at most 0.25 % of epsilon. "

@@ -201,8 +201,24 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
   return done;
 }
 
-/* Adds a node for the medial mesh of all meshes together, and adds the node to the scene. */
-static bool add_node(json_t *root, const json_t *extras, const double *origin, json_int_t skin, const char *name) {
+/* Adds a node above `*number` that turns the model's space into metres with y up, and makes `*number` its own. Nothing
+ * is added where the spaces are equal. */
+static bool add_unit_node(json_t *root, const qmat_gltf_options *options, const char *name, json_int_t *number) {
+  const double unit = options->meters_per_unit > 0 ? options->meters_per_unit : 1, half = sqrt(0.5);
+  if (unit == 1 && !options->is_z_up) return true;
+  json_t *node = json_pack("{s:[I]}", "children", *number);
+  bool done = node != NULL;
+  if (name) done = done && qmat_gltf_set(node, "name", json_sprintf("%s in metres, y up", name));
+  if (options->is_z_up) /* by -90 degrees about x */
+    done = done && qmat_gltf_set(node, "rotation", json_pack("[f, f, f, f]", -half, 0.0, 0.0, half));
+  if (unit != 1) done = done && qmat_gltf_set(node, "scale", json_pack("[f, f, f]", unit, unit, unit));
+  return qmat_gltf_add(root, "nodes", node, number) && done;
+}
+
+/* Adds a node for the medial mesh of all meshes together, and adds the node to the scene. `converted` is NULL where the
+ * medial mesh is in the asset's own space. */
+static bool add_node(json_t *root, const json_t *extras, const double *origin, json_int_t skin, const char *name,
+                     const qmat_gltf_options *converted) {
   json_t *node = json_object();
   bool done = node && set_translation(node, origin);
   if (name) done = done && qmat_gltf_set(node, "name", json_string(name));
@@ -210,6 +226,7 @@ static bool add_node(json_t *root, const json_t *extras, const double *origin, j
   done = done && set_extras(node, extras);
   json_int_t number;
   if (!qmat_gltf_add(root, "nodes", node, &number) || !done) return false;
+  if (converted && !add_unit_node(root, converted, name, &number)) return false;
   const json_t *scenes = json_object_get(root, "scenes"), *chosen = json_object_get(root, "scene");
   json_t *scene = json_array_get(scenes, json_is_number(chosen) ? (size_t)json_number_value(chosen) : 0);
   return !scene || qmat_gltf_add(scene, "nodes", json_integer(number), NULL); /* without scenes every root is shown */
@@ -327,7 +344,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   if (done && of_mesh) {
     done = add_to_carriers(document, scene->meshes[index], extras, origin, skin);
   } else if (done) {
-    done = add_node(document->root, extras, origin, skin, name);
+    done = add_node(document->root, extras, origin, skin, name, scene ? NULL : &options);
   }
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;

@@ -15,11 +15,14 @@ typedef struct qmat_gltf_options {
   int radius_bits;            /* the same */
   double quantisation;        /* allowed error of storage, model units; used if bits are 0 */
   const char *name;           /* of the node and the mesh, UTF-8; NULL or "": none */
+  double meters_per_unit;     /* of the medial mesh, for a new asset; 0: unknown, taken for 1 */
+  bool is_z_up;               /* the same; else y is up */
   qmat_stated_errors errors;  /* of the given medial mesh */
   qmat_stated_errors *stated; /* gets the errors that the file states; may be NULL */
 } qmat_gltf_options;
 
-/* Makes a glTF 2.0 file of a medial mesh: one scene with one node, which has
+/* Makes a glTF 2.0 file of a medial mesh: one scene with one node. glTF measures in metres and y is up; a medial mesh
+ * in other units or with z up keeps its coordinates, and its node gets a parent that scales and turns it. The node has
  *  - the skin as an ordinary mesh (POSITION, area-weighted NORMAL, indices, one material), so that every client shows
  *    something; without a skin (NULL, or no triangles) the node has no mesh;
  *  - the medial mesh in its extras, which clients preserve better than extensions: flat strings, numbers and booleans.

@@ -306,6 +306,48 @@ static void test_the_skin_is_a_plain_mesh_with_exact_bounds(void **state) {
   qmat_value_release(&medial->base);
 }
 
+/* The skin in the space of the file, as a viewer places it. */
+static void test_other_units_and_z_up_become_metres_and_y_up(void **state) {
+  (void)state;
+  static const struct {
+    double unit;
+    bool is_z_up;
+    size_t nodes;
+    double low[3], high[3];
+  } cases[] = {{0.01, true, 2, {-0.01, 0.02, -0.04}, {0.01, 0.03, 0}},
+               {1, true, 2, {-1, 2, -4}, {1, 3, 0}},
+               {0.0254, false, 2, {-0.0254, 0, 0.0508}, {0.0254, 0.1016, 0.0762}},
+               {1, false, 1, {-1, 0, 2}, {1, 4, 3}},
+               {0, false, 1, {-1, 0, 2}, {1, 4, 3}}};
+  qmat_medial *medial = example_medial(3);
+  qmat_mesh *box = make_box();
+  for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+    qmat_context context = {0};
+    qmat_soup soup = {0};
+    qmat_gltf_options options = usual_options();
+    options.meters_per_unit = cases[c].unit;
+    options.is_z_up = cases[c].is_z_up;
+    written w = write_file(medial, box, &options);
+    assert_int_equal(json_array_size(json_object_get(w.root, "nodes")), cases[c].nodes);
+    const qmat_file_part *part = &w.file->parts[0];
+    assert_int_equal(qmat_gltf_parse(&context, part->bytes, part->size, "file", &soup, NULL), QMAT_OK);
+    for (size_t k = 0; k < 3; k++) {
+      double low = INFINITY, high = -INFINITY;
+      for (size_t i = 0; i < soup.vertex_count; i++) {
+        low = fmin(low, soup.positions[3 * i + k]);
+        high = fmax(high, soup.positions[3 * i + k]);
+      }
+      assert_near(low, cases[c].low[k], 1e-6 * fmax(1, cases[c].unit));
+      assert_near(high, cases[c].high[k], 1e-6 * fmax(1, cases[c].unit));
+    }
+    qmat_soup_uninit(&soup);
+    close_file(&w);
+    qmat_context_uninit(&context);
+  }
+  qmat_value_release(&box->base);
+  qmat_value_release(&medial->base);
+}
+
 static void test_normals_weigh_facets_by_area(void **state) {
   (void)state;
   qmat_medial *medial = example_medial(3);
@@ -556,6 +598,7 @@ int main(void) {
       cmocka_unit_test(test_extras_are_flat_and_leave_out_what_is_not_known),
       cmocka_unit_test(test_without_a_skin_there_is_a_node_and_no_empty_array),
       cmocka_unit_test(test_the_skin_is_a_plain_mesh_with_exact_bounds),
+      cmocka_unit_test(test_other_units_and_z_up_become_metres_and_y_up),
       cmocka_unit_test(test_normals_weigh_facets_by_area),
       cmocka_unit_test(test_indices_widen_where_16_bits_end),
       cmocka_unit_test(test_a_compressed_skin_states_what_is_decoded),
