@@ -6,6 +6,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/node.h"
 #include "io/draco_draco.h"
+#include "io/stored_medial.h"
 
 /* ---- quantisation bits ---- */
 
@@ -37,59 +38,6 @@ static qmat_status check_bits(qmat_context *context, const char *field, int bits
 
 /* ---- medial meshes ---- */
 
-/* The index of edge (a, b), a < b, in the sorted edges; edge_count if it is missing. */
-static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
-  size_t low = 0, high = medial->edge_count;
-  while (low < high) {
-    size_t middle = low + (high - low) / 2;
-    const uint32_t *edge = medial->edges + 2 * middle;
-    if (edge[0] < a || (edge[0] == a && edge[1] < b)) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  if (low < medial->edge_count && medial->edges[2 * low] == a && medial->edges[2 * low + 1] == b) return low;
-  return medial->edge_count;
-}
-
-static void set_face(uint32_t *faces, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
-  faces[3 * *count] = a;
-  faces[3 * *count + 1] = b;
-  faces[3 * *count + 2] = c;
-  (*count)++;
-}
-
-/* Makes the faces that represent the medial mesh. `faces` has room for one face per triangle, edge and sphere.
- * `edge_marks` has edge_count zero bytes, `sphere_marks` sphere_count. */
-static qmat_status make_faces(qmat_context *context, const qmat_medial *medial, uint8_t *edge_marks,
-                              uint8_t *sphere_marks, uint32_t *faces, size_t *face_count) {
-  size_t count = 0;
-  for (size_t t = 0; t < medial->triangle_count; t++) {
-    const uint32_t *id = medial->triangles + 3 * t;
-    const uint32_t sides[3][2] = {{id[0], id[1]}, {id[0], id[2]}, {id[1], id[2]}};
-    for (int k = 0; k < 3; k++) {
-      size_t edge = find_edge(medial, sides[k][0], sides[k][1]);
-      if (edge == medial->edge_count) {
-        qmat_fail(context, QMAT_ERROR_GEOMETRY, "side (%u, %u) is missing from the edges", sides[k][0], sides[k][1]);
-        return qmat_fail_element(context, "triangle", (int64_t)t);
-      }
-      edge_marks[edge] = 1;
-    }
-    set_face(faces, &count, id[0], id[1], id[2]);
-  }
-  for (size_t e = 0; e < medial->edge_count; e++) {
-    const uint32_t *id = medial->edges + 2 * e;
-    sphere_marks[id[0]] = sphere_marks[id[1]] = 1;
-    if (!edge_marks[e]) set_face(faces, &count, id[0], id[1], id[1]);
-  }
-  for (uint32_t i = 0; i < medial->sphere_count; i++) {
-    if (!sphere_marks[i]) set_face(faces, &count, i, i, i);
-  }
-  *face_count = count;
-  return QMAT_OK;
-}
-
 qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *medial, const double *origin,
                                      int position_bits, int radius_bits, uint8_t **bytes, size_t *size) {
   *bytes = NULL;
@@ -102,10 +50,9 @@ qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *m
 
   float *centres = qmat_alloc(count, 3 * sizeof *centres);
   float *radii = qmat_alloc(count, sizeof *radii);
-  uint8_t *sphere_marks = qmat_calloc(count, 1);
-  uint8_t *edge_marks = qmat_calloc(medial->edge_count, 1);
-  uint32_t *faces = qmat_alloc(medial->triangle_count + medial->edge_count + count, 3 * sizeof *faces);
-  if (!centres || !radii || !sphere_marks || !edge_marks || !faces) {
+  uint32_t *faces = NULL;
+  size_t counts[3];
+  if (!centres || !radii) {
     status = qmat_fail_memory(context, "the Draco form of a medial mesh");
     goto done;
   }
@@ -122,22 +69,27 @@ qmat_status qmat_draco_encode_medial(qmat_context *context, const qmat_medial *m
       goto done;
     }
   }
-  size_t face_count = 0;
-  status = make_faces(context, medial, edge_marks, sphere_marks, faces, &face_count);
+  status = qmat_medial_faces(context, medial, &faces, counts);
   if (status != QMAT_OK) goto done;
   const qmat_draco_attribute attributes[2] = {
       {.meaning = QMAT_DRACO_POSITION, .components = 3, .bits = position_bits, .values = centres},
       {.meaning = QMAT_DRACO_GENERIC, .components = 1, .bits = radius_bits, .values = radii},
   };
-  status = qmat_draco_encode(context, attributes, 2, count, faces, face_count, true, bytes, size);
+  status =
+      qmat_draco_encode(context, attributes, 2, count, faces, counts[0] + counts[1] + counts[2], true, bytes, size);
 
 done:
   qmat_free(faces);
-  qmat_free(edge_marks);
-  qmat_free(sphere_marks);
   qmat_free(radii);
   qmat_free(centres);
   return status;
+}
+
+static void set_face(uint32_t *faces, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
+  faces[3 * *count] = a;
+  faces[3 * *count + 1] = b;
+  faces[3 * *count + 2] = c;
+  (*count)++;
 }
 
 /* Separates triangles from edges: `faces` keeps the triangles; `edges` has room for one edge per face. */

@@ -6,10 +6,12 @@
 
 #include "io/base64.h"
 #include "io/draco.h"
+#include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/ply_medial.h"
 #include "io/model.h"
+#include "io/stored_medial.h"
 #include "io/usd/usd_medial.h"
 
 static qmat_status take_facts(qmat_context *context, const json_t *extras, json_t *facts) {
@@ -17,7 +19,7 @@ static qmat_status take_facts(qmat_context *context, const json_t *extras, json_
   json_t *value;
   if (!facts) return QMAT_OK;
   json_object_foreach((json_t *)(uintptr_t)extras, key, value) {
-    if (strncmp(key, "qmat_", 5) != 0 || strcmp(key, "qmat_data") == 0) continue;
+    if (strncmp(key, "qmat_", 5) != 0 || strcmp(key, "qmat_data") == 0 || strcmp(key, "qmat_flat") == 0) continue;
     if (json_object_set(facts, key, value) != 0) return qmat_fail_memory(context, "the facts of a file");
   }
   return QMAT_OK;
@@ -37,15 +39,70 @@ static bool is_called(const json_t *nodes, size_t index, const char *name) {
   return true;
 }
 
-static const json_t *data_of(const json_t *node) {
-  const json_t *data = json_object_get(json_object_get(node, "extras"), "qmat_data");
+/* The text of a node's medial mesh in one of its two forms; NULL: none. */
+static const json_t *form_of(const json_t *node, const char *key) {
+  const json_t *data = json_object_get(json_object_get(node, "extras"), key);
   return json_is_string(data) ? data : NULL;
+}
+
+/* A node without Draco data is read by its plain form. */
+static const json_t *data_of(const json_t *node) {
+  const json_t *data = form_of(node, "qmat_data");
+  return data ? data : form_of(node, "qmat_flat");
 }
 
 /* The origin of a node's sphere coordinates, in the frame of the model. */
 static void take_origin(const json_t *extras, double origin[3]) {
   static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   for (int k = 0; k < 3; k++) origin[k] = json_number_value(json_object_get(extras, axes[k]));
+}
+
+static qmat_status decode_form(qmat_context *context, const json_t *data, bool is_flat, const double origin[3],
+                               qmat_medial **medial) {
+  uint8_t *blob = NULL;
+  size_t size = 0;
+  qmat_status status = qmat_base64_decode(context, json_string_value(data), json_string_length(data), &blob, &size);
+  if (status == QMAT_OK) {
+    status = is_flat ? qmat_flat_decode(context, blob, size, origin, medial)
+                     : qmat_draco_decode_medial(context, blob, size, origin, medial);
+  }
+  qmat_free(blob);
+  return status;
+}
+
+/* Whether the two forms say the same: the same simplices, and spheres that differ by what the file says that storage
+ * moved them. */
+static bool forms_agree(const qmat_medial *a, const qmat_medial *b, const json_t *extras) {
+  static const char *const keys[] = {"qmat_quantisation", "qmat_flat_quantisation"};
+  const bool alike =
+      a->sphere_count == b->sphere_count && a->edge_count == b->edge_count && a->triangle_count == b->triangle_count;
+  if (!alike || (a->edge_count > 0 && memcmp(a->edges, b->edges, 2 * a->edge_count * sizeof *a->edges) != 0) ||
+      (a->triangle_count > 0 && memcmp(a->triangles, b->triangles, 3 * a->triangle_count * sizeof *a->triangles) != 0))
+    return false;
+  double stated = 0;
+  for (size_t i = 0; i < 2; i++) {
+    const json_t *number = json_object_get(extras, keys[i]);
+    if (!json_is_number(number)) return true;
+    stated += json_number_value(number);
+  }
+  /* The factor is for rounding: the stated numbers are rounded, too. */
+  return qmat_medial_move(a, b) <= stated * (1 + 1e-9);
+}
+
+/* Decodes the medial mesh of a node. Where the node has both forms, they must agree. */
+static qmat_status decode_node(qmat_context *context, const json_t *node, qmat_medial **medial) {
+  const json_t *extras = json_object_get(node, "extras"), *draco = form_of(node, "qmat_data"),
+               *flat = form_of(node, "qmat_flat");
+  double origin[3];
+  take_origin(extras, origin);
+  qmat_status status = decode_form(context, data_of(node), !draco, origin, medial);
+  if (status != QMAT_OK || !draco || !flat) return status;
+  qmat_medial *second = NULL;
+  status = decode_form(context, flat, true, origin, &second);
+  if (status == QMAT_OK && !forms_agree(*medial, second, extras))
+    status = qmat_fail(context, QMAT_ERROR_FORMAT, "qmat_data and qmat_flat are different medial meshes");
+  if (second) qmat_value_release(&second->base);
+  return status;
 }
 
 static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
@@ -65,8 +122,6 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
     found = node;
     index = i;
   }
-  uint8_t *blob = NULL;
-  size_t size = 0;
   if (status == QMAT_OK && !found) {
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY,
                        carriers > 0 ? "no node of this name has a medial mesh" : "no node has a medial mesh");
@@ -76,16 +131,11 @@ static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, con
     qmat_fail_at(context, path, 0, 0);
     qmat_fail_hint(context, "give the name or number of the node; qmat info lists them");
   } else if (status == QMAT_OK) {
-    const json_t *data = data_of(found);
-    double origin[3];
-    take_origin(json_object_get(found, "extras"), origin);
-    status = qmat_base64_decode(context, json_string_value(data), json_string_length(data), &blob, &size);
-    if (status == QMAT_OK) status = qmat_draco_decode_medial(context, blob, size, origin, medial);
+    status = decode_node(context, found, medial);
     if (status != QMAT_OK) qmat_fail_element(context, "node", (int64_t)index);
     if (status == QMAT_OK) status = take_facts(context, json_object_get(found, "extras"), facts);
     if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
   }
-  qmat_free(blob);
   qmat_gltf_asset_uninit(&asset);
   return status;
 }

@@ -6,7 +6,8 @@
 
 #include "core/value.h"
 
-/* Extracts the medial mesh from a file: glTF (qmat_data in the extras of a node), USD (as io/usd/usd_write.h writes
+/* Extracts the medial mesh from a file: glTF (qmat_data in the extras of a node, else
+ * qmat_flat; where a node has both, they are compared), USD (as io/usd/usd_write.h writes
  * it), PLY (as io/mesh/ply_medial.h writes it), or .ma. Its frame is that of the original model or mesh: the local
  * frame of the node or prim, translated by the origin stated in the file. `name` is the name of the node or prim, NULL
  * if there is only one; PLY and .ma ignore it. `facts` (a JSON object, may be NULL) gains the extras or customData

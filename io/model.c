@@ -6,7 +6,6 @@
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_keep.h"
-#include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/scanner.h"
 #include "io/usd/usd_scene.h"
@@ -347,21 +346,5 @@ qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_
   qmat_value *made = NULL;
   const qmat_status status = qmat_model_read_meshes(context, path, options, "merged", scene, &made, report);
   *mesh = (qmat_mesh *)made;
-  return status;
-}
-
-qmat_status qmat_medial_read(qmat_context *context, const char *path, qmat_medial **medial) {
-  *medial = NULL;
-  qmat_bytes bytes = {0};
-  qmat_status status = qmat_bytes_read_file(context, path, &bytes);
-  if (status != QMAT_OK) return status;
-  const qmat_format found = qmat_format_of_bytes(&bytes);
-  if (found != QMAT_FORMAT_UNKNOWN) {
-    qmat_fail(context, QMAT_ERROR_FORMAT, "the content is %s, not a medial mesh (MA)", formats[found].title);
-    status = qmat_fail_at(context, path, 0, 0);
-  } else {
-    status = qmat_ma_read(context, &bytes, path, medial);
-  }
-  qmat_bytes_uninit(&bytes);
   return status;
 }

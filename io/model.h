@@ -52,7 +52,4 @@ qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_
 qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, const qmat_read_options *options,
                                    const char *choice, qmat_scene **scene, qmat_value **mesh, qmat_report **report);
 
-/* Reads the medial mesh in the .ma file `path`. `*medial` is sealed; the caller releases it; NULL on failure. */
-qmat_status qmat_medial_read(qmat_context *context, const char *path, qmat_medial **medial);
-
 #endif

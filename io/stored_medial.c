@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/arena.h"
 #include "core/geometry/vector.h"
 
 static double raise_error(double error, double by) {
@@ -53,4 +54,76 @@ void qmat_storage_origin(const qmat_medial *medial, const qmat_mesh *skin, doubl
   frexp(side, &exponent);
   const double step = ldexp(1, exponent);
   for (int k = 0; k < 3; k++) origin[k] = step * round((low[k] / 2 + high[k] / 2) / step);
+}
+
+/* ---- simplices ---- */
+
+/* The index of edge (a, b), a < b, in the sorted edges; edge_count if it is missing. */
+static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
+  size_t low = 0, high = medial->edge_count;
+  while (low < high) {
+    size_t middle = low + (high - low) / 2;
+    const uint32_t *edge = medial->edges + 2 * middle;
+    if (edge[0] < a || (edge[0] == a && edge[1] < b)) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  if (low < medial->edge_count && medial->edges[2 * low] == a && medial->edges[2 * low + 1] == b) return low;
+  return medial->edge_count;
+}
+
+static void set_face(uint32_t *faces, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
+  faces[3 * *count] = a;
+  faces[3 * *count + 1] = b;
+  faces[3 * *count + 2] = c;
+  (*count)++;
+}
+
+/* Fills the faces. `edge_marks` has edge_count zero bytes, `sphere_marks` sphere_count. */
+static qmat_status fill_faces(qmat_context *context, const qmat_medial *medial, uint8_t *edge_marks,
+                              uint8_t *sphere_marks, uint32_t *faces, size_t counts[3]) {
+  size_t count = 0;
+  for (size_t t = 0; t < medial->triangle_count; t++) {
+    const uint32_t *id = medial->triangles + 3 * t;
+    const uint32_t sides[3][2] = {{id[0], id[1]}, {id[0], id[2]}, {id[1], id[2]}};
+    for (int k = 0; k < 3; k++) {
+      size_t edge = find_edge(medial, sides[k][0], sides[k][1]);
+      if (edge == medial->edge_count) {
+        qmat_fail(context, QMAT_ERROR_GEOMETRY, "side (%u, %u) is missing from the edges", sides[k][0], sides[k][1]);
+        return qmat_fail_element(context, "triangle", (int64_t)t);
+      }
+      edge_marks[edge] = 1;
+    }
+    set_face(faces, &count, id[0], id[1], id[2]);
+  }
+  counts[0] = count;
+  for (size_t e = 0; e < medial->edge_count; e++) {
+    const uint32_t *id = medial->edges + 2 * e;
+    sphere_marks[id[0]] = sphere_marks[id[1]] = 1;
+    if (!edge_marks[e]) set_face(faces, &count, id[0], id[1], id[1]);
+  }
+  counts[1] = count - counts[0];
+  for (uint32_t i = 0; i < medial->sphere_count; i++) {
+    if (!sphere_marks[i]) set_face(faces, &count, i, i, i);
+  }
+  counts[2] = count - counts[0] - counts[1];
+  return QMAT_OK;
+}
+
+qmat_status qmat_medial_faces(qmat_context *context, const qmat_medial *medial, uint32_t **faces, size_t counts[3]) {
+  uint8_t *sphere_marks = qmat_calloc(medial->sphere_count, 1);
+  uint8_t *edge_marks = qmat_calloc(medial->edge_count, 1);
+  *faces = qmat_alloc(medial->triangle_count + medial->edge_count + medial->sphere_count, 3 * sizeof **faces);
+  qmat_status status = sphere_marks && edge_marks && *faces
+                           ? fill_faces(context, medial, edge_marks, sphere_marks, *faces, counts)
+                           : qmat_fail_memory(context, "the faces of a medial mesh");
+  if (status != QMAT_OK) {
+    qmat_free(*faces);
+    *faces = NULL;
+  }
+  qmat_free(edge_marks);
+  qmat_free(sphere_marks);
+  return status;
 }

@@ -30,4 +30,10 @@ double qmat_medial_move(const qmat_medial *given, const qmat_medial *stored);
  * their bounding box, at multiples of a power of two, which single precision can usually represent exactly. */
 void qmat_storage_origin(const qmat_medial *medial, const qmat_mesh *skin, double allowed, double origin[3]);
 
+/* The simplices that are no side of another, as files store them, in triples: the triangles in their order, then each
+ * edge (i, j) on no triangle as (i, j, j), then each sphere i on no edge as (i, i, i). `counts` gets the number of each
+ * kind. The caller frees `*faces` with qmat_free; NULL on failure. QMAT_ERROR_GEOMETRY: a side of a triangle is missing
+ * from the edges; QMAT_ERROR_MEMORY. Cost: linear, and a binary search per side of a triangle. */
+qmat_status qmat_medial_faces(qmat_context *context, const qmat_medial *medial, uint32_t **faces, size_t counts[3]);
+
 #endif

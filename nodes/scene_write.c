@@ -22,6 +22,7 @@ typedef struct scene_write_params {
   int format; /* a file_format */
   bool draco, draco_meshes, skin_beside, side_files;
   int64_t position_bits, radius_bits;
+  int flat; /* a qmat_flat_form */
 } scene_write_params;
 
 enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
@@ -90,6 +91,7 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
                                           .compress_skin = params->draco,
                                           .position_bits = (int)params->position_bits,
                                           .radius_bits = (int)params->radius_bits,
+                                          .flat = (qmat_flat_form)params->flat,
                                           .quantisation = storage_of(&errors),
                                           .name = name,
                                           .meters_per_unit = scene ? scene->meters_per_unit : 0,
@@ -269,6 +271,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 
 static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", NULL};
 
+static const char *const flat_forms[] = {"auto", "short", "float", "none", NULL};
+
 static const qmat_param params[] = {
     {.name = "format",
      .unit = "",
@@ -291,6 +295,9 @@ static const qmat_param params[] = {
              "Quantisation of the spheres' centres (glb, gltf); 0: chosen by epsilon"),
     QMAT_INT(scene_write_params, radius_bits, "bits", 0, 0, 30,
              "Quantisation of the spheres' radii (glb, gltf); 0: chosen by epsilon"),
+    QMAT_ENUM(
+        scene_write_params, flat, flat_forms, QMAT_FLAT_AUTO,
+        "Numbers of the plain medial mesh (glb, gltf): 16 bits, single precision, or by epsilon; none: without it"),
     {0},
 };
 
@@ -325,7 +332,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 5,
+    .version = 6,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
@@ -333,7 +340,9 @@ const qmat_node qmat_node_scene_write = {
         "metres, or "
         "with z up, below a node that converts it. A .glb contains the scene's "
         "buffers and images; those of a .gltf are files named after it.\n\n"
-        "qmat_data in the extras is the medial mesh, by Draco and in base64. qmat_error_out and qmat_error_in are the "
+        "qmat_data in the extras is the medial mesh, by Draco and in base64; qmat_flat is the same as plain numbers, "
+        "which "
+        "the readers of examples/readers decode. qmat_error_out and qmat_error_in are the "
         "errors of the report plus the distance by which storage moves the solid, at most 0.25 % of epsilon. "
         "qmat_certified says whether both are proved to be within qmat_epsilon. Far from zero, the node is translated "
         "to qmat_origin_x, _y and _z.\n\n"

@@ -10,6 +10,7 @@
 #include "io/base64.h"
 #include "io/bytes.h"
 #include "io/draco.h"
+#include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
@@ -24,6 +25,9 @@ typedef struct medial_text {
   int position_bits, radius_bits;
   const double *origin; /* the spheres are relative to it */
   double loss;          /* measured error of the encoding, model units */
+  char *flat;           /* base64 of the plain form; NULL: none */
+  bool flat_floats;
+  double flat_loss; /* as `loss` */
 } medial_text;
 
 /* Encodes the medial mesh, decodes it again, and measures the loss. */
@@ -41,6 +45,36 @@ static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *
   }
   if (status == QMAT_OK) text->loss = qmat_medial_move(medial, decoded);
   if (decoded) qmat_value_release(&decoded->base);
+  return status;
+}
+
+/* Encodes the plain form, decodes it again, and measures the loss. */
+static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial, medial_text *text) {
+  uint8_t *bytes = NULL;
+  size_t size = 0;
+  qmat_medial *decoded = NULL;
+  qmat_status status = qmat_flat_encode(context, medial, NULL, text->origin, text->flat_floats, &bytes, &size);
+  if (status == QMAT_OK) status = qmat_flat_decode(context, bytes, size, text->origin, &decoded);
+  if (status == QMAT_OK) {
+    qmat_free(text->flat);
+    text->flat_loss = qmat_medial_move(medial, decoded);
+    text->flat = qmat_base64_encode(bytes, size);
+    if (!text->flat) status = qmat_fail_memory(context, "the medial mesh as text");
+  }
+  if (decoded) qmat_value_release(&decoded->base);
+  qmat_free(bytes);
+  return status;
+}
+
+static qmat_status make_flat_text(qmat_context *context, const qmat_medial *medial, const qmat_gltf_options *options,
+                                  medial_text *text) {
+  if (options->flat == QMAT_FLAT_NONE) return QMAT_OK;
+  text->flat_floats = options->flat == QMAT_FLAT_FLOAT;
+  qmat_status status = encode_flat(context, medial, text);
+  if (status == QMAT_OK && options->flat == QMAT_FLAT_AUTO && text->flat_loss > options->quantisation) {
+    text->flat_floats = true;
+    status = encode_flat(context, medial, text);
+  }
   return status;
 }
 
@@ -71,6 +105,7 @@ static qmat_status make_medial_text(qmat_context *context, const qmat_medial *me
     if (!text->base64) status = qmat_fail_memory(context, "the medial mesh as text");
   }
   qmat_free(bytes);
+  if (status == QMAT_OK) status = make_flat_text(context, medial, options, text);
   return status;
 }
 
@@ -110,6 +145,11 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
          set_count(extras, "qmat_position_bits", (size_t)text->position_bits) &&
          set_count(extras, "qmat_radius_bits", (size_t)text->radius_bits) &&
          qmat_gltf_set(extras, "qmat_frame", json_string("node"));
+  if (text->flat) {
+    done = done && qmat_gltf_set(extras, "qmat_flat", json_string(text->flat)) &&
+           qmat_gltf_set(extras, "qmat_flat_format", json_string(text->flat_floats ? "f32" : "u16")) &&
+           qmat_gltf_set(extras, "qmat_flat_quantisation", json_real(text->flat_loss));
+  }
   static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   for (int k = 0; k < 3 && done && !is_zero(text->origin); k++)
     done = qmat_gltf_set(extras, axes[k], json_real(text->origin[k]));
@@ -335,7 +375,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   double origin[3];
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
   qmat_status status = make_medial_text(context, addition->medial, origin, &options, &text);
-  const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, text.loss);
+  const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
   const double skin_moved = options.compress_skin ? fmax(options.quantisation, DBL_MIN) : 0;
   if (status == QMAT_OK && mesh) status = qmat_gltf_skin_put(context, mesh, origin, skin_moved, &data, &document->data);
   json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, &stated) : NULL;
@@ -350,6 +390,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   if (options.stated) *options.stated = stated;
   json_decref(extras);
   qmat_free(text.base64);
+  qmat_free(text.flat);
   return status;
 }
 

@@ -6,6 +6,14 @@
 
 #include "io/stored_medial.h"
 
+/* How the plain form of a medial mesh (qmat_flat) stores coordinates and radii. */
+typedef enum qmat_flat_form {
+  QMAT_FLAT_AUTO,  /* 16 bits where they suffice for `quantisation`, else single precision */
+  QMAT_FLAT_SHORT, /* 16 bits */
+  QMAT_FLAT_FLOAT, /* single precision */
+  QMAT_FLAT_NONE   /* there is no plain form */
+} qmat_flat_form;
+
 /* How to write a medial mesh, and its known errors. */
 typedef struct qmat_gltf_options {
   bool binary;                /* write a .glb; else a .gltf with its data as base64 */
@@ -13,7 +21,8 @@ typedef struct qmat_gltf_options {
   bool compress_skin;         /* require KHR_draco_mesh_compression: smaller, but some engines reject it */
   int position_bits;          /* 1 to 30; 0: chosen from `quantisation` */
   int radius_bits;            /* the same */
-  double quantisation;        /* allowed error of storage, model units; used if bits are 0 */
+  qmat_flat_form flat;        /* of qmat_flat */
+  double quantisation;        /* allowed error of storage, model units; used if bits are 0, and by QMAT_FLAT_AUTO */
   const char *name;           /* of the node and the mesh, UTF-8; NULL or "": none */
   double meters_per_unit;     /* of the medial mesh, for a new asset; 0: unknown, taken for 1 */
   bool is_z_up;               /* the same; else y is up */
@@ -31,13 +40,17 @@ typedef struct qmat_gltf_options {
  *      qmat_data_format  "draco"
  *      qmat_vertices, qmat_edges, qmat_triangles     counts of the medial mesh
  *      qmat_epsilon      as in the options; missing when not known
- *      qmat_error_out    the errors of what qmat_data decodes to (qmat_errors_after_move); missing when not known
+ *      qmat_error_out    the errors of what qmat_data and qmat_flat decode to (qmat_errors_after_move), the larger of
+ *                        the two; missing when not known
  *      qmat_error_in
  *      qmat_error_unit   "diagonal"; with the three above
  *      qmat_certified    whether both are certified to be at most qmat_epsilon; missing when not known
  *      qmat_quantisation       the largest |dc| + |dr| between a sphere of `medial` and the same sphere in qmat_data
  *      qmat_quantisation_unit  "model"
  *      qmat_position_bits, qmat_radius_bits
+ *      qmat_flat         the same medial mesh as plain numbers: base64 of the output of qmat_flat_encode
+ *      qmat_flat_format  "u16" or "f32"
+ *      qmat_flat_quantisation  the same for qmat_flat
  *      qmat_frame        "node": spheres are in the node's local space, like the skin
  *      qmat_origin_x, qmat_origin_y, qmat_origin_z   the origin of that space in the space of `medial`; missing if zero
  * Single precision is too coarse far from zero. There the node is translated to the origin of qmat_storage_origin, and

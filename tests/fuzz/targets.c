@@ -11,6 +11,7 @@
 #include "io/base64.h"
 #include "io/draco.h"
 #include "io/extract.h"
+#include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
@@ -130,6 +131,29 @@ static void read_draco(const uint8_t *content, size_t size) {
     qmat_free(encoded);
     qmat_value_release(&medial->base);
   }
+  free(bytes.data);
+  qmat_context_uninit(&context);
+}
+
+/* What can be decoded can be encoded again. */
+static void read_flat(const uint8_t *content, size_t size) {
+  qmat_context context = {0};
+  qmat_bytes bytes = memory_file(content, size);
+  qmat_medial *medial = NULL, *again = NULL;
+  require_explained(&context, qmat_flat_decode(&context, bytes.data, size, NULL, &medial));
+  for (int floats = 0; medial && floats < 2; floats++) {
+    uint8_t *encoded = NULL;
+    size_t encoded_size = 0;
+    const qmat_status status = qmat_flat_encode(&context, medial, NULL, NULL, floats, &encoded, &encoded_size);
+    require_explained(&context, status);
+    if (status == QMAT_OK) {
+      require(qmat_flat_decode(&context, encoded, encoded_size, NULL, &again) == QMAT_OK);
+      require(again->edge_count == medial->edge_count && again->triangle_count == medial->triangle_count);
+      qmat_value_release(&again->base);
+    }
+    qmat_free(encoded);
+  }
+  if (medial) qmat_value_release(&medial->base);
   free(bytes.data);
   qmat_context_uninit(&context);
 }
@@ -390,15 +414,12 @@ static void read_record(const uint8_t *content, size_t size) {
 /* ---- the table ---- */
 
 const fuzz_target fuzz_targets[] = {
-    {"off", read_off},       {"obj", read_obj},
-    {"ply", read_ply},       {"stl", read_stl},
-    {"ma", read_ma},         {"gltf", read_gltf},
-    {"glb", read_gltf},      {"draco", read_draco},
-    {"extras", read_extras}, {"base64", read_base64},
-    {"usda", read_usd},      {"usdc", read_usd},
-    {"usdz", read_usd},      {"usdc-tables", read_crate_tables},
-    {"graph", read_graph},   {"value", read_value},
-    {"record", read_record},
+    {"off", read_off},       {"obj", read_obj},       {"ply", read_ply},
+    {"stl", read_stl},       {"ma", read_ma},         {"gltf", read_gltf},
+    {"glb", read_gltf},      {"draco", read_draco},   {"flat", read_flat},
+    {"extras", read_extras}, {"base64", read_base64}, {"usda", read_usd},
+    {"usdc", read_usd},      {"usdz", read_usd},      {"usdc-tables", read_crate_tables},
+    {"graph", read_graph},   {"value", read_value},   {"record", read_record},
 };
 const size_t fuzz_target_count = sizeof fuzz_targets / sizeof fuzz_targets[0];
 

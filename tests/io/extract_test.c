@@ -210,11 +210,44 @@ static void test_broken_data_and_wrong_counts_are_errors(void **state) {
   assert_null(read);
   assert_int_equal(context.error.element, 0);
   json_object_del(extras_of(root, 0), "qmat_data");
+  json_object_del(extras_of(root, 0), "qmat_flat");
   assert_fails(root, NULL, QMAT_ERROR_GEOMETRY, "no node has a medial mesh");
   static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
   assert_int_equal(extract_from(&context, "a.off", off, sizeof off - 1, NULL, &read, NULL), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.message, "OFF does not carry medial meshes");
   json_decref(root);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_the_plain_form_is_read_alone_and_compared_beside_draco(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = example_medial(200), *other = example_medial(20), *read;
+  json_t *root = write_gltf(medial), *other_root = write_gltf(other), *extras = extras_of(root, 0);
+  json_t *draco = json_incref(json_object_get(extras, "qmat_data")), *facts = json_object();
+  json_object_del(extras, "qmat_data");
+  assert_int_equal(extract_json(&context, root, NULL, &read, facts), QMAT_OK);
+  assert_int_equal(read->sphere_count, medial->sphere_count);
+  assert_memory_equal(read->edges, medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
+  assert_memory_equal(read->triangles, medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
+  const double stated = json_number_value(json_object_get(facts, "qmat_flat_quantisation"));
+  assert_true(stated > 0 && stated <= 1e-4);
+  assert_true(largest_move(medial, read) <= stated * (1 + 1e-12));
+  assert_null(json_object_get(facts, "qmat_flat"));
+  qmat_value_release(&read->base);
+  /* Draco data of the same mesh, whose radii the plain form does not have. */
+  json_object_set_new(extras, "qmat_data", draco);
+  json_object_set_new(extras, "qmat_quantisation", json_real(1e-9));
+  json_object_set_new(extras, "qmat_flat_quantisation", json_real(1e-9));
+  static const char different[] = "qmat_data and qmat_flat are different medial meshes";
+  assert_fails(root, NULL, QMAT_ERROR_FORMAT, different);
+  json_object_set(extras, "qmat_flat", json_object_get(extras_of(other_root, 0), "qmat_flat"));
+  assert_fails(root, NULL, QMAT_ERROR_FORMAT, different);
+  json_decref(facts);
+  json_decref(other_root);
+  json_decref(root);
+  qmat_value_release(&other->base);
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);
 }
@@ -265,6 +298,7 @@ int main(void) {
       cmocka_unit_test(test_what_was_written_comes_back_with_its_facts),
       cmocka_unit_test(test_every_form_gives_back_what_was_written_within_what_it_states),
       cmocka_unit_test(test_of_several_one_has_to_be_named),
+      cmocka_unit_test(test_the_plain_form_is_read_alone_and_compared_beside_draco),
       cmocka_unit_test(test_carriers_are_told_apart_by_what_names_them),
       cmocka_unit_test(test_broken_data_and_wrong_counts_are_errors),
   };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/model.h"
+#include "io/extract.h"
 
 #include "io/mesh/ma.h"
 #include "io/save.h"
@@ -188,22 +189,22 @@ static void test_a_failure_after_reading_leaves_no_values(void **state) {
   assert_not_read("a.obj", "v 0 0 0\n", 8, QMAT_ERROR_GEOMETRY, "the file has vertices but no facets", "");
 }
 
-static void test_a_medial_mesh_is_read_only_from_its_own_format(void **state) {
+static void test_a_medial_mesh_is_not_read_from_a_file_of_another_format(void **state) {
   (void)state;
   char path[128];
   qmat_context context = {0};
   qmat_medial *medial;
   snprintf(path, sizeof path, "%s/a.ma", folder);
-  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_ERROR_IO);
+  assert_int_equal(qmat_medial_extract(&context, path, NULL, &medial, NULL), QMAT_ERROR_IO);
   assert_null(medial);
   write_file(path, "1 0 0\nv 0 0 0 1\n", 16);
-  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_OK);
+  assert_int_equal(qmat_medial_extract(&context, path, NULL, &medial, NULL), QMAT_OK);
   assert_int_equal(medial->sphere_count, 1);
   qmat_value_release(&medial->base);
   write_file(path, off, strlen(off));
-  assert_int_equal(qmat_medial_read(&context, path, &medial), QMAT_ERROR_FORMAT);
+  assert_int_equal(qmat_medial_extract(&context, path, NULL, &medial, NULL), QMAT_ERROR_FORMAT);
   assert_null(medial);
-  assert_string_equal(context.error.message, "the content is OFF, not a medial mesh (MA)");
+  assert_string_equal(context.error.message, "the extension says MA, but the content is OFF");
   unlink(path);
   qmat_context_uninit(&context);
 }
@@ -290,7 +291,7 @@ static void test_a_shortage_of_memory_while_a_medial_mesh_is_read_written_or_sav
     qmat_medial *medial;
     qmat_file *file = NULL;
     allocations_left = granted;
-    status = qmat_medial_read(&context, path, &medial);
+    status = qmat_medial_extract(&context, path, NULL, &medial, NULL);
     if (status == QMAT_OK) status = qmat_ma_write(&context, medial, &file);
     if (status == QMAT_OK) {
       status = qmat_file_save(&context, file, path);
@@ -316,7 +317,7 @@ int main(void) {
       cmocka_unit_test(test_a_wrong_extension_is_an_error_that_names_the_content),
       cmocka_unit_test(test_what_is_not_read_is_refused_by_name),
       cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),
-      cmocka_unit_test(test_a_medial_mesh_is_read_only_from_its_own_format),
+      cmocka_unit_test(test_a_medial_mesh_is_not_read_from_a_file_of_another_format),
       cmocka_unit_test(test_looking_at_any_bytes_is_safe),
       cmocka_unit_test(test_a_shortage_of_memory_at_any_point_is_reported_and_leaks_nothing),
       cmocka_unit_test(test_a_shortage_of_memory_while_a_medial_mesh_is_read_written_or_saved_leaks_nothing),

@@ -14,6 +14,7 @@
 #include "io/base64.h"
 #include "io/draco.h"
 #include "io/draco_draco.h"
+#include "io/flat_medial.h"
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_write.h"
 #include "io/stored_medial.h"
@@ -243,6 +244,54 @@ static void test_extras_are_flat_and_leave_out_what_is_not_known(void **state) {
   options.errors.certified = QMAT_CERTIFICATE_NO;
   w = write_file(medial, NULL, &options);
   assert_true(json_is_false(extra(&w, "qmat_certified")));
+  close_file(&w);
+  qmat_value_release(&medial->base);
+}
+
+/* The medial mesh in qmat_flat, which `w` has. */
+static qmat_medial *decode_flat(const written *w) {
+  qmat_context context = {0};
+  const char *text = json_string_value(extra(w, "qmat_flat"));
+  assert_non_null(text);
+  uint8_t *bytes;
+  size_t size;
+  qmat_medial *medial;
+  assert_int_equal(qmat_base64_decode(&context, text, strlen(text), &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_flat_decode(&context, bytes, size, NULL, &medial), QMAT_OK);
+  qmat_free(bytes);
+  qmat_context_uninit(&context);
+  return medial;
+}
+
+static void test_the_plain_form_has_the_numbers_that_were_asked_for_and_counts_in_the_errors(void **state) {
+  (void)state;
+  static const qmat_flat_form forms[] = {QMAT_FLAT_AUTO, QMAT_FLAT_AUTO, QMAT_FLAT_SHORT, QMAT_FLAT_FLOAT};
+  static const double allowed[] = {1e-3, 1e-5, 1e-5, 1e-3};
+  static const char *const named[] = {"u16", "f32", "u16", "f32"};
+  qmat_medial *medial = example_medial(200);
+  qmat_gltf_options options = usual_options();
+  options.errors.diagonal = 20;
+  for (size_t i = 0; i < 4; i++) {
+    options.flat = forms[i];
+    options.quantisation = allowed[i];
+    written w = write_file(medial, NULL, &options);
+    qmat_medial *flat = decode_flat(&w);
+    assert_string_equal(json_string_value(extra(&w, "qmat_flat_format")), named[i]);
+    const double stated = json_real_value(extra(&w, "qmat_flat_quantisation")),
+                 draco = json_real_value(extra(&w, "qmat_quantisation"));
+    assert_near(stated, qmat_medial_move(medial, flat), 0);
+    if (forms[i] == QMAT_FLAT_AUTO) assert_true(stated <= allowed[i]);
+    /* Both forms are within the errors that the file states. */
+    assert_near(json_real_value(extra(&w, "qmat_error_out")), 0.007 + fmax(stated, draco) / 20, 1e-15);
+    assert_near(json_real_value(extra(&w, "qmat_error_in")), 0.009 + fmax(stated, draco) / 20, 1e-15);
+    if (forms[i] == QMAT_FLAT_SHORT) assert_true(stated > draco);
+    qmat_value_release(&flat->base);
+    close_file(&w);
+  }
+  options.flat = QMAT_FLAT_NONE;
+  written w = write_file(medial, NULL, &options);
+  static const char *const absent[] = {"qmat_flat", "qmat_flat_format", "qmat_flat_quantisation"};
+  for (size_t i = 0; i < 3; i++) assert_null(extra(&w, absent[i]));
   close_file(&w);
   qmat_value_release(&medial->base);
 }
@@ -596,6 +645,7 @@ int main(void) {
       cmocka_unit_test(test_the_medial_mesh_comes_back_within_the_stated_quantisation),
       cmocka_unit_test(test_given_bits_are_taken_and_chosen_ones_are_no_waste),
       cmocka_unit_test(test_extras_are_flat_and_leave_out_what_is_not_known),
+      cmocka_unit_test(test_the_plain_form_has_the_numbers_that_were_asked_for_and_counts_in_the_errors),
       cmocka_unit_test(test_without_a_skin_there_is_a_node_and_no_empty_array),
       cmocka_unit_test(test_the_skin_is_a_plain_mesh_with_exact_bounds),
       cmocka_unit_test(test_other_units_and_z_up_become_metres_and_y_up),
