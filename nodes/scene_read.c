@@ -57,7 +57,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   return QMAT_OK;
 }
 
-static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_library_tinygltf, NULL};
+static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_library_meshoptimizer,
+                                                &qmat_library_tinygltf, NULL};
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",

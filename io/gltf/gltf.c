@@ -55,7 +55,7 @@ static qmat_status read_triangles(qmat_context *context, const qmat_gltf_documen
   for (size_t i = 0; i < document->buffer_count; i++)
     buffers[i] = (qmat_gltf_bytes){.bytes = document->buffers[i].bytes, .size = document->buffers[i].size};
   target to = {.context = context, .soups = soups};
-  size_t most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * document->data_size;
+  size_t most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * (document->data_size + document->decoded_size);
   qmat_status status = qmat_gltf_triangles(context, document->text, document->text_length, buffers, most, meshes,
                                            mesh_count, add_to_soup, &to, &counts);
   if (status == QMAT_OK) status = add_report(context, &counts, meshes == NULL, document->extensions_ignored, report);

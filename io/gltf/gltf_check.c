@@ -15,6 +15,7 @@ static bool geometry_is_safe_with(const char *extension) {
   static const char *const known[] = {
       "KHR_draco_mesh_compression",
       "KHR_mesh_quantization",
+      "EXT_meshopt_compression",
       "KHR_texture_transform",
       "KHR_texture_basisu",
       "EXT_texture_webp",
@@ -50,8 +51,8 @@ static qmat_status check_extensions(const qmat_gltf_checker *check) {
     if (!geometry_is_safe_with(name)) {
       qmat_gltf_fail(check, NULL, 0, "the required extension %.100s is not supported", name);
       return qmat_fail_hint(check->context,
-                            "supported: KHR_draco_mesh_compression, KHR_mesh_quantization, and extensions of "
-                            "materials, textures, lights and metadata");
+                            "supported: KHR_draco_mesh_compression, EXT_meshopt_compression, KHR_mesh_quantization, "
+                            "and extensions of materials, textures, lights and metadata");
     }
   }
   for (size_t i = 0; i < json_array_size(used); i++) {

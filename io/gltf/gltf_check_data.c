@@ -5,6 +5,7 @@
 
 #include "core/arena.h"
 #include "io/base64.h"
+#include "io/gltf/gltf_check_meshopt.h"
 #include "io/gltf/gltf_uri.h"
 
 #define MOST_BUFFERS 4096
@@ -19,7 +20,7 @@ static qmat_status load_external(const qmat_gltf_checker *check, size_t index, c
   const json_t *all = json_object_get(check->root, "buffers");
   for (size_t i = 0; i < index; i++) { /* several buffers may name one file */
     const char *other = json_string_value(json_object_get(json_array_get(all, i), "uri"));
-    if (other && strcmp(other, uri) == 0) {
+    if (other && strcmp(other, uri) == 0 && !check->document->buffers[i].is_placeholder) {
       buffer->bytes = check->document->buffers[i].bytes;
       buffer->size = check->document->buffers[i].file.size;
       return QMAT_OK;
@@ -62,7 +63,8 @@ static qmat_status load_buffers(const qmat_gltf_checker *check) {
   json_t *array = json_object_get(check->root, "buffers");
   size_t count = json_array_size(array);
   if (count > MOST_BUFFERS) return qmat_gltf_fail(check, NULL, 0, "%zu buffers; the limit is %d", count, MOST_BUFFERS);
-  check->document->buffers = qmat_calloc(count, sizeof *check->document->buffers);
+  const size_t view_count = json_array_size(json_object_get(check->root, "bufferViews"));
+  check->document->buffers = qmat_calloc(count + view_count, sizeof *check->document->buffers);
   if (!check->document->buffers) return qmat_gltf_fail_memory(check);
   check->document->buffer_count = count;
   for (size_t i = 0; i < count; i++) {
@@ -72,8 +74,15 @@ static qmat_status load_buffers(const qmat_gltf_checker *check) {
     qmat_status status = qmat_gltf_take_whole(check, object, "byteLength", "buffer", i, 1, UINT32_MAX, &length, NULL);
     if (status != QMAT_OK) return status;
     if (uri && !json_is_string(uri)) return qmat_gltf_fail(check, "buffer", i, "uri must be a string");
-    if (!uri) {
-      if (i > 0 || !check->asset.chunk) return qmat_gltf_fail(check, "buffer", i, "has no uri and no GLB chunk");
+    const bool is_chunk = !uri && i == 0 && check->asset.chunk;
+    status = qmat_gltf_check_placeholder(check, i, object, &buffer->is_placeholder);
+    if (status != QMAT_OK) return status;
+    buffer->is_placeholder = !is_chunk && (!uri || buffer->is_placeholder); /* some writers do not mark them */
+    if (buffer->is_placeholder) {
+      buffer->size = (size_t)length;
+      continue;
+    }
+    if (is_chunk) {
       buffer->bytes = check->asset.chunk;
       buffer->size = check->asset.chunk_size;
     } else if (strncmp(json_string_value(uri), "data:", 5) == 0) {
@@ -117,6 +126,8 @@ static qmat_status check_views(qmat_gltf_checker *check) {
       return qmat_gltf_fail(check, "bufferView", i, "bytes %lld to %lld lie outside buffer %lld of %zu bytes",
                             (long long)offset, (long long)(offset + length), (long long)buffer, size);
     }
+    status = qmat_gltf_check_meshopt(check, i, object, &length);
+    if (status != QMAT_OK) return status;
     check->views[i] = (qmat_gltf_view){.size = length, .stride = stride};
     qmat_gltf_keep_keys(object, keys);
   }

@@ -8,6 +8,7 @@
 #include "io/bytes.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_keep.h"
+#include "io/gltf/gltf_meshopt.h"
 #include "io/gltf/gltf_uri.h"
 
 /* ---- embedding files in the chunk ---- */
@@ -102,6 +103,8 @@ static bool place_buffers(const embedder *e, size_t view_count, json_int_t *numb
     if (e->buffer[i] >= 0) first = json_incref(json_array_get(old, i));
   if (!first) first = json_object();
   json_object_del(first, "uri");
+  json_object_del(json_object_get(first, "extensions"), QMAT_GLTF_MESHOPT); /* it is no placeholder any more */
+  if (json_object_size(json_object_get(first, "extensions")) == 0) json_object_del(first, "extensions");
   bool done = qmat_gltf_set(first, "byteLength", json_integer((json_int_t)e->chunk.size));
   done = json_array_append_new(buffers, first) == 0 && done;
   for (size_t i = 0; i < e->buffer_count; i++) {

@@ -2,6 +2,7 @@
 #include "nodes/descriptor/libraries.h"
 
 #include <embree3/rtcore.h>
+#include <meshoptimizer.h>
 #include <stdio.h>
 
 #include "nodes/mesh/subdivision_osd.h"
@@ -12,6 +13,10 @@ static void describe_cgal(char *text, size_t size) {
 
 static void describe_draco(char *text, size_t size) {
   snprintf(text, size, "%s", QMAT_DRACO_VERSION);
+}
+
+static void describe_meshoptimizer(char *text, size_t size) {
+  snprintf(text, size, "%d.%d", MESHOPTIMIZER_VERSION / 1000, MESHOPTIMIZER_VERSION % 1000 / 10);
 }
 
 static void describe_tinygltf(char *text, size_t size) {
@@ -53,5 +58,6 @@ static void describe_embree(char *text, size_t size) {
 const qmat_library qmat_library_cgal = {.name = "CGAL", .describe = describe_cgal};
 const qmat_library qmat_library_draco = {.name = "Draco", .describe = describe_draco};
 const qmat_library qmat_library_embree = {.name = "Embree", .describe = describe_embree};
+const qmat_library qmat_library_meshoptimizer = {.name = "meshoptimizer", .describe = describe_meshoptimizer};
 const qmat_library qmat_library_opensubdiv = {.name = "OpenSubdiv", .describe = describe_opensubdiv};
 const qmat_library qmat_library_tinygltf = {.name = "tinygltf", .describe = describe_tinygltf};

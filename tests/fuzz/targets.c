@@ -13,6 +13,7 @@
 #include "io/extract.h"
 #include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_meshopt.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/mesh_formats.h"
@@ -154,6 +155,27 @@ static void read_flat(const uint8_t *content, size_t size) {
     qmat_free(encoded);
   }
   if (medial) qmat_value_release(&medial->base);
+  free(bytes.data);
+  qmat_context_uninit(&context);
+}
+
+/* The input is the mode, the filter, the stride, the count in two bytes, and the data. */
+static void read_meshopt(const uint8_t *content, size_t size) {
+  enum { HEAD = 5 };
+  if (size < HEAD) return;
+  qmat_context context = {0};
+  qmat_bytes bytes = memory_file(content + HEAD, size - HEAD);
+  const qmat_meshopt_view view = {.bytes = bytes.data,
+                                  .size = bytes.size,
+                                  .mode = (qmat_meshopt_mode)(content[0] % 3),
+                                  .filter = (qmat_meshopt_filter)(content[1] % 4),
+                                  .stride = content[2],
+                                  .count = content[3] + 256u * content[4]};
+  uint8_t *decoded = NULL;
+  const qmat_status status = qmat_meshopt_decode(&context, &view, &decoded);
+  require_explained(&context, status);
+  require((status == QMAT_OK) == (decoded != NULL));
+  qmat_free(decoded);
   free(bytes.data);
   qmat_context_uninit(&context);
 }
@@ -414,12 +436,13 @@ static void read_record(const uint8_t *content, size_t size) {
 /* ---- the table ---- */
 
 const fuzz_target fuzz_targets[] = {
-    {"off", read_off},       {"obj", read_obj},       {"ply", read_ply},
-    {"stl", read_stl},       {"ma", read_ma},         {"gltf", read_gltf},
-    {"glb", read_gltf},      {"draco", read_draco},   {"flat", read_flat},
-    {"extras", read_extras}, {"base64", read_base64}, {"usda", read_usd},
-    {"usdc", read_usd},      {"usdz", read_usd},      {"usdc-tables", read_crate_tables},
-    {"graph", read_graph},   {"value", read_value},   {"record", read_record},
+    {"off", read_off},         {"obj", read_obj},       {"ply", read_ply},
+    {"stl", read_stl},         {"ma", read_ma},         {"gltf", read_gltf},
+    {"glb", read_gltf},        {"draco", read_draco},   {"flat", read_flat},
+    {"extras", read_extras},   {"base64", read_base64}, {"usda", read_usd},
+    {"usdc", read_usd},        {"usdz", read_usd},      {"usdc-tables", read_crate_tables},
+    {"graph", read_graph},     {"value", read_value},   {"record", read_record},
+    {"meshopt", read_meshopt},
 };
 const size_t fuzz_target_count = sizeof fuzz_targets / sizeof fuzz_targets[0];
 
