@@ -108,8 +108,7 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
     const double interval = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
     const double tolerance = search < FIRST_CLOSE_SEARCH ? interval : interval / 16;
     qmat_hausdorff_bound bound;
-    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, e->unit.spheres, known, tolerance,
-                                          INFINITY, &bound);
+    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, &bound);
     e->surface_to_envelope = (qmat_bounds){bound.found, fmax(bound.bound, bound.found)};
     known = bound.found;
     if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
@@ -264,7 +263,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 5,
+    .version = 6,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

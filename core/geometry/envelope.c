@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_distance.h"
+#include "core/geometry/vector.h"
 #include "core/value_check.h"
 
 /* LEAF_SIZE: the most primitives of a leaf. Median splits halve the count, so the depth stays below 64. */
@@ -378,6 +379,16 @@ double qmat_envelope_distance(const qmat_envelope *envelope, const double point[
   envelope_item nearest = {0, 0};
   double distance = search(envelope, point, INFINITY, -INFINITY, &nearest);
   if (primitive) *primitive = nearest.primitive;
+  return distance;
+}
+
+double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3], const double corners[][3], int count,
+                           double *bound) {
+  envelope_item nearest = {0, 0};
+  const double distance = search(envelope, point, INFINITY, -INFINITY, &nearest);
+  *bound = distance < INFINITY ? -INFINITY : INFINITY;
+  if (!(distance < INFINITY)) return distance;
+  for (int i = 0; i < count; i++) *bound = qmat_larger(*bound, item_distance(envelope, nearest, corners[i]));
   return distance;
 }
 

@@ -42,6 +42,12 @@ int qmat_envelope_primitive(const qmat_envelope *envelope, size_t primitive, uin
  * primitive that attains it. Cost: O(log n) for a point near the boundary when primitives overlap little. */
 double qmat_envelope_distance(const qmat_envelope *envelope, const double point[3], size_t *primitive);
 
+/* F(point), and in `*bound` an upper bound of F over the convex hull of `count` corners (3 doubles each): the largest
+ * distance of a corner to the primitive that attains F(point), since the distance to one primitive is convex. INFINITY
+ * for both when there is no primitive. */
+double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3], const double corners[][3], int count,
+                           double *bound);
+
 /* F(point) and the medial sphere (4 doubles: centre, radius) that attains it. The gradient of F is the unit vector from
  * that centre to the point. `primitive` as above. Without primitives `sphere` is unchanged. */
 double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3], size_t *primitive, double sphere[4]);

@@ -260,6 +260,10 @@ double qmat_surface_distance(const qmat_surface *surface, const double point[3],
   return qmat_triangle_blocks_distance(surface->blocks, point, limit, closest, triangle);
 }
 
+double qmat_surface_distance_to_triangle(const qmat_surface *surface, const double point[3], uint32_t triangle) {
+  return qmat_triangle_blocks_distance_to(surface->blocks, triangle, point);
+}
+
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]) {
   const double distance = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
   return qmat_surface_inside(surface, point) ? -distance : distance;

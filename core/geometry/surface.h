@@ -41,6 +41,9 @@ void qmat_surface_inside_many(const qmat_surface *surface, const double *points,
 double qmat_surface_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
                              uint32_t *triangle);
 
+/* The distance to one triangle of the surface. It is a convex function of the point, unlike the distance to all. */
+double qmat_surface_distance_to_triangle(const qmat_surface *surface, const double point[3], uint32_t triangle);
+
 /* The same distance without limit, negative inside the solid (see qmat_surface_inside). */
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]);
 

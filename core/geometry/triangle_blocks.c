@@ -99,6 +99,11 @@ static double closest_on_triangle(const qmat_triangle_blocks *blocks, uint32_t t
   return height / square * height;
 }
 
+double qmat_triangle_blocks_distance_to(const qmat_triangle_blocks *blocks, uint32_t triangle, const double point[3]) {
+  double closest[3];
+  return sqrt(closest_on_triangle(blocks, triangle, point, INFINITY, closest));
+}
+
 /* --- the nearest ------------------------------------------------------------------------------------------------ */
 
 typedef struct nearest_query {

@@ -28,4 +28,7 @@ void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks);
 double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const double point[3], double limit,
                                      double *closest, uint32_t *triangle);
 
+/* The distance to one triangle, by its number. */
+double qmat_triangle_blocks_distance_to(const qmat_triangle_blocks *blocks, uint32_t triangle, const double point[3]);
+
 #endif

@@ -115,11 +115,16 @@ typedef struct finding {
   bool maybe_exposed; /* `place` is farther than epsilon, and may or may not be on the boundary */
 } finding;
 
-/* Whether no point within `reach` of the middle lies on the boundary. The middle of a piece of a feature is never
- * outside of the envelope. */
-static bool is_off_boundary(const search *s, bool is_cell, const double middle[3], double reach) {
-  if (qmat_envelope_holds(s->envelope, middle, reach + QMAT_BOUNDARY_SKIN)) return true;
-  return is_cell && qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
+/* Whether no point of the piece lies on the boundary. The middle of a piece of a feature is never outside of the
+ * envelope. */
+static bool is_off_boundary(const search *s, const qmat_boundary_piece *p, const double middle[3], double reach) {
+  if (p->feature == QMAT_CELL)
+    return qmat_envelope_holds(s->envelope, middle, reach + QMAT_BOUNDARY_SKIN) ||
+           qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
+  double points[4][3], bulge, bound;
+  const int count = qmat_boundary_piece_hull(s->features, p, points, &bulge);
+  const double f = qmat_envelope_bound(s->envelope, middle, (const double(*)[3])points, count, &bound);
+  return qmat_smaller(f + reach, bound + bulge) < -QMAT_BOUNDARY_SKIN;
 }
 
 /* Moves a cell's middle to the surface of its nearest medial sphere. */
@@ -140,30 +145,48 @@ static void raise_lower_bound(const search *s, bool is_cell, double middle[3], u
     result->found[OUTSIDE] = result->found[EITHER_SIDE];
 }
 
-/* Compares the piece, a ball around `middle`, with the targets. What is still wanted afterwards is `*wanted`; a piece
- * off the boundary counts for nothing. */
-static finding evaluate_ball(const search *s, bool is_cell, double middle[3], double reach, uint8_t *wanted) {
-  finding result = {.children = 0};
-  const uint8_t before = *wanted;
-  /* With one bound to prove, a distance beyond the target need not be exact. */
-  const bool is_short = !s->last && before == WANT_EITHER_SIDE;
-  double d = qmat_surface_distance(s->surface, middle, is_short ? s->target[0] - reach : INFINITY, NULL, NULL);
-  const double bound = d + reach;
-  result.undecided =
-      bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (before & WANT_EITHER_SIDE);
+/* An upper bound over a piece: the distance to one triangle is convex, so over a hull its maximum is at a corner. */
+static double hull_bound(const search *s, const qmat_boundary_piece *p, uint32_t triangle) {
+  double points[4][3], bulge, bound = 0;
+  const int count = qmat_boundary_piece_hull(s->features, p, points, &bulge);
+  if (count == 0) return INFINITY;
+  for (int i = 0; i < count; i++)
+    bound = qmat_larger(bound, qmat_surface_distance_to_triangle(s->surface, points[i], triangle));
+  return bound + bulge;
+}
+
+/* Finishes what the piece is wanted for and `bound` proves. */
+static void finish_with(const search *s, double bound, uint8_t *wanted, finding *result) {
+  result->undecided =
+      bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (*wanted & WANT_EITHER_SIDE);
   for (int i = 0; i < BOUND_COUNT; i++)
-    if ((before >> i & 1) && bound <= s->target[i]) {
-      result.bound[i] = bound;
+    if ((*wanted >> i & 1) && bound <= s->target[i]) {
+      result->bound[i] = bound;
       *wanted &= (uint8_t) ~(1 << i);
     }
+}
+
+/* Compares the piece, in a ball around `middle`, with the targets. What is still wanted afterwards is `*wanted`; a
+ * piece off the boundary counts for nothing. */
+static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, double middle[3], double reach,
+                             uint8_t *wanted) {
+  finding result = {.children = 0};
+  const bool is_cell = p->feature == QMAT_CELL;
+  /* With one bound to prove, a distance beyond the target need not be exact. */
+  const bool is_short = !s->last && *wanted == WANT_EITHER_SIDE;
+  const double limit = is_short ? s->target[0] - reach : INFINITY;
+  uint32_t triangle = 0;
+  double d = limit > 0 ? qmat_surface_distance(s->surface, middle, limit, NULL, &triangle) : INFINITY;
+  finish_with(s, d + reach, wanted, &result);
   if (!*wanted && !result.undecided) return result;
-  if (is_off_boundary(s, is_cell, middle, reach)) {
+  if (is_off_boundary(s, p, middle, reach)) {
     *wanted = 0;
     return (finding){.children = 0};
   }
+  if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, &triangle);
+  if (*wanted) finish_with(s, hull_bound(s, p, triangle), wanted, &result);
   if (result.undecided) memcpy(result.place, middle, sizeof result.place);
   if (!*wanted) return result;
-  if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, NULL);
   const bool inside = (*wanted & WANT_OUTSIDE) && qmat_surface_inside(s->surface, middle);
   if (inside && d > reach) *wanted &= WANT_EITHER_SIDE;
   if (d > qmat_smaller(s->lo[0], s->epsilon) || ((*wanted & WANT_OUTSIDE) && !inside && d > s->lo[1]))
@@ -183,9 +206,9 @@ static finding evaluate(const search *s, const qmat_boundary_piece *p) {
   const bool is_cell = p->feature == QMAT_CELL;
   uint8_t wanted = p->wanted;
   if (!qmat_boundary_piece_ball(s->features, p, middle, &reach)) return result;
-  if (s->last || reach < s->target[0])
-    result = evaluate_ball(s, is_cell, middle, reach, &wanted);
-  else if (is_off_boundary(s, is_cell, middle, reach))
+  if (s->last || reach < s->target[0] || !is_cell)
+    result = evaluate_ball(s, p, middle, reach, &wanted);
+  else if (is_off_boundary(s, p, middle, reach))
     return result;
   result.wanted = wanted;
   if (wanted) result.children = qmat_boundary_piece_child_count(s->features, p);

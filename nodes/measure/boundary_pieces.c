@@ -154,6 +154,55 @@ bool qmat_boundary_piece_ball(const qmat_boundary_features *f, const qmat_bounda
   }
 }
 
+/* ---- the hull of a piece ---- */
+
+/* A unit normal n of the patch is h / |h| for a point h of the triangle of the corners, and |h| >= h.m >= the least a.m
+ * over the corners a = 1 - |a - m|^2 / 2, for every unit vector m. */
+static int sphere_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
+                       double *bulge) {
+  const double *sphere = &f->spheres[4 * (size_t)p->feature];
+  double normal[3], spread = 0;
+  for (int k = 0; k < 3; k++) normal[k] = p->at[k] + p->at[3 + k] + p->at[6 + k];
+  qmat_normalize(normal);
+  for (int i = 0; i < 3; i++) {
+    spread = qmat_larger(spread, qmat_point_distance(normal, &p->at[3 * i]));
+    for (int k = 0; k < 3; k++) points[i][k] = sphere[k] + sphere[3] * p->at[3 * i + k];
+  }
+  *bulge = 0.5 * sphere[3] * spread * spread;
+  return 3;
+}
+
+/* A cone side is ruled by lines between two arcs; an arc leaves its chord by its sagitta. */
+static int cone_side_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
+                          double *bulge) {
+  const qmat_cone_side side = cone_side_of(f, p);
+  double radius = 0;
+  for (int i = 0; i < 4; i++) {
+    double sphere[4], normal[3];
+    qmat_cone_side_sphere(&side, p->at[i & 1], sphere);
+    qmat_cone_side_normal(&side, p->at[2 + (i >> 1)], normal);
+    for (int k = 0; k < 3; k++) points[i][k] = sphere[k] + sphere[3] * normal[k];
+    radius = qmat_larger(radius, sphere[3] * side.across);
+  }
+  *bulge = radius * (1 - cos(0.5 * (p->at[3] - p->at[2])));
+  return 4;
+}
+
+int qmat_boundary_piece_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
+                             double *bulge) {
+  *bulge = 0;
+  if (p->feature == QMAT_CELL) return 0;
+  switch (kind_of(f, p)) {
+    case QMAT_FEATURE_SPHERE:
+      return sphere_hull(f, p, points, bulge);
+    case QMAT_FEATURE_CONE_SIDE:
+      return cone_side_hull(f, p, points, bulge);
+    default:
+      memcpy(points, p->at, sizeof p->at);
+      return 3;
+  }
+}
+
 /* ---- the pieces of a piece ---- */
 
 int qmat_boundary_piece_child_count(const qmat_boundary_features *f, const qmat_boundary_piece *p) {

@@ -34,6 +34,10 @@ qmat_boundary_piece qmat_boundary_piece_of_space(const qmat_boundary_features *f
 bool qmat_boundary_piece_ball(const qmat_boundary_features *f, const qmat_boundary_piece *p, double middle[3],
                               double *reach);
 
+/* Points whose convex hull comes within `*bulge` of every point of the piece; returns their number, 0 for a cube. */
+int qmat_boundary_piece_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
+                             double *bulge);
+
 /* How many pieces (2, 4 or 8) a piece is split into, and these; they are wanted for the same. */
 int qmat_boundary_piece_child_count(const qmat_boundary_features *f, const qmat_boundary_piece *p);
 void qmat_boundary_piece_split(const qmat_boundary_features *f, const qmat_boundary_piece *p,

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/medial_distance.h"
 #include "core/geometry/vector.h"
 
 /* Below this, rounding of F exceeds the tolerance. */
@@ -12,43 +11,23 @@ static const double least_tolerance = 1e-6;
 
 typedef struct facet_search {
   const qmat_envelope *envelope;
-  const double *spheres;
   double tolerance;
   double found, bound;          /* the largest F found, and the largest bound of a finished piece */
   double worst, worst_point[3]; /* the largest F found on this facet */
 } facet_search;
 
-/* An upper bound of F over a triangle: the distance to one primitive is convex, so its maximum is at a corner. */
-static double convex_bound(const facet_search *search, size_t primitive, double corners[3][3]) {
-  uint32_t ids[3];
-  const int count = qmat_envelope_primitive(search->envelope, primitive, ids);
-  const double *s[3] = {NULL, NULL, NULL};
-  for (int k = 0; k < count; k++) s[k] = &search->spheres[4 * (size_t)ids[k]];
-  double bound = -INFINITY;
-  qmat_slab slab;
-  qmat_cone cone;
-  if (count == 3) qmat_slab_prepare(&slab, s[0], s[1], s[2]);
-  if (count == 2) qmat_cone_prepare(&cone, s[0], s[1]);
-  for (int i = 0; i < 3; i++)
-    bound = fmax(bound, count == 3   ? qmat_slab_prepared_distance(&slab, corners[i])
-                        : count == 2 ? qmat_cone_prepared_distance(&cone, corners[i])
-                                     : qmat_sphere_distance(s[0], corners[i]));
-  return bound;
-}
-
 static void search_piece(facet_search *search, double corners[3][3]) {
   double centre[3], reach = 0;
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
   for (int i = 0; i < 3; i++) reach = fmax(reach, qmat_point_distance(corners[i], centre));
-  size_t primitive;
-  const double f = qmat_envelope_distance(search->envelope, centre, &primitive);
+  double bound;
+  const double f = qmat_envelope_bound(search->envelope, centre, (const double(*)[3])corners, 3, &bound);
   if (f > search->worst) {
     search->worst = f;
     memcpy(search->worst_point, centre, sizeof centre);
   }
   search->found = fmax(search->found, f);
-  double bound = f + reach;
-  if (bound > search->found + search->tolerance) bound = fmin(bound, convex_bound(search, primitive, corners));
+  bound = fmin(bound, f + reach);
   if (bound <= search->found + search->tolerance || reach <= 0.5 * search->tolerance) {
     search->bound = fmax(search->bound, bound);
     return;
@@ -72,8 +51,8 @@ static void search_piece(facet_search *search, double corners[3][3]) {
 }
 
 qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surface *surface,
-                                         const qmat_envelope *envelope, const double *spheres, double known,
-                                         double tolerance, double threshold, qmat_hausdorff_bound *result) {
+                                         const qmat_envelope *envelope, double known, double tolerance,
+                                         double threshold, qmat_hausdorff_bound *result) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
   const size_t count = mesh->triangle_count, slice = 1 << 12;
@@ -91,7 +70,6 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : bound)
     for (size_t t = first; t < last; t++) {
       facet_search search = {.envelope = envelope,
-                             .spheres = spheres,
                              .tolerance = fmax(tolerance, least_tolerance),
                              .found = known,
                              .bound = -INFINITY,

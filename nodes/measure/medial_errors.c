@@ -53,8 +53,7 @@ qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
   for (size_t i = 0; i < point_count; i++)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
-  status = qmat_hausdorff_bound_measure(context, surface, envelope, unit->spheres, farthest, tolerance, threshold,
-                                        &errors->bound);
+  status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold, &errors->bound);
   errors->surface_to_envelope = errors->bound.bound;
   qmat_envelope_free(envelope);
   return status;
@@ -80,7 +79,7 @@ static size_t keep_inside(const qmat_surface *surface, double *points, size_t co
 }
 
 /* The tolerance of the bound on the boundary, as a share of epsilon. */
-static const double boundary_tolerance = 0.15;
+static const double boundary_tolerance = 0.2;
 
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                          double epsilon, qmat_medial_errors *errors) {

@@ -110,6 +110,42 @@ static void test_the_minimum_matches_brute_force(void **unused) {
   qmat_context_uninit(&context);
 }
 
+/* The bound belongs to the primitive nearest to the point, so that it holds at every point between the corners. */
+static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_one_primitive(void **unused) {
+  (void)unused;
+  qmat_context context = {0};
+  static random_medial m;
+  fill_random(&m, 3);
+  qmat_envelope *envelope = envelope_of(&context, &m);
+  for (size_t i = 0; i < 500; i++) {
+    double corners[3][3], p[3] = {0, 0, 0}, bound;
+    for (size_t c = 0; c < 3; c++)
+      for (size_t k = 0; k < 3; k++) p[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
+    assert_near(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, &bound), brute(&m, p));
+    uint32_t ids[3];
+    size_t primitive;
+    qmat_envelope_distance(envelope, p, &primitive);
+    const int count = qmat_envelope_primitive(envelope, primitive, ids);
+    const double *s[3];
+    for (int k = 0; k < 3; k++) s[k] = &m.spheres[4 * (size_t)ids[k < count ? k : 0]];
+    double wanted = -INFINITY;
+    for (int c = 0; c < 3; c++)
+      wanted = fmax(wanted, count == 3   ? qmat_slab_distance(s[0], s[1], s[2], corners[c])
+                            : count == 2 ? qmat_cone_distance(s[0], s[1], corners[c])
+                                         : qmat_sphere_distance(s[0], corners[c]));
+    assert_near(bound, wanted);
+    for (size_t w = 0; w < 10; w++) {
+      double weights[3], sum = 0, between[3] = {0, 0, 0};
+      for (size_t c = 0; c < 3; c++) sum += weights[c] = number(i, w, c);
+      for (int k = 0; k < 3; k++)
+        for (int c = 0; c < 3; c++) between[k] += weights[c] / sum * corners[c][k];
+      assert_true(brute(&m, between) <= bound + EXACT);
+    }
+  }
+  qmat_envelope_free(envelope);
+  qmat_context_uninit(&context);
+}
+
 static void test_few_spheres_match_brute_force(void **unused) {
   (void)unused;
   qmat_context context = {0};
@@ -186,6 +222,9 @@ static void test_no_primitive_is_infinitely_far(void **unused) {
   assert_true(qmat_envelope_distance(envelope, (double[3]){0, 0, 0}, NULL) == INFINITY);
   assert_true(qmat_envelope_nearest(envelope, (double[3]){0, 0, 0}, NULL, sphere) == INFINITY);
   assert_true(qmat_envelope_distance_within(envelope, (double[3]){0, 0, 0}, 5) == INFINITY);
+  const double corners[1][3] = {{0, 0, 0}};
+  double bound;
+  assert_true(qmat_envelope_bound(envelope, corners[0], corners, 1, &bound) == INFINITY && bound == INFINITY);
   qmat_envelope_free(envelope);
   qmat_envelope_free(NULL);
   qmat_context_uninit(&context);
@@ -232,6 +271,7 @@ static void test_answers_do_not_depend_on_threads(void **unused) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_minimum_matches_brute_force),
+      cmocka_unit_test(test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_one_primitive),
       cmocka_unit_test(test_few_spheres_match_brute_force),
       cmocka_unit_test(test_primitives_are_numbered_slabs_cones_spheres),
       cmocka_unit_test(test_coincident_primitives_are_searched_through),

@@ -153,6 +153,11 @@ static void check_against_brute_force(qmat_mesh *mesh, size_t count) {
     assert_near(sqrt(dot(offset, offset)), distance, 1e-13);
     assert_true(distance_to_triangle(corner(surface, triangle, 0), corner(surface, triangle, 1),
                                      corner(surface, triangle, 2), closest) < 1e-13);
+    const uint32_t other = (uint32_t)(i % mesh->triangle_count);
+    assert_near(
+        qmat_surface_distance_to_triangle(surface, p, other),
+        distance_to_triangle(corner(surface, other, 0), corner(surface, other, 1), corner(surface, other, 2), p),
+        1e-13);
     /* The limit cuts exactly. */
     assert_near(qmat_surface_distance(surface, p, distance, NULL, NULL), distance, 0);
     assert_true(isinf(qmat_surface_distance(surface, p, distance * (1 - 1e-9), NULL, NULL)));

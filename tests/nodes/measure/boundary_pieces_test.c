@@ -73,16 +73,28 @@ static double depth_of(const qmat_medial *medial, const double point[3]) {
   return fmax(depth, -qmat_slab_prepared_distance(&slab, point));
 }
 
+/* A point within `bulge` of a hull is at most that farther in any direction than the farthest corner. */
+static void check_hull(double points[4][3], int count, double bulge, const double point[3], random_numbers *random) {
+  double direction[3], farthest = -INFINITY;
+  for (int k = 0; k < 3; k++) direction[k] = random_between(random, -1, 1);
+  qmat_normalize(direction);
+  for (int i = 0; i < count; i++) farthest = fmax(farthest, qmat_dot(direction, points[i]));
+  assert_true(qmat_dot(direction, point) <= farthest + bulge + ROUNDING);
+}
+
 /* The ball of the piece, and those of a random line of descendants, hold what they should. */
 static void check_piece(const qmat_medial *medial, const qmat_boundary_features *f, qmat_boundary_piece piece,
                         random_numbers *random, size_t *buried) {
   for (int level = 0; level < DEPTH; level++) {
-    double middle[3], reach, point[3];
+    double middle[3], reach, point[3], hull[4][3], bulge;
+    const int corners = qmat_boundary_piece_hull(f, &piece, hull, &bulge);
+    assert_int_equal(corners > 0, piece.feature != QMAT_CELL);
     const bool exposed = qmat_boundary_piece_ball(f, &piece, middle, &reach);
     *buried += !exposed;
     for (int i = 0; i < POINTS; i++) {
       point_of_piece(f, &piece, random, point);
       assert_true(qmat_point_distance(middle, point) <= reach + ROUNDING);
+      if (corners > 0) check_hull(hull, corners, bulge, point, random);
       if (!exposed) assert_true(depth_of(medial, point) >= QMAT_BOUNDARY_SKIN - ROUNDING);
     }
     qmat_boundary_piece children[QMAT_MOST_PIECES];
@@ -91,7 +103,7 @@ static void check_piece(const qmat_medial *medial, const qmat_boundary_features 
   }
 }
 
-static void test_balls_hold_random_pieces_and_only_buried_ones_are_left_out(void **state) {
+static void test_balls_and_hulls_hold_random_pieces_and_only_buried_ones_are_left_out(void **state) {
   (void)state;
   random_numbers random = {.seed = 11};
   size_t checked[3] = {0, 0, 0}, buried = 0;
@@ -117,7 +129,7 @@ static void test_balls_hold_random_pieces_and_only_buried_ones_are_left_out(void
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_balls_hold_random_pieces_and_only_buried_ones_are_left_out),
+      cmocka_unit_test(test_balls_and_hulls_hold_random_pieces_and_only_buried_ones_are_left_out),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
