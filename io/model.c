@@ -284,8 +284,11 @@ static qmat_status read_gltf(qmat_context *context, qmat_format format, const ch
     }
   }
   if (status == QMAT_OK) status = qmat_gltf_keep(context, asset.root, bytes->data, bytes->size, path, scene, warnings);
-  if (status == QMAT_OK && json_array_size(warnings) > 0 && json_object_set(report, "warnings", warnings) != 0)
-    status = qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK && json_array_size(warnings) > 0) {
+    json_t *before = json_object_get(report, "warnings"); /* of the reader */
+    if ((before ? json_array_extend(before, warnings) : json_object_set(report, "warnings", warnings)) != 0)
+      status = qmat_fail_memory(context, "the report");
+  }
   json_decref(warnings);
   qmat_gltf_meshes_uninit(&meshes);
   qmat_gltf_asset_uninit(&asset);

@@ -30,12 +30,26 @@ static qmat_status add_to_soup(void *user, size_t which, const double *positions
   return status;
 }
 
+/* Adds the warnings of the document to those of the report. */
+static bool add_warnings(const qmat_gltf_counts *counts, json_t *warnings, json_t *report) {
+  bool done = true;
+  if (counts->primitives_skipped > 0) {
+    json_t *text = json_sprintf("%zu of %zu primitives are passed over: points, lines, or without positions",
+                                counts->primitives_skipped, counts->primitives_skipped + counts->primitives_read);
+    done = json_array_append_new(warnings, text) == 0;
+  }
+  if (!done || json_array_size(warnings) == 0) return done;
+  json_t *all = json_object_get(report, "warnings");
+  return (all ? json_array_extend(all, warnings) : json_object_set(report, "warnings", warnings)) == 0;
+}
+
 static qmat_status add_report(qmat_context *context, const qmat_gltf_counts *counts, bool placed,
-                              json_t *extensions_ignored, json_t *report) {
+                              const qmat_gltf_document *document, json_t *report) {
   if (!report) return QMAT_OK;
+  if (!add_warnings(counts, document->warnings, report)) return qmat_fail_memory(context, "a report");
   if (json_object_set_new(report, "primitives_read", json_integer((json_int_t)counts->primitives_read)) != 0 ||
       json_object_set_new(report, "primitives_skipped", json_integer((json_int_t)counts->primitives_skipped)) != 0 ||
-      json_object_set(report, "extensions_ignored", extensions_ignored) != 0) {
+      json_object_set(report, "extensions_ignored", document->extensions_ignored) != 0) {
     return qmat_fail_memory(context, "a report");
   }
   if (placed &&
@@ -58,7 +72,7 @@ static qmat_status read_triangles(qmat_context *context, const qmat_gltf_documen
   size_t most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * (document->data_size + document->decoded_size);
   qmat_status status = qmat_gltf_triangles(context, document->text, document->text_length, buffers, most, meshes,
                                            mesh_count, add_to_soup, &to, &counts);
-  if (status == QMAT_OK) status = add_report(context, &counts, meshes == NULL, document->extensions_ignored, report);
+  if (status == QMAT_OK) status = add_report(context, &counts, meshes == NULL, document, report);
   qmat_free(buffers);
   return status;
 }

@@ -16,9 +16,10 @@
  *
  * External files need a relative path inside the asset's folder. Every id, offset, length and count is checked before
  * use. All instances together may have 2^24 vertices and 2^24 triangles, plus 16 of each per byte of data.
+ * A node that is a root of the scene and a child of another node is read as a root, once, as engines do.
  * `report` (a JSON object, may be NULL) gains primitives_read, primitives_skipped (points, lines, and primitives
  * without positions), meshes_placed, meshes_skinned (whole numbers) and extensions_ignored (names of used extensions
- * that this reader does not know).
+ * that this reader does not know), and "warnings" (texts) where primitives or parents are passed over.
  * QMAT_ERROR_IO for unreadable files, QMAT_ERROR_FORMAT with the element ("accessor 3") for invalid glTF,
  * QMAT_ERROR_GEOMETRY for too many instances, QMAT_ERROR_MEMORY. On failure the soup holds part of the model.
  * One thread. Cost: linear in the data and in the vertices placed. */

@@ -115,7 +115,8 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
   *document = (qmat_gltf_document){0};
   qmat_gltf_checker check = {.context = context, .path = path, .document = document};
   document->extensions_ignored = json_array();
-  qmat_status status = document->extensions_ignored ? QMAT_OK : qmat_gltf_fail_memory(&check);
+  document->warnings = json_array();
+  qmat_status status = document->extensions_ignored && document->warnings ? QMAT_OK : qmat_gltf_fail_memory(&check);
   if (status == QMAT_OK) status = qmat_gltf_asset_init(context, bytes, size, path, &check.asset);
   check.root = check.asset.root;
   if (status == QMAT_OK) status = check_asset(&check);
@@ -140,5 +141,6 @@ void qmat_gltf_document_uninit(qmat_gltf_document *document) {
   qmat_free(document->buffers);
   qmat_free(document->text);
   json_decref(document->extensions_ignored);
+  json_decref(document->warnings);
   *document = (qmat_gltf_document){0};
 }

@@ -106,8 +106,26 @@ static qmat_status check_trees(const qmat_gltf_checker *check, uint8_t *has_pare
   return QMAT_OK;
 }
 
+/* Takes a root of the scene away from the node whose child it is, as engines do: it is in the scene once, placed by its
+ * own transform. */
+static qmat_status take_from_parent(const qmat_gltf_checker *check, size_t child) {
+  json_t *nodes = json_object_get(check->root, "nodes");
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    json_t *children = json_object_get(json_array_get(nodes, i), "children");
+    for (size_t k = 0; k < json_array_size(children); k++) {
+      if ((size_t)json_integer_value(json_array_get(children, k)) != child) continue;
+      json_array_remove(children, k);
+      json_t *text =
+          json_sprintf("node %zu is a root of the scene and a child of node %zu: it is read as a root", child, i);
+      return json_array_append_new(check->document->warnings, text) == 0 ? QMAT_OK : qmat_gltf_fail_memory(check);
+    }
+  }
+  return QMAT_OK;
+}
+
 /* Removes every scene except the one to read. `has_parent` comes from check_trees. */
 static qmat_status choose_scene(const qmat_gltf_checker *check, uint8_t *has_parent) {
+  enum { LISTED = 2 };
   json_t *scenes = json_object_get(check->root, "scenes"), *nodes = json_object_get(check->root, "nodes");
   json_t *ids = NULL;
   int64_t scene = 0;
@@ -121,12 +139,13 @@ static qmat_status choose_scene(const qmat_gltf_checker *check, uint8_t *has_par
     for (size_t i = 0; i < json_array_size(ids) && status == QMAT_OK; i++) {
       json_t *value = json_array_get(ids, i);
       size_t id = (size_t)json_integer_value(value);
-      if (has_parent[id]) {
-        status = qmat_gltf_fail(check, "scene", (size_t)scene, "node %zu is listed twice or has a parent", id);
-      } else if (json_array_append(roots, value) != 0) {
-        status = qmat_gltf_fail_memory(check);
+      if (has_parent[id] == LISTED) {
+        status = qmat_gltf_fail(check, "scene", (size_t)scene, "node %zu is listed twice", id);
+      } else if (has_parent[id]) {
+        status = take_from_parent(check, id);
       }
-      has_parent[id] = 1;
+      if (status == QMAT_OK && json_array_append(roots, value) != 0) status = qmat_gltf_fail_memory(check);
+      has_parent[id] = LISTED;
     }
   } else {
     for (size_t i = 0; i < json_array_size(nodes) && status == QMAT_OK; i++) {

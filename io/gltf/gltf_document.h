@@ -26,6 +26,7 @@ typedef struct qmat_gltf_document {
   size_t data_size;           /* of all buffers of the asset */
   size_t decoded_size;        /* of the decompressed buffer views */
   json_t *extensions_ignored; /* names of used extensions that the reader does not know */
+  json_t *warnings;           /* texts: what was read in another way than the asset says */
   char *text;                 /* the reduced JSON, terminated, NUL-free */
   size_t text_length;
 } qmat_gltf_document;

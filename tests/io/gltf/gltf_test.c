@@ -99,6 +99,7 @@ static void test_a_mesh_is_read_as_it_stands(void **state) {
   assert_int_equal(reported(&r, "meshes_placed"), 1);
   assert_int_equal(reported(&r, "meshes_skinned"), 0);
   assert_int_equal(json_array_size(json_object_get(r.report, "extensions_ignored")), 0);
+  assert_null(json_object_get(r.report, "warnings"));
   assert_int_equal(r.soup.facet_ordinals[1], 1);
   done(&r);
 }
@@ -191,6 +192,33 @@ static void test_strips_and_fans_become_triangles_without_stitches(void **state)
   done(&r);
 }
 
+static void assert_only_warning(const reading *r, const char *text) {
+  const json_t *warnings = json_object_get(r->report, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_string_equal(json_string_value(json_array_get(warnings, 0)), text);
+}
+
+/* Node 0 moves its child; as a root the child stands where its own transform places it, also for its children. */
+static void test_a_root_that_is_also_a_child_is_read_once_as_a_root(void **state) {
+  (void)state;
+  static const char *const roots[] = {"[1]", "[0,1]", "[1,0]"};
+  for (size_t i = 0; i < 3; i++) {
+    reading r;
+    char json[1024];
+    snprintf(json, sizeof json,
+             "{" SQUARE_PARTS SQUARE_MESH
+             "'scenes':[{'nodes':%s}],'nodes':[{'children':[1],'translation':[100,0,0]},"
+             "{'children':[2],'translation':[10,0,0]},{'mesh':0,'translation':[0,5,0]}]}",
+             roots[i]);
+    must_read(&r, json, &square, sizeof square);
+    const double expected[12] = {10, 5, 0, 11, 5, 0, 11, 6, 0, 10, 6, 0};
+    assert_positions(&r.soup, expected, 4, 0);
+    assert_int_equal(reported(&r, "meshes_placed"), 1);
+    assert_only_warning(&r, "node 1 is a root of the scene and a child of node 0: it is read as a root");
+    done(&r);
+  }
+}
+
 static void test_points_lines_and_placeless_primitives_are_counted(void **state) {
   (void)state;
   reading r;
@@ -202,6 +230,7 @@ static void test_points_lines_and_placeless_primitives_are_counted(void **state)
   assert_int_equal(r.soup.facet_count, 2);
   assert_int_equal(reported(&r, "primitives_skipped"), 3);
   assert_int_equal(reported(&r, "primitives_read"), 1);
+  assert_only_warning(&r, "3 of 4 primitives are passed over: points, lines, or without positions");
   done(&r);
 }
 
@@ -881,6 +910,7 @@ int main(void) {
       cmocka_unit_test(test_a_mesh_appears_once_for_each_node),
       cmocka_unit_test(test_only_the_default_scene_is_read),
       cmocka_unit_test(test_strips_and_fans_become_triangles_without_stitches),
+      cmocka_unit_test(test_a_root_that_is_also_a_child_is_read_once_as_a_root),
       cmocka_unit_test(test_points_lines_and_placeless_primitives_are_counted),
       cmocka_unit_test(test_without_indices_every_three_vertices_are_a_triangle),
       cmocka_unit_test(test_sparse_values_replace_dense_ones_and_zeros),
