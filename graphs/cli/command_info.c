@@ -89,7 +89,7 @@ static qmat_status run_node(qmat_context *context, const char *name, double epsi
 
 /* Replaces a mesh by the solid's surface, made as in the shipped graph. */
 static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value **mesh) {
-  static const char *const nodes[] = {"mesh.subdivide", "mesh.unite"};
+  static const char *const nodes[] = {"mesh.subdivide", "mesh.solid"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
     qmat_value *outputs[2] = {NULL};
     const qmat_status status = run_node(context, nodes[i], epsilon, (const qmat_value *const[]){*mesh}, outputs);

@@ -4,18 +4,23 @@
 #include "nodes/mesh/union_cgal.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <map>
 #include <new>
 #include <tuple>
 #include <vector>
 
+#include "core/geometry/triangle.h"
 #include "nodes/mesh/arrangement_cgal.h"
 #include "nodes/mesh/union_mesh_cgal.h"
 #include "nodes/mesh/winding_number_cgal.h"
 
 namespace qmat {
 namespace {
+
+/* The least share of a shell's area that it hides from itself. */
+constexpr double kLeastHidden = 1e-3;
 
 struct Edge {
   uint32_t low, high, piece;
@@ -78,6 +83,9 @@ class Union {
   uint32_t cluster_of(uint32_t triangle) const {
     return qmat_set_leader(clusters_, mesh_.shell(triangle));
   }
+  uint32_t cluster_of_any(uint32_t triangle) const {
+    return mesh_.has_shell(triangle) ? cluster_of(triangle) : triangle;
+  }
   bool is_active(uint32_t triangle) const {
     return mesh_.has_shell(triangle) && active_[mesh_.shell(triangle)];
   }
@@ -90,11 +98,13 @@ class Union {
   /* ---- the shells that may change ---- */
 
   void find_meeting_shells() {
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
+      if (mesh_.has_shell(t) && mesh_.crosses(t)) activate(t);
     std::vector<uint32_t> triangles;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
       if (mesh_.has_shell(t) && mesh_.reaches(t) && !mesh_.is_flat(t)) triangles.push_back(t);
     for_each_box_pair(mesh_, triangles, [&](uint32_t a, uint32_t b) {
-      if (mesh_.sheet(a) == mesh_.sheet(b) || !do_meet(mesh_, a, b)) return;
+      if (mesh_.patch(a) == mesh_.patch(b) || !do_meet(mesh_, a, b)) return;
       qmat_sets_join(clusters_, mesh_.shell(a), mesh_.shell(b));
       activate(a);
       activate(b);
@@ -143,6 +153,35 @@ class Union {
     for (uint32_t i = 0; i < pieces_.size(); i++) region_of_[i] = qmat_set_leader(leaders, i);
   }
 
+  double area_of(const Corners &corners) const {
+    double p[3][3];
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t v = corners[k];
+      const Point &at = arrangement_.points[v];
+      for (size_t i = 0; i < 3; i++)
+        p[k][i] = v < mesh_.vertex_count() ? mesh_.position(v)[i] : CGAL::to_double(at[static_cast<int>(i)]);
+    }
+    double normal[3];
+    qmat_triangle_normal(p[0], p[1], p[2], normal);
+    return std::sqrt(qmat_dot(normal, normal)) / 2;
+  }
+
+  /* A shell that meets only itself, in a fold that hides next to nothing, stays: its union would leave crumbs. */
+  void leave_small_folds(const std::vector<int8_t> &kept) {
+    std::vector<size_t> shells(mesh_.triangle_count());
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++) shells[cluster_of_any(t)] += mesh_.shell(t) == t;
+    std::vector<double> all(mesh_.triangle_count()), hidden(mesh_.triangle_count());
+    for (size_t i = 0; i < pieces_.size(); i++) {
+      const uint32_t cluster = cluster_of(pieces_[i].source);
+      if (shells[cluster] > 1) continue;
+      const double area = area_of(pieces_[i].corners);
+      all[cluster] += area;
+      if (!kept[region_of_[i]]) hidden[cluster] += area;
+    }
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
+      if (shells[t] == 1 && hidden[t] < kLeastHidden * all[t]) changed_[t] = false;
+  }
+
   /* Keeps the pieces with the inside behind them and the outside in front, each once. */
   void choose_pieces() {
     std::vector<int8_t> kept(pieces_.size(), -1); /* per region; -1: not known */
@@ -161,6 +200,7 @@ class Union {
       }
       if (!keeps || piece.layers != 1) changed_[cluster_of(piece.source)] = true;
     }
+    leave_small_folds(kept);
     size_t count = 0;
     for (size_t i = 0; i < pieces_.size(); i++)
       if (kept[region_of_[i]] && changed_[cluster_of(pieces_[i].source)]) pieces_[count++] = pieces_[i];

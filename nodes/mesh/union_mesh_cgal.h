@@ -62,11 +62,14 @@ class UnionMesh {
   bool has_shell(uint32_t triangle) const {
     return shell(triangle) != QMAT_NO_SHELL;
   }
-  uint32_t sheet(uint32_t triangle) const {
-    return shells_.sheets[triangle];
+  uint32_t patch(uint32_t triangle) const {
+    return shells_.patches[triangle];
   }
   bool reaches(uint32_t triangle) const {
     return shells_.reaches[triangle] != 0;
+  }
+  bool crosses(uint32_t triangle) const {
+    return shells_.crosses[triangle] != 0;
   }
   /* Whether the corners are collinear; false without a shell. */
   bool is_flat(uint32_t triangle) const {

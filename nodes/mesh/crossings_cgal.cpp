@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/mesh/crossings_cgal.h"
+
+#include <exception>
+
+#include "nodes/mesh/arrangement_cgal.h"
+#include "nodes/mesh/union_mesh_cgal.h"
+
+namespace {
+
+bool share_a_vertex(const uint32_t *a, const uint32_t *b) {
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++)
+      if (a[i] == b[k]) return true;
+  return false;
+}
+
+void find(qmat_context *context, const qmat_shells &shells, uint8_t *crosses) {
+  const qmat::UnionMesh mesh(context, shells);
+  std::vector<uint32_t> triangles;
+  for (uint32_t t = 0; t < mesh.triangle_count(); t++)
+    if (!mesh.is_flat(t)) triangles.push_back(t);
+  qmat::for_each_box_pair(mesh, triangles, [&](uint32_t a, uint32_t b) {
+    if (mesh.patch(a) != mesh.patch(b) || (crosses[a] && crosses[b])) return;
+    if (share_a_vertex(mesh.corners(a), mesh.corners(b)) || !qmat::do_meet(mesh, a, b)) return;
+    crosses[a] = crosses[b] = 1;
+  });
+}
+
+}  // namespace
+
+qmat_status qmat_find_crossings(qmat_context *context, const qmat_shells *shells, uint8_t *crosses) {
+  try {
+    find(context, *shells, crosses);
+    return QMAT_OK;
+  } catch (const qmat::UnionStopped &stopped) {
+    return stopped.status;
+  } catch (const std::bad_alloc &) {
+    return qmat_fail_memory(context, "the crossings of the mesh");
+  } catch (const std::exception &failure) {
+    return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "CGAL: %s", failure.what());
+  } catch (...) {
+    return qmat_fail(context, QMAT_ERROR_INTERNAL, "finding crossings failed in an unknown way");
+  }
+}

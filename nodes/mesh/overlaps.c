@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/mesh/overlaps.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/disjoint_sets.h"
+#include "nodes/mesh/crossings_cgal.h"
+#include "nodes/mesh/half_edges.h"
+
+typedef struct box {
+  double low[3], high[3];
+} box;
+
+/* A patch, connected across edges of two triangles: its bounding box, and the box of its intersections with the boxes
+ * of other patches. */
+typedef struct patch {
+  uint32_t leader; /* triangle */
+  box bounds, reach;
+} patch;
+
+typedef struct unison {
+  qmat_context *context;
+  size_t vertex_count, triangle_count;
+  const double *positions;
+  const uint32_t *triangles;
+  uint32_t *shells, *patches; /* disjoint sets of triangles */
+} unison;
+
+static qmat_status fail_shortage(qmat_context *context) {
+  return qmat_fail_memory(context, "the parts of the mesh");
+}
+
+/* Joins triangles at their edges. */
+static qmat_status find_shells(unison *u) {
+  u->shells = qmat_sets_new(u->context, u->triangle_count);
+  u->patches = qmat_sets_new(u->context, u->triangle_count);
+  if (!u->shells || !u->patches) return fail_shortage(u->context);
+  qmat_half_edges e;
+  const qmat_status status = qmat_half_edges_sort(u->context, u->vertex_count, u->triangle_count, u->triangles, &e);
+  for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
+    last = qmat_edge_last(&e, first);
+    for (size_t i = first + 1; i < last; i++) qmat_sets_join(u->shells, e.order[first] / 3, e.order[i] / 3);
+    if (last - first == 2) qmat_sets_join(u->patches, e.order[first] / 3, e.order[first + 1] / 3);
+  }
+  return status;
+}
+
+/* ---- boxes ---- */
+
+static const box no_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static void grow_box(box *b, const double *point) {
+  for (int k = 0; k < 3; k++) {
+    b->low[k] = fmin(b->low[k], point[k]);
+    b->high[k] = fmax(b->high[k], point[k]);
+  }
+}
+
+static box triangle_box(const unison *mesh, size_t triangle) {
+  box b = no_box;
+  for (size_t k = 0; k < 3; k++) grow_box(&b, mesh->positions + 3 * (size_t)mesh->triangles[3 * triangle + k]);
+  return b;
+}
+
+/* False if the boxes are disjoint. */
+static bool intersect_boxes(const box *a, const box *b, box *common) {
+  bool meet = true;
+  for (int k = 0; k < 3; k++) {
+    common->low[k] = fmax(a->low[k], b->low[k]);
+    common->high[k] = fmin(a->high[k], b->high[k]);
+    meet = meet && common->low[k] <= common->high[k];
+  }
+  return meet;
+}
+
+static int compare_patches(const void *left, const void *right) {
+  const patch *a = left, *b = right;
+  const int order = (a->bounds.low[0] > b->bounds.low[0]) - (a->bounds.low[0] < b->bounds.low[0]);
+  return order != 0 ? order : (a->leader > b->leader) - (a->leader < b->leader);
+}
+
+/* Finds the patches of shells whose boxes intersect. `reaches` (per triangle) becomes 1 if the triangle's box
+ * meets such an intersection, and `is_near` (zeroed, per shell by its leader) becomes 1 for their shells. */
+static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
+  const unison *mesh = u;
+  qmat_arena *arena = &u->context->arena;
+  uint32_t *numbers = qmat_arena_alloc(arena, mesh->triangle_count, sizeof *numbers);
+  size_t count = 0;
+  for (uint32_t t = 0; numbers && t < mesh->triangle_count; t++)
+    if (qmat_set_leader(u->patches, t) == t) numbers[t] = (uint32_t)count++;
+  patch *patches = qmat_arena_alloc(arena, count, sizeof *patches);
+  if (!numbers || !patches) return fail_shortage(u->context);
+  for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+    const uint32_t leader = qmat_set_leader(u->patches, t);
+    patch *s = &patches[numbers[leader]];
+    if (leader == t) *s = (patch){t, no_box, no_box};
+    for (size_t k = 0; k < 3; k++)
+      grow_box(&s->bounds, mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)t + k]);
+  }
+  qsort(patches, count, sizeof *patches, compare_patches);
+  for (size_t i = 0; i < count; i++) {
+    const qmat_status status = qmat_progress(u->context, i, count, "parts");
+    if (status != QMAT_OK) return status;
+    numbers[patches[i].leader] = (uint32_t)i;
+    for (size_t j = i + 1; j < count && patches[j].bounds.low[0] <= patches[i].bounds.high[0]; j++) {
+      box common;
+      if (!intersect_boxes(&patches[i].bounds, &patches[j].bounds, &common)) continue;
+      grow_box(&patches[i].reach, common.low);
+      grow_box(&patches[i].reach, common.high);
+      grow_box(&patches[j].reach, common.low);
+      grow_box(&patches[j].reach, common.high);
+      is_near[qmat_set_leader(u->shells, patches[i].leader)] = is_near[qmat_set_leader(u->shells, patches[j].leader)] =
+          1;
+    }
+  }
+  for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+    const box bounds = triangle_box(mesh, t);
+    box common;
+    reaches[t] = intersect_boxes(&bounds, &patches[numbers[qmat_set_leader(u->patches, t)]].reach, &common);
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
+                                size_t triangle_count, const uint32_t *triangles, qmat_united *united) {
+  *united = (qmat_united){.changed = false};
+  if (triangle_count == 0) return QMAT_OK;
+  unison u = {context, vertex_count, triangle_count, positions, triangles, NULL, NULL};
+  qmat_arena *arena = &context->arena;
+  uint8_t *reaches = qmat_arena_alloc(arena, triangle_count, 1), *is_near = qmat_arena_calloc(arena, triangle_count, 1),
+          *crosses = qmat_arena_calloc(arena, triangle_count, 1);
+  uint32_t *shells = qmat_arena_alloc(arena, triangle_count, sizeof *shells);
+  if (!reaches || !is_near || !crosses || !shells) return fail_shortage(context);
+  qmat_status status = find_shells(&u);
+  if (status == QMAT_OK) status = find_near(&u, reaches, is_near);
+  if (status != QMAT_OK) return status;
+  for (uint32_t t = 0; t < triangle_count; t++) {
+    shells[t] = qmat_set_leader(u.shells, t);
+    u.patches[t] = qmat_set_leader(u.patches, t);
+  }
+  qmat_shells input = {.vertex_count = vertex_count,
+                       .triangle_count = triangle_count,
+                       .positions = positions,
+                       .triangles = triangles,
+                       .shells = shells,
+                       .patches = u.patches,
+                       .reaches = reaches,
+                       .crosses = crosses};
+  status = qmat_find_crossings(context, &input, crosses);
+  if (status != QMAT_OK) return status;
+  bool any = false;
+  for (size_t t = 0; t < triangle_count; t++) {
+    if (crosses[t]) is_near[shells[t]] = 1;
+    any = any || is_near[shells[t]];
+  }
+  if (!any) return QMAT_OK;
+  for (size_t t = 0; t < triangle_count; t++)
+    if (!is_near[shells[t]]) shells[t] = QMAT_NO_SHELL;
+  return qmat_unite_shells(context, &input, united);
+}

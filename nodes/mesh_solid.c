@@ -1,0 +1,578 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* mesh.solid: a solid out of any triangles, and sheets of those that enclose nothing. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/surface.h"
+#include "core/geometry/triangle.h"
+#include "core/json_text.h"
+#include "core/node.h"
+#include "nodes/descriptor/epsilon.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/mesh/half_edges.h"
+#include "nodes/mesh/hole_cgal.h"
+#include "nodes/mesh/overlaps.h"
+#include "nodes/mesh/parts.h"
+#include "nodes/mesh/wrap_cgal.h"
+
+typedef enum solid_choice { SOLID_AUTO, SOLID_AS_IS, SOLID_CLOSE, SOLID_WRAP, SOLID_SHEET } solid_choice;
+
+typedef struct mesh_solid_params {
+  int solid;
+  double thickness, epsilon;
+} mesh_solid_params;
+
+/* A wrap is this share of epsilon away from what it wraps, and enters openings of a ball of so many times that. */
+static const double wrap_offset = 0.25, wrap_alpha = 4;
+/* The least epsilon that a wrap is made for, in diagonals; its triangles grow with the inverse square. */
+static const double least_wrap_epsilon = 0.004;
+/* Components and caps that the report lists. */
+enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
+
+typedef struct triangle_list {
+  size_t count, capacity;
+  uint32_t *corners; /* 3 * count; on the heap */
+} triangle_list;
+
+typedef struct solidifier {
+  qmat_context *context;
+  const mesh_solid_params *params;
+  const qmat_mesh *mesh;
+  qmat_frame frame;
+  double *unit;                   /* the vertices in the unit frame: areas and volumes neither overflow nor vanish */
+  size_t plain_count, pair_count; /* triangles without and with an opposite one, the latter once for each pair */
+  uint32_t *plain, *pairs;        /* their corners */
+  qmat_parts parts;
+  double *cap_areas; /* per loop */
+  uint8_t *turned;   /* per part: it is turned inside out */
+  triangle_list solids, sheets;
+  size_t caps, cap_sides, turned_parts, inner_triangles;
+  double cap_length, cap_area;
+  qmat_united united;
+  qmat_wrap wrap;
+} solidifier;
+
+static qmat_status fail_shortage(const solidifier *s) {
+  return qmat_fail_memory(s->context, "the solid");
+}
+
+static const double *position(const solidifier *s, uint32_t vertex) {
+  return s->unit + 3 * (size_t)vertex;
+}
+
+static bool is_sheet(const qmat_part *part) {
+  return part->kind == QMAT_PART_OPEN || part->kind == QMAT_PART_FLAT;
+}
+
+static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, uint32_t b, uint32_t c) {
+  if (3 * list->count + 3 > list->capacity &&
+      qmat_grow((void **)&list->corners, &list->capacity, 3 * list->count + 3, sizeof *list->corners) != 0)
+    return fail_shortage(s);
+  uint32_t *row = list->corners + 3 * list->count++;
+  row[0] = a;
+  row[1] = b;
+  row[2] = c;
+  return QMAT_OK;
+}
+
+/* ---- opposite triangles ---- */
+
+static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
+  return triangles[half_edge - half_edge % 3 + (half_edge + 2) % 3];
+}
+
+/* Finds pairs of triangles with the same corners and opposite sides: a card of two sides, or a wall between two solids
+ * that touch. They cancel in every winding number. `classes` becomes 1 for the first of a pair and 2 for the second. */
+static qmat_status find_pairs(const solidifier *s, uint8_t *classes) {
+  qmat_half_edges e;
+  const qmat_status status =
+      qmat_half_edges_sort(s->context, s->mesh->vertex_count, s->mesh->triangle_count, s->mesh->triangles, &e);
+  for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
+    last = qmat_edge_last(&e, first);
+    const uint32_t high = qmat_half_edge_high(&e, e.order[first]);
+    for (size_t i = first; i + 1 < last; i++) {
+      const uint32_t a = e.order[i], third = third_corner(e.triangles, a);
+      if (third <= high || classes[a / 3]) continue; /* each triangle once, at the edge of its lowest corners */
+      for (size_t k = i + 1; k < last; k++) {
+        const uint32_t b = e.order[k];
+        if (classes[b / 3] || third_corner(e.triangles, b) != third ||
+            qmat_half_edge_rises(&e, a) == qmat_half_edge_rises(&e, b))
+          continue;
+        classes[a / 3] = 1;
+        classes[b / 3] = 2;
+        break;
+      }
+    }
+  }
+  return status;
+}
+
+static qmat_status split_pairs(solidifier *s) {
+  const qmat_mesh *mesh = s->mesh;
+  qmat_arena *arena = &s->context->arena;
+  uint8_t *classes = qmat_arena_calloc(arena, mesh->triangle_count, 1);
+  s->plain = qmat_arena_alloc(arena, 3 * mesh->triangle_count, sizeof *s->plain);
+  s->pairs = qmat_arena_alloc(arena, 3 * mesh->triangle_count, sizeof *s->pairs);
+  if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
+  const qmat_status status = find_pairs(s, classes);
+  for (size_t t = 0; status == QMAT_OK && t < mesh->triangle_count; t++) {
+    const bool is_given_sheet = t >= mesh->triangle_count - mesh->sheet_triangle_count;
+    if (classes[t] == 2) continue;
+    uint32_t *to = classes[t] == 1 || is_given_sheet ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
+    memcpy(to, mesh->triangles + 3 * t, 3 * sizeof *to);
+  }
+  return status;
+}
+
+/* ---- solids ---- */
+
+/* Whether the other solid parts are wound around a point: a part there that faces inwards is a cavity. */
+static bool is_within_others(const solidifier *s, const double *boxes, uint32_t part, const double *point) {
+  double winding = 0;
+  for (size_t t = 0; t < s->parts.triangle_count; t++) {
+    const uint32_t other = s->parts.part_of[t];
+    const double *box = boxes + 6 * (size_t)other;
+    if (other == part || is_sheet(&s->parts.parts[other])) continue;
+    if (point[0] < box[0] || point[1] < box[1] || point[2] < box[2] || point[0] > box[3] || point[1] > box[4] ||
+        point[2] > box[5])
+      continue;
+    const uint32_t *c = s->parts.triangles + 3 * t;
+    winding += qmat_seen_share(point, position(s, c[0]), position(s, c[1]), position(s, c[2]));
+  }
+  return fabs(winding) > 0.5;
+}
+
+static qmat_status turn_parts(solidifier *s) {
+  const qmat_parts *parts = &s->parts;
+  double *boxes = NULL;
+  s->turned = qmat_arena_calloc(&s->context->arena, parts->part_count, 1);
+  if (!s->turned) return fail_shortage(s);
+  for (uint32_t t = 0; t < parts->triangle_count; t++) {
+    const uint32_t part = parts->part_of[t];
+    const qmat_part *p = &parts->parts[part];
+    if (p->volume >= 0 || is_sheet(p) || s->turned[part]) continue;
+    if (!boxes) {
+      boxes = qmat_arena_alloc(&s->context->arena, parts->part_count, 6 * sizeof *boxes);
+      if (!boxes) return fail_shortage(s);
+      for (size_t i = 0; i < 6 * parts->part_count; i++) boxes[i] = i % 6 < 3 ? INFINITY : -INFINITY;
+      for (size_t i = 0; i < 3 * parts->triangle_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+          double *box = boxes + 6 * (size_t)parts->part_of[i / 3];
+          box[k] = fmin(box[k], position(s, parts->triangles[i])[k]);
+          box[3 + k] = fmax(box[3 + k], position(s, parts->triangles[i])[k]);
+        }
+    }
+    s->turned[part] = is_within_others(s, boxes, part, position(s, parts->triangles[3 * (size_t)t])) ? 2 : 1;
+    s->turned_parts += s->turned[part] == 1;
+    const qmat_status status = qmat_progress(s->context, t, parts->triangle_count, "triangles");
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+/* Triangulates a border loop; its area is kept for the report. */
+static qmat_status add_cap(solidifier *s, size_t number) {
+  const qmat_loop *loop = &s->parts.loops[number];
+  const uint32_t *vertices = s->parts.loop_vertices + loop->first;
+  const bool turn = s->turned[loop->part] == 1;
+  double *points = qmat_alloc(6 * loop->count, sizeof *points), normal[3];
+  uint32_t *made = qmat_alloc(3 * (loop->count - 2), sizeof *made);
+  qmat_status status = points && made ? QMAT_OK : fail_shortage(s);
+  for (size_t i = 0; status == QMAT_OK && i < loop->count; i++) {
+    memcpy(points + 3 * i, position(s, vertices[i]), 3 * sizeof *points);
+    memcpy(points + 3 * (loop->count + i), position(s, s->parts.loop_thirds[loop->first + i]), 3 * sizeof *points);
+  }
+  if (status == QMAT_OK)
+    status = qmat_triangulate_hole(s->context, points, points + 3 * loop->count, loop->count, made);
+  for (size_t i = 0; status == QMAT_OK && i < 3 * (loop->count - 2); i += 3) {
+    const uint32_t a = made[i], b = made[turn ? i + 2 : i + 1], c = made[turn ? i + 1 : i + 2];
+    qmat_triangle_normal(points + 3 * (size_t)a, points + 3 * (size_t)b, points + 3 * (size_t)c, normal);
+    s->cap_areas[number] += sqrt(qmat_dot(normal, normal)) / 2;
+    status = append(s, &s->solids, vertices[a], vertices[b], vertices[c]);
+  }
+  qmat_free(points);
+  qmat_free(made);
+  s->caps++;
+  s->cap_sides += loop->count;
+  s->cap_length += loop->length;
+  s->cap_area += s->cap_areas[number];
+  return status;
+}
+
+/* The triangles of solid parts, then their caps; those of sheets, then one of each pair. */
+static qmat_status sort_triangles(solidifier *s) {
+  const qmat_parts *parts = &s->parts;
+  qmat_status status = QMAT_OK;
+  s->cap_areas = qmat_arena_calloc(&s->context->arena, parts->loop_count, sizeof *s->cap_areas);
+  if (!s->cap_areas) return fail_shortage(s);
+  for (size_t t = 0; status == QMAT_OK && t < parts->triangle_count; t++) {
+    const uint32_t *c = parts->triangles + 3 * t;
+    const bool turn = s->turned[parts->part_of[t]] == 1;
+    triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
+    status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
+  }
+  for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
+    if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
+    status = add_cap(s, i);
+    if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
+  }
+  for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
+    status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
+  return status;
+}
+
+static void choose_kinds(solidifier *s) {
+  for (size_t i = 0; i < s->parts.part_count; i++) {
+    qmat_part *part = &s->parts.parts[i];
+    if (s->params->solid == SOLID_SHEET && !is_sheet(part))
+      part->kind = part->kind == QMAT_PART_CLOSED ? QMAT_PART_FLAT : QMAT_PART_OPEN;
+    if (s->params->solid == SOLID_CLOSE && part->kind == QMAT_PART_OPEN) part->kind = QMAT_PART_HOLES;
+  }
+}
+
+/* Replaces everything by a wrap. */
+static qmat_status wrap_all(solidifier *s) {
+  const double epsilon = fmax(s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON, least_wrap_epsilon),
+               offset = wrap_offset * epsilon * s->frame.diagonal;
+  return qmat_wrap_triangles(s->context, s->mesh->positions, s->mesh->vertex_count, s->mesh->triangles,
+                             s->mesh->triangle_count, wrap_alpha * offset, offset, &s->wrap);
+}
+
+/* ---- the mesh ---- */
+
+static bool is_unchanged(const solidifier *s) {
+  return s->solids.count == s->mesh->triangle_count && s->caps == 0 && s->turned_parts == 0 && s->parts.turned == 0 &&
+         !s->united.changed && !s->wrap.triangles && s->mesh->closed && s->mesh->oriented;
+}
+
+/* Numbers the used vertices in their order. The sheets' vertices are the given mesh's; the solids' are too unless they
+ * come from a union or a wrap. */
+static qmat_status fill_mesh(const solidifier *s, const double *positions, size_t vertex_count,
+                             const uint32_t *triangles, size_t triangle_count, qmat_mesh *mesh) {
+  const bool shares = positions == s->mesh->positions;
+  const size_t most = vertex_count + (shares ? 0 : s->mesh->vertex_count), shift = shares ? 0 : vertex_count;
+  uint32_t *numbers = qmat_arena_calloc(&s->context->arena, most, sizeof *numbers);
+  mesh->triangle_count = triangle_count + s->sheets.count;
+  mesh->sheet_triangle_count = s->sheets.count;
+  mesh->triangles = qmat_alloc(3 * mesh->triangle_count, sizeof *mesh->triangles);
+  if (!numbers || !mesh->triangles) return fail_shortage(s);
+  for (size_t i = 0; i < 3 * triangle_count; i++) numbers[triangles[i]] = 1;
+  for (size_t i = 0; i < 3 * s->sheets.count; i++) numbers[shift + s->sheets.corners[i]] = 1;
+  for (size_t v = 0; v < most; v++) numbers[v] = numbers[v] ? (uint32_t)mesh->vertex_count++ : UINT32_MAX;
+  mesh->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *mesh->positions);
+  if (!mesh->positions) return fail_shortage(s);
+  for (size_t v = 0; v < most; v++) {
+    if (numbers[v] == UINT32_MAX) continue;
+    const double *from = v < vertex_count ? positions + 3 * v : s->mesh->positions + 3 * (v - vertex_count);
+    memcpy(mesh->positions + 3 * (size_t)numbers[v], from, 3 * sizeof *from);
+  }
+  for (size_t i = 0; i < 3 * triangle_count; i++) mesh->triangles[i] = numbers[triangles[i]];
+  for (size_t i = 0; i < 3 * s->sheets.count; i++)
+    mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
+  mesh->closed = mesh->oriented = s->sheets.count == 0;
+  mesh->deviation = s->mesh->deviation;
+  mesh->meters_per_unit = s->mesh->meters_per_unit;
+  if (s->sheets.count > 0)
+    mesh->sheet_thickness =
+        s->params->thickness > 0 ? s->params->thickness * s->frame.diagonal : s->mesh->sheet_thickness;
+  return QMAT_OK;
+}
+
+/* The nearest given vertex lends its joints; those that stay are found by their position. */
+static qmat_status fill_skin(const solidifier *s, qmat_mesh *mesh) {
+  const qmat_mesh *given = s->mesh;
+  if (given->skinned_count == 0) return QMAT_OK;
+  mesh->joints = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->joints);
+  mesh->weights = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->weights);
+  if (!mesh->joints || !mesh->weights) return fail_shortage(s);
+  mesh->skinned_count = mesh->vertex_count;
+  size_t next = 0;
+  for (size_t v = 0; v < mesh->vertex_count; v++) {
+    const double *p = mesh->positions + 3 * v;
+    size_t nearest = next;
+    while (nearest < given->vertex_count && memcmp(given->positions + 3 * nearest, p, 3 * sizeof *p) != 0) nearest++;
+    if (nearest < given->vertex_count) {
+      next = nearest + 1; /* vertices that stay keep their order */
+    } else {
+      double least = INFINITY;
+      for (size_t i = 0; i < given->vertex_count; i++) {
+        const double distance = qmat_point_distance(given->positions + 3 * i, p);
+        if (distance < least) nearest = i;
+        least = fmin(least, distance);
+      }
+    }
+    memcpy(mesh->joints + 4 * v, given->joints + 4 * nearest, 4 * sizeof *mesh->joints);
+    memcpy(mesh->weights + 4 * v, given->weights + 4 * nearest, 4 * sizeof *mesh->weights);
+    const qmat_status status = qmat_progress(s->context, v, mesh->vertex_count, "vertices");
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
+  qmat_mesh *mesh = qmat_mesh_new();
+  qmat_status status = mesh ? QMAT_OK : fail_shortage(s);
+  if (status == QMAT_OK) {
+    if (s->wrap.triangles)
+      status = fill_mesh(s, s->wrap.positions, s->wrap.vertex_count, s->wrap.triangles, s->wrap.triangle_count, mesh);
+    else if (s->united.changed)
+      status = fill_mesh(s, s->united.positions, s->united.vertex_count, s->united.triangles, s->united.triangle_count,
+                         mesh);
+    else
+      status = fill_mesh(s, s->mesh->positions, s->mesh->vertex_count, s->solids.corners, s->solids.count, mesh);
+  }
+  if (status == QMAT_OK && s->wrap.triangles) {
+    const double epsilon = fmax(s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON, least_wrap_epsilon);
+    mesh->deviation += wrap_offset * epsilon * s->frame.diagonal;
+  }
+  if (status == QMAT_OK) status = fill_skin(s, mesh);
+  if (status == QMAT_OK) status = qmat_value_seal(s->context, &mesh->base);
+  if (status == QMAT_OK)
+    *made = mesh;
+  else
+    qmat_value_release(mesh ? &mesh->base : NULL);
+  return status;
+}
+
+/* ---- sheets inside solids ---- */
+
+/* Whether the corners, the middles of the sides and the centroid of a triangle, all drawn a little towards the
+ * centroid, are inside. */
+static bool is_inside(const qmat_surface *solid, const double *positions, const uint32_t *corners) {
+  enum { POINTS = 7 };
+  static const double weights[POINTS][3] = {{1, 0, 0},     {0, 1, 0},     {0, 0, 1}, {0.5, 0.5, 0},
+                                            {0, 0.5, 0.5}, {0.5, 0, 0.5}, {0, 0, 0}};
+  for (int i = 0; i < POINTS; i++) {
+    double point[3];
+    for (int k = 0; k < 3; k++) {
+      const double a = positions[3 * (size_t)corners[0] + (size_t)k], b = positions[3 * (size_t)corners[1] + (size_t)k],
+                   c = positions[3 * (size_t)corners[2] + (size_t)k], centroid = (a + b + c) / 3;
+      const bool is_centroid = i == POINTS - 1;
+      point[k] =
+          is_centroid ? centroid : 0.99 * (weights[i][0] * a + weights[i][1] * b + weights[i][2] * c) + 0.01 * centroid;
+    }
+    if (!qmat_surface_inside(solid, point)) return false;
+  }
+  return true;
+}
+
+/* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
+ * nothing. */
+static qmat_status drop_inner_sheets(solidifier *s) {
+  if (s->sheets.count == 0 || (s->solids.count == 0 && !s->wrap.triangles)) return QMAT_OK;
+  const size_t sheet_count = s->sheets.count;
+  qmat_mesh *mesh = NULL, *solids = qmat_mesh_new();
+  qmat_surface *surface = NULL;
+  qmat_status status = make_mesh(s, &mesh);
+  if (status == QMAT_OK && !solids) status = fail_shortage(s);
+  if (status == QMAT_OK) {
+    solids->vertex_count = mesh->vertex_count;
+    solids->triangle_count = mesh->triangle_count - sheet_count;
+    solids->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *mesh->positions);
+    solids->triangles = qmat_alloc(3 * solids->triangle_count, sizeof *mesh->triangles);
+    solids->closed = solids->oriented = true;
+    if (!solids->positions || !solids->triangles) status = fail_shortage(s);
+  }
+  if (status == QMAT_OK) {
+    memcpy(solids->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *mesh->positions);
+    memcpy(solids->triangles, mesh->triangles, 3 * solids->triangle_count * sizeof *mesh->triangles);
+    status = qmat_surface_new(s->context, solids, &surface);
+  }
+  s->sheets.count = 0;
+  for (size_t t = 0; status == QMAT_OK && t < sheet_count; t++) {
+    const uint32_t *c = s->sheets.corners + 3 * t;
+    if (is_inside(surface, qmat_surface_positions(surface), mesh->triangles + 3 * (solids->triangle_count + t)))
+      s->inner_triangles++;
+    else
+      memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
+    if (t % 64 == 0) status = qmat_progress(s->context, t, sheet_count, "triangles of sheets");
+  }
+  qmat_surface_free(surface);
+  qmat_value_release(mesh ? &mesh->base : NULL);
+  qmat_value_release(solids ? &solids->base : NULL);
+  return status;
+}
+
+/* ---- the report ---- */
+
+static const char *const kind_names[QMAT_PART_KIND_COUNT] = {[QMAT_PART_CLOSED] = "solid",
+                                                             [QMAT_PART_HOLES] = "solid with holes",
+                                                             [QMAT_PART_OPEN] = "sheet",
+                                                             [QMAT_PART_FLAT] = "sheet of two sides"};
+
+static json_t *describe_part(const solidifier *s, uint32_t number) {
+  const qmat_part *part = &s->parts.parts[number];
+  json_t *caps = json_array(), *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)part->triangle_count,
+                                                   "taken_for", kind_names[part->kind], "area", part->area);
+  int bad = !caps || !object;
+  if (!bad && s->turned[number] == 1) bad |= json_object_set_new(object, "turned", json_true());
+  if (!bad && s->turned[number] == 2) bad |= json_object_set_new(object, "cavity", json_true());
+  if (!bad && part->kind == QMAT_PART_HOLES) {
+    bad |= qmat_json_set_count(object, "caps", part->loop_count);
+    for (size_t i = 0; i < part->loop_count && i < MOST_CAPS_LISTED; i++) {
+      const qmat_loop *loop = &s->parts.loops[part->first_loop + i];
+      bad |= json_array_append_new(caps, json_pack("{s:I,s:f,s:f}", "sides", (json_int_t)loop->count, "length",
+                                                   loop->length, "area", s->cap_areas[part->first_loop + i]));
+    }
+    bad |= json_object_set(object, "largest_caps", caps);
+  }
+  json_decref(caps);
+  if (!bad) return object;
+  json_decref(object);
+  return NULL;
+}
+
+static int report_parts(const solidifier *s, json_t *root) {
+  json_t *list = json_array();
+  int bad = !list;
+  for (uint32_t i = 0; i < s->parts.part_count && i < MOST_LISTED; i++)
+    bad |= json_array_append_new(list, describe_part(s, i));
+  if (s->parts.part_count > MOST_LISTED)
+    bad |= qmat_json_set_count(root, "components_not_listed", s->parts.part_count - MOST_LISTED);
+  return bad | json_object_set_new(root, "components", list);
+}
+
+static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
+  json_t *root = report->root;
+  size_t kinds[QMAT_PART_KIND_COUNT] = {0}, open = 0;
+  for (size_t i = 0; i < s->parts.part_count; i++) {
+    kinds[s->parts.parts[i].kind]++;
+    open += s->parts.parts[i].loop_count > 0;
+  }
+  const struct {
+    const char *key;
+    size_t count;
+  } counts[] = {{"parts", s->parts.part_count},
+                {"parts_open", open},
+                {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
+                {"solids_with_holes", kinds[QMAT_PART_HOLES]},
+                {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
+                {"sheet_triangles", s->sheets.count},
+                {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
+                {"inner_triangles", s->inner_triangles},
+                {"parts_turned", s->turned_parts},
+                {"triangles_turned", s->parts.turned},
+                {"caps", s->caps},
+                {"cap_sides", s->cap_sides},
+                {"parts_united", s->united.shells_united},
+                {"triangles_cut", s->united.cut_triangles}};
+  int bad = 0;
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+    bad |= qmat_json_set_count(root, counts[i].key, counts[i].count);
+  if (s->caps > 0) {
+    bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
+    bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
+  }
+  if (s->wrap.triangles) bad |= qmat_json_set_count(root, "wrap_triangles", s->wrap.triangle_count);
+  if (made) {
+    bad |= qmat_json_set_count(root, "vertices", made->vertex_count);
+    bad |= qmat_json_set_count(root, "triangles", made->triangle_count);
+  }
+  if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
+  if (s->united.why_not) {
+    char text[160];
+    snprintf(text, sizeof text, "intersecting parts are not united: %s", s->united.why_not);
+    bad |= json_object_set_new(root, "warnings", json_pack("[s]", text));
+  }
+  return bad ? qmat_fail_memory(s->context, "the report") : qmat_value_seal(s->context, &report->base);
+}
+
+/* ---- the node ---- */
+
+static qmat_status make_solid(solidifier *s) {
+  s->unit = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *s->unit);
+  if (!s->unit) return fail_shortage(s);
+  qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
+  qmat_status status = split_pairs(s);
+  if (status == QMAT_OK)
+    status = qmat_parts_find(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain, &s->parts);
+  if (status != QMAT_OK) return status;
+  choose_kinds(s);
+  status = turn_parts(s);
+  if (status == QMAT_OK) status = sort_triangles(s);
+  if (status == QMAT_OK)
+    status = qmat_unite_overlaps(s->context, s->mesh->vertex_count, s->mesh->positions, s->solids.count,
+                                 s->solids.corners, &s->united);
+  return status == QMAT_OK ? drop_inner_sheets(s) : status;
+}
+
+static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  solidifier s = {.context = context, .params = data, .mesh = (const qmat_mesh *)inputs[0]};
+  const bool keep = s.params->solid == SOLID_AS_IS;
+  qmat_mesh *made = NULL;
+  qmat_report *report = qmat_report_new();
+  qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
+  if (status == QMAT_OK) status = qmat_frame_of_mesh(context, s.mesh, &s.frame);
+  if (status == QMAT_OK && s.mesh->triangle_count >= UINT32_MAX / 6)
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu triangles; at most %u are made a solid",
+                       s.mesh->triangle_count, UINT32_MAX / 6);
+  if (status == QMAT_OK && !keep) status = s.params->solid == SOLID_WRAP ? wrap_all(&s) : make_solid(&s);
+  if (status == QMAT_OK && !keep && !is_unchanged(&s)) status = make_mesh(&s, &made);
+  if (status == QMAT_OK) status = fill_report(&s, made, report);
+  qmat_free(s.united.positions);
+  qmat_free(s.united.triangles);
+  qmat_free(s.wrap.positions);
+  qmat_free(s.wrap.triangles);
+  qmat_free(s.solids.corners);
+  qmat_free(s.sheets.corners);
+  if (status == QMAT_OK) {
+    outputs[0] = made ? &made->base : qmat_value_retain(&s.mesh->base);
+    outputs[1] = &report->base;
+    return QMAT_OK;
+  }
+  qmat_value_release(made ? &made->base : NULL);
+  qmat_value_release(report ? &report->base : NULL);
+  return status;
+}
+
+static const char *const choices[] = {[SOLID_AUTO] = "auto", [SOLID_AS_IS] = "as_is", [SOLID_CLOSE] = "close",
+                                      [SOLID_WRAP] = "wrap", [SOLID_SHEET] = "sheet", NULL};
+
+static const qmat_param params[] = {
+    QMAT_ENUM(
+        mesh_solid_params, solid, choices, SOLID_AUTO,
+        "auto: each component by its winding number; as_is: nothing is done; close: all borders are closed; wrap: "
+        "one closed surface around everything; sheet: everything is a sheet"),
+    QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
+    QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1, "A wrap keeps a quarter of this away; 0: of 1%"),
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "Any triangles"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "Closed solids, then sheets; the input if it is such a mesh"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "What each component was taken for, and what was done"},
+    {0},
+};
+
+static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_embree, NULL};
+
+const qmat_node qmat_node_mesh_solid = {
+    .name = "mesh.solid",
+    .version = 1,
+    .summary = "Makes a solid, and sheets, of any triangles",
+    .doc =
+        "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
+        "own. A closed component is a solid. The borders of an open one are closed by caps if the generalised winding "
+        "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. Of triangles that "
+        "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
+        "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
+        "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
+        "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are.\n\n"
+        "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
+        "it keeps away is added to the mesh's deviation.\n\n"
+        "If solids cannot be united, they stay as they are, with a warning.",
+    .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
+    .params_size = sizeof(mesh_solid_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .libraries = libraries,
+    .run = run,
+};
