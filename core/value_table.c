@@ -337,6 +337,52 @@ static qmat_status check_list(qmat_context *context, const qmat_value *value) {
   return QMAT_OK;
 }
 
+static const qmat_value_row colliders_rows[] = {ARRAY(qmat_colliders, spheres, F64, sphere_count, 4),
+                                                ARRAY(qmat_colliders, shapes, U32, shape_count, 3),
+                                                ARRAY(qmat_colliders, points, F64, point_count, 3),
+                                                ARRAY(qmat_colliders, triangles, U32, triangle_count, 3),
+                                                ARRAY(qmat_colliders, hull_ends, U32, shape_count, 2),
+                                                ARRAY(qmat_colliders, body, F64, body_count, 10),
+                                                END};
+
+/* The hulls follow each other, and each names only its own points. */
+static qmat_status check_hulls(qmat_context *context, const qmat_colliders *c) {
+  size_t points = 0, triangles = 0;
+  for (size_t i = 0; i < c->shape_count; i++) {
+    const size_t next_points = c->hull_ends[2 * i], next_triangles = c->hull_ends[2 * i + 1];
+    bool fits = next_points >= points && next_points <= c->point_count && next_triangles >= triangles &&
+                next_triangles <= c->triangle_count;
+    for (size_t k = 3 * triangles; fits && k < 3 * next_triangles; k++)
+      fits = c->triangles[k] >= points && c->triangles[k] < next_points;
+    if (!fits) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "its hull is not within its points and triangles");
+      return qmat_fail_element(context, "shape", (int64_t)i);
+    }
+    points = next_points;
+    triangles = next_triangles;
+  }
+  if (points == c->point_count && triangles == c->triangle_count) return QMAT_OK;
+  return qmat_fail(context, QMAT_ERROR_GEOMETRY, "points or triangles follow the last hull");
+}
+
+static qmat_status check_colliders(qmat_context *context, const qmat_value *value) {
+  const qmat_colliders *c = (const qmat_colliders *)value;
+  qmat_status status = qmat_check_u32_count(context, c->sphere_count, "spheres");
+  if (status == QMAT_OK) status = qmat_check_u32_count(context, c->point_count, "points");
+  if (status == QMAT_OK) status = qmat_check_u32_count(context, c->triangle_count, "triangles");
+  if (status == QMAT_OK) status = qmat_check_spheres(context, c->spheres, c->sphere_count, "sphere");
+  if (status == QMAT_OK)
+    status = qmat_check_ids(context, c->shapes, 3 * c->shape_count, c->sphere_count, "shape", 3, "sphere");
+  if (status == QMAT_OK) status = qmat_check_finite(context, c->points, c->point_count, 3, "point", "position");
+  if (status == QMAT_OK) status = qmat_check_finite(context, c->body, c->body_count, 10, "body", "mass property");
+  for (size_t i = 0; i < c->sphere_count && status == QMAT_OK; i++) {
+    if (c->spheres[4 * i + 3] > 0) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its radius is 0");
+    status = qmat_fail_element(context, "sphere", (int64_t)i);
+  }
+  return status == QMAT_OK ? check_hulls(context, c) : status;
+}
+
 /* The table. */
 
 #define COUNT(type, field, name) \
@@ -359,6 +405,9 @@ const qmat_value_layout qmat_value_layouts[QMAT_VALUE_TYPE_COUNT] = {
     [QMAT_REPORT] = {TYPE(report), {{0}}},
     [QMAT_FILE] = {TYPE(file), {DETAIL(qmat_file, part_count, "parts")}},
     [QMAT_FAILURE] = {TYPE(failure), {{0}}},
+    [QMAT_COLLIDERS] = {TYPE(colliders),
+                        {COUNT(qmat_colliders, shape_count, "shapes"),
+                         DETAIL(qmat_colliders, sphere_count, "spheres")}},
     [QMAT_LIST] = {TYPE(list), {{0}}},
 };
 

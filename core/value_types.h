@@ -27,7 +27,8 @@
   TYPE(CHAIN, chain)           \
   TYPE(REPORT, report)         \
   TYPE(FILE, file)             \
-  TYPE(FAILURE, failure)
+  TYPE(FAILURE, failure)       \
+  TYPE(COLLIDERS, colliders)
 
 #define QMAT_ENUMERATOR(NAME, name) QMAT_##NAME,
 typedef enum qmat_value_type { QMAT_VALUE_TYPES(QMAT_ENUMERATOR) QMAT_LIST, QMAT_VALUE_TYPE_COUNT } qmat_value_type;
@@ -140,6 +141,21 @@ typedef struct qmat_chain {
   double *errors;             /* collapse_count: the tolerance of each collapse, in diagonals; never decreases */
   double meters_per_diagonal; /* the length of the surface's diagonal in metres; 0: unknown */
 } qmat_chain;
+
+/* Shapes for collision detection and the rigid body that they stand for. A shape is the convex hull of one, two or
+ * three spheres: a sphere, a tapered capsule, a rounded triangle. Its hull is a polyhedron for engines without such
+ * shapes. */
+typedef struct qmat_colliders {
+  qmat_value base;
+  size_t sphere_count, shape_count, point_count, triangle_count;
+  double *spheres;     /* 4 * sphere_count: x y z radius, above 0 */
+  uint32_t *shapes;    /* 3 * shape_count: ids of spheres; a capsule repeats its second, a sphere its first */
+  double *points;      /* 3 * point_count: of all hulls, shape by shape */
+  uint32_t *triangles; /* 3 * triangle_count: point ids, counter-clockwise from outside, shape by shape */
+  uint32_t *hull_ends; /* 2 * shape_count: the end of its points, and of its triangles */
+  size_t body_count;   /* 1; 0: mass properties are not known */
+  double *body; /* mass; centre x y z; inertia about it xx yy zz xy xz yz (products with their sign in the tensor) */
+} qmat_colliders;
 
 /* Named counts and errors as a JSON object. It never contains times, so equal results have equal digests. */
 typedef struct qmat_report {

@@ -155,6 +155,24 @@ static qmat_list *list_example(void) {
 static qmat_value *known_item;
 static uint64_t known_size;
 
+/* A capsule with a hull of a tetrahedron, and its mass properties. */
+static qmat_colliders *colliders_example(void) {
+  qmat_colliders *colliders = qmat_colliders_new();
+  assert_non_null(colliders);
+  colliders->sphere_count = 2;
+  colliders->shape_count = 1;
+  colliders->point_count = 4;
+  colliders->triangle_count = 4;
+  colliders->body_count = 1;
+  ASSIGN(colliders->spheres, (double[]){0, 0, 0, 1, 1, 0, 0, 0.5});
+  ASSIGN(colliders->shapes, (uint32_t[]){0, 1, 1});
+  ASSIGN(colliders->points, (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+  ASSIGN(colliders->triangles, (uint32_t[]){0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3});
+  ASSIGN(colliders->hull_ends, (uint32_t[]){4, 4});
+  ASSIGN(colliders->body, (double[]){5, 0.5, 0, 0, 1, 2, 3, 0, 0, 0});
+  return colliders;
+}
+
 static int make_known_item(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -201,6 +219,8 @@ static qmat_value *example_of(qmat_value_type type) {
       return &file_example()->base;
     case QMAT_FAILURE:
       return &failure_example()->base;
+    case QMAT_COLLIDERS:
+      return &colliders_example()->base;
     case QMAT_LIST:
       return &list_example()->base;
     default:
@@ -226,6 +246,24 @@ static void assert_not_sealed(qmat_value *value, qmat_status expected, const cha
   qmat_value_release(value);
 }
 
+static void test_colliders_without_radius_or_with_another_hulls_points_are_refused(void **state) {
+  (void)state;
+  qmat_colliders *colliders = colliders_example();
+  colliders->spheres[7] = 0;
+  assert_not_sealed(&colliders->base, QMAT_ERROR_GEOMETRY, "sphere 1: its radius is 0");
+  colliders = colliders_example();
+  colliders->shapes[2] = 2;
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &colliders->base), QMAT_ERROR_GEOMETRY);
+  qmat_value_release(&colliders->base);
+  colliders = colliders_example();
+  colliders->triangles[5] = 4;
+  assert_not_sealed(&colliders->base, QMAT_ERROR_GEOMETRY, "shape 0: its hull is not within its points and triangles");
+  colliders = colliders_example();
+  colliders->hull_ends[1] = 3;
+  assert_not_sealed(&colliders->base, QMAT_ERROR_GEOMETRY, "points or triangles follow the last hull");
+}
+
 static void test_types_have_names(void **state) {
   (void)state;
   assert_string_equal(qmat_value_type_name(QMAT_SCENE), "scene");
@@ -238,10 +276,10 @@ static void test_types_have_names(void **state) {
 
 static void test_new_values_are_empty_and_can_be_released_at_once(void **state) {
   (void)state;
-  qmat_value *values[] = {&qmat_scene_new()->base,   &qmat_mesh_new()->base,   &qmat_field_new()->base,
-                          &qmat_samples_new()->base, &qmat_medial_new()->base, &qmat_chain_new()->base,
-                          &qmat_report_new()->base,  &qmat_file_new()->base,   &qmat_failure_new()->base,
-                          &qmat_list_new(0)->base};
+  qmat_value *values[] = {&qmat_scene_new()->base,     &qmat_mesh_new()->base,   &qmat_field_new()->base,
+                          &qmat_samples_new()->base,   &qmat_medial_new()->base, &qmat_chain_new()->base,
+                          &qmat_report_new()->base,    &qmat_file_new()->base,   &qmat_failure_new()->base,
+                          &qmat_colliders_new()->base, &qmat_list_new(0)->base};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     assert_non_null(values[type]);
     assert_int_equal(values[type]->type, type);
@@ -283,6 +321,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                                                     "\"steps\":[1,2.0,\"a\\\"b\"]}"),
                              [QMAT_FILE] = 4 + 8,
                              [QMAT_FAILURE] = 10,
+                             [QMAT_COLLIDERS] = 8 * 8 + 3 * 4 + 12 * 8 + 12 * 4 + 2 * 4 + 10 * 8,
                              [QMAT_LIST] = 2 * (3 * 8 + 10)};
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) {
     qmat_value *value = example_of((qmat_value_type)type);
@@ -1183,6 +1222,7 @@ static void test_a_failure_has_the_error_without_its_place(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_types_have_names),
+      cmocka_unit_test(test_colliders_without_radius_or_with_another_hulls_points_are_refused),
       cmocka_unit_test(test_new_values_are_empty_and_can_be_released_at_once),
       cmocka_unit_test(test_half_filled_values_are_released_whole),
       cmocka_unit_test(test_bytes_count_what_the_arrays_hold),

@@ -30,10 +30,11 @@ find core io nodes graphs -name '*.[ch]' -o -name '*.cpp' -o -name '*.c.in' | LC
     allow("nodes/measure", "core core/geometry")
     allow("nodes/initial", "core core/geometry nodes/measure")
     allow("nodes/mesh", "core core/geometry")
+    allow("nodes/colliders", "core core/geometry nodes/measure")
     allow("nodes/skin", "core core/geometry nodes/measure")
     allow("nodes/descriptor", "core nodes/mesh")
     allow("nodes/simplify", "core core/geometry nodes/descriptor nodes/initial nodes/measure")
-    nodes = "core core/geometry nodes nodes/descriptor nodes/initial nodes/measure nodes/mesh nodes/simplify nodes/skin"
+    nodes = "core core/geometry nodes nodes/colliders nodes/descriptor nodes/initial nodes/measure nodes/mesh nodes/simplify nodes/skin"
     allow("nodes", formats " " nodes)
     allow("graphs", formats " " nodes)
     allow("graphs/cache", formats " " nodes " graphs")

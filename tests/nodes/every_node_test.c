@@ -220,6 +220,7 @@ static void make_solid(world to, const qmat_model *model) {
   qmat_value_release(values[QMAT_MEDIAL]);
   values[QMAT_MEDIAL] = simple;
   seal(values[QMAT_CHAIN] = chain_of((const qmat_medial *)simple));
+  values[QMAT_COLLIDERS] = make("medial.colliders", "colliders", to, "samples", "100");
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
   seal(values[QMAT_FAILURE] = failure());
   seal(values[QMAT_LIST] = list_of(values[QMAT_REPORT]));
@@ -287,6 +288,7 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
   file->parts[0].name = qmat_strdup("");
   values[QMAT_FILE] = &file->base;
   values[QMAT_FAILURE] = failure();
+  values[QMAT_COLLIDERS] = &qmat_colliders_new()->base;
   values[QMAT_LIST] = list_of(values[QMAT_REPORT]);
   for (int type = 0; type < QMAT_VALUE_TYPE_COUNT; type++) seal(values[type]);
 }
@@ -857,6 +859,8 @@ static qmat_value *new_value(qmat_value_type type) {
       return &qmat_chain_new()->base;
     case QMAT_REPORT:
       return &qmat_report_new()->base;
+    case QMAT_COLLIDERS:
+      return &qmat_colliders_new()->base;
     default:
       return &qmat_file_new()->base;
   }

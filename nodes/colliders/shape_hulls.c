@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/colliders/shape_hulls.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+#include "nodes/colliders/convex_hull_cgal.h"
+
+/* Scratch of one hull: points in up to three copies of the directions. */
+typedef struct hull {
+  size_t point_count, triangle_count, used; /* used: points that are vertices of the hull */
+  double *points;
+  uint32_t *triangles, *names; /* names: the number of a point among those used, or QMAT_UNUSED */
+} hull;
+
+#define QMAT_UNUSED UINT32_MAX
+
+/* Fewer do not surround a point. Those of three spheres are within every limit. */
+enum { LEAST_DIRECTIONS = QMAT_LEAST_HULL_POINTS / 3 };
+
+/* Direction i of n, of length 1. */
+static void direction(size_t i, size_t n, double point[3]) {
+  static const double golden = 2.39996322972865332; /* pi (3 - sqrt 5) */
+  const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(1 - z * z), turn = golden * (double)i;
+  point[0] = r * cos(turn);
+  point[1] = r * sin(turn);
+  point[2] = z;
+}
+
+/* The hull of `width` spheres, each replaced by n points on the sphere of `factor` times its radius. */
+static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids, int width, size_t n, double factor) {
+  h->point_count = 0;
+  for (int s = 0; s < width; s++) {
+    const double *sphere = &spheres[4 * (size_t)ids[s]];
+    for (size_t i = 0; i < n; i++) {
+      double unit[3], *point = &h->points[3 * h->point_count++];
+      direction(i, n, unit);
+      for (int k = 0; k < 3; k++) point[k] = sphere[k] + factor * sphere[3] * unit[k];
+    }
+  }
+  const qmat_status status = qmat_convex_hull(h->points, h->point_count, h->triangles, &h->triangle_count);
+  if (status != QMAT_OK) return status;
+  memset(h->names, 0xff, h->point_count * sizeof *h->names);
+  for (size_t i = 0; i < 3 * h->triangle_count; i++) h->names[h->triangles[i]] = 0;
+  h->used = 0;
+  for (size_t i = 0; i < h->point_count; i++)
+    if (h->names[i] == 0) h->names[i] = (uint32_t)h->used++;
+  return QMAT_OK;
+}
+
+/* What the radius of n directions must be multiplied by so that their hull contains the unit sphere. */
+static qmat_status circumscribe(hull *h, size_t n, double *factor) {
+  static const double unit[4] = {0, 0, 0, 1};
+  static const uint32_t id = 0;
+  const qmat_status status = make_hull(h, unit, &id, 1, n, 1);
+  double nearest = 1;
+  for (size_t t = 0; t < h->triangle_count && status == QMAT_OK; t++) {
+    const uint32_t *row = &h->triangles[3 * t];
+    const double *a = &h->points[3 * (size_t)row[0]];
+    double ab[3], ac[3], normal[3];
+    qmat_subtract(&h->points[3 * (size_t)row[1]], a, ab);
+    qmat_subtract(&h->points[3 * (size_t)row[2]], a, ac);
+    qmat_cross(ab, ac, normal);
+    qmat_normalize(normal);
+    nearest = fmin(nearest, qmat_dot(normal, a));
+  }
+  *factor = (1 + 1e-9) / nearest;
+  return status;
+}
+
+/* The finest hull of a shape within the limit. */
+static qmat_status fit_hull(hull *h, const double *spheres, const uint32_t ids[3], size_t most, const double *factors) {
+  const int width = qmat_shape_width(ids);
+  size_t n = most;
+  for (;;) {
+    const qmat_status status = make_hull(h, spheres, ids, width, n, factors ? factors[n] : 1);
+    if (status != QMAT_OK || h->used <= most || n <= LEAST_DIRECTIONS) return status;
+    const size_t fewer = n * most / h->used;
+    n = fewer < LEAST_DIRECTIONS ? LEAST_DIRECTIONS : fewer < n ? fewer : n - 1;
+  }
+}
+
+/* Appends the hull to the value's arrays, which have room for it. */
+static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
+  const size_t first = colliders->point_count;
+  for (size_t i = 0; i < h->point_count; i++)
+    if (h->names[i] != QMAT_UNUSED)
+      memcpy(&colliders->points[3 * (first + h->names[i])], &h->points[3 * i], 3 * sizeof *h->points);
+  for (size_t i = 0; i < 3 * h->triangle_count; i++)
+    colliders->triangles[3 * colliders->triangle_count + i] = (uint32_t)first + h->names[h->triangles[i]];
+  colliders->point_count += h->used;
+  colliders->triangle_count += h->triangle_count;
+  colliders->hull_ends[2 * shape] = (uint32_t)colliders->point_count;
+  colliders->hull_ends[2 * shape + 1] = (uint32_t)colliders->triangle_count;
+}
+
+qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points,
+                             qmat_hull_side side) {
+  const size_t room = 3 * most_points, count = colliders->shape_count;
+  hull h = {.points = qmat_arena_alloc(&context->arena, room, 3 * sizeof *h.points),
+            .triangles = qmat_arena_alloc(&context->arena, room, 6 * sizeof *h.triangles),
+            .names = qmat_arena_alloc(&context->arena, room, sizeof *h.names)};
+  double *factors = qmat_arena_alloc(&context->arena, most_points + 1, sizeof *factors);
+  colliders->points = qmat_alloc(count * most_points, 3 * sizeof *colliders->points);
+  colliders->triangles = qmat_alloc(count * most_points, 6 * sizeof *colliders->triangles);
+  colliders->hull_ends = qmat_alloc(count, 2 * sizeof *colliders->hull_ends);
+  if (!h.points || !h.triangles || !h.names || !factors || !colliders->points || !colliders->triangles ||
+      !colliders->hull_ends)
+    return qmat_fail_memory(context, "the hulls");
+  qmat_status status = QMAT_OK;
+  for (size_t n = LEAST_DIRECTIONS; n <= most_points && side == QMAT_HULL_OUTSIDE && status == QMAT_OK; n++) {
+    status = qmat_progress(context, n, most_points, "directions");
+    if (status == QMAT_OK) status = circumscribe(&h, n, &factors[n]);
+  }
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    status = qmat_progress(context, i, count, "hulls");
+    if (status != QMAT_OK) return status;
+    status = fit_hull(&h, colliders->spheres, &colliders->shapes[3 * i], most_points,
+                      side == QMAT_HULL_OUTSIDE ? factors : NULL);
+    if (status == QMAT_OK) append(colliders, i, &h);
+    if (status == QMAT_ERROR_GEOMETRY) {
+      qmat_fail(context, status, "it has no hull");
+      return qmat_fail_element(context, "shape", (int64_t)i);
+    }
+  }
+  return status == QMAT_ERROR_MEMORY ? qmat_fail_memory(context, "the hulls") : status;
+}

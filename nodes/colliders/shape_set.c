@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/colliders/shape_set.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+
+enum { MOST_ROWS = 64 };
+
+int qmat_shape_width(const uint32_t shape[3]) {
+  return shape[1] == shape[0] ? 1 : shape[2] == shape[1] ? 2 : 3;
+}
+
+void qmat_shape_prepare(qmat_prepared_shape *shape, const double *spheres, const uint32_t ids[3]) {
+  const double *a = &spheres[4 * (size_t)ids[0]], *b = &spheres[4 * (size_t)ids[1]], *c = &spheres[4 * (size_t)ids[2]];
+  shape->count = qmat_shape_width(ids);
+  memcpy(shape->sphere, a, sizeof shape->sphere);
+  if (shape->count == 2) qmat_cone_prepare(&shape->cone, a, b);
+  if (shape->count == 3) qmat_slab_prepare(&shape->slab, a, b, c);
+}
+
+double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[3], double weights[3]) {
+  if (!weights)
+    return shape->count == 3   ? qmat_slab_prepared_distance(&shape->slab, point)
+           : shape->count == 2 ? qmat_cone_prepared_distance(&shape->cone, point)
+                               : qmat_sphere_distance(shape->sphere, point);
+  weights[0] = 1;
+  weights[1] = weights[2] = 0;
+  return shape->count == 3   ? qmat_slab_foot(&shape->slab, point, weights)
+         : shape->count == 2 ? qmat_cone_foot(&shape->cone, point, weights)
+                             : qmat_sphere_distance(shape->sphere, point);
+}
+
+double qmat_shape_volume(const double *spheres, const uint32_t ids[3]) {
+  static const double pi = 3.14159265358979323846;
+  const double *s[3];
+  for (int k = 0; k < 3; k++) s[k] = &spheres[4 * (size_t)ids[k]];
+  const int width = qmat_shape_width(ids);
+  if (width == 1) return 4 / 3.0 * pi * s[0][3] * s[0][3] * s[0][3];
+  if (width == 2) {
+    const double length = qmat_point_distance(s[0], s[1]), a = s[0][3], b = s[1][3];
+    const double larger = fmax(a, b);
+    if (length <= fabs(a - b)) return 4 / 3.0 * pi * larger * larger * larger;
+    /* A frustum between the circles where it touches the spheres, and a cap of each sphere. */
+    const double slope = (b - a) / length, rise2 = 1 - slope * slope;
+    const double cap_a = a * (1 - slope), cap_b = b * (1 + slope), height = length + slope * (a - b);
+    return pi / 3 *
+           (height * rise2 * (a * a + a * b + b * b) + cap_a * cap_a * (3 * a - cap_a) +
+            cap_b * cap_b * (3 * b - cap_b));
+  }
+  double u[3], v[3], normal[3];
+  qmat_subtract(s[1], s[0], u);
+  qmat_subtract(s[2], s[0], v);
+  qmat_cross(u, v, normal);
+  const double area = 0.5 * sqrt(qmat_dot(normal, normal)), r = (s[0][3] + s[1][3] + s[2][3]) / 3;
+  const double border =
+      qmat_point_distance(s[0], s[1]) + qmat_point_distance(s[1], s[2]) + qmat_point_distance(s[2], s[0]);
+  return 2 * area * r + 0.5 * pi * r * r * border + 4 / 3.0 * pi * r * r * r;
+}
+
+/* ---- a growing set ---- */
+
+typedef struct builder {
+  qmat_context *context;
+  qmat_shape_set set;
+  size_t sphere_room, shape_room;
+  bool failed;
+} builder;
+
+/* Doubles an array of the arena. */
+static void *grown(builder *b, const void *array, size_t count, size_t *room, size_t size) {
+  if (count < *room) return (void *)(uintptr_t)array;
+  *room = *room ? 2 * *room : 64;
+  void *larger = qmat_arena_alloc(&b->context->arena, *room, size);
+  if (larger && count > 0) memcpy(larger, array, count * size);
+  return larger;
+}
+
+static uint32_t add_sphere(builder *b, const double sphere[4]) {
+  double *spheres = grown(b, b->set.spheres, b->set.sphere_count, &b->sphere_room, 4 * sizeof *spheres);
+  b->failed = b->failed || !spheres;
+  if (b->failed) return 0;
+  b->set.spheres = spheres;
+  memcpy(&spheres[4 * b->set.sphere_count], sphere, 4 * sizeof *spheres);
+  return (uint32_t)b->set.sphere_count++;
+}
+
+/* Adds a shape; ids in any order, equal ones for fewer spheres. */
+static void add_shape(builder *b, uint32_t x, uint32_t y, uint32_t z) {
+  uint32_t *shapes = grown(b, b->set.shapes, b->set.shape_count, &b->shape_room, 3 * sizeof *shapes);
+  b->failed = b->failed || !shapes;
+  if (b->failed) return;
+  b->set.shapes = shapes;
+  uint32_t ids[3] = {x, y, z};
+  for (int i = 0; i < 2; i++)
+    for (int j = 0; j < 2; j++)
+      if (ids[j] > ids[j + 1]) {
+        const uint32_t higher = ids[j];
+        ids[j] = ids[j + 1];
+        ids[j + 1] = higher;
+      }
+  if (ids[0] == ids[1] && ids[1] != ids[2]) ids[1] = ids[2];
+  memcpy(&shapes[3 * b->set.shape_count++], ids, sizeof ids);
+}
+
+static void interpolate(const double *a, const double *b, double t, double sphere[4]) {
+  for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * a[k] + t * b[k];
+}
+
+/* The number of steps along `length` so that neighbours of radius `radius` leave dents of at most `dent`. */
+static int steps_along(double length, double radius, double dent) {
+  const double gap = dent < radius ? 2 * sqrt(dent * (2 * radius - dent)) : 2 * radius;
+  const double steps = ceil(length / gap);
+  return steps < 1 ? 1 : steps < MOST_ROWS ? (int)steps : MOST_ROWS;
+}
+
+/* Spheres along the cone of two, without those at its ends. */
+static void add_spheres_between(builder *b, const double *s, const double *t, double dent) {
+  double first[4], last[4], sphere[4];
+  memcpy(first, s, sizeof first); /* the array may move */
+  memcpy(last, t, sizeof last);
+  const int steps = steps_along(qmat_point_distance(first, last), fmin(first[3], last[3]), dent);
+  for (int i = 1; i < steps && !b->failed; i++) {
+    interpolate(first, last, (double)i / steps, sphere);
+    const uint32_t id = add_sphere(b, sphere);
+    add_shape(b, id, id, id);
+  }
+}
+
+/* A slab as capsules or spheres: rows along its longest side up to the corner across. */
+static void add_rows(builder *b, const uint32_t ids[3], qmat_shape_kind kind, double dent) {
+  double s[3][4];
+  int longest = 0;
+  for (int k = 0; k < 3; k++) memcpy(s[k], &b->set.spheres[4 * (size_t)ids[k]], sizeof s[k]);
+  for (int k = 1; k < 3; k++)
+    if (qmat_point_distance(s[k], s[(k + 1) % 3]) > qmat_point_distance(s[longest], s[(longest + 1) % 3])) longest = k;
+  const double *p = s[longest], *q = s[(longest + 1) % 3], *apex = s[(longest + 2) % 3];
+  double u[3], v[3], normal[3];
+  qmat_subtract(q, p, u);
+  qmat_subtract(apex, p, v);
+  qmat_cross(u, v, normal);
+  const double side = sqrt(qmat_dot(u, u)), height = side > 0 ? sqrt(qmat_dot(normal, normal)) / side : 0;
+  const int rows = steps_along(height, fmin(apex[3], fmin(p[3], q[3])), dent);
+  for (int i = 0; i <= rows && !b->failed; i++) {
+    const bool first = i == 0;
+    double left[4], right[4];
+    interpolate(p, apex, (double)i / rows, left);
+    interpolate(q, apex, (double)i / rows, right);
+    const uint32_t l = first ? ids[longest] : i == rows ? ids[(longest + 2) % 3] : add_sphere(b, left);
+    const uint32_t r = first ? ids[(longest + 1) % 3] : i == rows ? l : add_sphere(b, right);
+    if (kind == QMAT_SHAPES_CAPSULES) {
+      add_shape(b, l, r, r);
+    } else {
+      add_shape(b, l, l, l);
+      add_shape(b, r, r, r);
+      add_spheres_between(b, left, right, dent);
+    }
+  }
+}
+
+/* ---- what is redundant ---- */
+
+/* Slabs first; then by ids. */
+static int compare_shapes(const void *left, const void *right) {
+  const uint32_t *a = left, *b = right;
+  const int wide = qmat_shape_width(b) - qmat_shape_width(a);
+  if (wide != 0) return wide;
+  for (int k = 0; k < 3; k++)
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
+/* Replaces a shape whose spheres contain each other by those that count. */
+static void add_reduced(builder *b, const uint32_t ids[3]) {
+  const int width = qmat_shape_width(ids);
+  qmat_prepared_shape shape;
+  qmat_shape_prepare(&shape, b->set.spheres, ids);
+  if (width == 3 && !shape.slab.solid) {
+    for (int k = 0; k < 3; k++) {
+      const uint32_t side[3] = {ids[k], ids[(k + 1) % 3], ids[(k + 1) % 3]};
+      add_reduced(b, side);
+    }
+  } else if (width == 2 && shape.cone.only) {
+    const uint32_t id = ids[shape.cone.only - 1];
+    add_shape(b, id, id, id);
+  } else {
+    add_shape(b, ids[0], ids[1], ids[2]);
+  }
+}
+
+/* Whether every sphere of shape `inner` is inside `outer`. */
+static bool holds(const qmat_prepared_shape *outer, const double *spheres, const uint32_t inner[3]) {
+  const int width = qmat_shape_width(inner);
+  for (int k = 0; k < width; k++) {
+    const double *s = &spheres[4 * (size_t)inner[k]];
+    if (!(qmat_shape_distance(outer, s, NULL) + s[3] <= 1e-12)) return false;
+  }
+  return true;
+}
+
+/* Marks the shapes that are inside another one; of equal ones the first stays. */
+static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
+  qmat_prepared_shape *prepared = qmat_arena_alloc(&context->arena, set->shape_count, sizeof *prepared);
+  if (!prepared) return qmat_fail_memory(context, "the colliders");
+  for (size_t i = 0; i < set->shape_count; i++) qmat_shape_prepare(&prepared[i], set->spheres, &set->shapes[3 * i]);
+  for (size_t i = set->shape_count; i-- > 0;) {
+    const uint32_t *ids = &set->shapes[3 * i];
+    const qmat_status status = qmat_progress(context, set->shape_count - i, set->shape_count, "shapes compared");
+    if (status != QMAT_OK) return status;
+    for (size_t j = 0; j < set->shape_count && !dropped[i]; j++)
+      if (j != i && !dropped[j] && holds(&prepared[j], set->spheres, ids)) dropped[i] = 1;
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
+  builder b = {.context = context, .set = {.sphere_count = set->sphere_count, .spheres = set->spheres}};
+  for (size_t i = 0; i < set->shape_count; i++) add_reduced(&b, &set->shapes[3 * i]);
+  const size_t count = b.set.shape_count;
+  uint8_t *dropped = qmat_arena_calloc(&context->arena, count, 1);
+  uint32_t *names = qmat_arena_alloc(&context->arena, set->sphere_count, sizeof *names);
+  double *spheres = qmat_arena_alloc(&context->arena, set->sphere_count, 4 * sizeof *spheres);
+  if (b.failed || !dropped || !names || !spheres) return qmat_fail_memory(context, "the colliders");
+  if (count > 0) qsort(b.set.shapes, count, 3 * sizeof *b.set.shapes, compare_shapes);
+  const qmat_status status = mark_nested(context, &b.set, dropped);
+  if (status != QMAT_OK) return status;
+  memset(names, 0xff, set->sphere_count * sizeof *names);
+  size_t kept = 0, used = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (dropped[i]) continue;
+    memmove(&b.set.shapes[3 * kept++], &b.set.shapes[3 * i], 3 * sizeof *b.set.shapes);
+  }
+  for (size_t i = 0; i < 3 * kept; i++) names[b.set.shapes[i]] = 0;
+  for (size_t i = 0; i < set->sphere_count; i++) {
+    if (names[i] != 0) continue;
+    memcpy(&spheres[4 * used], &set->spheres[4 * i], 4 * sizeof *spheres);
+    names[i] = (uint32_t)used++;
+  }
+  for (size_t i = 0; i < 3 * kept; i++) b.set.shapes[i] = names[b.set.shapes[i]];
+  *set = (qmat_shape_set){.sphere_count = used, .shape_count = kept, .spheres = spheres, .shapes = b.set.shapes};
+  return QMAT_OK;
+}
+
+/* ---- from a medial mesh ---- */
+
+static void add_simplex(builder *b, uint32_t x, uint32_t y, uint32_t z, qmat_shape_kind kind, double dent) {
+  const uint32_t ids[3] = {x, y, z};
+  const int width = qmat_shape_width(ids);
+  if (kind == QMAT_SHAPES_ANY || width == 1 || (kind == QMAT_SHAPES_CAPSULES && width == 2)) {
+    add_shape(b, x, y, z);
+  } else if (width == 3) {
+    add_rows(b, ids, kind, kind == QMAT_SHAPES_SPHERES ? dent / 2 : dent);
+  } else {
+    add_shape(b, x, x, x);
+    add_shape(b, y, y, y);
+    add_spheres_between(b, &b->set.spheres[4 * (size_t)x], &b->set.spheres[4 * (size_t)y], dent);
+  }
+}
+
+qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
+                                qmat_shape_kind kind, double dent, qmat_shape_set *set) {
+  builder b = {.context = context};
+  uint8_t *used = qmat_arena_calloc(&context->arena, unit->sphere_count, 1);
+  b.failed = !used;
+  for (size_t i = 0; i < unit->sphere_count && !b.failed; i++) {
+    double sphere[4];
+    memcpy(sphere, &unit->spheres[4 * i], sizeof sphere);
+    sphere[3] = fmax(sphere[3], least_radius);
+    add_sphere(&b, sphere);
+  }
+  for (size_t i = 0; i < unit->triangle_count && !b.failed; i++) {
+    const uint32_t *row = &unit->triangles[3 * i];
+    for (int k = 0; k < 3; k++) used[row[k]] = 1;
+    add_simplex(&b, row[0], row[1], row[2], kind, dent);
+  }
+  for (size_t i = 0; i < unit->edge_count && !b.failed; i++) {
+    const uint32_t *row = &unit->edges[2 * i];
+    used[row[0]] = used[row[1]] = 1;
+    add_simplex(&b, row[0], row[1], row[1], kind, dent);
+  }
+  for (size_t i = 0; i < unit->sphere_count && !b.failed; i++)
+    if (!used[i]) add_shape(&b, (uint32_t)i, (uint32_t)i, (uint32_t)i);
+  if (b.failed) return qmat_fail_memory(context, "the colliders");
+  *set = b.set;
+  return qmat_shape_set_reduce(context, set);
+}
+
+qmat_status qmat_shape_set_envelope(qmat_context *context, const qmat_shape_set *set, qmat_envelope **envelope) {
+  size_t slabs = 0, cones = 0;
+  for (size_t i = 0; i < set->shape_count; i++) {
+    const int width = qmat_shape_width(&set->shapes[3 * i]);
+    slabs += width == 3;
+    cones += width == 2;
+  }
+  uint32_t *edges = qmat_arena_alloc(&context->arena, cones, 2 * sizeof *edges);
+  *envelope = NULL;
+  if (!edges) return qmat_fail_memory(context, "the colliders");
+  for (size_t i = 0; i < cones; i++) memcpy(&edges[2 * i], &set->shapes[3 * (slabs + i)], 2 * sizeof *edges);
+  return qmat_envelope_new(context, set->spheres, set->sphere_count, edges, cones, set->shapes, slabs, envelope);
+}

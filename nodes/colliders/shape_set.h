@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_COLLIDERS_SHAPE_SET_H
+#define QMAT_NODES_COLLIDERS_SHAPE_SET_H
+
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_distance.h"
+
+/* Colliders under construction, in the unit frame of a mesh. A shape is the convex hull of up to three spheres. Shapes
+ * of three spheres come first, then those of two, then those of one; ids rise within a shape. No shape contains
+ * another's spheres as a side, so that shape i is primitive i of the set's envelope. All arrays are in the context's
+ * arena. */
+typedef struct qmat_shape_set {
+  size_t sphere_count, shape_count;
+  double *spheres;  /* 4 per sphere */
+  uint32_t *shapes; /* 3 per shape, as in qmat_colliders */
+} qmat_shape_set;
+
+typedef enum qmat_shape_kind { QMAT_SHAPES_ANY, QMAT_SHAPES_CAPSULES, QMAT_SHAPES_SPHERES } qmat_shape_kind;
+
+/* A shape prepared for distance queries. */
+typedef struct qmat_prepared_shape {
+  int count;
+  double sphere[4];
+  qmat_cone cone;
+  qmat_slab slab;
+} qmat_prepared_shape;
+
+/* The number of spheres of a shape (3 ids): 1, 2 or 3. */
+int qmat_shape_width(const uint32_t shape[3]);
+
+/* Prepares the shape of these spheres (4 doubles each). */
+void qmat_shape_prepare(qmat_prepared_shape *shape, const double *spheres, const uint32_t ids[3]);
+
+/* The signed distance to a shape: exact outside, a bound inside, convex (core/geometry/medial_distance.h). `weights`
+ * (may be NULL) receives the shares of its spheres at the medial point that attains it. */
+double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[3], double weights[3]);
+
+/* The volume of a shape; of three spheres it is that of spheres with their mean radius. */
+double qmat_shape_volume(const double *spheres, const uint32_t ids[3]);
+
+/* Makes the shapes of a medial mesh: its maximal simplices. Radii below `least_radius` (above 0) become that. A simplex
+ * whose spheres contain each other becomes those that count, and a shape inside another one is left out. With `kind`,
+ * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep.
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the shapes. */
+qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
+                                qmat_shape_kind kind, double dent, qmat_shape_set *set);
+
+/* Leaves out what changed spheres have made redundant: simplices whose spheres contain each other, shapes inside
+ * others, unused spheres. Errors and cost as above. */
+qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set);
+
+/* Joins pairs of shapes, the least growth of volume first, until at most `most` are left. A joint shape is the hull of
+ * some of their spheres; `growth` times what the others leave it by is added to its radii, so that 1 makes it contain
+ * both. Errors as above. */
+qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
+                                 size_t most);
+
+/* The union of the shapes, whose primitives are numbered like them. The caller frees it with qmat_envelope_free. */
+qmat_status qmat_shape_set_envelope(qmat_context *context, const qmat_shape_set *set, qmat_envelope **envelope);
+
+#endif

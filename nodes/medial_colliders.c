@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* medial.colliders: a medial mesh as shapes for collision detection, with the mass properties of the solid. */
+#include <math.h>
+#include <string.h>
+
+#include "core/json_text.h"
+#include "core/node.h"
+#include "nodes/colliders/cover_fit.h"
+#include "nodes/colliders/inside_fit.h"
+#include "nodes/colliders/rigid_body.h"
+#include "nodes/colliders/shape_hulls.h"
+#include "nodes/colliders/shape_measures.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/measure/unit_spheres.h"
+
+typedef enum fit_side { FIT_BOTH, FIT_CONTAIN, FIT_INSIDE } fit_side;
+
+typedef struct medial_colliders_params {
+  int fit, kind;
+  int64_t shapes, hull_points, samples;
+  double least_radius, dent, density;
+} medial_colliders_params;
+
+typedef struct work {
+  qmat_context *context;
+  const medial_colliders_params *params;
+  qmat_surface *surface;
+  qmat_envelope *envelope;
+  qmat_shape_set set;
+  qmat_colliders *colliders;
+  double volume; /* of the solid, in the unit frame; 0: not known */
+  bool proved;
+  qmat_shape_measures measures;
+} work;
+
+static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial *medial) {
+  const medial_colliders_params *p = w->params;
+  qmat_context *context = w->context;
+  qmat_status status = qmat_surface_new(context, mesh, &w->surface);
+  if (status != QMAT_OK) return status;
+  qmat_medial unit = *medial;
+  status = qmat_unit_spheres(context, qmat_surface_frame(w->surface), medial, &unit.spheres);
+  if (status != QMAT_OK) return status;
+  status = qmat_shape_set_make(context, &unit, p->least_radius, (qmat_shape_kind)p->kind, p->dent, &w->set);
+  static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
+  if (status == QMAT_OK && p->shapes > 0)
+    status = qmat_shape_set_merge(context, &w->set, (qmat_shape_kind)p->kind, growth[p->fit], (size_t)p->shapes);
+  /* The surface itself is known to the deviation. */
+  const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
+  if (status == QMAT_OK && p->fit == FIT_CONTAIN) {
+    status = qmat_cover_fit(context, w->surface, &w->set, p->least_radius, &w->proved);
+    for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] += deviation;
+  }
+  if (status == QMAT_OK && p->fit == FIT_INSIDE) {
+    status = qmat_inside_fit(context, w->surface, &w->set, p->least_radius + deviation, &w->proved);
+    for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] -= deviation;
+  }
+  if (status != QMAT_OK || w->set.shape_count > 0) return status;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "no shape is left");
+  qmat_fail_field(context, "medial");
+  return qmat_fail_hint(context,
+                        "the solid is thinner than least_radius, or open; fit=both takes the spheres as they are");
+}
+
+static qmat_status fill_colliders(work *w) {
+  qmat_colliders *c = w->colliders;
+  c->spheres = qmat_alloc(w->set.sphere_count, 4 * sizeof *c->spheres);
+  c->shapes = qmat_alloc(w->set.shape_count, 3 * sizeof *c->shapes);
+  c->body = qmat_alloc(10, sizeof *c->body);
+  if (!c->spheres || !c->shapes || !c->body) return qmat_fail_memory(w->context, "the colliders");
+  c->sphere_count = w->set.sphere_count;
+  c->shape_count = w->set.shape_count;
+  qmat_frame_spheres_to_model(qmat_surface_frame(w->surface), w->set.spheres, c->sphere_count, c->spheres);
+  memcpy(c->shapes, w->set.shapes, 3 * c->shape_count * sizeof *c->shapes);
+  c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
+  const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
+  const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, side);
+  return status == QMAT_OK ? qmat_value_seal(w->context, &c->base) : status;
+}
+
+static const char *const fits[] = {"both", "contain", "inside", NULL};
+static const char *const kinds[] = {"any", "capsules", "spheres", NULL};
+
+static qmat_status make_report(const work *w, qmat_report *report) {
+  const qmat_shape_measures *m = &w->measures;
+  const struct {
+    const char *key;
+    double value;
+  } numbers[] = {
+      {"diagonal", qmat_surface_frame(w->surface)->diagonal},
+      {"coverage", m->coverage},
+      {"protrusion", m->protrusion},
+      {"protrusion_mean", m->protrusion_mean},
+      {"protrusion_p95", m->protrusion_p95},
+      {"gap_mean", m->gap_mean},
+      {"gap_p95", m->gap_p95},
+      {"max_uncovered_gap", m->max_uncovered_gap},
+      {"volume_ratio", m->volume_ratio},
+      {"iou", m->iou},
+  };
+  size_t widths[4] = {0};
+  for (size_t i = 0; i < w->set.shape_count; i++) widths[qmat_shape_width(&w->set.shapes[3 * i])]++;
+  const struct {
+    const char *key;
+    size_t value;
+  } counts[] = {{"shapes", w->set.shape_count},   {"single_spheres", widths[1]},
+                {"capsules", widths[2]},          {"hulls_of_three", widths[3]},
+                {"spheres", w->set.sphere_count}, {"hull_points", w->colliders->point_count}};
+  int bad = json_object_set_new(report->root, "fit", json_string(fits[w->params->fit]));
+  bad |= json_object_set_new(report->root, "proved", json_boolean(w->proved));
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+    bad |= json_object_set_new(report->root, numbers[i].key, json_real(numbers[i].value));
+  if (w->colliders->body_count > 0) {
+    const double *b = w->colliders->body;
+    bad |= json_object_set_new(report->root, "mass", json_real(b[0]));
+    bad |= json_object_set_new(report->root, "centre_of_mass", json_pack("[f, f, f]", b[1], b[2], b[3]));
+    bad |= json_object_set_new(report->root, "inertia",
+                               json_pack("[f, f, f, f, f, f]", b[4], b[5], b[6], b[7], b[8], b[9]));
+  }
+  return bad ? qmat_fail_memory(w->context, "the report") : qmat_value_seal(w->context, &report->base);
+}
+
+static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  work w = {.context = context, .params = data, .colliders = qmat_colliders_new()};
+  const qmat_medial *medial = (const qmat_medial *)inputs[1];
+  qmat_report *report = qmat_report_new();
+  qmat_status status = w.colliders && report ? QMAT_OK : qmat_fail_memory(context, "the colliders");
+  if (status == QMAT_OK) status = make_shapes(&w, (const qmat_mesh *)inputs[0], medial);
+  if (status == QMAT_OK) status = fill_colliders(&w);
+  if (status == QMAT_OK) status = qmat_shape_set_envelope(context, &w.set, &w.envelope);
+  if (status == QMAT_OK)
+    status = qmat_shape_measures_take(context, w.surface, &w.set, w.envelope, w.colliders, w.volume,
+                                      (size_t)w.params->samples, &w.measures);
+  if (status == QMAT_OK) status = make_report(&w, report);
+  qmat_envelope_free(w.envelope);
+  qmat_surface_free(w.surface);
+  if (status == QMAT_OK) {
+    outputs[0] = &w.colliders->base;
+    outputs[1] = &report->base;
+    return QMAT_OK;
+  }
+  qmat_value_release(w.colliders ? &w.colliders->base : NULL);
+  qmat_value_release(report ? &report->base : NULL);
+  return status;
+}
+
+static const qmat_param params[] = {
+    QMAT_ENUM(medial_colliders_params, fit, fits, FIT_BOTH,
+              "both: the spheres as they are; contain: nothing of the solid is outside of the shapes; inside: nothing "
+              "of a shape is outside of the solid"),
+    QMAT_INT(medial_colliders_params, shapes, "shapes", 0, 0, 1e6,
+             "The largest number of shapes; pairs become one until it is reached; 0: any number"),
+    QMAT_ENUM(medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
+              "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only"),
+    QMAT_LENGTH(medial_colliders_params, dent, 0.01, 1e-4, 1,
+                "How deep the dents between the capsules or spheres may be that replace a cone or slab"),
+    QMAT_LENGTH(medial_colliders_params, least_radius, 0.0005, 1e-6, 1,
+                "The smallest radius; engines refuse 0, which sharp features have"),
+    QMAT_INT(medial_colliders_params, hull_points, "points", 64, QMAT_LEAST_HULL_POINTS, 1024,
+             "The largest number of vertices of a hull: PhysX takes 64, Jolt 256"),
+    QMAT_FLOAT(medial_colliders_params, density, "mass per cubic model unit", 1, 1e-12, 1e12,
+               "The density of the solid, which its mass and inertia follow from"),
+    QMAT_INT(medial_colliders_params, samples, "points", 20000, 1, 1e8,
+             "Points of the surface and of the shapes, and a tenth of those of the volume, for the measures"),
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    {.name = "mesh", .type = QMAT_MESH, .doc = "The surface of the solid"},
+    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh that describes it"},
+    {0},
+};
+
+static const qmat_port outputs[] = {
+    {.name = "colliders", .type = QMAT_COLLIDERS, .doc = "Shapes, their hulls, and the mass properties of the solid"},
+    {.name = "report", .type = QMAT_REPORT, .doc = "How well the shapes describe the solid"},
+    {0},
+};
+
+static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_embree, NULL};
+
+const qmat_node qmat_node_medial_colliders = {
+    .name = "medial.colliders",
+    .version = 1,
+    .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
+    .doc =
+        "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
+        "mesh that is no side of another one. Each also has a hull, a convex polyhedron for engines without such "
+        "shapes.\n\n"
+        "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
+        "branch and bound that no point of the solid is outside, and grows them where one is; hulls then contain "
+        "their shapes. inside changes radii and proves the opposite; otherwise hulls are inside their shapes. proved "
+        "is false for open surfaces.\n\n"
+        "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
+        "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
+        "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union.",
+    .citation = "",
+    .params_size = sizeof(medial_colliders_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .libraries = libraries,
+    .run = run,
+};

@@ -1,0 +1,355 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_build.h"
+#include "core/geometry/surface.h"
+#include "core/hash.h"
+#include "nodes/colliders/shape_set.h"
+#include "tests/nodes/pipeline.h"
+
+static const double pi = 3.14159265358979323846;
+
+static qmat_medial *medial_of(const double *spheres, size_t sphere_count, const uint32_t *edges, size_t edge_count,
+                              const uint32_t *triangles, size_t triangle_count) {
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  assert_non_null(medial);
+  medial->sphere_count = sphere_count;
+  medial->spheres = qmat_alloc(4 * sphere_count, sizeof *medial->spheres);
+  assert_non_null(medial->spheres);
+  memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return medial;
+}
+
+typedef struct result {
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  qmat_colliders *colliders;
+  qmat_report *report;
+} result;
+
+/* Takes mesh and medial mesh over. */
+static result make(qmat_mesh *mesh, qmat_medial *medial, const char *params, int threads) {
+  result r = {.mesh = mesh->base.sealed ? mesh : shape_seal(mesh), .medial = medial};
+  qmat_value *outputs[2];
+  pipeline_must_run(threads, "medial.colliders", params, (const qmat_value *[]){&r.mesh->base, &medial->base}, outputs);
+  r.colliders = (qmat_colliders *)outputs[0];
+  r.report = (qmat_report *)outputs[1];
+  return r;
+}
+
+static void result_free(result *r) {
+  qmat_value_release(&r->mesh->base);
+  qmat_value_release(&r->medial->base);
+  qmat_value_release(&r->colliders->base);
+  qmat_value_release(&r->report->base);
+}
+
+static qmat_mesh *box_around(double x, double y, double z) {
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, -x, -y, -z, x, y, z, false);
+  return mesh;
+}
+
+/* The volume of the hull of a shape, by its triangles, which must be convex and closed. */
+static double hull_volume(const qmat_colliders *c, size_t shape) {
+  const size_t first = shape > 0 ? c->hull_ends[2 * shape - 1] : 0, last = c->hull_ends[2 * shape + 1];
+  const size_t low = shape > 0 ? c->hull_ends[2 * shape - 2] : 0, high = c->hull_ends[2 * shape];
+  double volume = 0;
+  for (size_t t = first; t < last; t++) {
+    const double *p[3];
+    double u[3], v[3], n[3], w[3];
+    for (int k = 0; k < 3; k++) p[k] = &c->points[3 * (size_t)c->triangles[3 * t + (size_t)k]];
+    for (int k = 0; k < 3; k++) u[k] = p[1][k] - p[0][k], v[k] = p[2][k] - p[0][k];
+    n[0] = u[1] * v[2] - u[2] * v[1], n[1] = u[2] * v[0] - u[0] * v[2], n[2] = u[0] * v[1] - u[1] * v[0];
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    volume += (n[0] * p[0][0] + n[1] * p[0][1] + n[2] * p[0][2]) / 6;
+    for (size_t i = low; i < high; i++) {
+      for (int k = 0; k < 3; k++) w[k] = c->points[3 * i + (size_t)k] - p[0][k];
+      assert_true((n[0] * w[0] + n[1] * w[1] + n[2] * w[2]) <= 1e-9 * length);
+    }
+  }
+  assert_int_equal(last - first, 2 * (high - low) - 4); /* Euler */
+  return volume;
+}
+
+static void test_two_joined_spheres_are_one_capsule(void **state) {
+  (void)state;
+  static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.25};
+  static const uint32_t edge[] = {0, 1};
+  result r = make(box_around(2, 1, 1), medial_of(spheres, 2, edge, 1, NULL, 0), "hull_points=1024", 0);
+  assert_int_equal(r.colliders->shape_count, 1);
+  assert_int_equal(r.colliders->sphere_count, 2);
+  assert_memory_equal(r.colliders->shapes, ((uint32_t[]){0, 1, 1}), 3 * sizeof(uint32_t));
+  for (size_t i = 0; i < 8; i++) assert_near(r.colliders->spheres[i], spheres[i], 1e-12);
+  assert_int_equal(pipeline_count(r.report, "capsules"), 1);
+  /* A frustum of slope 1/8 and two caps, by hand. */
+  const double slope = -0.125, rise2 = 1 - slope * slope, a = 0.5, b = 0.25, height = 2 + slope * (a - b);
+  const double cap_a = a * (1 - slope), cap_b = b * (1 + slope);
+  const double volume =
+      pi / 3 *
+      (height * rise2 * (a * a + a * b + b * b) + cap_a * cap_a * (3 * a - cap_a) + cap_b * cap_b * (3 * b - cap_b));
+  assert_near(qmat_shape_volume(spheres, (uint32_t[]){0, 1, 1}), volume, 1e-12);
+  assert_near(hull_volume(r.colliders, 0), volume, 0.02 * volume);
+  assert_true(hull_volume(r.colliders, 0) < volume);
+  assert_near(pipeline_number(r.report, "volume_ratio"), volume / 16, 0.01 * volume / 16);
+  assert_near(pipeline_number(r.report, "iou"), volume / 16, 0.01 * volume / 16);
+  assert_near(pipeline_number(r.report, "coverage"), volume / 16, 0.01 * volume / 16);
+  assert_near(pipeline_number(r.report, "protrusion"), 0, 0);
+  /* The farthest corner is nearest to the small end. */
+  const double corner = (sqrt(3) - 0.25) / sqrt(24);
+  assert_true(pipeline_number(r.report, "max_uncovered_gap") <= corner);
+  assert_near(pipeline_number(r.report, "max_uncovered_gap"), corner, 0.02);
+  result_free(&r);
+}
+
+static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
+  (void)state;
+  static const double ball[] = {0, 0, 0, 1.2};
+  result r = make(box_around(1, 1, 1), medial_of(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
+  /* Six caps of height 0.2, each of area 2 pi 1.2 0.2, of which no point is farther out than 0.2. */
+  assert_near(pipeline_number(r.report, "protrusion"), 6 * 0.2 / (2 * 1.2), 0.01);
+  assert_near(pipeline_number(r.report, "protrusion_mean"), 0.5 * 0.1 / sqrt(12), 0.001);
+  assert_true(pipeline_number(r.report, "protrusion_p95") <= 0.2 / sqrt(12));
+  const double volume = 4 / 3.0 * pi * 1.2 * 1.2 * 1.2, cap = pi * 0.04 * (3.6 - 0.2) / 3;
+  assert_near(pipeline_number(r.report, "volume_ratio"), volume / 8, 0.01);
+  assert_near(pipeline_number(r.report, "coverage"), (volume - 6 * cap) / 8, 0.01);
+  assert_near(pipeline_number(r.report, "iou"), (volume - 6 * cap) / (8 + 6 * cap), 0.01);
+  result_free(&r);
+}
+
+static void test_mass_properties_of_a_box_by_hand(void **state) {
+  (void)state;
+  static const double ball[] = {10, 20, 30, 0.5};
+  qmat_mesh *box = box_around(1, 2, 3);
+  shape_map(box, 1, 10, 20, 30);
+  result r = make(box, medial_of(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
+  const double mass = 2.5 * 48, *body = r.colliders->body;
+  const double expected[10] = {mass, 10, 20, 30, mass / 12 * (16 + 36), mass / 12 * (4 + 36), mass / 12 * (4 + 16)};
+  assert_int_equal(r.colliders->body_count, 1);
+  for (int k = 0; k < 10; k++) assert_near(body[k], expected[k], 1e-9 * mass);
+  assert_near(pipeline_number(r.report, "mass"), mass, 1e-9 * mass);
+  result_free(&r);
+}
+
+static void test_inertia_turns_with_the_solid(void **state) {
+  (void)state;
+  static const double ball[] = {0, 0, 0, 0.5};
+  qmat_mesh *box = box_around(1, 2, 3);
+  shape_rotate(box);
+  result r = make(box, medial_of(ball, 1, NULL, 0, NULL, 0), "", 0);
+  const double *i = &r.colliders->body[4], m = 48 / 12.0;
+  /* Invariants of the tensor: trace, sum of principal minors, determinant. */
+  const double a = m * 52, b = m * 40, c = m * 20;
+  assert_near(i[0] + i[1] + i[2], a + b + c, 1e-9);
+  assert_near(i[0] * i[1] + i[1] * i[2] + i[0] * i[2] - i[3] * i[3] - i[4] * i[4] - i[5] * i[5], a * b + b * c + a * c,
+              1e-6);
+  assert_near(
+      i[0] * (i[1] * i[2] - i[5] * i[5]) - i[3] * (i[3] * i[2] - i[5] * i[4]) + i[4] * (i[3] * i[5] - i[1] * i[4]),
+      a * b * c, 1e-4);
+  assert_true(fabs(i[3]) > 1);
+  result_free(&r);
+}
+
+static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
+  (void)state;
+  /* Sphere 1 is inside sphere 0, with which it is joined; sphere 2 has no radius; sphere 3 is inside the capsule. */
+  static const double nested[] = {0, 0, 0, 1, 0.3, 0, 0, 0.2, 4, 0, 0, 0, 2, 0, 0, 0.1};
+  static const uint32_t edges[] = {0, 1, 0, 2};
+  result r = make(box_around(5, 1, 1), medial_of(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
+  assert_int_equal(r.colliders->shape_count, 1);
+  assert_int_equal(r.colliders->sphere_count, 2);
+  assert_near(r.colliders->spheres[7], 0.001 * sqrt(108), 1e-12);
+  result_free(&r);
+  /* A slab whose large sphere reaches beyond the line of the others is two capsules and no hull. */
+  static const double steep[] = {0, 0, 0, 1, 1.2, 0.1, 0, 0.1, 1.2, -0.1, 0, 0.1};
+  static const uint32_t slab[] = {0, 1, 2};
+  r = make(box_around(3, 3, 3), medial_of(steep, 3, NULL, 0, slab, 1), "", 0);
+  assert_int_equal(pipeline_count(r.report, "hulls_of_three") + pipeline_count(r.report, "capsules"),
+                   r.colliders->shape_count);
+  result_free(&r);
+  /* Two equal spheres are one. */
+  static const double equal[] = {0, 0, 0, 1, 0, 0, 0, 1};
+  r = make(box_around(1, 1, 1), medial_of(equal, 2, NULL, 0, NULL, 0), "", 0);
+  assert_int_equal(r.colliders->shape_count, 1);
+  result_free(&r);
+}
+
+/* A model at 3 % and its medial mesh. */
+static void describe(const char *name, qmat_mesh **mesh, qmat_medial **medial) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS] = {NULL};
+  *mesh = shape_seal(pipeline_model(name, 12));
+  qmat_value *field, *samples;
+  pipeline_must_run(0, "mesh.sdf", "", (const qmat_value *[]){&(*mesh)->base}, outputs);
+  field = outputs[0];
+  pipeline_must_run(0, "mesh.sample", "", (const qmat_value *[]){&(*mesh)->base, field}, outputs);
+  samples = outputs[0];
+  pipeline_must_run(0, "medial.delaunay", "", (const qmat_value *[]){&(*mesh)->base, field, samples}, outputs);
+  qmat_value *initial = outputs[0];
+  outputs[1] = NULL;
+  pipeline_must_run(0, "medial.simplify", "epsilon=3%", (const qmat_value *[]){&(*mesh)->base, field, samples, initial},
+                    outputs);
+  *medial = (qmat_medial *)outputs[0];
+  for (int i = 1; i < PIPELINE_MOST_PORTS; i++) qmat_value_release(outputs[i]);
+  qmat_value_release(field);
+  qmat_value_release(samples);
+  qmat_value_release(initial);
+}
+
+static qmat_envelope *envelope_of(const qmat_colliders *c) {
+  qmat_context context = {0};
+  const qmat_shape_set set = {c->sphere_count, c->shape_count, c->spheres, c->shapes};
+  qmat_envelope *envelope;
+  assert_int_equal(qmat_shape_set_envelope(&context, &set, &envelope), QMAT_OK);
+  qmat_context_uninit(&context);
+  return envelope;
+}
+
+static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
+  (void)state;
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("l-bracket", &mesh, &medial);
+  result r = make(mesh, medial, "fit=contain", 0);
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  qmat_envelope *envelope = envelope_of(r.colliders);
+  size_t inside = 0, outside = 0;
+  const double *positions = qmat_surface_positions(surface);
+  double low[3] = {1, 1, 1}, high[3] = {-1, -1, -1};
+  for (size_t i = 0; i < 3 * mesh->vertex_count; i++) {
+    low[i % 3] = fmin(low[i % 3], positions[i]);
+    high[i % 3] = fmax(high[i % 3], positions[i]);
+  }
+  for (uint64_t i = 0; inside < 1000000; i++) {
+    double point[3];
+    for (uint64_t k = 0; k < 3; k++) point[k] = low[k] + (high[k] - low[k]) * qmat_hash_unit(qmat_hash3(99, i, k));
+    if (!qmat_surface_inside(surface, point)) continue;
+    inside++;
+    qmat_frame_to_model(qmat_surface_frame(surface), point, 1, point);
+    outside += !qmat_envelope_holds(envelope, point, -1e-9);
+  }
+  assert_int_equal(outside, 0);
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_near(pipeline_number(r.report, "coverage"), 1, 0);
+  assert_true(pipeline_number(r.report, "volume_ratio") < 1.5);
+  /* Hulls contain their shapes: every sphere's farthest points are behind all planes. */
+  for (size_t s = 0; s < r.colliders->shape_count; s++)
+    assert_true(hull_volume(r.colliders, s) >=
+                0.999 * (qmat_shape_width(&r.colliders->shapes[3 * s]) < 3
+                             ? qmat_shape_volume(r.colliders->spheres, &r.colliders->shapes[3 * s])
+                             : 0));
+  qmat_envelope_free(envelope);
+  qmat_surface_free(surface);
+  result_free(&r);
+  qmat_context_uninit(&context);
+}
+
+static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
+  (void)state;
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("l-bracket", &mesh, &medial);
+  result r = make(mesh, medial, "fit=inside", 0);
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  size_t outside = 0;
+  for (uint64_t i = 0; i < 200000; i++) { /* points of the boundaries of the shapes' spheres */
+    const uint32_t *ids = &r.colliders->shapes[3 * (i % r.colliders->shape_count)];
+    double shares[3], point[3] = {0, 0, 0}, radius = 0, sum = 0;
+    for (uint64_t k = 0; k < 3; k++) sum += shares[k] = qmat_hash_unit(qmat_hash3(7, i, k)) + 1e-9;
+    for (int s = 0; s < 3; s++) {
+      const double *sphere = &r.colliders->spheres[4 * (size_t)ids[s]];
+      for (int k = 0; k < 3; k++) point[k] += shares[s] / sum * sphere[k];
+      radius += shares[s] / sum * sphere[3];
+    }
+    const double z = 2 * qmat_hash_unit(qmat_hash3(8, i, 0)) - 1, turn = 2 * pi * qmat_hash_unit(qmat_hash3(8, i, 1));
+    point[0] += radius * sqrt(1 - z * z) * cos(turn);
+    point[1] += radius * sqrt(1 - z * z) * sin(turn);
+    point[2] += radius * z;
+    qmat_frame_to_unit(qmat_surface_frame(surface), point, 1, point);
+    outside += qmat_surface_signed_distance(surface, point) > 1e-8;
+  }
+  assert_int_equal(outside, 0);
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_near(pipeline_number(r.report, "protrusion"), 0, 0);
+  assert_true(pipeline_number(r.report, "coverage") > 0.6);
+  qmat_surface_free(surface);
+  result_free(&r);
+  qmat_context_uninit(&context);
+}
+
+static void test_budget_kind_and_hull_points_are_kept(void **state) {
+  (void)state;
+  static const char *const cases[][2] = {{"fit=both shapes=5", "both"},
+                                         {"fit=contain shapes=4 kind=capsules hull_points=24", "contain"},
+                                         {"fit=contain shapes=12 kind=spheres", "contain"},
+                                         {"fit=inside kind=spheres", "inside"}};
+  static const size_t most[] = {5, 4, 12, 100000};
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("l-bracket", &mesh, &medial);
+  for (size_t i = 0; i < 4; i++) {
+    qmat_value_retain(&mesh->base);
+    qmat_value_retain(&medial->base);
+    result r = make(mesh, medial, cases[i][0], 0);
+    assert_in_range(r.colliders->shape_count, 1, most[i]);
+    if (strstr(cases[i][0], "capsules")) assert_int_equal(pipeline_count(r.report, "hulls_of_three"), 0);
+    if (strstr(cases[i][0], "spheres"))
+      assert_int_equal(pipeline_count(r.report, "single_spheres"), r.colliders->shape_count);
+    for (size_t s = 0; s < r.colliders->shape_count; s++)
+      assert_true(r.colliders->hull_ends[2 * s] - (s ? r.colliders->hull_ends[2 * s - 2] : 0) <= (i == 1 ? 24 : 64));
+    if (i > 0) assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+    if (i == 1 || i == 2) assert_near(pipeline_number(r.report, "coverage"), 1, 0);
+    result_free(&r);
+  }
+  qmat_value_release(&mesh->base);
+  qmat_value_release(&medial->base);
+}
+
+static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
+  (void)state;
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("l-bracket", &mesh, &medial);
+  static const char *const params[] = {"fit=contain samples=1000", "fit=inside samples=1000"};
+  for (size_t p = 0; p < 2; p++) {
+    qmat_digest first;
+    for (int threads = 1; threads <= 8; threads *= 2) {
+      qmat_value_retain(&mesh->base);
+      qmat_value_retain(&medial->base);
+      result r = make(mesh, medial, params[p], threads);
+      if (threads == 1) first = r.colliders->base.digest;
+      assert_true(qmat_digest_equal(&first, &r.colliders->base.digest));
+      result_free(&r);
+    }
+  }
+  qmat_value_release(&mesh->base);
+  qmat_value_release(&medial->base);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_two_joined_spheres_are_one_capsule),
+      cmocka_unit_test(test_a_ball_that_leaves_a_cube_protrudes_by_hand),
+      cmocka_unit_test(test_mass_properties_of_a_box_by_hand),
+      cmocka_unit_test(test_inertia_turns_with_the_solid),
+      cmocka_unit_test(test_nested_and_degenerate_shapes_are_left_out),
+      cmocka_unit_test(test_contain_leaves_none_of_a_million_points_outside),
+      cmocka_unit_test(test_inside_leaves_no_point_of_a_shape_outside),
+      cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
+      cmocka_unit_test(test_one_two_and_eight_threads_make_the_same_bytes),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
