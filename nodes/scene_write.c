@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/node.h"
+#include "core/text.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/ply_medial.h"
@@ -18,11 +19,14 @@
 
 typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMAT_USDA, FORMAT_USDZ } file_format;
 
+typedef enum requirement { REQUIRE_NOTHING, REQUIRE_CERTIFIED } requirement;
+
 typedef struct scene_write_params {
   int format; /* a file_format */
   bool draco, draco_meshes, skin_beside, side_files;
   int64_t position_bits, radius_bits;
-  int flat; /* a qmat_flat_form */
+  int flat;    /* a qmat_flat_form */
+  int require; /* a requirement */
 } scene_write_params;
 
 enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
@@ -229,6 +233,31 @@ static qmat_status check_spheres(qmat_context *context, const qmat_value *const 
   return QMAT_OK;
 }
 
+/* Fails unless the file states of each medial mesh that it is certified. */
+static qmat_status check_certified(qmat_context *context, const qmat_value *given, const qmat_stated_errors *stated) {
+  for (size_t i = 0; i < qmat_value_count(given); i++) {
+    if (given_for(given, i) && stated[i].certified == QMAT_CERTIFICATE_YES) continue;
+    char out[48], in[48], epsilon[48];
+    qmat_format_bound(stated[i].error_out, out);
+    qmat_format_bound(stated[i].error_in, in);
+    qmat_format_bound(stated[i].epsilon, epsilon);
+    if (!given_for(given, i))
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: %s", qmat_value_failure(qmat_value_at(given, i)));
+    else if (stated[i].certified == QMAT_CERTIFICATE_UNKNOWN)
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: no report says how large the errors are");
+    else if (fmax(stated[i].error_out, stated[i].error_in) <= stated[i].epsilon)
+      qmat_fail(context, QMAT_ERROR_GEOMETRY,
+                "not certified: the errors are estimates, since the surface is not closed");
+    else
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: the errors are %s and %s of the diagonal, and epsilon %s",
+                out, in, epsilon);
+    if (given->type == QMAT_LIST) qmat_fail_within(context, ((const qmat_list *)given)->names[i]);
+    qmat_fail_field(context, "require");
+    return qmat_fail_hint(context, "a larger epsilon, or require=none");
+  }
+  return QMAT_OK;
+}
+
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const scene_write_params *params = data;
@@ -256,6 +285,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
         break;
     }
   }
+  if (status == QMAT_OK && params->require == REQUIRE_CERTIFIED)
+    status = check_certified(context, inputs[IN_MEDIAL], stated);
   if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(stated);
@@ -270,6 +301,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 }
 
 static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", NULL};
+
+static const char *const requirements[] = {[REQUIRE_NOTHING] = "none", [REQUIRE_CERTIFIED] = "certified", NULL};
 
 static const char *const flat_forms[] = {"auto", "short", "float", "none", NULL};
 
@@ -298,6 +331,8 @@ static const qmat_param params[] = {
     QMAT_ENUM(
         scene_write_params, flat, flat_forms, QMAT_FLAT_AUTO,
         "Numbers of the plain medial mesh (glb, gltf): 16 bits, single precision, or by epsilon; none: without it"),
+    QMAT_ENUM(scene_write_params, require, requirements, REQUIRE_NOTHING,
+              "certified: the run fails, and nothing is written, where a result is not certified"),
     {0},
 };
 
@@ -332,7 +367,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 6,
+    .version = 7,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

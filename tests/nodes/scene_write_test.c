@@ -295,6 +295,46 @@ static void test_a_medial_mesh_without_spheres_is_refused(void **state) {
   qmat_context_uninit(&context);
 }
 
+static void test_what_is_not_certified_fails_where_that_is_required(void **state) {
+  (void)state;
+  static const char *const settings[][2] = {{"require", "certified"}, {NULL, NULL}};
+  const qmat_node *node = qmat_node_find("scene.write");
+  qmat_medial *medial = make_medial();
+  const struct {
+    double error;
+    int certified, status;
+    const char *why;
+  } cases[] = {
+      {0.01, 1, QMAT_OK, NULL},
+      {0.01, 0, QMAT_ERROR_GEOMETRY, "not certified: the errors are estimates, since the surface is not closed"},
+      {0.03, 0, QMAT_ERROR_GEOMETRY, "not certified: the errors are 3.1 % and 1.1 % of the diagonal, and epsilon 2 %"},
+      {0.01, -1, QMAT_ERROR_GEOMETRY, "not certified: no report says how large the errors are"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    json_t *root = json_pack("{s:f, s:f, s:f, s:f}", "epsilon", 0.02, "surface_to_envelope", cases[i].error,
+                             "envelope_to_surface", 0.01, "diagonal", 8.0);
+    if (cases[i].certified >= 0) json_object_set_new(root, "certified", json_boolean(cases[i].certified));
+    qmat_report *report = make_report(root);
+    const qmat_value *inputs[4] = {NULL};
+    inputs[qmat_input_find(node, "medial")] = &medial->base;
+    inputs[qmat_input_find(node, "report")] = &report->base;
+    qmat_value *outputs[2] = {NULL};
+    void *params = make_params(node, settings);
+    qmat_context context = {0};
+    assert_int_equal(node->run(&context, params, inputs, outputs), cases[i].status);
+    if (cases[i].why) {
+      assert_string_equal(context.error.message, cases[i].why);
+      assert_string_equal(context.error.field, "require");
+      assert_null(outputs[0]);
+    }
+    qmat_value_release(outputs[0]);
+    qmat_value_release(outputs[1]);
+    qmat_value_release(&report->base);
+    free(params);
+    qmat_context_uninit(&context);
+  }
+  qmat_value_release(&medial->base);
+}
+
 static void test_the_same_inputs_give_the_same_bytes(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
@@ -321,6 +361,7 @@ int main(void) {
       cmocka_unit_test(test_ma_keeps_every_number),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
       cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),
+      cmocka_unit_test(test_what_is_not_certified_fails_where_that_is_required),
       cmocka_unit_test(test_the_same_inputs_give_the_same_bytes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
