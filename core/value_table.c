@@ -21,6 +21,9 @@ static const qmat_value_row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
                                             SCALAR(qmat_scene, is_z_up, BOOL),
                                             ARRAY(qmat_scene, parts, PARTS, part_count, 1),
                                             ARRAY(qmat_scene, meshes, U32, mesh_count, 1),
+                                            ARRAY(qmat_scene, placed, U32, placement_count, 1),
+                                            ARRAY(qmat_scene, placements, F64, placement_count, 16),
+                                            ARRAY(qmat_scene, placement_paths, NAMES, placement_count, 1),
                                             END};
 
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
@@ -29,8 +32,14 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   if (status == QMAT_OK && !(scene->meters_per_unit >= 0 && isfinite(scene->meters_per_unit)))
     return qmat_fail(context, QMAT_ERROR_GEOMETRY, "the unit of the scene is negative or not finite");
   if (status != QMAT_OK) return status;
-  const qmat_status of_format = qmat_check_utf8(context, scene->format, "format of the scene");
-  return of_format != QMAT_OK ? of_format : qmat_check_parts(context, scene->parts, scene->part_count);
+  qmat_status of_rows = qmat_check_utf8(context, scene->format, "format of the scene");
+  if (of_rows == QMAT_OK)
+    of_rows = qmat_check_ids(context, scene->placed, scene->placement_count, scene->mesh_count, "placement", 1, "mesh");
+  if (of_rows == QMAT_OK)
+    of_rows = qmat_check_finite(context, scene->placements, scene->placement_count, 16, "placement", "transform");
+  for (size_t i = 0; i < scene->placement_count && of_rows == QMAT_OK; i++)
+    of_rows = qmat_check_utf8(context, scene->placement_paths[i], "path of a mesh");
+  return of_rows != QMAT_OK ? of_rows : qmat_check_parts(context, scene->parts, scene->part_count);
 }
 
 static const qmat_value_row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),

@@ -50,7 +50,7 @@ typedef struct qmat_file_part {
 } qmat_file_part;
 
 /* Where a model came from: its name, unit and up axis. A glTF scene keeps the whole asset, so that it can be written
- * again with the result. */
+ * again with the result; a USD scene keeps the places of its meshes. */
 typedef struct qmat_scene {
   qmat_value base;
   char *name;             /* UTF-8: the file's base name without its extension */
@@ -61,6 +61,11 @@ typedef struct qmat_scene {
   qmat_file_part *parts;  /* the file as read, then the side files that it refers to */
   size_t mesh_count;      /* 0: all meshes of the asset were merged into one */
   uint32_t *meshes;       /* mesh_count: indices of the asset's meshes that were read, each in its own coordinates */
+  /* Where the meshes of a USD scene are, one by one; none where they were merged. glTF has this in its nodes. */
+  size_t placement_count;
+  uint32_t *placed;       /* placement_count: a mesh, from 0 to mesh_count - 1 */
+  double *placements;     /* 16 * placement_count: from the mesh's space into the scene's, p' = (p, 1) * m by rows */
+  char **placement_paths; /* placement_count: of the prim with the mesh */
 } qmat_scene;
 
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. The first triangles bound solids; the last ones may

@@ -8,7 +8,7 @@
 #include "io/gltf/gltf_keep.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/scanner.h"
-#include "io/usd/usd_scene.h"
+#include "io/usd/usd_model.h"
 
 static const struct {
   const char *title; /* the usual name */
@@ -146,8 +146,6 @@ static qmat_status read_surface(qmat_context *context, qmat_format format, const
     case QMAT_FORMAT_GLTF:
     case QMAT_FORMAT_GLB:
       return qmat_gltf_parse(context, bytes->data, bytes->size, path, soup, report);
-    case QMAT_FORMAT_USD:
-      return qmat_usd_read(context, bytes, path, soup, report);
     default:
       qmat_fail(context, QMAT_ERROR_FORMAT, "the file has a medial mesh, not a surface");
       qmat_fail_at(context, path, 0, 0);
@@ -186,10 +184,26 @@ static qmat_status read_whole(qmat_context *context, qmat_format format, const c
   return status;
 }
 
+/* Several meshes that were read, each in its own space. */
+typedef struct separate_meshes {
+  size_t count;
+  const uint32_t *ids; /* count: their numbers in the file */
+  qmat_soup *soups;    /* count */
+  const json_t *root;  /* of a glTF asset, for names and uses; NULL: */
+  char **names;        /* count */
+  const size_t *uses;  /* count: how often the scene shows a mesh */
+} separate_meshes;
+
+/* The name of a mesh, which the caller frees; NULL if memory is short. */
+static char *name_of(const separate_meshes *from, size_t i) {
+  return from->root ? qmat_gltf_mesh_name(from->root, from->ids[i]) : qmat_strdup(from->names[i]);
+}
+
 /* Appends an entry for a mesh to the report's list "meshes". NULL if memory is short. */
-static json_t *add_mesh_report(json_t *report, const json_t *root, const char *name, uint32_t id) {
-  json_t *of_mesh = json_pack("{s:s, s:I, s:I}", "name", name, "mesh", (json_int_t)id, "nodes",
-                              (json_int_t)qmat_gltf_mesh_carriers(root, id));
+static json_t *add_mesh_report(json_t *report, const separate_meshes *from, size_t i, const char *name) {
+  const size_t uses = from->root ? qmat_gltf_mesh_carriers(from->root, from->ids[i]) : from->uses[i];
+  json_t *of_mesh =
+      json_pack("{s:s, s:I, s:I}", "name", name, "mesh", (json_int_t)from->ids[i], "nodes", (json_int_t)uses);
   return json_array_append_new(json_object_get(report, "meshes"), of_mesh) == 0 ? of_mesh : NULL;
 }
 
@@ -207,7 +221,7 @@ static qmat_status make_mesh(qmat_context *context, const char *path, const qmat
 }
 
 /* Makes one value of the meshes: a mesh, or a list of several. */
-static qmat_status make_meshes(qmat_context *context, const char *path, const json_t *root, qmat_gltf_meshes *from,
+static qmat_status make_meshes(qmat_context *context, const char *path, const separate_meshes *from,
                                const qmat_read_options *options, qmat_value **mesh, json_t *report) {
   qmat_status status = QMAT_OK;
   if (from->count == 1) {
@@ -222,8 +236,8 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const js
   if (!list || json_object_set_new(report, "meshes", json_array()) != 0)
     status = qmat_fail_memory(context, "the meshes of a scene");
   for (size_t i = 0; i < from->count && status == QMAT_OK; i++) {
-    list->names[i] = qmat_gltf_mesh_name(root, from->ids[i]);
-    json_t *of_mesh = list->names[i] ? add_mesh_report(report, root, list->names[i], from->ids[i]) : NULL;
+    list->names[i] = name_of(from, i);
+    json_t *of_mesh = list->names[i] ? add_mesh_report(report, from, i, list->names[i]) : NULL;
     if (!of_mesh) {
       status = qmat_fail_memory(context, "the meshes of a scene");
       break;
@@ -275,7 +289,8 @@ static qmat_status read_gltf(qmat_context *context, qmat_format format, const ch
     status = read_whole(context, format, path, bytes, options, mesh, report);
   } else if (status == QMAT_OK) {
     status = qmat_gltf_parse_meshes(context, bytes->data, bytes->size, path, asset.root, choice, &meshes, report);
-    if (status == QMAT_OK) status = make_meshes(context, path, asset.root, &meshes, options, mesh, report);
+    const separate_meshes from = {.count = meshes.count, .ids = meshes.ids, .soups = meshes.soups, .root = asset.root};
+    if (status == QMAT_OK) status = make_meshes(context, path, &from, options, mesh, report);
     if (status == QMAT_OK) status = warn_of_extras(context, asset.root, &meshes, warnings);
     if (status == QMAT_OK) {
       scene->mesh_count = meshes.count;
@@ -292,6 +307,18 @@ static qmat_status read_gltf(qmat_context *context, qmat_format format, const ch
   json_decref(warnings);
   qmat_gltf_meshes_uninit(&meshes);
   qmat_gltf_asset_uninit(&asset);
+  return status;
+}
+
+static qmat_status read_usd(qmat_context *context, const char *path, const qmat_bytes *bytes,
+                            const qmat_read_options *options, const char *choice, qmat_scene *scene, qmat_value **mesh,
+                            json_t *report) {
+  qmat_usd_meshes meshes;
+  qmat_status status = qmat_usd_read_meshes(context, bytes, path, choice, options->segments, scene, &meshes, report);
+  const separate_meshes from = {
+      .count = meshes.count, .ids = meshes.ids, .soups = meshes.soups, .names = meshes.names, .uses = meshes.uses};
+  if (status == QMAT_OK) status = make_meshes(context, path, &from, options, mesh, report);
+  qmat_usd_meshes_uninit(&meshes);
   return status;
 }
 
@@ -318,8 +345,10 @@ qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, cons
   }
   if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) {
     status = read_gltf(context, format, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
+  } else if (format == QMAT_FORMAT_USD) {
+    status = read_usd(context, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
   } else if (strcmp(choice, "all") != 0 && strcmp(choice, "merged") != 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "only glTF has a choice of meshes; %s is read as a whole",
+    qmat_fail(context, QMAT_ERROR_USAGE, "only glTF and USD have a choice of meshes; %s is read as a whole",
               formats[format].title);
     qmat_fail_at(context, path, 0, 0);
     status = qmat_fail_field(context, "mesh");

@@ -511,6 +511,7 @@ qmat_status qmat_soup_to_mesh(qmat_context *context, const qmat_soup *soup, cons
   if (status == QMAT_OK) {
     made->closed = facts.closed;
     made->oriented = facts.oriented;
+    made->deviation = soup->deviation;
     if (report) status = fill_report(&c, made, &facts, report);
   }
   if (status == QMAT_OK) status = copy_cage(context, &soup->cage, &made->cage);

@@ -22,6 +22,7 @@ typedef struct qmat_soup {
   uint32_t *corners; /* corner_count vertex indices */
   qmat_cage cage;    /* subdivision surfaces, copied into the mesh unchanged */
   size_t cage_capacities[QMAT_CAGE_ARRAYS];
+  double deviation; /* of the facets from the surface that they stand for, copied into the mesh; 0: exact */
 } qmat_soup;
 
 /* How to treat facets that use a vertex twice or have the same vertices as an earlier facet. */
@@ -29,6 +30,7 @@ typedef enum qmat_defects { QMAT_DEFECTS_REFUSE, QMAT_DEFECTS_DROP } qmat_defect
 
 typedef struct qmat_read_options {
   qmat_defects defects;
+  size_t segments; /* sides of the polygons for circles of USD's round solids; 0: 64 */
 } qmat_read_options;
 
 /* Reserves room for that many additional elements. Readers check the counts against the file size before the call.

@@ -43,7 +43,8 @@ typedef struct subdivision {
   uint8_t *face_groups;  /* per face of the source */
   size_t *first_corners; /* per face of the source */
   group groups[GROUPS];
-  size_t surface_count; /* subdivided ones */
+  size_t surface_count;    /* subdivided ones */
+  double source_deviation; /* of surfaces that are not subdivided */
 } subdivision;
 
 /* The mesh of a level, and its distance from the limit surface in diagonals. */
@@ -62,6 +63,7 @@ static qmat_status fail_shortage(qmat_context *context) {
 /* Finds the cage. The triangles of a mesh without cage become a surface of the scheme none. */
 static qmat_status find_source(subdivision *s, const qmat_mesh *mesh) {
   s->source = mesh->cage;
+  s->source_deviation = mesh->deviation;
   if (mesh->cage.surface_count > 0) return QMAT_OK;
   static uint32_t scheme = QMAT_SCHEME_NONE, boundary = QMAT_BOUNDARY_EDGE_AND_CORNER;
   uint32_t *sizes = qmat_arena_alloc(&s->context->arena, mesh->triangle_count + 1, sizeof *sizes);
@@ -247,11 +249,12 @@ static qmat_status add_level(qmat_context *context, const qmat_limit_level *limi
   for (size_t i = 0; i < limit->face_count && status == QMAT_OK; i++) {
     const uint32_t *ids = limit->faces + i * limit->face_stride;
     uint32_t turn = 0;
-    if (size == 4 &&
+    if (size == 4 && ids[2] != ids[3] &&
         !is_first_nearer(positions + 3 * (size_t)ids[0], positions + 3 * (size_t)ids[1], positions + 3 * (size_t)ids[2],
                          positions + 3 * (size_t)ids[3], positions + 3 * (size_t)ids[8]))
       turn = 1;
-    for (uint32_t t = 0; t < size - 2 && status == QMAT_OK; t++) {
+    const uint32_t count = size == 4 && ids[2] == ids[3] ? 1 : (uint32_t)size - 2;
+    for (uint32_t t = 0; t < count && status == QMAT_OK; t++) {
       const uint32_t corners[] = {(uint32_t)first + ids[turn], (uint32_t)first + ids[turn + t + 1],
                                   (uint32_t)first + ids[(turn + t + 2) % size]};
       status = qmat_soup_add_facet(context, soup, corners, 3, (uint32_t)soup->facet_count, 0);
@@ -325,7 +328,7 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
     a->unresolved /= diagonal;
     a->deviation = all_levels * a->seen + a->unresolved;
     /* Nobody else has the mesh yet, so it may be sealed again. */
-    a->mesh->deviation = a->deviation * diagonal;
+    a->mesh->deviation = fmax(a->deviation * diagonal, s->source_deviation);
     a->mesh->base.sealed = false;
     status = qmat_value_seal(context, &a->mesh->base);
   }
@@ -345,6 +348,7 @@ static qmat_status fail_too_fine(const subdivision *s, int level, int depth, con
             "a deviation below %.2g of the diagonal takes %.0f faces, and at most %.0f are made", coarser->deviation,
             faces_at(s, depth), MOST_FACES);
   qmat_fail_field(s->context, "epsilon");
+  if (level == 1) return qmat_fail_hint(s->context, "set a larger epsilon or tolerance");
   return qmat_fail_hint(s->context, "set a larger epsilon or tolerance, or level=%d", level - 1);
 }
 
@@ -353,7 +357,7 @@ static qmat_status fail_too_fine(const subdivision *s, int level, int depth, con
 static qmat_status find_level(const subdivision *s, double allowed, int *level, int *depth, attempt *best,
                               json_t *report) {
   const bool is_chosen = s->params->level == 0;
-  *level = is_chosen ? 1 : (int)s->params->level;
+  *level = is_chosen ? 0 : (int)s->params->level;
   *depth = *level + 1;
   *best = (attempt){.mesh = NULL};
   for (;;) {
@@ -416,7 +420,7 @@ static qmat_status subdivide(subdivision *s, const qmat_mesh *mesh, attempt *bes
     int32_t *ids = qmat_arena_alloc(&s->context->arena, s->source.vertex_count, sizeof *ids);
     facts = json_object();
     if (!ids || !facts) status = fail_shortage(s->context);
-    if (status == QMAT_OK && faces_at(s, 2) > MOST_FACES) status = fail_too_fine(s, 1, 2, best);
+    if (status == QMAT_OK && faces_at(s, 1) > MOST_FACES) status = fail_too_fine(s, 0, 1, best);
     for (size_t i = QMAT_BOUNDARY_COUNT; i < GROUPS && status == QMAT_OK; i++)
       if (s->groups[i].face_count > 0) status = fill_group(s, i, ids);
     if (status == QMAT_OK) status = find_level(s, s->params->tolerance * epsilon, &level, &depth, best, facts);
@@ -460,7 +464,7 @@ static const char *const boundary_rules[] = {
 
 static const qmat_param params[] = {
     QMAT_INT(mesh_subdivide_params, level, "subdivisions", 0, 0, 8,
-             "The number of subdivisions; 0: as many as epsilon needs"),
+             "The number of subdivisions; 0: as many as epsilon needs, none where the cage is fine enough"),
     QMAT_LENGTH(mesh_subdivide_params, epsilon, 0.01, 0, 1, "The error bound of the final result; 0: 0.01"),
     QMAT_FLOAT(mesh_subdivide_params, tolerance, "epsilon", 0.1, 0.001, 1,
                "The largest distance between mesh and limit surface"),
@@ -493,7 +497,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_mesh_subdivide = {
     .name = "mesh.subdivide",
-    .version = 2,
+    .version = 3,
     .summary = "Replaces subdivision surfaces by triangles on their limit surface",
     .doc =
         "Subdivides the Catmull-Clark, Loop and bilinear surfaces of a USD file, with their creases, corners, boundary "

@@ -7,6 +7,7 @@ typedef struct scene_read_params {
   const char *path;
   const char *mesh;
   int defects; /* qmat_defects */
+  int64_t segments;
 } scene_read_params;
 
 static const char *const defects_choices[] = {"refuse", "drop", NULL};
@@ -19,21 +20,26 @@ static const qmat_param params[] = {
      .flags = QMAT_PARAM_REQUIRED | QMAT_PARAM_INPUT_FILE,
      .offset = offsetof(scene_read_params, path)},
     {.name = "mesh",
-     .doc = "Which meshes of a glTF scene: all (each in its own space), merged (placed as one), or a name or number",
+     .doc =
+         "Which meshes of a glTF or USD scene: all (each in its own space), merged (placed as one), or a name, path or "
+         "number",
      .unit = "",
      .type = QMAT_PARAM_STRING,
      .default_text = "all",
      .offset = offsetof(scene_read_params, mesh)},
     QMAT_ENUM(scene_read_params, defects, defects_choices, QMAT_DEFECTS_DROP,
               "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped and counted"),
+    QMAT_INT(scene_read_params, segments, "sides", 64, 8, 1024,
+             "Sides of the polygons that stand for the circles of USD's spheres, capsules, cylinders and cones"),
     {0}};
 
 enum { SCENE, MESH, REPORT };
 
 static const qmat_port outputs[] = {
-    [SCENE] = {.name = "scene",
-               .type = QMAT_SCENE,
-               .doc = "The model's name, format and unit; for glTF also the whole asset"},
+    [SCENE] =
+        {.name = "scene",
+         .type = QMAT_SCENE,
+         .doc = "The model's name, format and unit; for glTF also the whole asset, for USD the places of its meshes"},
     [MESH] = {.name = "mesh",
               .type = QMAT_MESH,
               .doc = "The surface as triangles; a list where the scene has several meshes",
@@ -45,7 +51,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
                        qmat_value *made[]) {
   (void)inputs;
   const scene_read_params *p = raw_params;
-  const qmat_read_options options = {.defects = (qmat_defects)p->defects};
+  const qmat_read_options options = {.defects = (qmat_defects)p->defects, .segments = (size_t)p->segments};
   qmat_scene *scene;
   qmat_value *mesh;
   qmat_report *report;
@@ -62,8 +68,8 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 6,
-    .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF scene",
+    .version = 7,
+    .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
         "removed, and triangles oriented, outward where the surface is closed. The report counts all of this.\n\n"
@@ -71,8 +77,11 @@ const qmat_node qmat_node_scene_read = {
         "meshes are read one by one, in their own spaces and in bind pose, and later nodes run once for each. Meshes "
         "on no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
         "space, skins in their current pose.\n\n"
-        "The meshes of a USD scene are placed as one surface; warnings name what was left out. Subdivision surfaces "
-        "are read as control cages, for mesh.subdivide.",
+        "A USD scene is read alike: equal meshes are one, wherever references, instances and point instancers place "
+        "it, "
+        "and warnings name what was left out. Subdivision surfaces are control cages, for mesh.subdivide. Sphere, "
+        "Cube, "
+        "Capsule, Cylinder and Cone are solids; the mesh's deviation is that of the polygons from their circles.",
     .citation = "",
     .params_size = sizeof(scene_read_params),
     .params = params,

@@ -114,9 +114,9 @@ static const char *name_of(const qmat_scene *scene, const qmat_value *medial, si
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               json_t *report, qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  const bool kept = scene && scene->part_count > 0;
+  const bool placed = scene && scene->placement_count > 0, kept = scene && scene->part_count > 0 && !placed;
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
-               expected = kept && scene->mesh_count > 0 ? scene->mesh_count : 1;
+               expected = (kept || placed) && scene->mesh_count > 0 ? scene->mesh_count : 1;
   if (count != expected) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes for %zu meshes", count, expected);
     return qmat_fail_field(context, "medial");
@@ -131,8 +131,9 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
                                name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);
   }
   const qmat_status status =
-      kept ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
-           : qmat_gltf_write(context, additions[0].medial, additions[0].skin, &additions[0].options, file);
+      kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
+      : placed ? qmat_gltf_write_places(context, scene, additions, count, file)
+               : qmat_gltf_write(context, additions[0].medial, additions[0].skin, &additions[0].options, file);
   qmat_free(additions);
   return status;
 }

@@ -101,8 +101,7 @@ static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value 
   return QMAT_OK;
 }
 
-/* Evaluates the medial mesh against a model. `mesh_choice` is the number of the mesh that it describes if the model is
- * glTF, else "merged". */
+/* Evaluates the medial mesh against a model. `mesh_choice` is the mesh of the model that it describes, or "merged". */
 static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
                                  const qmat_medial *medial, const json_t *facts) {
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
@@ -151,7 +150,8 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
       const bool by_mesh = mesh && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF);
       char number[24] = "merged";
       if (by_mesh) snprintf(number, sizeof number, "%lld", (long long)json_integer_value(mesh));
-      status = check_against(context, against, number, medial, facts);
+      const char *prim = json_string_value(json_object_get(facts, "qmat_prim"));
+      status = check_against(context, against, format == QMAT_FORMAT_USD && prim ? prim : number, medial, facts);
     }
     qmat_value_release(&medial->base);
   }

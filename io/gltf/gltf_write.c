@@ -15,6 +15,7 @@
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
 #include "io/gltf/gltf_skin.h"
+#include "io/placement.h"
 
 #define DATA_URI "data:application/octet-stream;base64,"
 
@@ -174,6 +175,8 @@ typedef struct document {
   size_t data_start;               /* offset of `data` after the asset's own chunk; 0: in another buffer */
   json_int_t buffer;               /* number of the buffer that holds `data` */
   json_int_t material;             /* of the skins; -1: not created yet */
+  const qmat_scene *places;        /* of a new asset: where the meshes are; NULL: one mesh, where it is */
+  json_t *converter;               /* of a new asset: the node that turns units and axes; NULL: none yet */
 } document;
 
 /* The bytes as a data URI; NULL when out of memory. */
@@ -241,35 +244,90 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
   return done;
 }
 
-/* Adds a node above `*number` that turns the model's space into metres with y up, and makes `*number` its own. Nothing
- * is added where the spaces are equal. */
-static bool add_unit_node(json_t *root, const qmat_gltf_options *options, const char *name, json_int_t *number) {
-  const double unit = options->meters_per_unit > 0 ? options->meters_per_unit : 1, half = sqrt(0.5);
-  if (unit == 1 && !options->is_z_up) return true;
-  json_t *node = json_pack("{s:[I]}", "children", *number);
-  bool done = node != NULL;
-  if (name) done = done && qmat_gltf_set(node, "name", json_sprintf("%s in metres, y up", name));
-  if (options->is_z_up) /* by -90 degrees about x */
-    done = done && qmat_gltf_set(node, "rotation", json_pack("[f, f, f, f]", -half, 0.0, 0.0, half));
-  if (unit != 1) done = done && qmat_gltf_set(node, "scale", json_pack("[f, f, f]", unit, unit, unit));
-  return qmat_gltf_add(root, "nodes", node, number) && done;
+/* Adds a node to the scene that is shown. */
+static bool add_root(json_t *root, json_int_t number) {
+  const json_t *scenes = json_object_get(root, "scenes"), *chosen = json_object_get(root, "scene");
+  json_t *scene = json_array_get(scenes, json_is_number(chosen) ? (size_t)json_number_value(chosen) : 0);
+  return !scene || qmat_gltf_add(scene, "nodes", json_integer(number), NULL); /* without scenes every root is shown */
 }
 
-/* Adds a node for the medial mesh of all meshes together, and adds the node to the scene. `converted` is NULL where the
- * medial mesh is in the asset's own space. */
-static bool add_node(json_t *root, const json_t *extras, const double *origin, json_int_t skin, const char *name,
-                     const qmat_gltf_options *converted) {
+/* Adds a node to a new asset: to its scene, or to the child of it that turns the model's space into metres with y up,
+ * where they differ. */
+static bool add_converted(document *document, const qmat_gltf_options *options, json_int_t number) {
+  const double unit = options->meters_per_unit > 0 ? options->meters_per_unit : 1, half = sqrt(0.5);
+  if (unit == 1 && !options->is_z_up) return add_root(document->root, number);
+  if (!document->converter) {
+    json_t *node = json_object();
+    json_int_t converter;
+    bool done = node != NULL;
+    const char *name = document->places ? document->places->name : options->name;
+    if (name && name[0] && qmat_is_utf8(name))
+      done = done && qmat_gltf_set(node, "name", json_sprintf("%s in metres, y up", name));
+    if (options->is_z_up) /* by -90 degrees about x */
+      done = done && qmat_gltf_set(node, "rotation", json_pack("[f, f, f, f]", -half, 0.0, 0.0, half));
+    if (unit != 1) done = done && qmat_gltf_set(node, "scale", json_pack("[f, f, f]", unit, unit, unit));
+    if (!qmat_gltf_add(document->root, "nodes", node, &converter) || !done || !add_root(document->root, converter))
+      return false;
+    document->converter = node;
+  }
+  return qmat_gltf_add(document->converter, "children", json_integer(number), NULL);
+}
+
+/* Adds a node for the medial mesh of all meshes together. */
+static bool add_node(document *document, const json_t *extras, const double *origin, json_int_t skin, const char *name,
+                     const qmat_gltf_options *options, bool is_new) {
   json_t *node = json_object();
   bool done = node && set_translation(node, origin);
   if (name) done = done && qmat_gltf_set(node, "name", json_string(name));
   if (skin >= 0) done = done && qmat_gltf_set(node, "mesh", json_integer(skin));
   done = done && set_extras(node, extras);
   json_int_t number;
-  if (!qmat_gltf_add(root, "nodes", node, &number) || !done) return false;
-  if (converted && !add_unit_node(root, converted, name, &number)) return false;
-  const json_t *scenes = json_object_get(root, "scenes"), *chosen = json_object_get(root, "scene");
-  json_t *scene = json_array_get(scenes, json_is_number(chosen) ? (size_t)json_number_value(chosen) : 0);
-  return !scene || qmat_gltf_add(scene, "nodes", json_integer(number), NULL); /* without scenes every root is shown */
+  if (!qmat_gltf_add(document->root, "nodes", node, &number) || !done) return false;
+  return is_new ? add_converted(document, options, number) : add_root(document->root, number);
+}
+
+/* Sets a node's matrix, unless it is the identity. */
+static bool set_matrix(json_t *node, const double m[16]) {
+  bool is_identity = true;
+  json_t *matrix = json_array();
+  bool done = matrix != NULL;
+  for (int i = 0; i < 16 && done; i++) {
+    is_identity = is_identity && m[i] == (i % 5 == 0);
+    done = json_array_append_new(matrix, json_real(m[i])) == 0;
+  }
+  if (done && !is_identity) return qmat_gltf_set(node, "matrix", matrix);
+  json_decref(matrix);
+  return done;
+}
+
+/* Adds a node at each place of a mesh. A place that shears gets two: glTF has no matrix for it. */
+static bool add_places(document *document, size_t mesh, const json_t *extras, const double *origin, json_int_t skin,
+                       const qmat_gltf_options *options) {
+  const qmat_scene *scene = document->places;
+  bool done = true;
+  for (size_t i = 0; i < scene->placement_count && done; i++) {
+    if (scene->placed[i] != mesh) continue;
+    const char *path = scene->placement_paths[i], *slash = strrchr(path, '/');
+    double m[16], inner[16], outer[16];
+    memcpy(m, scene->placements + 16 * i, sizeof m);
+    for (int k = 0; k < 3; k++) m[12 + k] += origin[0] * m[k] + origin[1] * m[4 + k] + origin[2] * m[8 + k];
+    const bool is_plain = qmat_placement_is_plain(m);
+    if (!is_plain) qmat_placement_split(m, inner, outer);
+    json_t *node = json_pack("{s:s}", "name", slash ? slash + 1 : path);
+    done = node && set_matrix(node, is_plain ? m : inner);
+    if (skin >= 0) done = done && qmat_gltf_set(node, "mesh", json_integer(skin));
+    done = done && set_extras(node, extras);
+    done = done && qmat_gltf_set(json_object_get(node, "extras"), "qmat_prim", json_string(path));
+    json_int_t number;
+    done = qmat_gltf_add(document->root, "nodes", node, &number) && done;
+    if (!is_plain) {
+      json_t *above = json_pack("{s:[I]}", "children", number);
+      done = done && above && set_matrix(above, outer);
+      done = qmat_gltf_add(document->root, "nodes", above, &number) && done;
+    }
+    done = done && add_converted(document, options, number);
+  }
+  return done;
 }
 
 /* ---- the document ---- */
@@ -384,7 +442,8 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   if (done && of_mesh) {
     done = add_to_carriers(document, scene->meshes[index], extras, origin, skin);
   } else if (done) {
-    done = add_node(document->root, extras, origin, skin, name, scene ? NULL : &options);
+    done = document->places ? add_places(document, index, extras, origin, skin, &options)
+                            : add_node(document, extras, origin, skin, name, &options, !scene);
   }
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;
@@ -463,10 +522,11 @@ static qmat_status make_file(qmat_context *context, const qmat_scene *scene, con
   return status;
 }
 
-/* `scene` is NULL for a new asset. */
-static qmat_status write_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
-                                  size_t count, bool draco_meshes, json_t *report, qmat_file **file) {
-  document document = {0};
+/* `scene` is NULL for a new asset, whose meshes then are at `places` (NULL: there is one). */
+static qmat_status write_document(qmat_context *context, const qmat_scene *scene, const qmat_scene *places,
+                                  const qmat_gltf_addition *additions, size_t count, bool draco_meshes, json_t *report,
+                                  qmat_file **file) {
+  document document = {.places = places};
   *file = NULL;
   qmat_status status = open_document(context, scene, &additions[0].options, &document);
   if (status == QMAT_OK && draco_meshes) status = compress_meshes(context, scene, additions, count, &document, report);
@@ -481,10 +541,15 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
 qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                             const qmat_gltf_options *options, qmat_file **file) {
   const qmat_gltf_addition addition = {.medial = medial, .skin = skin, .options = *options};
-  return write_document(context, NULL, &addition, 1, false, NULL, file);
+  return write_document(context, NULL, NULL, &addition, 1, false, NULL, file);
+}
+
+qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                   size_t count, qmat_file **file) {
+  return write_document(context, NULL, scene, additions, count, false, NULL, file);
 }
 
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                              size_t count, bool draco_meshes, json_t *report, qmat_file **file) {
-  return write_document(context, scene, additions, count, draco_meshes, report, file);
+  return write_document(context, scene, NULL, additions, count, draco_meshes, report, file);
 }

@@ -70,6 +70,12 @@ typedef struct qmat_gltf_addition {
   qmat_gltf_options options;
 } qmat_gltf_addition;
 
+/* Makes a glTF 2.0 file of the medial meshes of a USD scene, with the places that `scene` lists. `additions` has one
+ * element per mesh of the scene, in that mesh's space. Each place is a node with the mesh's skin and extras, and with
+ * the path of the prim as qmat_prim; a place that shears has a node above it. Otherwise as qmat_gltf_write. */
+qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                   size_t count, qmat_file **file);
+
 /* Writes the glTF asset of `scene` with medial meshes added. Apart from `embed` and `draco_meshes`, existing content is
  * preserved: the JSON gains keys and members at the end of arrays, and no byte of a buffer changes. `additions` has one
  * element per mesh of the scene (scene->mesh_count), in that mesh's space. If mesh_count is 0, it has one element for

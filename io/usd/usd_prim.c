@@ -160,6 +160,14 @@ qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name,
   return QMAT_OK;
 }
 
+qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, const char *otherwise,
+                                const char **token) {
+  const qmat_usd_value *value;
+  qmat_status status = qmat_usd_prim_attribute(prim, name, &value);
+  *token = value && qmat_usd_text(value) ? qmat_usd_text(value) : otherwise;
+  return status;
+}
+
 bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name) {
   for (size_t i = 0; i < prim->opinion_count; i++) {
     if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, QMAT_USD_RELATIONSHIP, name)) return true;

@@ -13,6 +13,7 @@ typedef struct qmat_usd_opinion {
   const qmat_usd_layer *layer;
   const qmat_usd_spec *spec;
   bool is_inherited; /* through an inherit or specialize arc */
+  int introduced;    /* the depth of the prim with the arc that brings the spec's paths into the scene; 0: none does */
 } qmat_usd_opinion;
 
 /* Where the messages about the prims of a stage go. */
@@ -61,8 +62,20 @@ const char *qmat_usd_prim_specifier(const qmat_usd_prim *prim);
  * its first sample, with a warning. */
 qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name, const qmat_usd_value **value);
 
+/* The strongest value of an attribute that is a text, which the layer owns; `otherwise` for other values and for none.
+ */
+qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, const char *otherwise, const char **token);
+
 /* Whether any opinion has a relationship of this name. */
 bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name);
+
+/* The targets of a relationship as paths in the scene, edited from the weakest opinion to the strongest; `arena` gets
+ * them. Targets outside of what an arc brings in are skipped with a warning. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_prim_targets(const qmat_usd_prim *prim, const char *name, qmat_arena *arena,
+                                  const char *const **targets, size_t *count);
+
+/* The path of a prim in the scene, in the arena's memory; NULL when memory is short. */
+const char *qmat_usd_prim_path(const qmat_usd_prim *prim, qmat_arena *arena);
 
 void qmat_usd_prim_uninit(qmat_usd_prim *prim);
 

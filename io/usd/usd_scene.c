@@ -4,317 +4,141 @@
 #include <math.h>
 #include <string.h>
 
-#include "io/usd/usd_stage.h"
-#include "io/usd/usd_transform.h"
+#include "io/usd/usd_instancer.h"
+#include "io/usd/usd_shape.h"
 
 #define FREE_ELEMENTS ((size_t)1 << 24)
 #define ELEMENTS_PER_BYTE 16
+#define FREE_PLACEMENTS ((size_t)1 << 20)
+#define BYTES_PER_PLACEMENT 8
+
+enum { DEEPEST_INSTANCERS = 16, USUAL_SEGMENTS = 64 };
 
 /* What a prim inherits from its parent. */
 typedef struct inherited {
   qmat_usd_transform world;
   const char *purpose; /* "default" when no prim above has one */
+  int instancers;      /* above it */
+  bool is_prototype;   /* it is itself the prototype of an instancer */
 } inherited;
 
 typedef struct reader {
   qmat_context *context;
+  qmat_usd_scene *scene;
   qmat_usd_stage *stage;
-  qmat_soup *soup;
-  size_t elements;      /* vertices and corners that were placed */
+  size_t segments;
   bool takes_undefined; /* also reads prims that only have an 'over' */
   bool has_undefined;   /* such a prim was found */
-  size_t prims, meshes, cages, holes, instances, prims_skipped, shapes_skipped;
 } reader;
 
 /* ---- meshes ---- */
 
-/* The arrays of a mesh; NULL for those that it lacks. */
-typedef struct usd_mesh {
-  const qmat_usd_value *points, *counts, *indices, *holes;
-  const qmat_usd_value *crease_lengths, *crease_indices, *crease_sharpness, *sharp_vertices, *vertex_sharpness;
-  bool is_left_handed;
-  qmat_scheme scheme;
-  qmat_boundary boundary;
-} usd_mesh;
-
-static qmat_status read_array(const qmat_usd_prim *prim, const char *name, bool numbers, unsigned components,
-                              const qmat_usd_value **value) {
-  qmat_status status = qmat_usd_prim_attribute(prim, name, value);
-  if (status != QMAT_OK || !*value) return status;
-  const qmat_usd_value *v = *value;
-  bool good = v->is_array && v->components == components &&
-              (numbers ? qmat_usd_is_number(v->type) : qmat_usd_is_integer(v->type));
-  if (good) return QMAT_OK;
-  return qmat_usd_prim_fail(prim, "%s has a value of the wrong type", name);
+/* The number of the mesh with this digest; UINT32_MAX: it is new. */
+static uint32_t find_mesh(const qmat_usd_scene *scene, const qmat_digest *digest) {
+  for (size_t i = 0; i < scene->mesh_count; i++)
+    if (qmat_digest_equal(&scene->digests[i], digest)) return (uint32_t)i;
+  return UINT32_MAX;
 }
 
-static qmat_status read_token(const qmat_usd_prim *prim, const char *name, const char *otherwise, const char **token) {
-  const qmat_usd_value *value;
-  qmat_status status = qmat_usd_prim_attribute(prim, name, &value);
-  *token = value && qmat_usd_text(value) ? qmat_usd_text(value) : otherwise;
-  return status;
-}
-
-/* One of the words. */
-static qmat_status read_choice(const qmat_usd_prim *prim, const char *name, const char *const *words, unsigned count,
-                               unsigned otherwise, unsigned *choice) {
-  const char *word;
-  qmat_status status = read_token(prim, name, words[otherwise], &word);
-  for (*choice = 0; status == QMAT_OK && *choice < count; ++*choice) {
-    if (strcmp(word, words[*choice]) == 0) return QMAT_OK;
-  }
-  if (status != QMAT_OK) return status;
-  return qmat_usd_prim_fail(prim, "%s is '%.40s', which is unknown", name, qmat_usd_shown(word));
-}
-
-static size_t count_of(const qmat_usd_value *value) {
-  return value ? value->count : 0;
-}
-
-/* Reads creases and sharp vertices. A crease of n vertices has n - 1 edges, and one sharpness or n - 1 of them. */
-static qmat_status read_sharpness(const qmat_usd_prim *prim, usd_mesh *mesh) {
-  const struct {
-    const char *name;
-    bool numbers;
-    const qmat_usd_value **value;
-  } arrays[] = {{"creaseLengths", false, &mesh->crease_lengths},
-                {"creaseIndices", false, &mesh->crease_indices},
-                {"creaseSharpnesses", true, &mesh->crease_sharpness},
-                {"cornerIndices", false, &mesh->sharp_vertices},
-                {"cornerSharpnesses", true, &mesh->vertex_sharpness}};
-  for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
-    qmat_status status = read_array(prim, arrays[i].name, arrays[i].numbers, 1, arrays[i].value);
-    if (status != QMAT_OK) return status;
-  }
-  const size_t lengths = count_of(mesh->crease_lengths), indices = count_of(mesh->crease_indices),
-               values = count_of(mesh->crease_sharpness);
-  size_t total = 0;
-  for (size_t i = 0; i < lengths; i++) {
-    const int64_t length = mesh->crease_lengths->integers[i];
-    if (length < 2 || (uint64_t)length > indices - total)
-      return qmat_usd_prim_fail(prim, "crease %zu has %lld vertices", i, (long long)length);
-    total += (size_t)length;
-  }
-  if (total != indices || (values != lengths && values != indices - lengths)) {
-    return qmat_usd_prim_fail(prim, "%zu creases of %zu vertices do not match %zu indices and %zu sharpnesses", lengths,
-                              total, indices, values);
-  }
-  if (count_of(mesh->sharp_vertices) != count_of(mesh->vertex_sharpness)) {
-    return qmat_usd_prim_fail(prim, "%zu corners do not match %zu sharpnesses", count_of(mesh->sharp_vertices),
-                              count_of(mesh->vertex_sharpness));
-  }
-  const qmat_usd_value *const ids[] = {mesh->crease_indices, mesh->sharp_vertices}, *const sharpness[] = {
-                                                                                        mesh->crease_sharpness,
-                                                                                        mesh->vertex_sharpness};
-  for (size_t k = 0; k < 2; k++) {
-    for (size_t i = 0; i < count_of(ids[k]); i++) {
-      if (ids[k]->integers[i] >= 0 && (uint64_t)ids[k]->integers[i] < count_of(mesh->points)) continue;
-      return qmat_usd_prim_fail(prim, "a %s refers to vertex %lld, but there are %zu points", k ? "corner" : "crease",
-                                (long long)ids[k]->integers[i], count_of(mesh->points));
-    }
-    for (size_t i = 0; i < count_of(sharpness[k]); i++) {
-      if (sharpness[k]->numbers[i] >= 0 && isfinite(sharpness[k]->numbers[i])) continue;
-      return qmat_usd_prim_fail(prim, "the sharpness of %s %zu is negative or not finite", k ? "corner" : "crease", i);
-    }
-  }
+static qmat_status add_mesh(qmat_usd_scene *scene, const qmat_usd_prim *prim, const qmat_usd_mesh *mesh,
+                            const qmat_digest *digest) {
+  const size_t at = scene->mesh_count;
+  if (qmat_grow((void **)&scene->meshes, &scene->mesh_capacity, at + 1, sizeof *scene->meshes) != 0 ||
+      qmat_grow((void **)&scene->digests, &scene->digest_capacity, at + 1, sizeof *scene->digests) != 0)
+    return qmat_usd_fail_prim_memory(prim);
+  scene->meshes[at] = *mesh;
+  scene->digests[at] = *digest;
+  scene->mesh_count++;
+  if (mesh->scheme != QMAT_SCHEME_NONE) scene->cages++;
+  scene->holes += qmat_usd_mesh_holes(mesh);
   return QMAT_OK;
 }
 
-static qmat_status read_mesh(const qmat_usd_prim *prim, usd_mesh *mesh) {
-  static const char *const schemes[] = {"none", "catmullClark", "loop", "bilinear"}, *const boundaries[] = {
-                                                                                         "none", "edgeOnly",
-                                                                                         "edgeAndCorner"};
-  const char *handedness;
-  unsigned scheme = 0, boundary = 0;
-  qmat_status status = read_array(prim, "points", true, 3, &mesh->points);
-  if (status == QMAT_OK) status = read_array(prim, "faceVertexCounts", false, 1, &mesh->counts);
-  if (status == QMAT_OK) status = read_array(prim, "faceVertexIndices", false, 1, &mesh->indices);
-  if (status == QMAT_OK) status = read_array(prim, "holeIndices", false, 1, &mesh->holes);
-  if (status == QMAT_OK) status = read_token(prim, "orientation", "rightHanded", &handedness);
-  if (status == QMAT_OK)
-    status = read_choice(prim, "subdivisionScheme", schemes, QMAT_SCHEME_COUNT, QMAT_SCHEME_CATMULL_CLARK, &scheme);
-  if (status == QMAT_OK) {
-    status = read_choice(prim, "interpolateBoundary", boundaries, QMAT_BOUNDARY_COUNT, QMAT_BOUNDARY_EDGE_AND_CORNER,
-                         &boundary);
-  }
-  if (status == QMAT_OK && scheme != QMAT_SCHEME_NONE) status = read_sharpness(prim, mesh);
-  if (status != QMAT_OK) return status;
-  mesh->is_left_handed = strcmp(handedness, "leftHanded") == 0;
-  mesh->scheme = (qmat_scheme)scheme;
-  mesh->boundary = (qmat_boundary)boundary;
-  if (!mesh->points || !mesh->counts || !mesh->indices) return QMAT_OK;
-  size_t corners = 0;
-  for (size_t f = 0; f < mesh->counts->count; f++) {
-    const int64_t count = mesh->counts->integers[f];
-    if (count < 0 || (uint64_t)count > mesh->indices->count - corners) {
-      return qmat_usd_prim_fail(prim,
-                                count < 0 ? "face %zu has a negative number of corners"
-                                          : "face %zu has more corners than there are faceVertexIndices",
-                                f);
-    }
-    corners += (size_t)count;
-  }
-  if (corners != mesh->indices->count) {
-    return qmat_usd_prim_fail(prim, "the faces have %zu corners, but there are %zu faceVertexIndices", corners,
-                              mesh->indices->count);
-  }
-  for (size_t i = 0; i < corners; i++) {
-    const int64_t index = mesh->indices->integers[i];
-    if (index < 0 || (uint64_t)index >= mesh->points->count) {
-      return qmat_usd_prim_fail(prim, "corner %zu refers to vertex %lld, but there are %zu points", i, (long long)index,
-                                mesh->points->count);
-    }
-  }
-  for (size_t i = 0; mesh->holes && i < mesh->holes->count; i++) {
-    const int64_t hole = mesh->holes->integers[i];
-    if (hole >= 0 && (uint64_t)hole < mesh->counts->count) continue;
-    return qmat_usd_prim_fail(prim, "hole %zu refers to face %lld, but there are %zu faces", i, (long long)hole,
-                              mesh->counts->count);
-  }
+static qmat_status fail_too_many(const reader *r, const qmat_usd_prim *prim, const char *what) {
+  qmat_usd_prim_fail(prim, "the scene has more %s than its files justify", what);
+  return r->context->error.status = QMAT_ERROR_GEOMETRY;
+}
+
+static qmat_status add_placement(const reader *r, const qmat_usd_prim *prim, const qmat_usd_placement *placement) {
+  qmat_usd_scene *scene = r->scene;
+  if (scene->placement_count >= FREE_PLACEMENTS + qmat_usd_stage_bytes(r->stage) / BYTES_PER_PLACEMENT)
+    return fail_too_many(r, prim, "places of meshes");
+  if (qmat_grow((void **)&scene->placements, &scene->placement_capacity, scene->placement_count + 1,
+                sizeof *scene->placements) != 0)
+    return qmat_usd_fail_prim_memory(prim);
+  scene->placements[scene->placement_count++] = *placement;
   return QMAT_OK;
 }
 
-static qmat_status add_points(reader *r, const usd_mesh *mesh, const qmat_usd_transform *world) {
-  const double *m = world->m;
-  qmat_status status = QMAT_OK;
-  for (size_t v = 0; v < mesh->points->count && status == QMAT_OK; v++) {
-    const double *p = mesh->points->numbers + 3 * v;
-    double point[3];
-    for (int k = 0; k < 3; k++) point[k] = p[0] * m[k] + p[1] * m[4 + k] + p[2] * m[8 + k] + m[12 + k];
-    status = qmat_soup_add_vertices(r->context, r->soup, point, 1);
-  }
-  return status;
+/* Places the mesh of this number at the prim. */
+static qmat_status place_mesh(const reader *r, const qmat_usd_prim *prim, uint32_t mesh, const inherited *state) {
+  const qmat_usd_placement placement = {
+      .mesh = mesh, .world = state->world, .path = qmat_usd_prim_path(prim, &r->scene->arena)};
+  return placement.path ? add_placement(r, prim, &placement) : qmat_usd_fail_prim_memory(prim);
 }
 
-static qmat_status add_faces(reader *r, const usd_mesh *mesh, size_t first_vertex, bool turned) {
-  const size_t faces = mesh->counts->count;
-  size_t most = 1, at = 0;
-  for (size_t f = 0; f < faces; f++) {
-    if ((size_t)mesh->counts->integers[f] > most) most = (size_t)mesh->counts->integers[f];
-  }
-  bool *is_hole = qmat_calloc(faces, sizeof *is_hole);
-  uint32_t *corners = qmat_alloc(most, sizeof *corners);
-  qmat_status status = is_hole && corners ? QMAT_OK : qmat_fail_memory(r->context, "the faces of a mesh");
-  for (size_t i = 0; status == QMAT_OK && mesh->holes && i < mesh->holes->count; i++)
-    is_hole[mesh->holes->integers[i]] = true;
-  for (size_t f = 0; f < faces && status == QMAT_OK; f++) {
-    const size_t count = (size_t)mesh->counts->integers[f];
-    for (size_t k = 0; k < count; k++) {
-      const size_t corner = at + (turned ? count - 1 - k : k);
-      corners[k] = (uint32_t)(first_vertex + (size_t)mesh->indices->integers[corner]);
-    }
-    at += count;
-    if (is_hole[f]) {
-      r->holes++;
-    } else {
-      status = qmat_soup_add_facet(r->context, r->soup, corners, count, (uint32_t)r->soup->facet_count, 0);
-    }
-  }
-  qmat_free(corners);
-  qmat_free(is_hole);
-  return status;
+/* Whether the transform keeps a volume: it is finite and flattens nothing. */
+static bool keeps_volume(const qmat_usd_transform *world) {
+  for (int i = 0; i < 16; i++)
+    if (!isfinite(world->m[i])) return false;
+  return fabs(qmat_usd_volume(world)) > 0;
 }
 
-/* Adds the polygons of the mesh to the soup's cage. Its points are in the soup from `first_vertex` on. */
-static qmat_status add_cage(reader *r, const usd_mesh *mesh, size_t first_vertex, bool turned) {
-  const size_t faces = mesh->counts->count, corners = mesh->indices->count, holes = count_of(mesh->holes),
-               creases = count_of(mesh->crease_indices) - count_of(mesh->crease_lengths),
-               sharp = count_of(mesh->sharp_vertices);
-  uint32_t scheme = mesh->scheme, boundary = mesh->boundary, face_count = (uint32_t)faces;
-  qmat_arena arena = {0};
-  qmat_cage cage = {
-      .surface_count = 1,
-      .surface_faces = &face_count,
-      .schemes = &scheme,
-      .boundaries = &boundary,
-      .vertex_count = mesh->points->count,
-      .positions = r->soup->positions + 3 * first_vertex,
-      .face_count = faces,
-      .face_sizes = qmat_arena_alloc(&arena, faces, sizeof(uint32_t)),
-      .corner_count = corners,
-      .corners = qmat_arena_alloc(&arena, corners, sizeof(uint32_t)),
-      .hole_count = holes,
-      .holes = qmat_arena_alloc(&arena, holes, sizeof(uint32_t)),
-      .crease_count = creases,
-      .creases = qmat_arena_alloc(&arena, creases, 2 * sizeof(uint32_t)),
-      .crease_sharpness = qmat_arena_alloc(&arena, creases, sizeof(double)),
-      .sharp_count = sharp,
-      .sharp_vertices = qmat_arena_alloc(&arena, sharp, sizeof(uint32_t)),
-      .vertex_sharpness = qmat_arena_alloc(&arena, sharp, sizeof(double)),
-  };
-  qmat_status status = QMAT_OK;
-  if (!cage.face_sizes || !cage.corners || !cage.holes || !cage.creases || !cage.crease_sharpness ||
-      !cage.sharp_vertices || !cage.vertex_sharpness || faces > UINT32_MAX) {
-    status = qmat_fail_memory(r->context, "the cage of a subdivision surface");
-    goto done;
-  }
-  size_t at = 0;
-  for (size_t f = 0; f < faces; f++) {
-    const size_t count = (size_t)mesh->counts->integers[f];
-    cage.face_sizes[f] = (uint32_t)count;
-    for (size_t k = 0; k < count; k++)
-      cage.corners[at + k] = (uint32_t)mesh->indices->integers[at + (turned ? count - 1 - k : k)];
-    at += count;
-  }
-  for (size_t i = 0; i < holes; i++) cage.holes[i] = (uint32_t)mesh->holes->integers[i];
-  size_t edge = 0, vertex = 0;
-  const bool per_edge = creases > 0 && mesh->crease_sharpness->count == creases;
-  for (size_t i = 0; i < count_of(mesh->crease_lengths); i++) {
-    for (int64_t k = 1; k < mesh->crease_lengths->integers[i]; k++, vertex++, edge++) {
-      cage.creases[2 * edge] = (uint32_t)mesh->crease_indices->integers[vertex];
-      cage.creases[2 * edge + 1] = (uint32_t)mesh->crease_indices->integers[vertex + 1];
-      cage.crease_sharpness[edge] = mesh->crease_sharpness->numbers[per_edge ? edge : i];
-    }
-    vertex++;
-  }
-  for (size_t i = 0; i < sharp; i++) {
-    cage.sharp_vertices[i] = (uint32_t)mesh->sharp_vertices->integers[i];
-    cage.vertex_sharpness[i] = mesh->vertex_sharpness->numbers[i];
-  }
-  status = qmat_soup_add_cage(r->context, r->soup, &cage);
-done:
-  qmat_arena_uninit(&arena);
-  return status;
+static qmat_status warn_if_flattened(const qmat_usd_prim *prim, const inherited *state, bool *flattened) {
+  *flattened = !keeps_volume(&state->world);
+  return *flattened ? qmat_usd_warn(prim, "left out: its transform flattens it or is not finite") : QMAT_OK;
 }
 
-static qmat_status place_mesh(reader *r, const qmat_usd_prim *prim, const inherited *state) {
-  usd_mesh mesh = {0};
-  qmat_status status = read_mesh(prim, &mesh);
+static qmat_status read_mesh(const reader *r, const qmat_usd_prim *prim, const inherited *state) {
+  qmat_usd_mesh mesh = {0};
+  qmat_digest digest;
+  bool flattened;
+  qmat_status status = qmat_usd_mesh_read(prim, &mesh);
   if (status != QMAT_OK) return status;
-  if (!mesh.points || !mesh.counts || !mesh.indices || mesh.counts->count == 0) {
-    return qmat_usd_warn(prim, "the mesh has no %s",
-                         !mesh.points    ? "points"
-                         : !mesh.indices ? "faceVertexIndices"
-                                         : "faces");
-  }
-  const size_t elements = mesh.points->count + mesh.indices->count, first = r->soup->vertex_count;
-  const size_t justified = FREE_ELEMENTS + ELEMENTS_PER_BYTE * qmat_usd_stage_bytes(r->stage);
-  if (elements > justified - r->elements || mesh.points->count > UINT32_MAX - first) {
-    qmat_usd_prim_fail(prim, "the copies of meshes have more vertices than the files justify");
-    r->context->error.status = QMAT_ERROR_GEOMETRY;
-    return QMAT_ERROR_GEOMETRY;
-  }
-  r->elements += elements;
-  if (mesh.scheme != QMAT_SCHEME_NONE) r->cages++;
+  const char *lacks = qmat_usd_mesh_lacks(&mesh);
+  if (lacks) return qmat_usd_warn(prim, "the mesh has no %s", lacks);
   if (qmat_usd_prim_has_relationship(prim, "skel:skeleton"))
     status = qmat_usd_warn(prim, "its skeleton is ignored: the mesh keeps its modelled pose");
-  r->meshes++;
-  if (status == QMAT_OK)
-    status = qmat_soup_reserve(r->context, r->soup, mesh.points->count, mesh.counts->count, mesh.indices->count);
-  if (status == QMAT_OK) status = add_points(r, &mesh, &state->world);
-  /* A mirror turns a left-handed mesh into a right-handed one. */
-  const bool turned = mesh.is_left_handed != qmat_usd_mirrors(&state->world);
-  if (status == QMAT_OK) status = add_faces(r, &mesh, first, turned);
-  return status == QMAT_OK ? add_cage(r, &mesh, first, turned) : status;
+  if (status == QMAT_OK) status = warn_if_flattened(prim, state, &flattened);
+  if (status != QMAT_OK || flattened) return status;
+  if (qmat_usd_mesh_digest(&mesh, &digest) != QMAT_OK) return qmat_usd_fail_prim_memory(prim);
+  uint32_t number = find_mesh(r->scene, &digest);
+  if (number == UINT32_MAX) {
+    number = (uint32_t)r->scene->mesh_count;
+    status = add_mesh(r->scene, prim, &mesh, &digest);
+  }
+  return status == QMAT_OK ? place_mesh(r, prim, number, state) : status;
+}
+
+static qmat_status read_shape(const reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
+  qmat_usd_scene *scene = r->scene;
+  qmat_usd_shape shape;
+  qmat_usd_mesh mesh;
+  qmat_digest digest;
+  bool flattened;
+  scene->shapes++;
+  qmat_status status = qmat_usd_shape_read(prim, type, &shape);
+  if (status != QMAT_OK || shape.is_flat) return status;
+  status = warn_if_flattened(prim, state, &flattened);
+  if (status != QMAT_OK || flattened) return status;
+  if (qmat_usd_shape_digest(&shape, &digest) != QMAT_OK) return qmat_usd_fail_prim_memory(prim);
+  uint32_t number = find_mesh(scene, &digest);
+  if (number == UINT32_MAX) {
+    number = (uint32_t)scene->mesh_count;
+    if (!qmat_usd_shape_mesh(&shape, r->segments, &scene->arena, &mesh)) return qmat_usd_fail_prim_memory(prim);
+    scene->shape_elements += mesh.points->count + mesh.indices->count;
+    if (scene->shape_elements > FREE_ELEMENTS) return fail_too_many(r, prim, "different shapes");
+    status = add_mesh(scene, prim, &mesh, &digest);
+  }
+  return status == QMAT_OK ? place_mesh(r, prim, number, state) : status;
 }
 
 /* ---- prims ---- */
 
-/* Whether the type is geometry other than a mesh. */
+/* Whether the type is geometry that is not read. */
 static bool is_other_shape(const char *type) {
-  static const char *const types[] = {
-      "Sphere", "Cube",        "Cylinder",   "Cylinder_1", "Cone",        "Capsule",       "Capsule_1", "Plane",
-      "Points", "BasisCurves", "NurbsPatch", "TetMesh",    "NurbsCurves", "HermiteCurves", "Volume",    "Field3DAsset"};
+  static const char *const types[] = {"Points",      "BasisCurves",   "NurbsPatch", "TetMesh",
+                                      "NurbsCurves", "HermiteCurves", "Volume",     "Field3DAsset"};
   for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
     if (strcmp(type, types[i]) == 0) return true;
   }
@@ -326,25 +150,25 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
   const char *visibility, *purpose;
   *skipped = true;
   if (!qmat_usd_truth(qmat_usd_prim_field(prim, "active"), true)) {
-    r->prims_skipped++;
+    r->scene->prims_skipped++;
     return QMAT_OK;
   }
   const char *specifier = qmat_usd_prim_specifier(prim);
   qmat_status status = QMAT_OK;
-  if (strcmp(specifier, "class") == 0) return QMAT_OK;
-  if (strcmp(specifier, "over") == 0) {
+  if (strcmp(specifier, "class") == 0 && !state->is_prototype) return QMAT_OK;
+  if (strcmp(specifier, "over") == 0 && !state->is_prototype) {
     r->has_undefined = true;
     status =
         qmat_usd_warn(prim, r->takes_undefined ? "read although nothing defines it: the scene has only an 'over' of it"
                                                : "skipped with all prims below it: nothing defines this 'over'");
     if (status != QMAT_OK || !r->takes_undefined) return status;
   }
-  status = read_token(prim, "visibility", "inherited", &visibility);
-  if (status == QMAT_OK) status = read_token(prim, "purpose", state->purpose, &purpose);
+  status = qmat_usd_prim_token(prim, "visibility", "inherited", &visibility);
+  if (status == QMAT_OK) status = qmat_usd_prim_token(prim, "purpose", state->purpose, &purpose);
   if (status != QMAT_OK) return status;
   state->purpose = purpose;
   *skipped = strcmp(visibility, "invisible") == 0;
-  if (*skipped) r->prims_skipped++;
+  if (*skipped) r->scene->prims_skipped++;
   return QMAT_OK;
 }
 
@@ -352,16 +176,19 @@ static bool is_for_rendering(const char *purpose) {
   return strcmp(purpose, "default") == 0 || strcmp(purpose, "render") == 0;
 }
 
-static qmat_status read_shape(reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
-  const bool is_mesh = strcmp(type, "Mesh") == 0;
-  if (!is_mesh && !is_other_shape(type)) return QMAT_OK;
+static qmat_status read_geometry(reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
+  const bool is_mesh = strcmp(type, "Mesh") == 0, is_shape = qmat_usd_is_shape(type);
+  if (!is_mesh && !is_shape && !is_other_shape(type)) return QMAT_OK;
   if (!is_for_rendering(state->purpose)) {
-    r->prims_skipped++;
+    r->scene->prims_skipped++;
     return QMAT_OK;
   }
-  if (is_mesh) return place_mesh(r, prim, state);
-  r->shapes_skipped++;
-  return qmat_usd_warn(prim, "skipped: a %s is not a mesh", type);
+  if (is_mesh) return read_mesh(r, prim, state);
+  if (!is_shape) {
+    r->scene->shapes_skipped++;
+    return qmat_usd_warn(prim, "skipped: a %s is not a surface that bounds a solid", type);
+  }
+  return read_shape(r, prim, type, state);
 }
 
 static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state);
@@ -379,46 +206,173 @@ static qmat_status read_children(reader *r, qmat_usd_prim *prim, const inherited
   return status;
 }
 
+/* ---- point instancers ---- */
+
+/* Reads the prim that `path` names below `above`; nothing, with a warning about the instancer, where there is none. */
+static qmat_status read_prototype(reader *r, const qmat_usd_prim *instancer, qmat_usd_prim *above, const char *path,
+                                  const inherited *state) {
+  if (*path == '\0') return read_prim(r, above, *state);
+  const size_t length = strcspn(++path, "/");
+  const char *const *names;
+  size_t count, at = 0;
+  qmat_status status = qmat_usd_prim_children(above, &names, &count);
+  if (status != QMAT_OK) return status;
+  while (at < count && (strlen(names[at]) != length || memcmp(names[at], path, length) != 0)) at++;
+  if (at == count) return qmat_usd_warn(instancer, "a prototype is skipped: there is no such prim");
+  qmat_usd_prim child;
+  status = qmat_usd_prim_child(r->stage, above, names[at], &child);
+  if (status == QMAT_OK) status = read_prototype(r, instancer, &child, path + length, state);
+  qmat_usd_prim_uninit(&child);
+  return status;
+}
+
+/* Places what a prototype has, the places from `first` on, at each of its instances instead. */
+static qmat_status place_instances(const reader *r, const qmat_usd_prim *prim, const qmat_usd_instancer *instancer,
+                                   size_t prototype, const inherited *state, size_t first) {
+  qmat_usd_scene *scene = r->scene;
+  const size_t count = scene->placement_count - first;
+  qmat_usd_placement *own = qmat_alloc(count, sizeof *own);
+  if (!own) return qmat_usd_fail_prim_memory(prim);
+  if (count > 0) memcpy(own, scene->placements + first, count * sizeof *own);
+  scene->placement_count = first;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < instancer->instance_count && status == QMAT_OK; i++) {
+    if (instancer->of[i] != prototype) continue;
+    const qmat_usd_transform world = qmat_usd_product(&instancer->placements[i], &state->world);
+    for (size_t k = 0; k < count && status == QMAT_OK; k++) {
+      qmat_usd_placement placed = own[k];
+      placed.world = qmat_usd_product(&own[k].world, &world);
+      if (keeps_volume(&placed.world)) status = add_placement(r, prim, &placed);
+    }
+    if (status == QMAT_OK && i % 4096 == 0)
+      status = qmat_progress(r->context, i, instancer->instance_count, "instances");
+  }
+  qmat_free(own);
+  return status;
+}
+
+static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherited *state) {
+  qmat_usd_instancer instancer;
+  qmat_usd_prim root = {0};
+  if (state->instancers >= DEEPEST_INSTANCERS)
+    return qmat_usd_prim_fail(prim, "instancers are nested more than %d deep", DEEPEST_INSTANCERS);
+  qmat_status status = qmat_usd_instancer_read(prim, &prim->arena, &instancer);
+  if (status != QMAT_OK) return status;
+  r->scene->point_instances += instancer.instance_count;
+  /* Prototypes inherit neither the instancer's purpose nor, twice, its place. */
+  const inherited own = {
+      .world = qmat_usd_identity(), .purpose = "default", .instancers = state->instancers + 1, .is_prototype = true};
+  status = qmat_usd_stage_root(r->stage, &root);
+  for (size_t i = 0; i < instancer.prototype_count && status == QMAT_OK; i++) {
+    const size_t first = r->scene->placement_count;
+    status = read_prototype(r, prim, &root, instancer.prototypes[i], &own);
+    if (status == QMAT_OK) status = place_instances(r, prim, &instancer, i, state, first);
+  }
+  qmat_usd_prim_uninit(&root);
+  return status;
+}
+
 static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state) {
   bool skipped;
-  r->prims++;
-  if (r->prims % 1024 == 0) {
-    qmat_status status = qmat_progress(r->context, r->prims, 0, "prims");
+  if (++r->scene->prims % 1024 == 0) {
+    const qmat_status status = qmat_progress(r->context, r->scene->prims, 0, "prims");
     if (status != QMAT_OK) return status;
   }
   qmat_status status = find_skipped(r, prim, &state, &skipped);
   if (status != QMAT_OK || skipped) return status;
+  state.is_prototype = false;
   const char *type = qmat_usd_text(qmat_usd_prim_field(prim, "typeName"));
   if (!type) type = "";
-  if (qmat_usd_truth(qmat_usd_prim_field(prim, "instanceable"), false)) r->instances++;
+  if (qmat_usd_truth(qmat_usd_prim_field(prim, "instanceable"), false)) r->scene->instances++;
   status = qmat_usd_read_transform(prim, type, &state.world);
   if (status != QMAT_OK) return status;
-  if (strcmp(type, "PointInstancer") == 0) {
-    r->shapes_skipped++;
-    return qmat_usd_warn(prim, "skipped with all prims below it: a PointInstancer is not expanded");
-  }
-  status = read_shape(r, prim, type, &state);
+  if (strcmp(type, "PointInstancer") == 0) return read_instancer(r, prim, &state);
+  status = read_geometry(r, prim, type, &state);
   return status == QMAT_OK ? read_children(r, prim, &state) : status;
 }
 
-static qmat_status fill_report(const reader *r, json_t *report) {
-  const qmat_usd_spec *root = qmat_usd_stage_root_layer(r->stage)->root;
+/* ---- the scene ---- */
+
+/* Removes meshes that have no place: prototypes without instances. */
+static void drop_unplaced(qmat_usd_scene *scene, uint32_t *numbers) {
+  for (size_t i = 0; i < scene->mesh_count; i++) numbers[i] = UINT32_MAX;
+  for (size_t i = 0; i < scene->placement_count; i++) numbers[scene->placements[i].mesh] = 0;
+  uint32_t kept = 0;
+  for (size_t i = 0; i < scene->mesh_count; i++) {
+    if (numbers[i] == UINT32_MAX) continue;
+    scene->meshes[kept] = scene->meshes[i];
+    numbers[i] = kept++;
+  }
+  for (size_t i = 0; i < scene->placement_count; i++) scene->placements[i].mesh = numbers[scene->placements[i].mesh];
+  scene->mesh_count = kept;
+}
+
+static qmat_status check_any(qmat_context *context, const qmat_usd_scene *scene, const char *path) {
+  if (scene->placement_count > 0) return QMAT_OK;
+  const char *first = json_string_value(json_array_get(qmat_usd_stage_warnings(scene->stage), 0));
+  return qmat_fail_file(context, QMAT_ERROR_GEOMETRY, path, "the scene has no mesh that can be read%s%s",
+                        first ? "; " : "", first ? first : "");
+}
+
+qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, const char *path, size_t segments,
+                                qmat_usd_scene *scene) {
+  qmat_usd_prim root = {0};
+  *scene = (qmat_usd_scene){0};
+  qmat_status status = qmat_usd_stage_open(context, bytes, path, &scene->stage);
+  if (status != QMAT_OK) return status;
+  reader r = {
+      .context = context, .scene = scene, .stage = scene->stage, .segments = segments > 0 ? segments : USUAL_SEGMENTS};
+  const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
+  status = qmat_usd_stage_root(r.stage, &root);
+  if (status == QMAT_OK) status = read_children(&r, &root, &state);
+  if (status == QMAT_OK && scene->placement_count == 0 && r.has_undefined) {
+    /* The file may be meant as a layer of another one. */
+    qmat_usd_stage *stage = scene->stage;
+    scene->stage = NULL;
+    qmat_usd_scene_close(scene);
+    scene->stage = stage;
+    qmat_usd_stage_forget_warnings(stage);
+    r.takes_undefined = true;
+    status = read_children(&r, &root, &state);
+  }
+  qmat_usd_prim_uninit(&root);
+  if (status == QMAT_OK) status = check_any(context, scene, path);
+  uint32_t *numbers = status == QMAT_OK ? qmat_alloc(scene->mesh_count, sizeof *numbers) : NULL;
+  if (status == QMAT_OK && !numbers) status = qmat_fail_memory(context, "a USD scene");
+  if (status == QMAT_OK) drop_unplaced(scene, numbers);
+  qmat_free(numbers);
+  return status;
+}
+
+void qmat_usd_scene_close(qmat_usd_scene *scene) {
+  qmat_usd_stage_close(scene->stage);
+  qmat_free(scene->meshes);
+  qmat_free(scene->digests);
+  qmat_free(scene->placements);
+  qmat_arena_uninit(&scene->arena);
+  *scene = (qmat_usd_scene){0};
+}
+
+qmat_status qmat_usd_scene_report(qmat_context *context, const qmat_usd_scene *scene, json_t *report) {
+  const qmat_usd_spec *root = qmat_usd_stage_root_layer(scene->stage)->root;
   const struct {
     const char *key;
     size_t count;
   } rows[] = {
-      {"layers_read", qmat_usd_stage_layer_count(r->stage)},
-      {"prims_read", r->prims},
-      {"meshes_placed", r->meshes},
-      {"cages", r->cages},
-      {"holes", r->holes},
-      {"instances", r->instances},
-      {"prims_skipped", r->prims_skipped},
-      {"shapes_skipped", r->shapes_skipped},
+      {"layers_read", qmat_usd_stage_layer_count(scene->stage)},
+      {"prims_read", scene->prims},
+      {"meshes_placed", scene->placement_count},
+      {"cages", scene->cages},
+      {"holes", scene->holes},
+      {"instances", scene->instances},
+      {"point_instances", scene->point_instances},
+      {"shapes_read", scene->shapes},
+      {"prims_skipped", scene->prims_skipped},
+      {"shapes_skipped", scene->shapes_skipped},
   };
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
     if (json_object_set_new(report, rows[i].key, json_integer((json_int_t)rows[i].count)) != 0)
-      return qmat_fail_memory(r->context, "a report");
+      return qmat_fail_memory(context, "a report");
   }
   /* The defaults are those of USD. */
   const double unit = qmat_usd_number(qmat_usd_field_value(root, "metersPerUnit"), 0.01);
@@ -426,38 +380,44 @@ static qmat_status fill_report(const reader *r, json_t *report) {
   const bool is_z = up && strcmp(up, "Z") == 0;
   if (json_object_set_new(report, "meters_per_unit", json_real(isfinite(unit) ? unit : 0.01)) != 0 ||
       json_object_set_new(report, "up_axis", json_string(is_z ? "Z" : "Y")) != 0 ||
-      json_object_set(report, "warnings", qmat_usd_stage_warnings(r->stage)) != 0) {
-    return qmat_fail_memory(r->context, "a report");
+      json_object_set(report, "warnings", qmat_usd_stage_warnings(scene->stage)) != 0) {
+    return qmat_fail_memory(context, "a report");
   }
   return QMAT_OK;
 }
 
-static qmat_status check_any(const reader *r, const char *path) {
-  if (r->meshes > 0) return QMAT_OK;
-  const char *first = json_string_value(json_array_get(qmat_usd_stage_warnings(r->stage), 0));
-  return qmat_fail_file(r->context, QMAT_ERROR_GEOMETRY, path, "the scene has no mesh that can be read%s%s",
-                        first ? "; " : "", first ? first : "");
+qmat_status qmat_usd_scene_add_mesh(qmat_context *context, const qmat_usd_scene *scene, size_t mesh, qmat_soup *soup) {
+  const qmat_usd_transform identity = qmat_usd_identity();
+  const qmat_status status = qmat_usd_mesh_add(context, &scene->meshes[mesh], &identity, soup);
+  if (scene->meshes[mesh].scheme == QMAT_SCHEME_NONE) qmat_soup_clear_cage(soup); /* no subdivision surface */
+  return status;
+}
+
+qmat_status qmat_usd_scene_add_all(qmat_context *context, const qmat_usd_scene *scene, const char *path,
+                                   qmat_soup *soup) {
+  const size_t justified = FREE_ELEMENTS + ELEMENTS_PER_BYTE * qmat_usd_stage_bytes(scene->stage);
+  size_t elements = 0;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < scene->placement_count && status == QMAT_OK; i++) {
+    const qmat_usd_placement *placement = &scene->placements[i];
+    const qmat_usd_mesh *mesh = &scene->meshes[placement->mesh];
+    elements += mesh->points->count + mesh->indices->count;
+    if (elements > justified || mesh->points->count > UINT32_MAX - soup->vertex_count)
+      return qmat_fail_file(context, QMAT_ERROR_GEOMETRY, path,
+                            "%s: the copies of meshes have more vertices than the files justify",
+                            qmat_usd_shown(placement->path));
+    status = qmat_usd_mesh_add(context, mesh, &placement->world, soup);
+  }
+  if (scene->cages == 0) qmat_soup_clear_cage(soup);
+  return status;
 }
 
 qmat_status qmat_usd_read(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_soup *soup,
                           json_t *report) {
-  reader r = {.context = context, .soup = soup};
-  qmat_usd_prim root = {0};
-  qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
-  if (status != QMAT_OK) return status;
-  const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
-  status = qmat_usd_stage_root(r.stage, &root);
-  if (status == QMAT_OK) status = read_children(&r, &root, &state);
-  if (status == QMAT_OK && r.meshes == 0 && r.has_undefined) {
-    /* The file may be meant as a layer of another one. */
-    qmat_usd_stage_forget_warnings(r.stage);
-    r = (reader){.context = context, .stage = r.stage, .soup = soup, .takes_undefined = true};
-    status = read_children(&r, &root, &state);
-  }
-  qmat_usd_prim_uninit(&root);
-  if (status == QMAT_OK) status = check_any(&r, path);
-  if (r.cages == 0) qmat_soup_clear_cage(soup); /* no subdivision surface */
-  if (status == QMAT_OK && report) status = fill_report(&r, report);
-  qmat_usd_stage_close(r.stage);
+  qmat_usd_scene scene;
+  qmat_status status = qmat_usd_scene_open(context, bytes, path, 0, &scene);
+  if (status == QMAT_OK) status = qmat_usd_scene_add_all(context, &scene, path, soup);
+  if (status == QMAT_OK && report) status = qmat_usd_scene_report(context, &scene, report);
+  qmat_usd_scene_close(&scene);
   return status;
 }

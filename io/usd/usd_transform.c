@@ -14,8 +14,7 @@ transform qmat_usd_identity(void) {
   return (transform){.m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
 }
 
-/* First `a`, then `b`. */
-static transform product(const transform *a, const transform *b) {
+transform qmat_usd_product(const transform *a, const transform *b) {
   transform result;
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < 4; j++) {
@@ -27,15 +26,17 @@ static transform product(const transform *a, const transform *b) {
   return result;
 }
 
-bool qmat_usd_mirrors(const transform *t) {
+double qmat_usd_volume(const transform *t) {
   const double *m = t->m;
-  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-             m[2] * (m[4] * m[9] - m[5] * m[8]) <
-         0;
+  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-/* Gauss-Jordan elimination with partial pivoting; false when there is no inverse. */
-static bool inverse(const transform *t, transform *result) {
+bool qmat_usd_mirrors(const transform *t) {
+  return qmat_usd_volume(t) < 0;
+}
+
+/* Gauss-Jordan elimination with partial pivoting. */
+bool qmat_usd_inverse(const transform *t, transform *result) {
   double a[4][8];
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < 4; j++) {
@@ -85,8 +86,7 @@ static transform rotation(int axis, double degrees) {
   return result;
 }
 
-/* The rotation of a quaternion of any length, its real part first. */
-static transform orientation(const double *q) {
+transform qmat_usd_orientation(const double q[4]) {
   transform result = qmat_usd_identity();
   const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(length > 0)) return result;
@@ -142,11 +142,11 @@ static transform make_operation(size_t row, const double *numbers) {
     case OP_EULER:
       for (int i = 0; i < 3; i++) {
         const transform turn = rotation(axes[i], numbers[axes[i]]);
-        result = product(&result, &turn);
+        result = qmat_usd_product(&result, &turn);
       }
       break;
     case OP_ORIENT:
-      return orientation(numbers);
+      return qmat_usd_orientation(numbers);
     case OP_TRANSFORM:
       memcpy(result.m, numbers, sizeof result.m);
       break;
@@ -177,7 +177,7 @@ static qmat_status read_operation(const qmat_usd_prim *prim, const char *name, t
   *result = make_operation(row, numbers);
   if (!inverted) return QMAT_OK;
   const transform forward = *result;
-  if (inverse(&forward, result)) return QMAT_OK;
+  if (qmat_usd_inverse(&forward, result)) return QMAT_OK;
   return qmat_usd_prim_fail(prim, "%s has no inverse", name);
 }
 
@@ -197,8 +197,8 @@ qmat_status qmat_usd_read_transform(const qmat_usd_prim *prim, const char *type,
     }
     transform operation;
     status = read_operation(prim, order->texts[i], &operation);
-    local = product(&operation, &local);
+    local = qmat_usd_product(&operation, &local);
   }
-  *world = product(&local, world);
+  *world = qmat_usd_product(&local, world);
   return status;
 }

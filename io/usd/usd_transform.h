@@ -11,6 +11,18 @@ typedef struct qmat_usd_transform {
 
 qmat_usd_transform qmat_usd_identity(void);
 
+/* First `a`, then `b`. */
+qmat_usd_transform qmat_usd_product(const qmat_usd_transform *a, const qmat_usd_transform *b);
+
+/* The inverse; false when there is none. */
+bool qmat_usd_inverse(const qmat_usd_transform *t, qmat_usd_transform *inverse);
+
+/* The rotation of a quaternion of any length, its real part first; none for a quaternion of zeros. */
+qmat_usd_transform qmat_usd_orientation(const double q[4]);
+
+/* The volume to which the transform takes the unit cube, negative where it turns a right hand into a left hand. */
+double qmat_usd_volume(const qmat_usd_transform *t);
+
 /* Whether the transform turns a right hand into a left hand. */
 bool qmat_usd_mirrors(const qmat_usd_transform *t);
 

@@ -138,6 +138,24 @@ std::vector<int> descendants(const Far::TopologyRefiner &refiner, int level) {
   return result;
 }
 
+/* The faces that stand for one face of a cage: where quads are wanted, other polygons become fans. */
+size_t fan_size(int corners, bool quads) {
+  return quads && corners != 4 ? static_cast<size_t>(corners) : 1;
+}
+
+/* Adds the triangles between the edges of a face and the limit of its centre. */
+void add_fan(const Far::TopologyLevel &coarse, int face, qmat_limit_level *limit) {
+  const auto corners = coarse.GetFaceVertices(face), edges = coarse.GetFaceEdges(face);
+  const auto centre = static_cast<uint32_t>(coarse.GetFaceChildVertex(face));
+  for (int k = 0; k < corners.size(); k++) {
+    uint32_t *ids = limit->faces + limit->face_stride * limit->face_count++;
+    ids[0] = static_cast<uint32_t>(coarse.GetVertexChildVertex(corners[k]));
+    ids[1] = static_cast<uint32_t>(coarse.GetVertexChildVertex(corners[(k + 1) % corners.size()]));
+    ids[2] = ids[3] = centre;
+    std::fill(ids + 4, ids + limit->face_stride, static_cast<uint32_t>(coarse.GetEdgeChildVertex(edges[k])));
+  }
+}
+
 qmat_status fill(qmat_context *context, const Far::TopologyRefiner &refiner, const std::vector<Point> &limits,
                  int level, qmat_limit_level *limit) {
   const Far::TopologyLevel &coarse = refiner.GetLevel(level);
@@ -148,15 +166,21 @@ qmat_status fill(qmat_context *context, const Far::TopologyRefiner &refiner, con
   limit->face_stride = quads ? 9 : 6;
   limit->position_count = places.size();
   limit->positions = static_cast<double *>(qmat_alloc(places.size(), 3 * sizeof(double)));
-  limit->faces = static_cast<uint32_t *>(qmat_alloc(static_cast<size_t>(faces) * limit->face_stride, sizeof(uint32_t)));
+  size_t most = 0;
+  for (int f = 0; f < faces; f++) most += fan_size(coarse.GetFaceVertices(f).size(), quads);
+  limit->faces = static_cast<uint32_t *>(qmat_alloc(most * limit->face_stride, sizeof(uint32_t)));
   if (!limit->positions || !limit->faces) return qmat_fail_memory(context, "the limit surface");
   for (size_t i = 0; i < places.size(); i++)
     std::copy_n(limits[static_cast<size_t>(places[i])].x, 3, limit->positions + 3 * i);
   const int size = static_cast<int>(limit->face_size);
   for (int f = 0; f < faces; f++) {
     if (coarse.IsFaceHole(f)) continue;
-    uint32_t *ids = limit->faces + limit->face_stride * limit->face_count++;
     const auto corners = coarse.GetFaceVertices(f), edges = coarse.GetFaceEdges(f);
+    if (fan_size(corners.size(), quads) > 1) {
+      add_fan(coarse, f, limit);
+      continue;
+    }
+    uint32_t *ids = limit->faces + limit->face_stride * limit->face_count++;
     for (int k = 0; k < size; k++) {
       ids[k] = static_cast<uint32_t>(coarse.GetVertexChildVertex(corners[k]));
       ids[size + k] = static_cast<uint32_t>(coarse.GetEdgeChildVertex(edges[k]));

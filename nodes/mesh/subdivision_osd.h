@@ -14,7 +14,9 @@ extern "C" {
 typedef struct qmat_limit_level {
   size_t face_count, face_size, face_stride;
   /* face_stride ids per face: face_size corners (4, or 3 by Loop's scheme), counter-clockwise as in the cage, the
-   * limits of the midpoints of the edges that start there, and for quads the limit of the centre. */
+   * limits of the midpoints of the edges that start there, and for quads the limit of the centre. At level 0 a polygon
+   * of another size than 4 is a fan of triangles about the limit of its centre, which is the third and fourth corner.
+   */
   uint32_t *faces;
   size_t position_count;
   double *positions; /* 3 * position_count: points of the limit surface */

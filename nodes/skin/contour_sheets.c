@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/eigen.h"
 #include "nodes/skin/contour.h"
 
 /* Vertices keep this far from the sides of their cells, in cells: no two vertices meet. */
@@ -53,38 +54,6 @@ qmat_status qmat_contour_find_sheets(qmat_contour *c) {
   return QMAT_OK;
 }
 
-/* Eigenvalues and orthonormal eigenvectors (columns of v) of a symmetric matrix, by Jacobi rotations. */
-static void symmetric_eigen(double m[3][3], double v[3][3]) {
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) v[i][j] = i == j;
-  }
-  for (int sweep = 0; sweep < 12; sweep++) {
-    double off = fabs(m[0][1]) + fabs(m[0][2]) + fabs(m[1][2]);
-    if (off <= 1e-15 * (fabs(m[0][0]) + fabs(m[1][1]) + fabs(m[2][2]))) break;
-    for (int p = 0; p < 2; p++) {
-      for (int q = p + 1; q < 3; q++) {
-        if (m[p][q] == 0) continue;
-        double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-        double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1)), cs = 1 / sqrt(t * t + 1),
-               sn = t * cs;
-        for (int k = 0; k < 3; k++) {
-          double a = m[k][p], b = m[k][q];
-          m[k][p] = cs * a - sn * b;
-          m[k][q] = sn * a + cs * b;
-        }
-        for (int k = 0; k < 3; k++) {
-          double a = m[p][k], b = m[q][k];
-          m[p][k] = cs * a - sn * b;
-          m[q][k] = sn * a + cs * b;
-          a = v[k][p], b = v[k][q];
-          v[k][p] = cs * a - sn * b;
-          v[k][q] = sn * a + cs * b;
-        }
-      }
-    }
-  }
-}
-
 /* The region of a cell where its vertices may lie. */
 static void inner_box(const qmat_contour *c, const qmat_cell *cell, double low[3], double high[3]) {
   for (int k = 0; k < 3; k++) {
@@ -125,7 +94,7 @@ static void place_sheet(qmat_contour *c, size_t sheet) {
     }
   }
   memcpy(diagonal, m, sizeof m);
-  symmetric_eigen(diagonal, v);
+  qmat_symmetric_eigen(diagonal, v);
   double largest = fmax(diagonal[0][0], fmax(diagonal[1][1], diagonal[2][2]));
   memcpy(point, mean, sizeof mean);
   for (int e = 0; e < 3; e++) {

@@ -19,6 +19,7 @@
 #include "io/mesh/mesh_formats.h"
 #include "io/model.h"
 #include "io/usd/usd_medial.h"
+#include "io/usd/usd_model.h"
 #include "io/usd/usd_scene.h"
 #include "nodes/nodes.h"
 #include "tests/io/files.h" /* brings cmocka.h, which the headers below need */
@@ -303,6 +304,26 @@ static void read_base64(const uint8_t *content, size_t size) {
 }
 
 /* A text layer, a crate or a package, told apart by the first bytes. */
+/* The meshes of a scene one by one, and their places. */
+static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
+  qmat_context context = {0};
+  qmat_usd_meshes meshes;
+  json_t *report = json_object();
+  qmat_scene *scene = qmat_scene_new();
+  scene->name = qmat_strdup("file");
+  scene->format = qmat_strdup("usd");
+  const qmat_status status = qmat_usd_read_meshes(&context, bytes, path, "all", 8, scene, &meshes, report);
+  require_explained(&context, status);
+  if (status == QMAT_OK) {
+    require(meshes.count > 0 && scene->mesh_count == meshes.count && scene->placement_count >= meshes.count);
+    require(qmat_value_seal(&context, &scene->base) == QMAT_OK);
+  }
+  qmat_usd_meshes_uninit(&meshes);
+  qmat_value_release(&scene->base);
+  json_decref(report);
+  qmat_context_uninit(&context);
+}
+
 static void read_usd(const uint8_t *content, size_t size) {
   static const char path[] = "/no such folder/file.usd";
   qmat_context context = {0};
@@ -321,6 +342,7 @@ static void read_usd(const uint8_t *content, size_t size) {
     require_explained(&context, qmat_soup_to_mesh(&context, &soup, path, &options, &mesh, NULL));
     if (mesh) qmat_value_release(&mesh->base);
   }
+  read_usd_meshes(&bytes, path);
   require_explained(&context, qmat_usd_read_medial(&context, &bytes, path, NULL, &medial, facts));
   if (medial) qmat_value_release(&medial->base);
   qmat_soup_uninit(&soup);

@@ -353,6 +353,12 @@ static void test_the_limit_of_a_bilinear_cage_is_the_cage(void **state) {
   cage_spec spec = cube;
   spec.scheme = QMAT_SCHEME_BILINEAR;
   result r = good(RUN(mesh_of(&spec), "level", "0"));
+  assert_true(number(&r, "level") == 0);
+  assert_near(r.mesh->deviation, 0, 1e-15);
+  assert_int_equal(r.mesh->vertex_count, 8);
+  assert_int_equal(r.mesh->triangle_count, 12);
+  release(&r);
+  r = good(RUN(mesh_of(&spec), "level", "1"));
   assert_true(number(&r, "level") == 1);
   assert_near(r.mesh->deviation, 0, 1e-15);
   assert_int_equal(r.mesh->vertex_count, 26);
@@ -360,6 +366,50 @@ static void test_the_limit_of_a_bilinear_cage_is_the_cage(void **state) {
     assert_vertex(r.mesh, cube_positions[3 * i], cube_positions[3 * i + 1], cube_positions[3 * i + 2]);
   assert_vertex(r.mesh, 0, 0, 1);
   assert_vertex(r.mesh, 0, 1, 1);
+  release(&r);
+}
+
+/* The prism over the triangle (0, 0), (6, 0), (0, 3): its ends become fans about their centres, (2, 1). */
+static void test_a_cage_that_is_fine_enough_is_not_subdivided(void **state) {
+  (void)state;
+  static const double positions[] = {0, 0, 0, 6, 0, 0, 0, 3, 0, 0, 0, 1, 6, 0, 1, 0, 3, 1};
+  static const uint32_t sizes[] = {3, 3, 4, 4, 4}, corners[] = {2, 1, 0, 3, 4, 5, 0, 1, 4, 3, 1, 2, 5, 4, 2, 0, 3, 5};
+  const cage_spec spec = {.scheme = QMAT_SCHEME_BILINEAR,
+                          .boundary = QMAT_BOUNDARY_EDGE_AND_CORNER,
+                          .vertex_count = 6,
+                          .face_count = 5,
+                          .positions = positions,
+                          .sizes = sizes,
+                          .corners = corners};
+  result r = good(RUN(mesh_of(&spec), "level", "0"));
+  assert_true(number(&r, "level") == 0);
+  assert_near(r.mesh->deviation, 0, 1e-15);
+  assert_int_equal(r.mesh->vertex_count, 8);
+  assert_int_equal(r.mesh->triangle_count, 12);
+  assert_true(r.mesh->closed && r.mesh->oriented);
+  assert_vertex(r.mesh, 2, 1, 0);
+  assert_vertex(r.mesh, 2, 1, 1);
+  release(&r);
+  /* The vertices of a cage that is taken as it is are on the limit surface, which for a cube is far away. */
+  r = good(RUN(mesh_of(&cube), "level", "0", "epsilon", "1", "tolerance", "1"));
+  assert_true(number(&r, "level") == 0);
+  assert_int_equal(r.mesh->triangle_count, 12);
+  /* The corners' limits are half-way to the centre, as above. */
+  for (size_t i = 0; i < 24; i++) assert_near(fabs(r.mesh->positions[i]), 0.5, 1e-12);
+  assert_true(r.mesh->deviation > 0.1);
+  release(&r);
+}
+
+/* What is not subdivided keeps its own deviation. */
+static void test_the_deviation_of_other_surfaces_is_kept(void **state) {
+  (void)state;
+  cage_spec spec = cube;
+  spec.scheme = QMAT_SCHEME_BILINEAR;
+  qmat_mesh *mesh = shape_new();
+  add_surface(mesh, &spec);
+  mesh->deviation = 0.25;
+  result r = good(RUN(shape_seal(mesh), "level", "0"));
+  assert_near(r.mesh->deviation, 0.25, 0);
   release(&r);
 }
 
@@ -728,6 +778,8 @@ int main(void) {
       cmocka_unit_test(test_the_level_is_the_first_that_epsilon_allows),
       cmocka_unit_test(test_an_octahedron_goes_to_the_limit_points_of_loop),
       cmocka_unit_test(test_the_limit_of_a_bilinear_cage_is_the_cage),
+      cmocka_unit_test(test_a_cage_that_is_fine_enough_is_not_subdivided),
+      cmocka_unit_test(test_the_deviation_of_other_surfaces_is_kept),
       cmocka_unit_test(test_borders_follow_their_rule),
       cmocka_unit_test(test_holes_shape_the_surface_and_are_left_out),
       cmocka_unit_test(test_surfaces_of_other_schemes_stay_beside_those_that_are_subdivided),

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_instancer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct arrays {
+  const qmat_usd_value *indices, *positions, *orientations, *scales, *ids;
+} arrays;
+
+/* Reads an array of `components`, one element for each of `count` instances (SIZE_MAX: any number); NULL without it. */
+static qmat_status read_array(const qmat_usd_prim *prim, const char *name, bool numbers, unsigned components,
+                              size_t count, const qmat_usd_value **value) {
+  const qmat_status status = qmat_usd_prim_attribute(prim, name, value);
+  if (status != QMAT_OK || !*value) return status;
+  const qmat_usd_value *v = *value;
+  const bool good = v->is_array && v->components == components &&
+                    (numbers ? qmat_usd_is_number(v->type) : qmat_usd_is_integer(v->type));
+  if (!good) return qmat_usd_prim_fail(prim, "%s has a value of the wrong type", name);
+  if (v->count == 0 && strcmp(name, "protoIndices") != 0) *value = NULL;
+  if (!*value || count == SIZE_MAX || v->count == count) return QMAT_OK;
+  return qmat_usd_prim_fail(prim, "%s has %zu elements for %zu instances", name, v->count, count);
+}
+
+static qmat_status read_arrays(const qmat_usd_prim *prim, arrays *a) {
+  *a = (arrays){0};
+  qmat_status status = read_array(prim, "protoIndices", false, 1, SIZE_MAX, &a->indices);
+  if (status != QMAT_OK || !a->indices) return status;
+  const size_t count = a->indices->count;
+  status = read_array(prim, "positions", true, 3, count, &a->positions);
+  if (status == QMAT_OK) status = read_array(prim, "orientationsf", true, 4, count, &a->orientations);
+  if (status == QMAT_OK && !a->orientations)
+    status = read_array(prim, "orientations", true, 4, count, &a->orientations);
+  if (status == QMAT_OK) status = read_array(prim, "scales", true, 3, count, &a->scales);
+  if (status == QMAT_OK) status = read_array(prim, "ids", false, 1, count, &a->ids);
+  return status;
+}
+
+static int compare_ids(const void *a, const void *b) {
+  const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+  return x < y ? -1 : x > y;
+}
+
+/* The sorted ids of the instances that are left out. */
+static qmat_status read_masked(const qmat_usd_prim *prim, qmat_arena *arena, int64_t **masked, size_t *count) {
+  const qmat_usd_value *invisible, *inactive = qmat_usd_prim_field(prim, "inactiveIds");
+  const qmat_status status = read_array(prim, "invisibleIds", false, 1, SIZE_MAX, &invisible);
+  if (status != QMAT_OK) return status;
+  const qmat_usd_list_op *op = inactive && inactive->type == QMAT_USD_LIST_OP ? inactive->list_op : NULL;
+  size_t most = invisible ? invisible->count : 0;
+  const bool is_plain = inactive && inactive->is_array && qmat_usd_is_integer(inactive->type);
+  if (is_plain) most += inactive->count;
+  for (int edit = 0; op && edit < QMAT_USD_EDIT_COUNT; edit++) most += op->lists[edit].count;
+  *masked = qmat_arena_alloc(arena, most, sizeof **masked);
+  if (!*masked) return qmat_usd_fail_prim_memory(prim);
+  *count = 0;
+  for (size_t i = 0; invisible && i < invisible->count; i++) (*masked)[(*count)++] = invisible->integers[i];
+  for (size_t i = 0; is_plain && i < inactive->count; i++) (*masked)[(*count)++] = inactive->integers[i];
+  for (int edit = 0; op && edit < QMAT_USD_EDIT_COUNT; edit++) {
+    const qmat_usd_value *list = &op->lists[edit];
+    if (edit == QMAT_USD_DELETED || edit == QMAT_USD_ORDERED || !qmat_usd_is_integer(list->type)) continue;
+    for (size_t i = 0; i < list->count; i++) (*masked)[(*count)++] = list->integers[i];
+  }
+  qsort(*masked, *count, sizeof **masked, compare_ids);
+  return QMAT_OK;
+}
+
+/* Scale, then orientation, then position. */
+static qmat_usd_transform place(const arrays *a, size_t i) {
+  qmat_usd_transform result = qmat_usd_identity();
+  for (size_t k = 0; k < 3 && a->scales; k++) result.m[5 * k] = a->scales->numbers[3 * i + k];
+  if (a->orientations) {
+    const qmat_usd_transform turn = qmat_usd_orientation(a->orientations->numbers + 4 * i);
+    result = qmat_usd_product(&result, &turn);
+  }
+  for (size_t k = 0; k < 3 && a->positions; k++) result.m[12 + k] = a->positions->numbers[3 * i + k];
+  return result;
+}
+
+qmat_status qmat_usd_instancer_read(const qmat_usd_prim *prim, qmat_arena *arena, qmat_usd_instancer *instancer) {
+  arrays a;
+  int64_t *masked = NULL;
+  size_t masked_count = 0;
+  *instancer = (qmat_usd_instancer){0};
+  qmat_status status =
+      qmat_usd_prim_targets(prim, "prototypes", arena, &instancer->prototypes, &instancer->prototype_count);
+  if (status == QMAT_OK) status = read_arrays(prim, &a);
+  if (status == QMAT_OK) status = read_masked(prim, arena, &masked, &masked_count);
+  if (status != QMAT_OK || !a.indices) return status;
+  instancer->of = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->of);
+  instancer->placements = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->placements);
+  if (!instancer->of || !instancer->placements) return qmat_usd_fail_prim_memory(prim);
+  for (size_t i = 0; i < a.indices->count; i++) {
+    const int64_t of = a.indices->integers[i], id = a.ids ? a.ids->integers[i] : (int64_t)i;
+    if (of < 0 || (uint64_t)of >= instancer->prototype_count)
+      return qmat_usd_prim_fail(prim, "instance %zu has prototype %lld, but there are %zu", i, (long long)of,
+                                instancer->prototype_count);
+    if (bsearch(&id, masked, masked_count, sizeof *masked, compare_ids)) continue;
+    instancer->of[instancer->instance_count] = (uint32_t)of;
+    instancer->placements[instancer->instance_count++] = place(&a, i);
+  }
+  return QMAT_OK;
+}

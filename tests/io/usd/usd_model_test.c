@@ -1,0 +1,296 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Meshes of a USD scene, each once and in its own space, and their places: as read, and as written to glTF. */
+#include "io/usd/usd_model.h"
+
+#include "core/value.h"
+#include "io/gltf/gltf.h"
+#include "io/gltf/gltf_write.h"
+#include "io/placement.h"
+#include "tests/io/files.h"
+#include "tests/io/medial_examples.h"
+#include "tests/shapes.h"
+
+#define AT(x, y, z) \
+  "double3 xformOp:translate = (" #x "," #y "," #z ")\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n"
+#define CUBE(name, more) "def Cube \"" name "\" { " more " }\n"
+
+/* A scene that was read. */
+typedef struct reading {
+  qmat_context context;
+  qmat_scene *scene;
+  qmat_usd_meshes meshes;
+  json_t *report;
+  qmat_status status;
+} reading;
+
+static reading read_choice(const char *text, const char *choice) {
+  reading r = {.scene = qmat_scene_new(), .report = json_object()};
+  assert_true(r.scene && r.report);
+  qmat_bytes bytes = memory_file(text, strlen(text));
+  r.scene->name = qmat_strdup("thing");
+  r.scene->format = qmat_strdup("usd");
+  r.status = qmat_usd_read_meshes(&r.context, &bytes, "file.usda", choice, 16, r.scene, &r.meshes, r.report);
+  free(bytes.data);
+  if (r.status == QMAT_OK) assert_int_equal(qmat_value_seal(&r.context, &r.scene->base), QMAT_OK);
+  return r;
+}
+
+static reading read_all(const char *text) {
+  reading r = read_choice(text, "all");
+  if (r.status == QMAT_OK) return r;
+  char line[1024];
+  qmat_error_format(&r.context.error, line, sizeof line);
+  fail_msg("%s", line);
+  return r;
+}
+
+static void release(reading *r) {
+  qmat_usd_meshes_uninit(&r->meshes);
+  qmat_value_release(&r->scene->base);
+  json_decref(r->report);
+  qmat_context_uninit(&r->context);
+}
+
+static void assert_place(const reading *r, size_t i, uint32_t mesh, const char *path, double x, double y, double z) {
+  const double *m = r->scene->placements + 16 * i;
+  assert_true(i < r->scene->placement_count);
+  assert_int_equal(r->scene->placed[i], mesh);
+  assert_string_equal(r->scene->placement_paths[i], path);
+  if (fabs(m[12] - x) > 1e-9 || fabs(m[13] - y) > 1e-9 || fabs(m[14] - z) > 1e-9)
+    fail_msg("place %zu is (%g, %g, %g)", i, m[12], m[13], m[14]);
+}
+
+static const char *warning_of(const reading *r, size_t i) {
+  const char *text = json_string_value(json_array_get(json_object_get(r->report, "warnings"), i));
+  return text ? text : "";
+}
+
+static void test_equal_meshes_are_one_mesh_in_several_places(void **state) {
+  (void)state;
+  reading r = read_all("#usda 1.0\nclass \"shared\" {\n" CUBE(
+      "body",
+      "") "}\n"
+          "def Xform \"a\" ( references = </shared> ) { " AT(
+              1, 0,
+              0) "}\n"
+                 "def Xform \"b\" ( references = </shared>\n instanceable = true ) { " AT(
+                     2, 0,
+                     0) "}\n"
+                        "def Sphere \"ball\" { " AT(0, 5, 0) "}\n" CUBE("plain", AT(3, 0, 0))
+                            CUBE("large", "double size = 4\n" AT(4, 0, 0)));
+  assert_int_equal(r.meshes.count, 3);
+  assert_int_equal(r.scene->mesh_count, 3);
+  assert_int_equal(r.scene->placement_count, 5);
+  assert_place(&r, 0, 0, "/a/body", 1, 0, 0);
+  assert_place(&r, 1, 0, "/b/body", 2, 0, 0);
+  assert_place(&r, 2, 1, "/ball", 0, 5, 0);
+  assert_place(&r, 3, 0, "/plain", 3, 0, 0);
+  assert_place(&r, 4, 2, "/large", 4, 0, 0);
+  assert_string_equal(r.meshes.names[0], "/a/body");
+  assert_string_equal(r.meshes.names[2], "/large");
+  assert_int_equal(r.meshes.uses[0], 3);
+  assert_int_equal(r.meshes.soups[0].facet_count, 6);
+  for (size_t i = 0; i < 24; i++) assert_true(fabs(r.meshes.soups[0].positions[i]) == 1); /* its own space */
+  assert_int_equal(json_integer_value(json_object_get(r.report, "instances")), 1);
+  release(&r);
+}
+
+static void test_a_mesh_is_chosen_by_path_end_or_number(void **state) {
+  (void)state;
+  static const char scene[] = "#usda 1.0\ndef Xform \"a\" {\n" CUBE("x", "") "def Sphere \"y\" {}\n}\n"
+                              "def Xform \"b\" {\n" CUBE("x", "double size = 4") CUBE("z", AT(1, 2, 3)) "}\n";
+  static const struct {
+    const char *choice;
+    uint32_t id;
+    size_t places;
+  } good[] = {{"/a/x", 0, 2}, {"y", 1, 1}, {"b/x", 2, 1}, {"z", 0, 2}, {"2", 2, 1}};
+  for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+    reading r = read_choice(scene, good[i].choice);
+    assert_int_equal(r.status, QMAT_OK);
+    assert_int_equal(r.meshes.count, 1);
+    assert_int_equal(r.scene->meshes[0], good[i].id);
+    assert_int_equal(r.scene->placement_count, good[i].places);
+    for (size_t k = 0; k < good[i].places; k++) assert_int_equal(r.scene->placed[k], 0);
+    release(&r);
+  }
+  static const char *const bad[][2] = {{"x", "2 different meshes have a path that ends in 'x'"},
+                                       {"3", "the scene has no mesh '3'"},
+                                       {"/x", "the scene has no mesh '/x'"},
+                                       {"", "the scene has no mesh ''"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    reading r = read_choice(scene, bad[i][0]);
+    assert_int_equal(r.status, QMAT_ERROR_USAGE);
+    assert_string_equal(r.context.error.message, bad[i][1]);
+    assert_string_equal(r.context.error.field, "mesh");
+    release(&r);
+  }
+  reading r = read_choice(scene, "merged");
+  assert_int_equal(r.scene->placement_count, 0);
+  assert_int_equal(r.scene->mesh_count, 0);
+  assert_int_equal(r.meshes.soups[0].facet_count, 6 + 6 + 6 + 16 * 8);
+  release(&r);
+}
+
+#define INSTANCER(more)                                                                                         \
+  "def PointInstancer \"many\" {\n" AT(10, 0, 0) more "def Xform \"kinds\" {\ndef Xform \"one\" { " AT(0, 1, 0) \
+      CUBE("body", "") "}\ndef Sphere \"two\" {}\n" CUBE("unused", "double size = 9") "}\n}\n"
+#define TWO "rel prototypes = [</many/kinds/one>, </many/kinds/two>]\n"
+
+static void test_an_instancer_places_its_prototypes(void **state) {
+  (void)state;
+  /* Scaled by 2, turned by 90 degrees about z, moved: the prototype's own (0, 1, 0) goes to (-2, 0, 0). */
+  reading r =
+      read_all("#usda 1.0\n" INSTANCER(
+          TWO "int[] protoIndices = [0, 1, 0]\npoint3f[] positions = [(0, 0, 0), (0, 0, 5), (0, 0, 7)]\n"
+              "float3[] scales = [(1, 1, 1), (1, 1, 1), (2, 2, 2)]\n"
+              "quath[] orientations = [(1, 0, 0, 0), (1, 0, 0, 0), (1, 0, 0, 1)]\n"));
+  assert_int_equal(r.meshes.count, 2);
+  assert_int_equal(r.scene->placement_count, 3);
+  assert_place(&r, 0, 0, "/many/kinds/one/body", 10, 1, 0);
+  assert_place(&r, 1, 0, "/many/kinds/one/body", 8, 0, 7);
+  assert_place(&r, 2, 1, "/many/kinds/two", 10, 0, 5);
+  assert_near(r.scene->placements[16 + 1], 2, 1e-9); /* x goes to y, twice as long */
+  assert_near(r.scene->placements[16 + 4], -2, 1e-9);
+  assert_int_equal(json_integer_value(json_object_get(r.report, "point_instances")), 3);
+  release(&r);
+  r =
+      read_all("#usda 1.0\n" INSTANCER(
+          TWO "int[] protoIndices = [0, 1, 0, 0]\npoint3f[] positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)]\n"
+              "int64[] ids = [7, 8, 9, 10]\nint64[] invisibleIds = [8, 10]\n"));
+  assert_int_equal(r.meshes.count, 1);
+  assert_int_equal(r.scene->placement_count, 2);
+  assert_place(&r, 1, 0, "/many/kinds/one/body", 12, 1, 0);
+  release(&r);
+}
+
+static void test_prototypes_are_found_through_references_and_instancers_nest(void **state) {
+  (void)state;
+  reading r = read_all(
+      "#usda 1.0\nclass \"forest\" {\n"
+      "def PointInstancer \"trees\" {\nrel prototypes = [<kinds/tree>]\nint[] protoIndices = [0, 0]\n"
+      "point3f[] positions = [(0, 0, 0), (1, 0, 0)]\ndef Scope \"kinds\" {\n"
+      "def PointInstancer \"tree\" {\nrel prototypes = </forest/trees/kinds/tree/leaf>\n"
+      "int[] protoIndices = [0, 0]\npoint3f[] positions = [(0, 0, 0), (0, 5, 0)]\n"
+      "def Sphere \"leaf\" {}\n}\n}\n}\n}\n"
+      "def Xform \"here\" ( references = </forest> ) { " AT(100, 0, 0) "}\n");
+  assert_int_equal(r.meshes.count, 1);
+  assert_int_equal(r.scene->placement_count, 4);
+  assert_place(&r, 0, 0, "/here/trees/kinds/tree/leaf", 100, 0, 0);
+  assert_place(&r, 3, 0, "/here/trees/kinds/tree/leaf", 101, 5, 0);
+  release(&r);
+  r = read_all(
+      "#usda 1.0\nclass \"c\" {\ndef PointInstancer \"p\" {\nrel prototypes = [</else/where>, </c/none>]\n"
+      "int[] protoIndices = [0]\n}\n}\ndef \"d\" ( references = </c> ) {}\ndef Sphere \"s\" {}\n");
+  assert_string_equal(warning_of(&r, 0),
+                      "/d/p: the target </else/where> is skipped: it is outside of what is referred to");
+  assert_string_equal(warning_of(&r, 1), "/d/p: a prototype is skipped: there is no such prim");
+  release(&r);
+}
+
+static void test_broken_instancers_are_errors_that_name_the_prim(void **state) {
+  (void)state;
+  static const char *const cases[][2] = {
+      {"int[] protoIndices = [0, 2]\n", "/many: instance 1 has prototype 2, but there are 2"},
+      {"int[] protoIndices = [-1]\n", "/many: instance 0 has prototype -1, but there are 2"},
+      {"int[] protoIndices = [0, 1]\npoint3f[] positions = [(0, 0, 0)]\n",
+       "/many: positions has 1 elements for 2 instances"},
+      {"int[] protoIndices = [0]\nquath[] orientations = [(1, 0, 0, 0), (1, 0, 0, 0)]\n",
+       "/many: orientations has 2 elements for 1 instances"},
+      {"int[] protoIndices = [0]\nfloat[] scales = [1]\n", "/many: scales has a value of the wrong type"},
+      {"float[] protoIndices = [0]\n", "/many: protoIndices has a value of the wrong type"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char text[2048];
+    snprintf(text, sizeof text, "#usda 1.0\n" INSTANCER(TWO "%s"), cases[i][0]);
+    reading r = read_choice(text, "all");
+    assert_int_equal(r.status, QMAT_ERROR_FORMAT);
+    assert_string_equal(r.context.error.message, cases[i][1]);
+    release(&r);
+  }
+  /* An instancer that is its own prototype ends. */
+  reading r =
+      read_choice("#usda 1.0\ndef PointInstancer \"p\" {\nrel prototypes = </p>\nint[] protoIndices = [0]\n}\n", "all");
+  assert_int_equal(r.status, QMAT_ERROR_FORMAT);
+  assert_string_equal(r.context.error.message, "/p: instancers are nested more than 16 deep");
+  release(&r);
+}
+
+/* Places of all kinds come back through a glTF file as they were: also mirrors, and what shears. */
+static void test_places_in_gltf_are_where_the_scene_has_them(void **state) {
+  (void)state;
+  reading r = read_all("#usda 1.0\n( metersPerUnit = 0.01 upAxis = \"Z\" )\n" CUBE("plain", "") CUBE(
+      "moved",
+      AT(10, 20,
+         30)) "def Xform \"wide\" { float3 xformOp:scale = (1, 5, 1)\nuniform token[] xformOpOrder = "
+              "[\"xformOp:scale\"]\n" CUBE("sheared",
+                                           "float xformOp:rotateZ = 30\nuniform token[] xformOpOrder = "
+                                           "[\"xformOp:rotateZ\"]\n") "}\n" CUBE("mirrored",
+                                                                                 "float3 xformOp:scale = (-1, 2, "
+                                                                                 "1)\nfloat xformOp:rotateX = "
+                                                                                 "20\nuniform token[] xformOpOrder = "
+                                                                                 "[\"xformOp:rotateX\", "
+                                                                                 "\"xformOp:scale\"]\n"));
+  assert_int_equal(r.meshes.count, 1);
+  r.scene->base.sealed = false;
+  r.scene->meters_per_unit = 0.01;
+  r.scene->is_z_up = true;
+  qmat_medial *medial = example_medial(3);
+  qmat_mesh *box = shape_new();
+  shape_add_box(box, -1, -1, -1, 1, 1, 1, false);
+  shape_seal(box);
+  const qmat_gltf_addition addition = {
+      .medial = medial,
+      .skin = box,
+      .options = {.binary = true, .quantisation = 1e-3, .name = "plain", .meters_per_unit = 0.01, .is_z_up = true}};
+  qmat_file *file;
+  assert_int_equal(qmat_gltf_write_places(&r.context, r.scene, &addition, 1, &file), QMAT_OK);
+  qmat_soup soup = {0};
+  assert_int_equal(qmat_gltf_parse(&r.context, file->parts[0].bytes, file->parts[0].size, "file", &soup, NULL),
+                   QMAT_OK);
+  assert_int_equal(soup.vertex_count, 4 * box->vertex_count);
+  for (size_t i = 0; i < soup.vertex_count; i++) {
+    const double *m = r.scene->placements + 16 * (i / box->vertex_count),
+                 *p = box->positions + 3 * (i % box->vertex_count);
+    double at[3];
+    for (int k = 0; k < 3; k++) at[k] = 0.01 * (p[0] * m[k] + p[1] * m[4 + k] + p[2] * m[8 + k] + m[12 + k]);
+    assert_near(soup.positions[3 * i], at[0], 1e-7);
+    assert_near(soup.positions[3 * i + 1], at[2], 1e-7);
+    assert_near(soup.positions[3 * i + 2], -at[1], 1e-7);
+  }
+  qmat_soup_uninit(&soup);
+  qmat_value_release(&file->base);
+  qmat_value_release(&box->base);
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
+static void test_a_transform_is_split_into_a_rotation_and_a_plain_one(void **state) {
+  (void)state;
+  const double m[16] = {1, 2, 0.5, 0, -1, 3, 0.25, 0, 0.1, 0.2, -2, 0, 7, 8, 9, 1};
+  double inner[16], outer[16];
+  assert_false(qmat_placement_is_plain(m));
+  qmat_placement_split(m, inner, outer);
+  assert_true(qmat_placement_is_plain(outer) && qmat_placement_is_plain(inner));
+  assert_near(qmat_placement_stretch(inner), 1, 1e-12);
+  assert_near(qmat_placement_stretch(outer), qmat_placement_stretch(m), 1e-12);
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < 4; j++) {
+      double sum = 0;
+      for (int k = 0; k < 4; k++) sum += inner[4 * i + k] * outer[4 * k + j];
+      assert_near(sum, m[4 * i + j], 1e-12);
+    }
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_equal_meshes_are_one_mesh_in_several_places),
+      cmocka_unit_test(test_a_mesh_is_chosen_by_path_end_or_number),
+      cmocka_unit_test(test_an_instancer_places_its_prototypes),
+      cmocka_unit_test(test_prototypes_are_found_through_references_and_instancers_nest),
+      cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),
+      cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
