@@ -220,16 +220,16 @@ static void test_places_in_gltf_are_where_the_scene_has_them(void **state) {
   (void)state;
   reading r = read_all("#usda 1.0\n( metersPerUnit = 0.01 upAxis = \"Z\" )\n" CUBE("plain", "") CUBE(
       "moved",
-      AT(10, 20,
-         30)) "def Xform \"wide\" { float3 xformOp:scale = (1, 5, 1)\nuniform token[] xformOpOrder = "
-              "[\"xformOp:scale\"]\n" CUBE("sheared",
-                                           "float xformOp:rotateZ = 30\nuniform token[] xformOpOrder = "
-                                           "[\"xformOp:rotateZ\"]\n") "}\n" CUBE("mirrored",
-                                                                                 "float3 xformOp:scale = (-1, 2, "
-                                                                                 "1)\nfloat xformOp:rotateX = "
-                                                                                 "20\nuniform token[] xformOpOrder = "
-                                                                                 "[\"xformOp:rotateX\", "
-                                                                                 "\"xformOp:scale\"]\n"));
+      AT(10, 20, 30)) "def Xform \"wide\" { float3 xformOp:scale = (1, 5, 1)\nuniform token[] xformOpOrder = "
+                      "[\"xformOp:scale\"]\n" CUBE(
+                          "sheared",
+                          "float xformOp:rotateZ = 30\nuniform token[] xformOpOrder = "
+                          "[\"xformOp:rotateZ\"]\n") "}\n" CUBE("mirrored",
+                                                                "float3 xformOp:scale = (-1, 2, "
+                                                                "1)\nfloat xformOp:rotateX = "
+                                                                "20\nuniform token[] xformOpOrder = "
+                                                                "[\"xformOp:rotateX\", "
+                                                                "\"xformOp:scale\"]\n"));
   assert_int_equal(r.meshes.count, 1);
   r.scene->base.sealed = false;
   r.scene->meters_per_unit = 0.01;

@@ -158,7 +158,8 @@ static void test_shapes_that_are_none_are_left_out_or_refused(void **state) {
       {"Cube \"s\" { double[] size = [1, 2] }", "/s: size must be one finite number", QMAT_ERROR_FORMAT},
       {"Cone \"s\" { token axis = \"W\" }", "/s: axis is 'W', which is unknown", QMAT_ERROR_FORMAT},
       {"Sphere \"s\" { float3 xformOp:scale = (1, 0, 1) uniform token[] xformOpOrder = [\"xformOp:scale\"] }",
-       "the scene has no mesh that can be read; /s: left out: its transform flattens it or is not finite", QMAT_ERROR_GEOMETRY},
+       "the scene has no mesh that can be read; /s: left out: its transform flattens it or is not finite",
+       QMAT_ERROR_GEOMETRY},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     char text[512];
