@@ -159,6 +159,14 @@ refused() {
   fi
 }
 
+# Without a facet it is a solid with one hole; without its closing, nothing is proved.
+awk 'NR == 2 { $3 = 0; $2 = 23 } NR < 42' parts.off >hole.off
+qmat info hole.off >hole.txt
+holds "holes: info names the cap" grep -q "solid with holes, 1 closed: 3 sides, length" hole.txt
+holds "holes: closed, they are certified" qmat mat hole.off -o hole.ma --epsilon 2% --require certified
+refused "what is not certified, where that is required" hole.off --epsilon 2% --require certified \
+  --set solid.solid=as_is
+
 model=models/l-bracket.off
 last=$(($(wc -l <$model) - 1))
 vertices=$(sed -n 2p $model | cut -d ' ' -f 1)

@@ -87,13 +87,43 @@ static qmat_status run_node(qmat_context *context, const char *name, double epsi
   return status;
 }
 
-/* Replaces a mesh by the solid's surface, made as in the shipped graph. */
+/* Prints what mesh.solid took each component for, and what it did. Lengths are in diagonals. */
+static void print_components(const json_t *report) {
+  static const char *const counts[] = {"components_not_listed", "sheet_triangles",  "opposite_triangles_merged",
+                                       "inner_triangles",       "triangles_turned", "parts_united",
+                                       "triangles_cut"};
+  size_t i;
+  json_t *part;
+  json_array_foreach(json_object_get(report, "components"), i, part) {
+    const json_t *caps = json_object_get(part, "largest_caps");
+    printf("  component %zu: %lld triangles, %s", i + 1,
+           (long long)json_integer_value(json_object_get(part, "triangles")),
+           json_string_value(json_object_get(part, "taken_for")));
+    if (json_is_true(json_object_get(part, "cavity"))) printf(", a cavity");
+    if (json_is_true(json_object_get(part, "turned"))) printf(", turned outwards");
+    if (caps) printf(", %lld closed:", (long long)json_integer_value(json_object_get(part, "caps")));
+    for (size_t k = 0; k < json_array_size(caps); k++) {
+      const json_t *cap = json_array_get(caps, k);
+      printf("%s %lld sides, length %.3g, area %.3g", k ? ";" : "",
+             (long long)json_integer_value(json_object_get(cap, "sides")), number_of(cap, "length"),
+             number_of(cap, "area"));
+    }
+    printf("\n");
+  }
+  for (i = 0; i < sizeof counts / sizeof *counts; i++) {
+    const json_int_t count = json_integer_value(json_object_get(report, counts[i]));
+    if (count > 0) printf("  %s: %lld\n", counts[i], (long long)count);
+  }
+}
+
+/* Replaces a mesh by the solid's surface, made as in the shipped graph, and prints its components. */
 static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value **mesh) {
   static const char *const nodes[] = {"mesh.subdivide", "mesh.solid"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
     qmat_value *outputs[2] = {NULL};
     const qmat_status status = run_node(context, nodes[i], epsilon, (const qmat_value *const[]){*mesh}, outputs);
     if (status != QMAT_OK) return status;
+    print_components(((const qmat_report *)outputs[1])->root);
     qmat_value_release(outputs[1]);
     qmat_value_release(*mesh);
     *mesh = outputs[0];
@@ -112,11 +142,11 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
   qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
   if (status == QMAT_OK) {
     const double epsilon = number_of(facts, "qmat_epsilon");
+    printf("against %s\n", path);
     status = make_solid(context, epsilon, &mesh);
     if (status == QMAT_OK)
       status = run_node(context, "medial.evaluate", epsilon, (const qmat_value *const[]){mesh, &medial->base}, &output);
     if (status == QMAT_OK) {
-      printf("against %s\n", path);
       status = compare(context, facts, ((const qmat_report *)output)->root);
       if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
     }
@@ -199,6 +229,12 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   if (has_surface) {
     printf("%s: a surface\n", path);
     print_object(report->root);
+    qmat_value *outputs[2] = {NULL};
+    if (run_node(context, "mesh.solid", 0, (const qmat_value *const[]){&mesh->base}, outputs) == QMAT_OK) {
+      print_components(((const qmat_report *)outputs[1])->root);
+      qmat_value_release(outputs[0]);
+      qmat_value_release(outputs[1]);
+    }
     qmat_value_release(&scene->base);
     qmat_value_release(&mesh->base);
     qmat_value_release(&report->base);
@@ -227,11 +263,10 @@ const qmat_command qmat_command_info = {
     .arguments = "FILE",
     .summary = "Print what a model file contains",
     .doc =
-        "Prints the contents of a model file: counts, units, and what was left out; for each medial mesh in it, its "
-        "counts and stated errors.\n"
-        "With --against, bounds the errors anew, on limit surfaces of subdivision cages and on the union of "
-        "overlapping "
-        "components. The exit code is 1 if an error is certainly larger than stated. If both files are glTF, each "
+        "Prints the contents of a model file: counts, units, what was left out, and what mesh.solid takes each "
+        "component for, with the caps of its holes; for each medial mesh in it, its counts and stated errors.\n"
+        "With --against, bounds the errors anew, on limit surfaces of subdivision cages and on the solids and sheets "
+        "of mesh.solid. The exit code is 1 if an error is certainly larger than stated. If both files are glTF, each "
         "medial "
         "mesh is compared with the mesh that its node refers to, in that mesh's own space.",
     .options = options,
