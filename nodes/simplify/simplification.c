@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/simplification.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "nodes/measure/envelope_to_surface.h"
+#include "nodes/simplify/cavity_filling.h"
+#include "nodes/simplify/decimation_resume.h"
+#include "nodes/simplify/partitioned_collapse.h"
+#include "nodes/simplify/topology_mending.h"
+
+/* Constraint points are held to 0.975 epsilon; the margin covers the surface between them. Where that is not enough,
+ * the round is repeated with constraint points at the places found, in at most 8 rounds. Uncovered interior is filled
+ * by extra spheres; filling one cavity can expose another: at most 6 passes. */
+enum { MOST_ROUNDS = 8, MOST_JOINT_REFITS = 3, MOST_FILLINGS = 6 };
+
+/* The dense collapse uses only the first share of the error and is done once for all rounds, so that points found later
+ * still fit. Points inside the solid must be as deep in the envelope as the second share of epsilon. */
+static const double dense_share = 0.9, required_depth_share = 0.05;
+
+/* The fault of wrong Betti numbers as a share of epsilon. */
+static const double topology_fault = 0.05;
+
+/* A guarded result replaces a free one only where it takes at most this many times its spheres. */
+static const double most_spheres_for_topology = 1.25;
+
+/* ---- constraint points found on the way ---- */
+
+/* Appends `added` points. */
+static qmat_status append(qmat_context *context, const double **points, size_t *count, const double *added,
+                          size_t added_count) {
+  double *all = qmat_arena_alloc(&context->arena, *count + added_count, 3 * sizeof *all);
+  if (!all) return qmat_fail_memory(context, "constraint points");
+  if (*count) memcpy(all, *points, 3 * *count * sizeof *all);
+  if (added_count) memcpy(all + 3 * *count, added, 3 * added_count * sizeof *all);
+  *points = all;
+  *count += added_count;
+  return QMAT_OK;
+}
+
+static qmat_status append_inner(qmat_context *context, const double *added, size_t count, qmat_extra_points *to) {
+  return append(context, &to->inner, &to->inner_count, added, count);
+}
+
+/* Adds the points found between the constraint points to the constraints of the next round. */
+static qmat_status constrain_found_points(const qmat_simplification *s, const qmat_medial_errors *found,
+                                          qmat_extra_points *extra) {
+  qmat_status status = QMAT_OK;
+  if (found->surface_to_envelope > s->params.epsilon)
+    status = append(s->context, &extra->surface, &extra->surface_count, found->bound.points, found->bound.count);
+  if (status == QMAT_OK) status = append_inner(s->context, found->uncovered, found->uncovered_count, extra);
+  return status == QMAT_OK ? append_inner(s->context, found->undecided, found->undecided_count, extra) : status;
+}
+
+static qmat_extra_points no_extra_points(const qmat_simplification *s) {
+  return (qmat_extra_points){.required_depth = required_depth_share * s->params.epsilon};
+}
+
+/* Whether the initial medial mesh is within epsilon at all constraint points. If not, no round can repair it. */
+static bool starts_within(const qmat_simplification *s) {
+  if (!(s->params.epsilon > 0)) return false;
+  for (size_t i = 0; i < s->constraints.surface_count; i++)
+    if (!(s->constraints.distances[i] <= s->params.epsilon)) return false;
+  return true;
+}
+
+/* Whether the dense collapse satisfies the constraints of a round as well as the result has to. */
+static bool dense_satisfies(const qmat_simplification *s, const qmat_extra_points *extra) {
+  const qmat_constraint_points *base = &s->constraints, *all = &s->round_constraints[s->newest];
+  for (size_t i = base->surface_count; i < all->surface_count; i++)
+    if (!(all->distances[i] <= s->dense.rules.limit)) return false;
+  return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
+}
+
+/* ---- a result, and its judgement ---- */
+
+static bool is_better(const qmat_simplified *a, const qmat_simplified *best) {
+  return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
+}
+
+/* Replaces `best` by `a`, which is empty afterwards. */
+static void replace(qmat_simplified *a, qmat_simplified *best) {
+  qmat_simplified_uninit(best);
+  *best = *a;
+  a->medial = NULL;
+}
+
+/* Fills uncovered interior of the envelope with spheres. `left` gets the errors afterwards, `filled` the number of
+ * spheres. */
+static qmat_status fill_cavities(const qmat_simplification *s, const qmat_medial_errors *found, qmat_medial *unit,
+                                 qmat_medial_errors *left, size_t *filled) {
+  const double epsilon = s->params.epsilon;
+  qmat_status status = QMAT_OK;
+  *left = *found;
+  *filled = 0;
+  for (int i = 0; i < MOST_FILLINGS && left->uncovered_count > 0 && status == QMAT_OK; i++) {
+    size_t added;
+    status = qmat_cavities_fill(s->context, s->surface, left->uncovered, left->uncovered_count, epsilon, unit, &added);
+    if (status != QMAT_OK || added == 0) break;
+    *filled += added;
+    left->envelope_to_surface = epsilon;
+    if (i > 0) qmat_medial_errors_uninit(left);
+    left->uncovered = left->undecided = NULL; /* `found` keeps its own */
+    left->uncovered_count = left->undecided_count = 0;
+    status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
+  }
+  return status;
+}
+
+/* Extracts the newest round, fills its cavities, and measures the fault. `found` are the errors before the filling;
+ * `a->figures.filled` starts with the spheres that were added before the round. */
+static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a, qmat_medial_errors *found) {
+  const double epsilon = s->params.epsilon;
+  const qmat_decimation *round = &s->rounds[s->newest];
+  qmat_status status = qmat_decimation_extract(round, a->medial);
+  if (status == QMAT_OK) status = qmat_simplification_measure(s, a->medial, found);
+  qmat_medial_errors after = *found;
+  size_t filled = 0;
+  if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);
+  qmat_simplify_figures_of(round, &a->figures);
+  a->figures.filled += filled;
+  a->figures.queries = s->dense.envelope_tracker.lattice.queries;
+  a->figures.surface_to_envelope = after.surface_to_envelope;
+  a->figures.envelope_to_surface = after.envelope_to_surface;
+  a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
+  a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
+  if (filled > 0) { /* the points that are undecided now become constraints too */
+    double *const undecided = found->undecided;
+    found->undecided = after.undecided;
+    found->undecided_count = after.undecided_count;
+    after.undecided = undecided;
+    qmat_medial_errors_uninit(&after);
+  }
+  if (status == QMAT_OK) status = qmat_simplified_judge_topology(s, a);
+  if (a->topology_faults > 0) a->fault += topology_fault * epsilon;
+  return status;
+}
+
+/* ---- the passes ---- */
+
+/* Collapses the dense initial medial mesh as far as `dense_share` of the error allows: in pieces on all threads, where
+ * it is large, then as a whole. */
+static qmat_status collapse_dense(qmat_simplification *s) {
+  qmat_decimation *dense = &s->dense;
+  qmat_decimation_uninit(dense);
+  *dense = (qmat_decimation){.context = s->context, .surface = s->surface};
+  qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
+  if (status == QMAT_OK)
+    status = qmat_simplify_rules(s->context, &s->params, qmat_surface_mesh(s->surface), &s->state, &dense->rules);
+  const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
+  const bool inside = s->params.error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
+  if (status == QMAT_OK)
+    status = qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
+                                         QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
+  if (s->dense_extra.surface_count + s->dense_extra.inner_count > 0) {
+    const qmat_constraint_points base = s->constraints;
+    qmat_constraint_points further;
+    if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &dense->complex, &s->dense_extra, &further);
+    if (status == QMAT_OK)
+      status =
+          qmat_constraint_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->constraints);
+  }
+  dense->rules.share = dense_share;
+  dense->rules.refits = 0;
+  if (status == QMAT_OK)
+    status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex)
+                 ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
+                 : qmat_decimation_init(dense, &s->constraints, s->state.depths);
+  return status == QMAT_OK ? qmat_decimation_run(dense) : status;
+}
+
+static void swap_lattices(qmat_decimation *a, qmat_decimation *b) {
+  const qmat_depth_lattice lattice = a->envelope_tracker.lattice;
+  a->envelope_tracker.lattice = b->envelope_tracker.lattice;
+  b->envelope_tracker.lattice = lattice;
+}
+
+/* Continues the collapses of `from`, whose extract is `left`, and judges the result. `neighbourhoods` and `final_refit`
+ * are as in the rules; `a` and `found` are new, and `a->figures.filled` is 0 or as in `left`. */
+static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from, const qmat_medial *left,
+                             const qmat_extra_points *extra, bool neighbourhoods, bool final_refit, qmat_simplified *a,
+                             qmat_medial_errors *found) {
+  s->newest = 1 - s->newest;
+  qmat_decimation *round = &s->rounds[s->newest];
+  qmat_decimation_uninit(round);
+  *round = (qmat_decimation){.context = s->context, .surface = s->surface};
+  a->medial = qmat_medial_new();
+  if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
+  qmat_status status =
+      qmat_simplify_rules(s->context, &s->params, qmat_surface_mesh(s->surface), &s->state, &round->rules);
+  round->rules.neighbourhoods = neighbourhoods;
+  round->rules.final_refit = final_refit;
+  if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
+  if (status != QMAT_OK) return status;
+  swap_lattices(&s->dense, round); /* known depths hold in every round */
+  status = qmat_decimation_run(round);
+  swap_lattices(&s->dense, round);
+  return status == QMAT_OK ? judge_round(s, a, found) : status;
+}
+
+/* Collapses and fits spheres from the end of the dense collapse, with the points found by earlier rounds. */
+static qmat_status collapse_and_fit(qmat_simplification *s, const qmat_extra_points *extra, bool is_last,
+                                    qmat_simplified *a, qmat_medial_errors *found) {
+  qmat_medial *left = qmat_medial_new();
+  qmat_status status = left ? QMAT_OK : qmat_fail_memory(s->context, "the medial mesh");
+  if (status == QMAT_OK) status = qmat_decimation_extract(&s->dense, left);
+  if (status == QMAT_OK) status = run_round(s, &s->dense, left, extra, false, is_last, a, found);
+  qmat_value_release(left ? &left->base : NULL);
+  return status;
+}
+
+/* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
+ * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
+ * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
+static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
+  if (s->params.refits == 0 || best->medial->sphere_count <= (size_t)s->params.vertices) return QMAT_OK;
+  qmat_extra_points extra = no_extra_points(s);
+  const int base = s->newest;
+  qmat_status status = QMAT_OK;
+  if (best->figures.filled > 0) status = append_inner(s->context, found->uncovered, found->uncovered_count, &extra);
+  bool ended = false;
+  for (int i = 0; i < MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
+    qmat_simplified a = {.figures = best->figures, .fault = INFINITY};
+    qmat_medial_errors errors = {.surface_to_envelope = 0};
+    s->newest = base;
+    status = run_round(s, &s->rounds[base], best->medial, &extra, true, true, &a, &errors);
+    ended = a.within_epsilon;
+    if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
+    qmat_medial_errors_uninit(&errors);
+    if (status == QMAT_OK && !is_better(best, &a)) {
+      replace(&a, best);
+      return QMAT_OK;
+    }
+    qmat_simplified_uninit(&a);
+  }
+  s->newest = base;
+  return status;
+}
+
+/* Runs rounds of collapses until both errors are within epsilon between the constraint points too. Places where the
+ * surface is too far from the envelope, or the interior is uncovered, become constraint points. Where the dense
+ * collapse violates these, it is done again with them. The best round counts. */
+static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
+  const double epsilon = s->params.epsilon;
+  qmat_extra_points extra = s->dense_extra = no_extra_points(s);
+  qmat_status status = collapse_dense(s);
+  for (size_t round = 1; status == QMAT_OK; round++) {
+    qmat_medial_errors errors = {.surface_to_envelope = 0};
+    qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
+    const bool is_within = starts_within(s), is_last = round == MOST_ROUNDS || !is_within;
+    status = collapse_and_fit(s, &extra, is_last, &a, &errors);
+    const bool is_done =
+        is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
+    const bool again = status == QMAT_OK && !is_done && !dense_satisfies(s, &extra);
+    if (status == QMAT_OK && is_done && (a.within_epsilon || a.figures.filled > 0 || is_within))
+      status = refit_jointly(s, &errors, &a);
+    if (status == QMAT_OK && is_better(&a, best)) replace(&a, best);
+    qmat_simplified_uninit(&a);
+    if (status == QMAT_OK && !is_done) status = constrain_found_points(s, &errors, &extra);
+    qmat_medial_errors_uninit(&errors);
+    if (status != QMAT_OK || is_done) return status;
+    if (!again) continue;
+    qmat_extra_points *dense = &s->dense_extra;
+    status = append(s->context, &dense->surface, &dense->surface_count, extra.surface, extra.surface_count);
+    if (status == QMAT_OK) status = append_inner(s->context, extra.inner, extra.inner_count, dense);
+    extra = no_extra_points(s);
+    if (status == QMAT_OK) status = collapse_dense(s);
+  }
+  return status;
+}
+
+/* Collapses freely, judges the Betti numbers of the result, and mends those that differ from the solid's. Small loops
+ * and voids of the dense initial mesh are noise at the scale of epsilon: a guard that counts them while it collapses
+ * strands simple solids at hundreds of spheres. Only where mending fails are collapses guarded from the start. */
+static qmat_status simplify_and_mend(qmat_simplification *s, qmat_simplified *best) {
+  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return run_rounds(s, best);
+  for (int guarded = 0; guarded < 2; guarded++) {
+    qmat_simplified a = {.fault = INFINITY};
+    s->params.topology = guarded ? QMAT_TOPOLOGY_GUARD : QMAT_TOPOLOGY_FREE;
+    qmat_status status = run_rounds(s, &a);
+    if (status == QMAT_OK) status = qmat_simplification_open_voids(s, &a);
+    if (status == QMAT_OK) status = qmat_simplification_close_loops(s, &a);
+    if (status == QMAT_OK && a.topology_faults > 0) status = qmat_simplified_judge_topology(s, &a);
+    const double most_spheres = most_spheres_for_topology * (double)(best->medial ? best->medial->sphere_count : 0);
+    if (status == QMAT_OK && (!guarded || (a.topology_faults == 0 && (a.within_epsilon || !best->within_epsilon) &&
+                                           (double)a.medial->sphere_count <= most_spheres)))
+      replace(&a, best);
+    qmat_simplified_uninit(&a);
+    if (status != QMAT_OK || best->topology_faults == 0) return status;
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_simplification_run(qmat_simplification *s, const qmat_value *const inputs[], qmat_simplified *best) {
+  s->samples = (const qmat_samples *)inputs[2];
+  s->initial = (const qmat_medial *)inputs[3];
+  *best = (qmat_simplified){.fault = INFINITY};
+  qmat_status status = qmat_simplify_prepare(s->context, &s->params, inputs, &s->surface, &s->state);
+  if (status == QMAT_OK) status = qmat_topology_of_solid(s->context, s->surface, &s->solid);
+  return status == QMAT_OK ? simplify_and_mend(s, best) : status;
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/simplification_state.h"
+
+#include <math.h>
+
+#include "nodes/descriptor/epsilon.h"
+#include "nodes/measure/envelope_to_surface.h"
+
+qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat_medial *unit,
+                                        qmat_medial_errors *errors) {
+  const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : QMAT_DEFAULT_EPSILON;
+  const double tolerance = qmat_error_tolerance * epsilon, enough = qmat_least_reported * epsilon;
+  const qmat_constraint_points *constraints = &s->round_constraints[s->newest];
+  qmat_status status =
+      qmat_medial_surface_bound_measure(s->context, s->surface, unit, constraints->points, constraints->surface_count,
+                                        tolerance, enough, epsilon - tolerance, errors);
+  if (status != QMAT_OK) return status;
+  const bool two_sided = s->params.epsilon > 0 && s->params.error == QMAT_ERROR_TWO_SIDED;
+  const qmat_decimation *round = &s->rounds[s->newest];
+  if (two_sided)
+    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->envelope_tracker, &round->complex);
+  if (!two_sided || errors->envelope_to_surface > epsilon)
+    status = qmat_medial_envelope_bound_measure(s->context, s->surface, unit, tolerance, enough, errors);
+  return status == QMAT_OK && two_sided ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
+                                        : status;
+}
+
+static size_t difference(size_t a, size_t b) {
+  return a > b ? a - b : b - a;
+}
+
+qmat_status qmat_simplified_judge_topology(const qmat_simplification *s, qmat_simplified *a) {
+  qmat_topology found;
+  a->topology_faults = 0;
+  const qmat_status status = s->solid.known ? qmat_topology_of_medial(s->context, a->medial, &found) : QMAT_OK;
+  if (status != QMAT_OK || !s->solid.known || !found.known) return status;
+  a->topology_faults = difference(found.components, s->solid.components) + difference(found.loops, s->solid.loops) +
+                       difference(found.voids, s->solid.voids);
+  return QMAT_OK;
+}
+
+void qmat_simplification_uninit(qmat_simplification *s) {
+  for (int i = 0; i < 2; i++) qmat_decimation_uninit(&s->rounds[i]);
+  qmat_decimation_uninit(&s->dense);
+  qmat_surface_free(s->surface);
+}
+
+void qmat_simplified_uninit(qmat_simplified *a) {
+  qmat_value_release(a->medial ? &a->medial->base : NULL);
+  *a = (qmat_simplified){.fault = INFINITY};
+}

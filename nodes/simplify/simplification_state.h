@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_SIMPLIFICATION_STATE_H
+#define QMAT_NODES_SIMPLIFY_SIMPLIFICATION_STATE_H
+
+#include "nodes/measure/medial_errors.h"
+#include "nodes/measure/topology.h"
+#include "nodes/simplify/simplify_report.h"
+#include "nodes/simplify/simplify_setup.h"
+
+/* The reported surface-to-envelope error exceeds the true one by at most the first share of epsilon, but is never below
+ * the second. The envelope-to-surface error is a bound, refined only where it exceeds epsilon. */
+static const double qmat_error_tolerance = 0.01, qmat_least_reported = 0.5;
+
+/* What all passes of medial.simplify work on, with on_exceed=skip. */
+typedef struct qmat_simplification {
+  qmat_context *context;
+  qmat_simplify_params params; /* with epsilon less the mesh's deviation */
+  const qmat_samples *samples;
+  const qmat_medial *initial;
+  qmat_initial_medial state;
+  qmat_surface *surface;
+  qmat_topology solid;                /* of the solid; not known for every input */
+  qmat_extra_points dense_extra;      /* points found by earlier rounds that the dense collapse keeps too */
+  qmat_constraint_points constraints; /* of `dense` */
+  qmat_decimation dense;              /* the start of each round */
+  /* Of the newest round, and of the round that it continues. */
+  qmat_constraint_points round_constraints[2];
+  qmat_decimation rounds[2];
+  int newest;
+} qmat_simplification;
+
+/* A result so far, in the unit frame. `fault` is its largest error, at least epsilon, plus a share of epsilon where its
+ * Betti numbers are not the solid's. */
+typedef struct qmat_simplified {
+  qmat_medial *medial; /* unsealed; the caller releases it */
+  qmat_simplify_figures figures;
+  double fault;
+  size_t topology_faults; /* components, loops and voids too many or too few */
+  bool within_epsilon;    /* whether both errors are within epsilon, as far as measured */
+} qmat_simplified;
+
+/* Measures both errors of a medial mesh (unit frame) that differs from the newest round at most by added spheres or
+ * removed slabs. `errors` gets them and the places beyond epsilon; free with qmat_medial_errors_uninit, also after a
+ * failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
+                                        qmat_medial_errors *errors);
+
+/* Sets `result->topology_faults`, to 0 where a Betti number is not known. QMAT_ERROR_MEMORY. */
+qmat_status qmat_simplified_judge_topology(const qmat_simplification *simplification, qmat_simplified *result);
+
+/* Frees what a simplification has made; the caller keeps the inputs. */
+void qmat_simplification_uninit(qmat_simplification *simplification);
+void qmat_simplified_uninit(qmat_simplified *result);
+
+#endif
