@@ -41,32 +41,16 @@ bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, q
   return true;
 }
 
-/* The change of the Euler characteristic by the newest preview, and whether it satisfies the link condition (Attali et
- * al. 2011), which preserves the homotopy type: neighbours shared by both ends span a slab with the edge, and the ends
- * span no slab with a common edge. */
-static int64_t euler_change(const qmat_collapse *c, bool *link_condition) {
-  int64_t shared_neighbours = 0, shared_edges = 0;
+/* Neighbours shared by both ends span a slab with the edge, and the ends span no slab with a common edge. */
+bool qmat_decimation_keeps_topology(const qmat_decimation *s) {
+  if (s->rules.topology != QMAT_TOPOLOGY_PRESERVE) return true;
+  const qmat_collapse *c = &s->collapse;
+  size_t shared_neighbours = 0, shared_edges = 0;
   for (size_t n = 0; n < c->neighbour_count; n++)
     shared_neighbours += c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
   for (size_t t = 0; t < c->triangle_count; t++)
     shared_edges += c->kept_triangles[t] != QMAT_NONE && c->removed_triangles[t] != QMAT_NONE;
-  const int64_t vanishing = (int64_t)c->vanishing_count;
-  *link_condition = shared_neighbours == vanishing && shared_edges == 0;
-  return shared_neighbours - vanishing - shared_edges;
-}
-
-/* The Euler characteristic may be off by one per 128 spheres: tears and voids of the dense initial mesh cancel only in
- * pairs. Sharp features do not count as spheres here. */
-enum { SPHERES_PER_FAULT = 128 };
-
-bool qmat_decimation_keeps_topology(const qmat_decimation *s, int64_t *change) {
-  bool link_condition;
-  *change = euler_change(&s->collapse, &link_condition);
-  if (s->rules.topology == QMAT_TOPOLOGY_PRESERVE) return link_condition;
-  if (s->rules.topology == QMAT_TOPOLOGY_FREE || !s->rules.has_target) return true;
-  const int64_t before = llabs(s->euler - s->rules.target_euler);
-  const int64_t after = llabs(s->euler + *change - s->rules.target_euler);
-  return after <= before || after <= (int64_t)(s->complex.live_vertices - s->creases.left) / SPHERES_PER_FAULT;
+  return shared_neighbours == c->vanishing_count && shared_edges == 0;
 }
 
 static bool bounds_envelope(const qmat_decimation *s) {

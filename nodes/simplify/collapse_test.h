@@ -31,8 +31,9 @@ bool qmat_decimation_is_protected(const qmat_decimation *decimation, uint32_t ve
 bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_t edge, qmat_candidates *candidates,
                                       bool *bound);
 
-/* Whether the topology policy allows the newest preview; `*change` gets its change of the Euler characteristic. */
-bool qmat_decimation_keeps_topology(const qmat_decimation *decimation, int64_t *change);
+/* Whether the topology policy allows the newest preview: with QMAT_TOPOLOGY_PRESERVE it has to satisfy the link
+ * condition (Attali et al. 2011), which preserves the homotopy type. */
+bool qmat_decimation_keeps_topology(const qmat_decimation *decimation);
 
 /* Whether the newest preview may be done with this sphere (4 doubles): inside the model, and both errors within the
  * threshold. `first` is a constraint point to test first (QMAT_NONE: none). Where an error exceeds the threshold,

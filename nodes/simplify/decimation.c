@@ -135,7 +135,6 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
   qmat_context *context = s->context;
   const qmat_complex *c = &s->complex;
   s->constraints = constraints;
-  s->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
   double *limits = qmat_arena_alloc(&context->arena, constraints->count, sizeof *limits);
   if (!limits) return qmat_fail_memory(context, "the simplification");
   if (!s->quadrics) {
@@ -205,8 +204,7 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse
   }
   status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
   if (status != QMAT_OK) return status;
-  int64_t change;
-  if (!qmat_decimation_keeps_topology(s, &change)) {
+  if (!qmat_decimation_keeps_topology(s)) {
     s->counts.refused_by_topology++;
     return QMAT_OK;
   }
@@ -231,10 +229,7 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse
       sphere = s->neighbourhood.spheres[0];
     }
   }
-  if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) {
-    s->euler += change;
-    return qmat_decimation_commit(s, sphere);
-  }
+  if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) return qmat_decimation_commit(s, sphere);
   if (exceeded) *result = QMAT_COLLAPSE_EXCEEDS;
   return status;
 }

@@ -46,8 +46,6 @@ typedef struct qmat_decimation_rules {
   bool neighbourhoods; /* edges are tried with the spheres around them fitted jointly, from the end of an earlier run */
   bool final_refit;    /* spheres are fitted at the end to lower the error itself */
   const uint8_t *thin; /* per sample: whether it lies on a thin feature; read only with protection */
-  bool has_target;     /* whether the solid's Euler characteristic is known */
-  int64_t target_euler;
 } qmat_decimation_rules;
 
 /* A medial mesh while its edges collapse, the cheapest first, each to the best candidate that lies inside the model and
@@ -84,8 +82,7 @@ typedef struct qmat_decimation {
   uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
   const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
   bool protecting, fitting;
-  int refusal;   /* why the newest test of a sphere failed */
-  int64_t euler; /* of the medial mesh */
+  int refusal; /* why the newest test of a sphere failed */
   size_t moves;
   qmat_collapse_counts counts;
 } qmat_decimation;

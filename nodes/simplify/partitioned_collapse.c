@@ -192,13 +192,6 @@ static qmat_status take_points(qmat_context *context, const partition *d, size_t
   return QMAT_OK;
 }
 
-/* A piece's share of a number, in proportion to its vertices. The shares of all pieces sum to the number. */
-static int64_t share_of(const partition *d, size_t piece, int64_t number) {
-  const double all = (double)d->whole->complex.vertex_count;
-  const double before = (double)d->vertices.starts[piece] / all, after = (double)d->vertices.starts[piece + 1] / all;
-  return (int64_t)floor((double)number * after) - (int64_t)floor((double)number * before);
-}
-
 /* Sets the piece up as a medial mesh of its own. */
 static qmat_status start_piece(qmat_context *context, const partition *d, size_t piece,
                                qmat_constraint_points *constraints, qmat_decimation *own) {
@@ -230,9 +223,7 @@ static qmat_status start_piece(qmat_context *context, const partition *d, size_t
   own->rules.vertices = (size_t)ceil(kept_share * (double)count);
   qmat_status status = qmat_complex_init(context, &own->complex, &medial, spheres);
   if (status == QMAT_OK) status = take_points(context, d, piece, constraints);
-  if (status == QMAT_OK) status = qmat_decimation_init(own, constraints, depths);
-  own->rules.target_euler = own->euler + share_of(d, piece, whole->rules.target_euler - whole->euler);
-  return status;
+  return status == QMAT_OK ? qmat_decimation_init(own, constraints, depths) : status;
 }
 
 /* The live rows of a piece with the vertex numbers of the whole, and their bounds. The caller frees both. */
@@ -467,7 +458,6 @@ qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constrai
   if (!d.depths || !decimation->quadrics) return qmat_fail_memory(context, "pieces of the medial mesh");
   memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
   qmat_medial_quadrics_add(c, decimation->quadrics);
-  decimation->euler = (int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count;
   qmat_status status = divide(&d);
   if (status == QMAT_OK) status = collapse_pieces(&d);
   if (status == QMAT_OK) status = join_pieces(&d);

@@ -22,9 +22,6 @@ static const double dense_share = 0.9, required_depth_share = 0.05;
 /* The fault of wrong Betti numbers as a share of epsilon. */
 static const double topology_fault = 0.05;
 
-/* A guarded result replaces a free one only where it takes at most this many times its spheres. */
-static const double most_spheres_for_topology = 1.25;
-
 /* ---- constraint points found on the way ---- */
 
 /* Appends `added` points. */
@@ -65,14 +62,6 @@ static bool starts_within(const qmat_simplification *s) {
   return true;
 }
 
-/* Whether the dense collapse satisfies the constraints of a round as well as the result has to. */
-static bool dense_satisfies(const qmat_simplification *s, const qmat_extra_points *extra) {
-  const qmat_constraint_points *base = &s->constraints, *all = &s->round_constraints[s->newest];
-  for (size_t i = base->surface_count; i < all->surface_count; i++)
-    if (!(all->distances[i] <= s->dense.rules.limit)) return false;
-  return all->count - all->surface_count == base->count - base->surface_count + extra->inner_count;
-}
-
 /* ---- a result, and its judgement ---- */
 
 static bool is_better(const qmat_simplified *a, const qmat_simplified *best) {
@@ -84,6 +73,16 @@ static void replace(qmat_simplified *a, qmat_simplified *best) {
   qmat_simplified_uninit(best);
   *best = *a;
   a->medial = NULL;
+}
+
+/* Whether all Betti numbers of a result are the solid's, as far as they are known. */
+static qmat_status judge_topology(const qmat_simplification *s, const qmat_medial *unit, bool *right) {
+  qmat_topology found;
+  *right = true;
+  const qmat_status status = s->solid.known ? qmat_topology_of_medial(s->context, unit, &found) : QMAT_OK;
+  if (status != QMAT_OK || !s->solid.known || !found.known) return status;
+  *right = found.components == s->solid.components && found.loops == s->solid.loops && found.voids == s->solid.voids;
+  return QMAT_OK;
 }
 
 /* Fills uncovered interior of the envelope with spheres. `left` gets the errors afterwards, `filled` the number of
@@ -132,8 +131,9 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
     after.undecided = undecided;
     qmat_medial_errors_uninit(&after);
   }
-  if (status == QMAT_OK) status = qmat_simplified_judge_topology(s, a);
-  if (a->topology_faults > 0) a->fault += topology_fault * epsilon;
+  bool right = true;
+  if (status == QMAT_OK) status = judge_topology(s, a->medial, &right);
+  if (!right) a->fault += topology_fault * epsilon;
   return status;
 }
 
@@ -144,23 +144,14 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
 static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   qmat_decimation_uninit(dense);
-  *dense = (qmat_decimation){.context = s->context, .surface = s->surface};
+  *dense = (qmat_decimation){
+      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state)};
   qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
-  if (status == QMAT_OK)
-    status = qmat_simplify_rules(s->context, &s->params, qmat_surface_mesh(s->surface), &s->state, &dense->rules);
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
   const bool inside = s->params.error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
                                          QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
-  if (s->dense_extra.surface_count + s->dense_extra.inner_count > 0) {
-    const qmat_constraint_points base = s->constraints;
-    qmat_constraint_points further;
-    if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &dense->complex, &s->dense_extra, &further);
-    if (status == QMAT_OK)
-      status =
-          qmat_constraint_points_join(s->context, &base, base.witnesses, base.weights, NULL, &further, &s->constraints);
-  }
   dense->rules.share = dense_share;
   dense->rules.refits = 0;
   if (status == QMAT_OK)
@@ -184,14 +175,13 @@ static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from
   s->newest = 1 - s->newest;
   qmat_decimation *round = &s->rounds[s->newest];
   qmat_decimation_uninit(round);
-  *round = (qmat_decimation){.context = s->context, .surface = s->surface};
+  *round = (qmat_decimation){
+      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state)};
   a->medial = qmat_medial_new();
   if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
-  qmat_status status =
-      qmat_simplify_rules(s->context, &s->params, qmat_surface_mesh(s->surface), &s->state, &round->rules);
   round->rules.neighbourhoods = neighbourhoods;
   round->rules.final_refit = final_refit;
-  if (status == QMAT_OK) status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
+  qmat_status status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
   if (status != QMAT_OK) return status;
   swap_lattices(&s->dense, round); /* known depths hold in every round */
   status = qmat_decimation_run(round);
@@ -239,11 +229,11 @@ static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_error
 }
 
 /* Runs rounds of collapses until both errors are within epsilon between the constraint points too. Places where the
- * surface is too far from the envelope, or the interior is uncovered, become constraint points. Where the dense
- * collapse violates these, it is done again with them. The best round counts. */
+ * surface is too far from the envelope, or the interior is uncovered, become constraint points. The best round
+ * counts. */
 static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
   const double epsilon = s->params.epsilon;
-  qmat_extra_points extra = s->dense_extra = no_extra_points(s);
+  qmat_extra_points extra = no_extra_points(s);
   qmat_status status = collapse_dense(s);
   for (size_t round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
@@ -252,7 +242,6 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
     status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
-    const bool again = status == QMAT_OK && !is_done && !dense_satisfies(s, &extra);
     if (status == QMAT_OK && is_done && (a.within_epsilon || a.figures.filled > 0 || is_within))
       status = refit_jointly(s, &errors, &a);
     if (status == QMAT_OK && is_better(&a, best)) replace(&a, best);
@@ -260,36 +249,16 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
     if (status == QMAT_OK && !is_done) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status != QMAT_OK || is_done) return status;
-    if (!again) continue;
-    qmat_extra_points *dense = &s->dense_extra;
-    status = append(s->context, &dense->surface, &dense->surface_count, extra.surface, extra.surface_count);
-    if (status == QMAT_OK) status = append_inner(s->context, extra.inner, extra.inner_count, dense);
-    extra = no_extra_points(s);
-    if (status == QMAT_OK) status = collapse_dense(s);
   }
   return status;
 }
 
-/* Collapses freely, judges the Betti numbers of the result, and mends those that differ from the solid's. Small loops
- * and voids of the dense initial mesh are noise at the scale of epsilon: a guard that counts them while it collapses
- * strands simple solids at hundreds of spheres. Only where mending fails are collapses guarded from the start. */
-static qmat_status simplify_and_mend(qmat_simplification *s, qmat_simplified *best) {
-  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return run_rounds(s, best);
-  for (int guarded = 0; guarded < 2; guarded++) {
-    qmat_simplified a = {.fault = INFINITY};
-    s->params.topology = guarded ? QMAT_TOPOLOGY_GUARD : QMAT_TOPOLOGY_FREE;
-    qmat_status status = run_rounds(s, &a);
-    if (status == QMAT_OK) status = qmat_simplification_open_voids(s, &a);
-    if (status == QMAT_OK) status = qmat_simplification_close_loops(s, &a);
-    if (status == QMAT_OK && a.topology_faults > 0) status = qmat_simplified_judge_topology(s, &a);
-    const double most_spheres = most_spheres_for_topology * (double)(best->medial ? best->medial->sphere_count : 0);
-    if (status == QMAT_OK && (!guarded || (a.topology_faults == 0 && (a.within_epsilon || !best->within_epsilon) &&
-                                           (double)a.medial->sphere_count <= most_spheres)))
-      replace(&a, best);
-    qmat_simplified_uninit(&a);
-    if (status != QMAT_OK || best->topology_faults == 0) return status;
-  }
-  return QMAT_OK;
+/* Mends the Betti numbers of a free result. Small loops and voids of the dense initial mesh are noise at the scale of
+ * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. */
+static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *best) {
+  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  const qmat_status status = qmat_simplification_open_voids(s, best);
+  return status == QMAT_OK ? qmat_simplification_close_loops(s, best) : status;
 }
 
 qmat_status qmat_simplification_run(qmat_simplification *s, const qmat_value *const inputs[], qmat_simplified *best) {
@@ -298,5 +267,6 @@ qmat_status qmat_simplification_run(qmat_simplification *s, const qmat_value *co
   *best = (qmat_simplified){.fault = INFINITY};
   qmat_status status = qmat_simplify_prepare(s->context, &s->params, inputs, &s->surface, &s->state);
   if (status == QMAT_OK) status = qmat_topology_of_solid(s->context, s->surface, &s->solid);
-  return status == QMAT_OK ? simplify_and_mend(s, best) : status;
+  if (status == QMAT_OK) status = run_rounds(s, best);
+  return status == QMAT_OK ? mend_topology(s, best) : status;
 }

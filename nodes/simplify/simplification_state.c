@@ -25,20 +25,6 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
                                         : status;
 }
 
-static size_t difference(size_t a, size_t b) {
-  return a > b ? a - b : b - a;
-}
-
-qmat_status qmat_simplified_judge_topology(const qmat_simplification *s, qmat_simplified *a) {
-  qmat_topology found;
-  a->topology_faults = 0;
-  const qmat_status status = s->solid.known ? qmat_topology_of_medial(s->context, a->medial, &found) : QMAT_OK;
-  if (status != QMAT_OK || !s->solid.known || !found.known) return status;
-  a->topology_faults = difference(found.components, s->solid.components) + difference(found.loops, s->solid.loops) +
-                       difference(found.voids, s->solid.voids);
-  return QMAT_OK;
-}
-
 void qmat_simplification_uninit(qmat_simplification *s) {
   for (int i = 0; i < 2; i++) qmat_decimation_uninit(&s->rounds[i]);
   qmat_decimation_uninit(&s->dense);

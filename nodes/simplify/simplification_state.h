@@ -20,7 +20,6 @@ typedef struct qmat_simplification {
   qmat_initial_medial state;
   qmat_surface *surface;
   qmat_topology solid;                /* of the solid; not known for every input */
-  qmat_extra_points dense_extra;      /* points found by earlier rounds that the dense collapse keeps too */
   qmat_constraint_points constraints; /* of `dense` */
   qmat_decimation dense;              /* the start of each round */
   /* Of the newest round, and of the round that it continues. */
@@ -35,8 +34,7 @@ typedef struct qmat_simplified {
   qmat_medial *medial; /* unsealed; the caller releases it */
   qmat_simplify_figures figures;
   double fault;
-  size_t topology_faults; /* components, loops and voids too many or too few */
-  bool within_epsilon;    /* whether both errors are within epsilon, as far as measured */
+  bool within_epsilon; /* whether both errors are within epsilon, as far as measured */
 } qmat_simplified;
 
 /* Measures both errors of a medial mesh (unit frame) that differs from the newest round at most by added spheres or
@@ -44,9 +42,6 @@ typedef struct qmat_simplified {
  * failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
                                         qmat_medial_errors *errors);
-
-/* Sets `result->topology_faults`, to 0 where a Betti number is not known. QMAT_ERROR_MEMORY. */
-qmat_status qmat_simplified_judge_topology(const qmat_simplification *simplification, qmat_simplified *result);
 
 /* Frees what a simplification has made; the caller keeps the inputs. */
 void qmat_simplification_uninit(qmat_simplification *simplification);

@@ -91,40 +91,23 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
 }
 
-/* The Euler characteristic of the solid within a closed surface: half that of the surface. */
-static qmat_status find_target_euler(qmat_context *context, const qmat_mesh *mesh, int64_t *euler) {
-  uint8_t *used = qmat_arena_calloc(&context->arena, mesh->vertex_count, sizeof *used);
-  if (!used) return qmat_fail_memory(context, "the surface's vertices");
-  int64_t vertices = 0;
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-    vertices += !used[mesh->triangles[i]];
-    used[mesh->triangles[i]] = 1;
-  }
-  /* Every triangle has three sides, every side two triangles. */
-  *euler = (vertices - (int64_t)mesh->triangle_count / 2) / 2;
-  return QMAT_OK;
-}
-
-qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *p, const qmat_mesh *mesh,
-                                const qmat_initial_medial *initial, qmat_decimation_rules *rules) {
-  *rules = (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
-                                   .share = 1,
-                                   .finest = p->finest,
-                                   .vertices = (size_t)p->vertices,
-                                   .most_cost = p->most_cost,
-                                   .k = p->k,
-                                   .cost = (qmat_cost_kind)p->cost,
-                                   .published = p->compat == QMAT_COMPAT_QMAT,
-                                   .error = (qmat_error_kind)p->error,
-                                   .on_exceed = (qmat_exceed_rule)p->on_exceed,
-                                   .topology = (qmat_topology_policy)p->topology,
-                                   .protect = (qmat_protection)p->protect,
-                                   .features = (qmat_feature_rule)p->features,
-                                   .crease_share = p->crease,
-                                   .refits = (int)p->refits,
-                                   .thin = initial->thin,
-                                   .has_target = mesh->closed && mesh->oriented};
-  return rules->has_target ? find_target_euler(context, mesh, &rules->target_euler) : QMAT_OK;
+qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const qmat_initial_medial *initial) {
+  return (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
+                                 .share = 1,
+                                 .finest = p->finest,
+                                 .vertices = (size_t)p->vertices,
+                                 .most_cost = p->most_cost,
+                                 .k = p->k,
+                                 .cost = (qmat_cost_kind)p->cost,
+                                 .published = p->compat == QMAT_COMPAT_QMAT,
+                                 .error = (qmat_error_kind)p->error,
+                                 .on_exceed = (qmat_exceed_rule)p->on_exceed,
+                                 .topology = (qmat_topology_policy)p->topology,
+                                 .protect = (qmat_protection)p->protect,
+                                 .features = (qmat_feature_rule)p->features,
+                                 .crease_share = p->crease,
+                                 .refits = (int)p->refits,
+                                 .thin = initial->thin};
 }
 
 bool qmat_simplify_in_order(const qmat_simplify_params *params) {
@@ -133,7 +116,6 @@ bool qmat_simplify_in_order(const qmat_simplify_params *params) {
 
 qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplify_params *params,
                                        const qmat_value *const inputs[], qmat_ordered_collapses *o) {
-  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
   const qmat_medial *medial = (const qmat_medial *)inputs[3];
   *o = (qmat_ordered_collapses){.params = *params};
@@ -143,8 +125,8 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status != QMAT_OK) return status;
   run->context = context;
   run->surface = o->surface;
-  status = qmat_simplify_rules(context, &o->params, mesh, &o->initial, &run->rules);
-  if (status == QMAT_OK) status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
+  run->rules = qmat_simplify_rules(&o->params, &o->initial);
+  status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,
                                          constraint_error * o->params.finest, QMAT_MOST_CONSTRAINT_POINTS,

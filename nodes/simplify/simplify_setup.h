@@ -46,8 +46,8 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
                 "features; the stop is vertices"),                                                                    \
       QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                           \
                 "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
-                "loops and voids of the result are corrected to those of the solid. preserve: collapses keep the "    \
-                "topology of the initial mesh (link condition)"),                                                     \
+                "loops and voids of the result are corrected to those of the solid (on_exceed=skip only). preserve: " \
+                "collapses keep the topology of the initial mesh (link condition)"),                                  \
       QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                \
                 "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
       QMAT_ENUM(                                                                                                      \
@@ -84,9 +84,8 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
                                   const qmat_value *const inputs[], qmat_surface **surface,
                                   qmat_initial_medial *initial);
 
-/* The rules for the parameters. QMAT_ERROR_MEMORY. */
-qmat_status qmat_simplify_rules(qmat_context *context, const qmat_simplify_params *params, const qmat_mesh *mesh,
-                                const qmat_initial_medial *initial, qmat_decimation_rules *rules);
+/* The rules for the parameters. */
+qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *params, const qmat_initial_medial *initial);
 
 /* Whether the parameters select collapses that do not depend on epsilon. */
 bool qmat_simplify_in_order(const qmat_simplify_params *params);
