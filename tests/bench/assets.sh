@@ -1,16 +1,17 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Prints a Markdown table of what `qmat mat` makes of the model files in a folder, and a summary line:
-#   assets.sh [FOLDER] [--epsilon E]      default: ../shared/data/assets at 2 %
-# Where the folder's README.md has a table whose first column names files, these are taken, else all model files. Each has
-# a minute. Class: closed, holes (borders were closed), sheets, or what is mixed. A result is "wrong" when it is written
+#   assets.sh [FOLDER] [--epsilon E] [--timeout SECONDS]      default: ../shared/data/assets at 2 %, a minute each
+# Where the folder's README.md has a table whose first column names files, these are taken, else all model files. Class: closed, holes (borders were closed), sheets, or what is mixed. A result is "wrong" when it is written
 # although an error is above 1.25 epsilon.
 set -eu
 epsilon=2%
+seconds=60
 folder=
 while [ $# -gt 0 ]; do
   case $1 in
     --epsilon) epsilon=$2 && shift ;;
+    --timeout) seconds=$2 && shift ;;
     *) folder=$1 ;;
   esac
   shift
@@ -57,7 +58,7 @@ echo '| --- | --- | ---: | ---: | ---: | ---: | --- | ---: | ---: | --- |'
 while read -r name; do
   rm -f "$work/report.json" "$work/out.glb"
   status=0
-  /usr/bin/time -f '%U %S %M' -o "$work/cost" timeout 60 "$build/qmat" mat "$folder/$name" -o "$work/out.glb" \
+  /usr/bin/time -f '%U %S %M' -o "$work/cost" timeout "$seconds" "$build/qmat" mat "$folder/$name" -o "$work/out.glb" \
     --epsilon "$epsilon" --report "$work/report.json" --quiet --progress off 2>"$work/complaint" </dev/null || status=$?
   cost=$(tail -n 1 "$work/cost" | awk '{ printf "%.1f | %d", $1 + $2, $3 / 1024 }')
   reason=$(grep -v 'warning: ' "$work/complaint" | tail -n 1 | sed 's/|/\\|/g; s/^qmat: //' | cut -c 1-160)

@@ -3,10 +3,13 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
 
+#include "io/model.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 #include "tests/shapes.h"
@@ -707,6 +710,48 @@ static void test_ten_holes_are_ten_caps_and_the_same_solid(void **state) {
   release(&r);
 }
 
+/* A file of a sphere's triangles in any order, every other one turned, without common vertices; some are missing. */
+static void test_a_soup_of_triangles_that_face_anywhere_is_the_solid(void **state) {
+  (void)state;
+  qmat_mesh *sphere = shape_sphere(2, 12);
+  const double volume = volume_of(sphere);
+  char path[] = "soup_XXXXXX.stl";
+  const int handle = mkstemps(path, 4);
+  assert_true(handle >= 0);
+  FILE *file = fdopen(handle, "w");
+  assert_non_null(file);
+  fprintf(file, "solid soup\n");
+  for (size_t i = 0; i < sphere->triangle_count; i++) {
+    const size_t t = i * 101 % sphere->triangle_count; /* 101 and the number of triangles, 528, have no common factor */
+    if (t == 100 || t == 300) continue;
+    fprintf(file, "facet normal 0 0 0\nouter loop\n");
+    for (size_t k = 0; k < 3; k++) {
+      const double *p = sphere->positions + 3 * (size_t)sphere->triangles[3 * t + (i % 2 ? 2 - k : k)];
+      fprintf(file, "vertex %.17g %.17g %.17g\n", p[0], p[1], p[2]);
+    }
+    fprintf(file, "endloop\nendfacet\n");
+  }
+  fprintf(file, "endsolid soup\n");
+  assert_int_equal(fclose(file), 0);
+  qmat_value_release(&sphere->base);
+  qmat_context context = {0};
+  qmat_scene *scene;
+  qmat_mesh *mesh;
+  qmat_report *report;
+  assert_int_equal(qmat_model_read(&context, path, &(qmat_read_options){0}, &scene, &mesh, &report), QMAT_OK);
+  remove(path);
+  result r = unite(mesh);
+  assert_string_equal(taken_for(&r, 0), "solid with holes");
+  assert_int_equal(pipeline_count(r.report, "caps"), 2);
+  assert_int_equal(r.mesh->triangle_count, 528);
+  assert_near(fabs(volume_of(r.mesh)), volume, 1e-6 * volume); /* coordinates of STL are in single precision */
+  assert_true(volume_of(r.mesh) > 0);
+  release(&r);
+  qmat_value_release(&scene->base);
+  qmat_value_release(&report->base);
+  qmat_context_uninit(&context);
+}
+
 /* A part of a cylinder's side, `turn` around. */
 static qmat_mesh *curved_shell(double turn) {
   qmat_mesh *mesh = shape_new();
@@ -863,6 +908,7 @@ int main(void) {
       cmocka_unit_test(test_a_union_passes),
       cmocka_unit_test(test_a_cut_neck_is_one_cap_of_known_size),
       cmocka_unit_test(test_ten_holes_are_ten_caps_and_the_same_solid),
+      cmocka_unit_test(test_a_soup_of_triangles_that_face_anywhere_is_the_solid),
       cmocka_unit_test(test_surfaces_without_volume_are_sheets_as_they_are),
       cmocka_unit_test(test_a_card_of_two_sides_is_a_sheet_of_one),
       cmocka_unit_test(test_fins_are_sheets_and_walls_inside_are_left_out),
