@@ -10,6 +10,7 @@
 #include "core/node.h"
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/mesh/border_weld.h"
 #include "nodes/mesh/half_edges.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/overlaps.h"
@@ -27,6 +28,9 @@ typedef struct mesh_solid_params {
 static const double wrap_offset = 0.25, wrap_alpha = 4;
 /* The least epsilon that a wrap is made for, in diagonals; its triangles grow with the inverse square. */
 static const double least_wrap_epsilon = 0.004;
+/* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
+ */
+static const double weld_tolerance = 1e-5;
 /* Components and caps that the report lists. */
 enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
 
@@ -40,7 +44,10 @@ typedef struct solidifier {
   const mesh_solid_params *params;
   const qmat_mesh *mesh;
   qmat_frame frame;
-  double *unit;                   /* the vertices in the unit frame: areas and volumes neither overflow nor vanish */
+  double *unit;              /* the vertices in the unit frame: areas and volumes neither overflow nor vanish */
+  size_t triangle_count;     /* those that are left after welding; without the given sheets' */
+  const uint32_t *triangles; /* 3 * triangle_count */
+  qmat_border_weld weld;
   size_t plain_count, pair_count; /* triangles without and with an opposite one, the latter once for each pair */
   uint32_t *plain, *pairs;        /* their corners */
   qmat_parts parts;
@@ -87,7 +94,7 @@ static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
 static qmat_status find_pairs(const solidifier *s, uint8_t *classes) {
   qmat_half_edges e;
   const qmat_status status =
-      qmat_half_edges_sort(s->context, s->mesh->vertex_count, s->mesh->triangle_count, s->mesh->triangles, &e);
+      qmat_half_edges_sort(s->context, s->mesh->vertex_count, s->triangle_count, s->triangles, &e);
   for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
     last = qmat_edge_last(&e, first);
     const uint32_t high = qmat_half_edge_high(&e, e.order[first]);
@@ -110,19 +117,37 @@ static qmat_status find_pairs(const solidifier *s, uint8_t *classes) {
 
 static qmat_status split_pairs(solidifier *s) {
   const qmat_mesh *mesh = s->mesh;
+  const size_t sheet_count = mesh->sheet_triangle_count;
   qmat_arena *arena = &s->context->arena;
-  uint8_t *classes = qmat_arena_calloc(arena, mesh->triangle_count, 1);
-  s->plain = qmat_arena_alloc(arena, 3 * mesh->triangle_count, sizeof *s->plain);
-  s->pairs = qmat_arena_alloc(arena, 3 * mesh->triangle_count, sizeof *s->pairs);
+  uint8_t *classes = qmat_arena_calloc(arena, s->triangle_count, 1);
+  s->plain = qmat_arena_alloc(arena, 3 * s->triangle_count, sizeof *s->plain);
+  s->pairs = qmat_arena_alloc(arena, 3 * (s->triangle_count + sheet_count), sizeof *s->pairs);
   if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
   const qmat_status status = find_pairs(s, classes);
-  for (size_t t = 0; status == QMAT_OK && t < mesh->triangle_count; t++) {
-    const bool is_given_sheet = t >= mesh->triangle_count - mesh->sheet_triangle_count;
+  for (size_t t = 0; status == QMAT_OK && t < s->triangle_count; t++) {
     if (classes[t] == 2) continue;
-    uint32_t *to = classes[t] == 1 || is_given_sheet ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
-    memcpy(to, mesh->triangles + 3 * t, 3 * sizeof *to);
+    uint32_t *to = classes[t] == 1 ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
+    memcpy(to, s->triangles + 3 * t, 3 * sizeof *to);
   }
+  if (sheet_count > 0)
+    memcpy(s->pairs + 3 * s->pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
+           3 * sheet_count * sizeof *s->pairs);
+  s->pair_count += sheet_count;
   return status;
+}
+
+/* The triangles that may bound solids, with the seams of open meshes welded. */
+static qmat_status weld_seams(solidifier *s) {
+  s->triangles = s->mesh->triangles;
+  s->triangle_count = s->mesh->triangle_count - s->mesh->sheet_triangle_count;
+  if (s->mesh->closed) return QMAT_OK;
+  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
+  const qmat_status status = qmat_weld_borders(s->context, s->mesh->vertex_count, s->unit, s->triangle_count,
+                                               s->triangles, fmin(weld_tolerance, 0.01 * epsilon), &s->weld);
+  if (status != QMAT_OK || s->weld.merged == 0) return status;
+  s->triangles = s->weld.triangles;
+  s->triangle_count = s->weld.triangle_count;
+  return QMAT_OK;
 }
 
 /* ---- solids ---- */
@@ -242,8 +267,8 @@ static qmat_status wrap_all(solidifier *s) {
 /* ---- the mesh ---- */
 
 static bool is_unchanged(const solidifier *s) {
-  return s->solids.count == s->mesh->triangle_count && s->caps == 0 && s->turned_parts == 0 && s->parts.turned == 0 &&
-         !s->united.changed && !s->wrap.triangles && s->mesh->closed && s->mesh->oriented;
+  return s->solids.count == s->mesh->triangle_count && s->weld.merged == 0 && s->caps == 0 && s->turned_parts == 0 &&
+         s->parts.turned == 0 && !s->united.changed && !s->wrap.triangles && s->mesh->closed && s->mesh->oriented;
 }
 
 /* Numbers the used vertices in their order. The sheets' vertices are the given mesh's; the solids' are too unless they
@@ -271,7 +296,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = s->sheets.count == 0;
-  mesh->deviation = s->mesh->deviation;
+  mesh->deviation = s->mesh->deviation + s->weld.moved * s->frame.diagonal;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   if (s->sheets.count > 0)
     mesh->sheet_thickness =
@@ -443,7 +468,8 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
   const struct {
     const char *key;
     size_t count;
-  } counts[] = {{"parts", s->parts.part_count},
+  } counts[] = {{"vertices_welded", s->weld.merged},
+                {"parts", s->parts.part_count},
                 {"parts_open", open},
                 {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
                 {"solids_with_holes", kinds[QMAT_PART_HOLES]},
@@ -484,7 +510,8 @@ static qmat_status make_solid(solidifier *s) {
   s->unit = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *s->unit);
   if (!s->unit) return fail_shortage(s);
   qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
-  qmat_status status = split_pairs(s);
+  qmat_status status = weld_seams(s);
+  if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
     status = qmat_parts_find(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain, &s->parts);
   if (status != QMAT_OK) return status;
@@ -559,7 +586,8 @@ const qmat_node qmat_node_mesh_solid = {
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
-        "own. A closed component is a solid. The borders of an open one are closed by caps if the generalised winding "
+        "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
+        "are closed by caps if the generalised winding "
         "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. Of triangles that "
         "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
