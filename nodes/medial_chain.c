@@ -5,7 +5,7 @@
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/simplify/collapse_chain.h"
-#include "nodes/simplify/simplify_setup.h"
+#include "nodes/simplify/ordered_collapse.h"
 
 static void *copy_of(const void *array, size_t count, size_t size) {
   void *copy = qmat_alloc(count, size);

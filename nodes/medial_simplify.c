@@ -7,6 +7,7 @@
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/simplify/decimation_resume.h"
+#include "nodes/simplify/ordered_collapse.h"
 #include "nodes/simplify/simplification.h"
 
 typedef qmat_simplify_params medial_simplify_params;

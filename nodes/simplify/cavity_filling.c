@@ -8,6 +8,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
 #include "nodes/measure/envelope_to_surface.h"
+#include "nodes/simplify/thresholds.h"
 
 /* Distances a new sphere may protrude, as shares of epsilon. The first with a cone within epsilon is used. */
 static const double protruding_shares[] = {0.9, 0.6, 0.3, 0};
@@ -15,9 +16,6 @@ enum { SHARES = sizeof protruding_shares / sizeof *protruding_shares };
 
 /* Cones to this many of the nearest spheres are tried. */
 enum { MOST_NEIGHBOURS = 8 };
-
-/* Tolerance and floor of the bound of a cone, as shares of epsilon. */
-static const double tolerance_share = 0.01, enough_share = 0.5;
 
 typedef struct {
   double depth;
@@ -68,8 +66,8 @@ static bool fit_sphere(const qmat_surface *surface, const double *spheres, size_
     for (size_t n = 0; n < found; n++) {
       const double *const ends[2] = {sphere, &spheres[4 * (size_t)nearest[n]]};
       *neighbour = nearest[n];
-      if (qmat_envelope_to_surface_bound(surface, ends, 2, enough_share * epsilon, tolerance_share * epsilon) <=
-          epsilon)
+      if (qmat_envelope_to_surface_bound(surface, ends, 2, qmat_least_reported * epsilon,
+                                         qmat_error_tolerance * epsilon) <= epsilon)
         return true;
     }
   }

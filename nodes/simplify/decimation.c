@@ -6,7 +6,9 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/simplify/collapse_test.h"
+#include "nodes/simplify/cost_rows.h"
 #include "nodes/simplify/fitted_collapse.h"
+#include "nodes/simplify/rising_threshold.h"
 
 /* Progress interval, in cost evaluations and in attempts. The last attempts test thousands of points each. */
 enum { COSTS_A_REPORT = 256, ATTEMPTS_A_REPORT = 16 };
@@ -16,74 +18,26 @@ static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
 }
 
-/* The threshold doubles every twelve levels. It is INFINITY beyond the size of the model. */
-enum { LEVELS_TO_A_DOUBLING = 12 };
-
-static double threshold_at(const qmat_decimation *s, int level) {
-  const double part = exp2((double)(level % LEVELS_TO_A_DOUBLING) / LEVELS_TO_A_DOUBLING);
-  const double error = ldexp(part, level / LEVELS_TO_A_DOUBLING) * s->rules.finest;
-  return error <= 1 ? qmat_constraint_share * error : INFINITY;
-}
-
-/* Sets the threshold of a level. Surface points with a larger initial distance must not get worse. Interior points
- * deeper than the threshold must stay covered. */
-static void set_threshold(qmat_decimation *s, int level) {
-  const qmat_constraint_points *constraints = s->constraints;
-  s->level = level;
-  s->threshold = threshold_at(s, level);
-  for (size_t i = 0; i < constraints->surface_count; i++)
-    s->surface_tracker.limits[i] = fmax(s->threshold, constraints->distances[i]);
-  for (size_t i = constraints->surface_count; i < constraints->count; i++)
-    s->surface_tracker.limits[i] = -constraints->distances[i] > s->threshold ? 0 : INFINITY;
-  s->envelope_tracker.limit = qmat_decimation_is_two_sided(s) ? s->threshold : INFINITY;
-}
-
-/* Raises the threshold by a level. False if it would exceed the limit, or if there is no threshold. */
-static bool raise_threshold(qmat_decimation *s) {
-  if (!(s->threshold < INFINITY) || threshold_at(s, s->level + 1) > s->rules.limit) return false;
-  set_threshold(s, s->level + 1);
-  return true;
-}
-
-static qmat_status find_candidates(qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
-  if (s->rules.cost == QMAT_COST_PMAT) {
-    qmat_candidates_find_larger(&s->complex, s->quadrics, edge, c);
-  } else if (s->rules.cost == QMAT_COST_HAUSDORFF) {
-    const qmat_status status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
-    if (status != QMAT_OK) return status;
-    return qmat_hausdorff_candidates(s->context, &s->surface_tracker, &s->complex, &s->collapse,
-                                     s->constraints->surface_count, c);
-  } else if (s->rules.published) {
-    qmat_candidates_find_published(&s->complex, s->quadrics, edge, c);
-  } else {
-    qmat_candidates_find(&s->complex, s->quadrics, edge, c);
-  }
-  return QMAT_OK;
-}
-
 /* Restricts the candidates of an edge at sharp features, for any threshold. Unchanged if none would remain. */
 static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
   qmat_candidates allowed;
   double needed;
-  if (s->rules.cost == QMAT_COST_SLAB &&
-      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &needed) &&
+  if (qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &needed) &&
       allowed.count > 0)
     *c = allowed;
 }
 
 /* The cost of the best candidate. */
 static qmat_status set_cost(qmat_decimation *s, uint32_t edge) {
+  const qmat_cost_row *row = qmat_cost_row_of(&s->rules);
   qmat_candidates c;
-  const qmat_status status = find_candidates(s, edge, &c);
+  const qmat_status status = row->find(s, edge, &c);
   if (status != QMAT_OK) return status;
-  prefer_features(s, edge, &c);
+  if (row->by_quadrics) prefer_features(s, edge, &c);
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   const double *a = &s->complex.spheres[4 * (size_t)ends[0]], *b = &s->complex.spheres[4 * (size_t)ends[1]];
-  const bool slab = s->rules.cost == QMAT_COST_SLAB;
-  s->heap.errors[edge] = slab ? c.errors[0] : qmat_point_distance(a, b);
-  s->heap.costs[edge] = slab                              ? qmat_slab_cost(c.errors[0], s->rules.k, a, b)
-                        : s->rules.cost == QMAT_COST_PMAT ? qmat_pmat_cost(a, b)
-                                                          : c.errors[0];
+  s->heap.errors[edge] = row->by_quadrics ? c.errors[0] : qmat_point_distance(a, b);
+  s->heap.costs[edge] = row->cost(s, &c, a, b);
   s->stale[edge] = 0;
   return QMAT_OK;
 }
@@ -103,7 +57,7 @@ static qmat_status fill_heap(qmat_decimation *s) {
     s->failed_points[e] = QMAT_NONE;
     s->needed[e] = 0;
   }
-  if (s->rules.cost == QMAT_COST_HAUSDORFF) { /* serial: all costs use the same preview */
+  if (qmat_cost_row_of(&s->rules)->takes_preview) { /* serial: all costs use the same preview */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
       if (e % COSTS_A_REPORT == 0) status = qmat_progress(s->context, e, count, "costs");
       if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
@@ -115,20 +69,6 @@ static qmat_status fill_heap(qmat_decimation *s) {
   }
   qmat_edge_heap_fill(&s->heap, s->locked);
   return status;
-}
-
-/* Allocates the log for every collapse, and records the initial owners of the samples. */
-static qmat_status start_log(qmat_decimation *s) {
-  const size_t most = s->complex.vertex_count, samples = s->constraints->sample_count;
-  qmat_arena *arena = &s->context->arena;
-  s->log.ends = qmat_arena_alloc(arena, most, 2 * sizeof(uint32_t));
-  s->log.merged = qmat_arena_alloc(arena, most, 4 * sizeof(double));
-  s->log.errors = qmat_arena_alloc(arena, most, sizeof(double));
-  s->log.owners = qmat_arena_alloc(arena, samples, sizeof(uint32_t));
-  if (!s->log.ends || !s->log.merged || !s->log.errors || !s->log.owners)
-    return qmat_fail_memory(s->context, "the collapses");
-  for (size_t i = 0; i < samples; i++) s->log.owners[i] = qmat_surface_to_envelope_owner(&s->surface_tracker, i);
-  return QMAT_OK;
 }
 
 qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_points *constraints, const double *depths) {
@@ -166,8 +106,7 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
                                                                           : s->rules.limit);
   if (qmat_decimation_is_two_sided(s)) s->envelope_tracker.limit = limit;
   if (status != QMAT_OK || !qmat_decimation_in_order(s)) return status;
-  set_threshold(s, 0);
-  return start_log(s);
+  return qmat_rising_threshold_start(s);
 }
 
 void qmat_decimation_uninit(qmat_decimation *s) {
@@ -185,7 +124,7 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse
   qmat_candidates c;
   *result = QMAT_COLLAPSE_REFUSED;
   s->neighbourhood.count = 0; /* drops the neighbourhood of the edge tried before */
-  qmat_status status = find_candidates(s, edge, &c);
+  qmat_status status = qmat_cost_row_of(&s->rules)->find(s, edge, &c);
   if (status != QMAT_OK) return status;
   double needed;
   const double share = s->rules.crease_share;
@@ -234,10 +173,6 @@ static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse
   return status;
 }
 
-/* An edge whose fitted sphere has an error above this many times the threshold is tried again only when a sphere nearby
- * disappears, not when one moves. */
-static const double retry_ratio = 2;
-
 static bool is_locked(const qmat_decimation *s, uint32_t edge) {
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   return s->locked && (s->locked[ends[0]] || s->locked[ends[1]]);
@@ -245,7 +180,7 @@ static bool is_locked(const qmat_decimation *s, uint32_t edge) {
 
 static void queue_again(qmat_decimation *s, uint32_t edge) {
   if (s->heap.places[edge] != QMAT_NONE || is_locked(s, edge)) return;
-  if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > retry_ratio * s->threshold) return;
+  if (s->collapse.removed == QMAT_NONE && s->fitted_errors[edge] > qmat_retry_ratio * s->threshold) return;
   qmat_edge_heap_update(&s->heap, edge);
 }
 
@@ -297,8 +232,7 @@ static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   return status;
 }
 
-/* Collapses edges until the heap is empty or the rules end it; then `*ended` is true. */
-static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
+qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
     qmat_status status = s->rules.neighbourhoods || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
@@ -324,18 +258,12 @@ static qmat_status collapse_edges(qmat_decimation *s, bool *ended) {
         status = commit_placed(s, s->neighbourhood.vertices[i]);
       if (status != QMAT_OK) return status;
     } else if (result == QMAT_COLLAPSE_EXCEEDS && s->rules.on_exceed == QMAT_EXCEED_STOP) {
-      *ended = !raise_threshold(s);
+      *ended = !qmat_rising_threshold_raise(s);
       qmat_edge_heap_update(&s->heap, edge);
     }
   }
   return QMAT_OK;
 }
-
-/* The constraint points that each sphere is fitted to in the final refits. */
-enum { FINAL_REFIT_POINTS = 1024 };
-
-/* A move has to lower the error by at least this share. */
-static const double least_gain = 0.02;
 
 /* Fits every sphere to the surface where that lowers its largest error. Converged spheres, which did not move in their
  * last fit and whose neighbours have not moved since, are skipped. A fit uses at most `most` constraint points. */
@@ -360,7 +288,7 @@ static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
       status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, INFINITY,
                                    sphere, &after);
     if (status != QMAT_OK) return status;
-    if (!(after <= (1 - least_gain) * before)) continue;
+    if (!(after <= (1 - qmat_least_gain) * before)) continue;
     qmat_collapse_outcome result;
     double needed;
     status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, &result, &needed);
@@ -380,28 +308,16 @@ static void queue_all(qmat_decimation *s) {
     if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE) qmat_edge_heap_update(&s->heap, e);
 }
 
-/* Queues the edges that the raised threshold may allow. */
-static void queue_raised(qmat_decimation *s) {
-  for (uint32_t e = 0; e < s->complex.edge_count; e++)
-    if (s->complex.edge_alive[e] && s->heap.places[e] == QMAT_NONE && s->needed[e] <= s->threshold)
-      qmat_edge_heap_update(&s->heap, e);
-}
-
 qmat_status qmat_decimation_run(qmat_decimation *s) {
   bool ended = s->threshold > s->rules.limit; /* even the lowest threshold exceeds the limit */
-  qmat_status status = s->rules.neighbourhoods ? QMAT_OK : collapse_edges(s, &ended);
-  while (s->rules.on_exceed == QMAT_EXCEED_RAISE && status == QMAT_OK && !ended && s->complex.live_edges > 0 &&
-         raise_threshold(s)) {
-    queue_raised(s);
-    status = collapse_edges(s, &ended);
-  }
-  if (status != QMAT_OK || ended || qmat_decimation_in_order(s) || !(s->rules.limit < INFINITY)) return status;
+  qmat_status status = s->rules.neighbourhoods ? QMAT_OK : qmat_decimation_collapse_edges(s, &ended);
+  if (status != QMAT_OK || ended || !(s->rules.limit < INFINITY)) return status;
   for (int i = 0; i < s->rules.refits && !ended; i++) {
     const size_t collapses = s->counts.collapses;
     size_t moved;
     s->fitting = true;
     if (i == 0) queue_all(s);
-    status = collapse_edges(s, &ended);
+    status = qmat_decimation_collapse_edges(s, &ended);
     if (status != QMAT_OK || ended) return status;
     if ((i > 0 || s->rules.neighbourhoods) && s->counts.collapses == collapses) break;
     if ((status = refit(s, QMAT_FITTED_POINTS, &moved)) != QMAT_OK) return status;
@@ -409,6 +325,6 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
   /* The final refits lower the error itself. */
   size_t moved = s->rules.final_refit;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
-    status = refit(s, FINAL_REFIT_POINTS, &moved);
+    status = refit(s, QMAT_FINAL_REFIT_POINTS, &moved);
   return status;
 }

@@ -12,7 +12,12 @@ qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constra
                                  const double *depths);
 void qmat_decimation_uninit(qmat_decimation *decimation);
 
-/* Collapses edges until the rules allow no more. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. */
+/* Collapses edges until the heap is empty or the rules end it; then `*ended` is true. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. One thread. */
+qmat_status qmat_decimation_collapse_edges(qmat_decimation *decimation, bool *ended);
+
+/* Collapses edges, with QMAT_EXCEED_SKIP, and fits spheres until the rules allow no more. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. One thread. */
 qmat_status qmat_decimation_run(qmat_decimation *decimation);
 
 #endif

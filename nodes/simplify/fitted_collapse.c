@@ -6,12 +6,6 @@
 
 #include "nodes/simplify/collapse_test.h"
 
-/* A sphere is tested only if its error at the sampled points is at most this multiple of the threshold. */
-static const double test_ratio = 1.1;
-
-/* In joint refits the spheres have been fitted before, so give_up_error of a fit is this share of the threshold. */
-static const double early_exit_share = 0.6;
-
 qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
                                        qmat_collapse_outcome *result) {
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
@@ -26,15 +20,15 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const 
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   s->refusal = QMAT_REFUSED_BY_NOTHING;
   if (status == QMAT_OK)
-    status =
-        qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse,
-                            s->rules.neighbourhoods ? early_exit_share * s->threshold : s->threshold, sphere, &error);
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse,
+                                 s->rules.neighbourhoods ? qmat_early_exit_share * s->threshold : s->threshold, sphere,
+                                 &error);
   s->fitted_errors[edge] = error;
   memcpy(s->fitted, sphere, sizeof s->fitted);
-  if (status == QMAT_OK && error <= test_ratio * s->threshold)
+  if (status == QMAT_OK && error <= qmat_test_ratio * s->threshold)
     status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, result, &needed);
   for (int i = 0; i < c->count && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
-    if (!(errors[i] <= test_ratio * s->threshold)) continue;
+    if (!(errors[i] <= qmat_test_ratio * s->threshold)) continue;
     memcpy(sphere, c->spheres[i], sizeof c->spheres[i]);
     status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, result, &needed);
   }
@@ -87,9 +81,6 @@ static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphe
   return status;
 }
 
-/* A refused point becomes a target of the fit, with this share of the threshold as margin. */
-static const double margin = 0.02;
-
 /* Adds the place where the newest test failed to the targets; `*needed` is false where a fit cannot repair it. */
 static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
   const double *centre = s->refusal == QMAT_REFUSED_BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
@@ -98,7 +89,7 @@ static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, 
     const size_t point = s->surface_tracker.failed_point;
     return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->surface_tracker.points[3 * point],
                                       qmat_decimation_is_inner(s, point) ? QMAT_TARGET_INSIDE : QMAT_TARGET_SURFACE,
-                                      s->surface_tracker.limits[point] - margin * s->threshold);
+                                      s->surface_tracker.limits[point] - qmat_target_margin * s->threshold);
   }
   double closest[3];
   uint32_t triangle;
@@ -106,7 +97,7 @@ static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, 
   if (!*needed) return QMAT_OK;
   qmat_surface_distance(s->surface, centre, INFINITY, closest, &triangle);
   return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, closest, QMAT_TARGET_BORDER,
-                                    (1 - margin) * s->threshold);
+                                    (1 - qmat_target_margin) * s->threshold);
 }
 
 /* Tests a sphere of the neighbourhood, which is in place; number 0 is the sphere of the collapse. */
@@ -145,13 +136,6 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
   return status;
 }
 
-/* A neighbourhood is fitted at most this often, each time with the newest failure as a target. */
-enum { MOST_FITS = 6 };
-
-/* A neighbourhood is fitted only if the error of the single sphere's fit is at most the first multiple of the
- * threshold, and tested only if the error of the joint fit is at most the second. */
-static const double neighbourhood_ratio = 1.3, placement_ratio = 1.02;
-
 /* Tries the newest preview from its fitted sphere, refitted with its neighbours unless `alone`. If `*result` allows it,
  * the spheres are in place, and the collapse is the newest preview and test. Otherwise nothing has changed. */
 static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
@@ -168,10 +152,10 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
                                    others, count, s->constraints->surface_count, s->threshold);
   bool again = true;
   int last_refused = 0;
-  for (int i = 0; i < MOST_FITS && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
+  for (int i = 0; i < QMAT_MOST_FITS && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
     double error;
     qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, i % 2 == 1, &error);
-    if (!(error <= placement_ratio * s->threshold)) return status;
+    if (!(error <= qmat_placement_ratio * s->threshold)) return status;
     s->saved_count = 0;
     status = save_star(s, removed);
     for (int k = 0; k < s->neighbourhood.count && status == QMAT_OK; k++)
@@ -187,9 +171,9 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
   qmat_status status = QMAT_OK;
   if (s->refusal == QMAT_REFUSED_BY_MIDPOINT) return status;
-  if (s->fitted_errors[edge] <= test_ratio * s->threshold) status = try_neighbourhood(s, edge, true, result);
+  if (s->fitted_errors[edge] <= qmat_test_ratio * s->threshold) status = try_neighbourhood(s, edge, true, result);
   if (status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED &&
-      s->fitted_errors[edge] <= neighbourhood_ratio * s->threshold)
+      s->fitted_errors[edge] <= qmat_neighbourhood_ratio * s->threshold)
     status = try_neighbourhood(s, edge, false, result);
   return status;
 }

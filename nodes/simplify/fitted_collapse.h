@@ -4,9 +4,6 @@
 
 #include "nodes/simplify/collapse_test.h"
 
-/* The largest number of constraint points in the fit of one sphere. */
-enum { QMAT_FITTED_POINTS = 256 };
-
 /* Tries the newest preview, of `edge`, with a sphere that is fitted to the surface from the best candidate, then with
  * the candidates themselves where their error is small. `sphere` is the one that `*result` allows. QMAT_ERROR_MEMORY.
  */

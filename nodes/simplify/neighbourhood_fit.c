@@ -6,7 +6,7 @@
 
 #include "core/geometry/vector.h"
 
-enum { MOST_TARGETS = 512, VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
+enum { VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 
 /* A slab or loose cone of the neighbourhood, prepared with the spheres of the newest step, and a ball around it. */
 typedef struct qmat_fit_primitive {
@@ -115,7 +115,7 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
       status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
   size_t slots = tracker->slot_counts[collapse->removed], at = 0;
   for (int i = 0; i < fit->count; i++) slots += tracker->slot_counts[fit->vertices[i]];
-  const size_t stride = (slots + MOST_TARGETS - 1) / MOST_TARGETS;
+  const size_t stride = (slots + QMAT_FITTED_TARGETS - 1) / QMAT_FITTED_TARGETS;
   for (int i = -1; i < fit->count && status == QMAT_OK; i++)
     for (uint32_t slot = qmat_surface_to_envelope_first(tracker, i < 0 ? collapse->removed : fit->vertices[i]);
          slot != QMAT_NONE && status == QMAT_OK; slot = tracker->next[slot], at++) {

@@ -3,8 +3,7 @@
 #define QMAT_NODES_SIMPLIFY_NEIGHBOURHOOD_FIT_H
 
 #include "nodes/measure/surface_to_envelope.h"
-
-enum { QMAT_NEIGHBOURHOOD_SPHERES = 12 };
+#include "nodes/simplify/thresholds.h"
 
 /* The condition of a target: near the envelope, inside it, or not deeper in it than a limit. */
 typedef enum { QMAT_TARGET_SURFACE, QMAT_TARGET_INSIDE, QMAT_TARGET_BORDER } qmat_target_kind;

@@ -7,12 +7,6 @@
 
 #include "core/geometry/medial_build.h"
 
-/* The largest number of vertices of a piece. A piece whose vertices coincide may be larger. */
-enum { MOST_PIECE_VERTICES = 1 << 14 };
-
-/* The share of the vertices of a piece that remains. */
-static const double kept_share = 0.25;
-
 static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex) {
   for (size_t v = 0; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
     if (complex->spheres[4 * v + 3] == 0) return true;
@@ -20,9 +14,9 @@ static bool has_features(const qmat_decimation_rules *rules, const qmat_complex 
 }
 
 bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex) {
-  return complex->vertex_count > MOST_PIECE_VERTICES && rules->on_exceed == QMAT_EXCEED_SKIP &&
+  return complex->vertex_count > QMAT_MOST_PIECE_VERTICES && rules->on_exceed == QMAT_EXCEED_SKIP &&
          rules->cost == QMAT_COST_SLAB && !rules->published && rules->protect == QMAT_PROTECT_OFF &&
-         (double)rules->vertices <= kept_share * (double)complex->vertex_count && !has_features(rules, complex);
+         (double)rules->vertices <= qmat_piece_share * (double)complex->vertex_count && !has_features(rules, complex);
 }
 
 /* Row numbers sorted by piece: those of piece p are items[starts[p]] to items[starts[p + 1] - 1]. Rows with vertices of
@@ -91,7 +85,8 @@ static size_t halve(const double *spheres, uint32_t *vertices, size_t count, uin
 
 /* Divides `count` vertices into pieces by repeated halving, and numbers the pieces. */
 static void divide_vertices(partition *d, uint32_t *vertices, size_t count, uint32_t *scratch) {
-  const size_t lower = count > MOST_PIECE_VERTICES ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
+  const size_t lower =
+      count > QMAT_MOST_PIECE_VERTICES ? halve(d->whole->complex.spheres, vertices, count, scratch) : 0;
   if (lower > 0 && lower < count) {
     divide_vertices(d, vertices, lower, scratch);
     divide_vertices(d, &vertices[lower], count - lower, scratch);
@@ -220,7 +215,7 @@ static qmat_status start_piece(qmat_context *context, const partition *d, size_t
   }
   own->locked = locked;
   own->rules.refits = 0;
-  own->rules.vertices = (size_t)ceil(kept_share * (double)count);
+  own->rules.vertices = (size_t)ceil(qmat_piece_share * (double)count);
   qmat_status status = qmat_complex_init(context, &own->complex, &medial, spheres);
   if (status == QMAT_OK) status = take_points(context, d, piece, constraints);
   return status == QMAT_OK ? qmat_decimation_init(own, constraints, depths) : status;

@@ -10,18 +10,6 @@
 #include "nodes/simplify/partitioned_collapse.h"
 #include "nodes/simplify/topology_mending.h"
 
-/* Constraint points are held to 0.975 epsilon; the margin covers the surface between them. Where that is not enough,
- * the round is repeated with constraint points at the places found, in at most 8 rounds. Uncovered interior is filled
- * by extra spheres; filling one cavity can expose another: at most 6 passes. */
-enum { MOST_ROUNDS = 8, MOST_JOINT_REFITS = 3, MOST_FILLINGS = 6 };
-
-/* The dense collapse uses only the first share of the error and is done once for all rounds, so that points found later
- * still fit. Points inside the solid must be as deep in the envelope as the second share of epsilon. */
-static const double dense_share = 0.9, required_depth_share = 0.05;
-
-/* The fault of wrong Betti numbers as a share of epsilon. */
-static const double topology_fault = 0.05;
-
 /* ---- constraint points found on the way ---- */
 
 /* Appends `added` points. */
@@ -51,7 +39,7 @@ static qmat_status constrain_found_points(const qmat_simplification *s, const qm
 }
 
 static qmat_extra_points no_extra_points(const qmat_simplification *s) {
-  return (qmat_extra_points){.required_depth = required_depth_share * s->params.epsilon};
+  return (qmat_extra_points){.required_depth = qmat_required_depth_share * s->params.epsilon};
 }
 
 /* Whether the initial medial mesh is within epsilon at all constraint points. If not, no round can repair it. */
@@ -93,7 +81,7 @@ static qmat_status fill_cavities(const qmat_simplification *s, const qmat_medial
   qmat_status status = QMAT_OK;
   *left = *found;
   *filled = 0;
-  for (int i = 0; i < MOST_FILLINGS && left->uncovered_count > 0 && status == QMAT_OK; i++) {
+  for (int i = 0; i < QMAT_MOST_FILLINGS && left->uncovered_count > 0 && status == QMAT_OK; i++) {
     size_t added;
     status = qmat_cavities_fill(s->context, s->surface, left->uncovered, left->uncovered_count, epsilon, unit, &added);
     if (status != QMAT_OK || added == 0) break;
@@ -133,14 +121,14 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
   }
   bool right = true;
   if (status == QMAT_OK) status = judge_topology(s, a->medial, &right);
-  if (!right) a->fault += topology_fault * epsilon;
+  if (!right) a->fault += qmat_topology_fault * epsilon;
   return status;
 }
 
 /* ---- the passes ---- */
 
-/* Collapses the dense initial medial mesh as far as `dense_share` of the error allows: in pieces on all threads, where
- * it is large, then as a whole. */
+/* Collapses the dense initial medial mesh as far as `qmat_dense_share` of the error allows: in pieces on all threads,
+ * where it is large, then as a whole. */
 static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   qmat_decimation_uninit(dense);
@@ -152,7 +140,7 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
                                          QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
-  dense->rules.share = dense_share;
+  dense->rules.share = qmat_dense_share;
   dense->rules.refits = 0;
   if (status == QMAT_OK)
     status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex)
@@ -210,7 +198,7 @@ static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_error
   qmat_status status = QMAT_OK;
   if (best->figures.filled > 0) status = append_inner(s->context, found->uncovered, found->uncovered_count, &extra);
   bool ended = false;
-  for (int i = 0; i < MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
+  for (int i = 0; i < QMAT_MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
     qmat_simplified a = {.figures = best->figures, .fault = INFINITY};
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     s->newest = base;
@@ -238,7 +226,7 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
   for (size_t round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
-    const bool is_within = starts_within(s), is_last = round == MOST_ROUNDS || !is_within;
+    const bool is_within = starts_within(s), is_last = round == QMAT_MOST_ROUNDS || !is_within;
     status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);

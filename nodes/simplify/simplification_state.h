@@ -6,10 +6,7 @@
 #include "nodes/measure/topology.h"
 #include "nodes/simplify/simplify_report.h"
 #include "nodes/simplify/simplify_setup.h"
-
-/* The reported surface-to-envelope error exceeds the true one by at most the first share of epsilon, but is never below
- * the second. The envelope-to-surface error is a bound, refined only where it exceeds epsilon. */
-static const double qmat_error_tolerance = 0.01, qmat_least_reported = 0.5;
+#include "nodes/simplify/thresholds.h"
 
 /* What all passes of medial.simplify work on, with on_exceed=skip. */
 typedef struct qmat_simplification {

@@ -14,10 +14,6 @@ const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
 const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
-/* Collapses in order do not depend on epsilon: their constraint points are made for this multiple of the finest
- * threshold. */
-static const double constraint_error = 2;
-
 /* The exact depth at the centre of a medial sphere. Most spheres are inscribed: a query within the radius finds it. */
 static double depth_of(const qmat_surface *surface, const double *sphere) {
   double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
@@ -39,8 +35,7 @@ static qmat_status measure_depths(qmat_context *context, const qmat_surface *sur
   return QMAT_OK;
 }
 
-/* The constants and rules of the public Q-MAT code. */
-static void apply_compatibility(qmat_simplify_params *p) {
+void qmat_simplify_apply_compatibility(qmat_simplify_params *p) {
   if (p->compat != QMAT_COMPAT_QMAT) return;
   p->cost = QMAT_COST_SLAB;
   p->k = 1e-5;
@@ -112,30 +107,4 @@ qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const q
 
 bool qmat_simplify_in_order(const qmat_simplify_params *params) {
   return params->on_exceed != QMAT_EXCEED_SKIP || params->compat != QMAT_COMPAT_OFF;
-}
-
-qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplify_params *params,
-                                       const qmat_value *const inputs[], qmat_ordered_collapses *o) {
-  const qmat_samples *samples = (const qmat_samples *)inputs[2];
-  const qmat_medial *medial = (const qmat_medial *)inputs[3];
-  *o = (qmat_ordered_collapses){.params = *params};
-  apply_compatibility(&o->params);
-  qmat_decimation *run = &o->decimation;
-  qmat_status status = qmat_simplify_prepare(context, &o->params, inputs, &o->surface, &o->initial);
-  if (status != QMAT_OK) return status;
-  run->context = context;
-  run->surface = o->surface;
-  run->rules = qmat_simplify_rules(&o->params, &o->initial);
-  status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
-  if (status == QMAT_OK)
-    status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,
-                                         constraint_error * o->params.finest, QMAT_MOST_CONSTRAINT_POINTS,
-                                         run->rules.error == QMAT_ERROR_TWO_SIDED, &o->constraints);
-  if (status == QMAT_OK) status = qmat_decimation_init(run, &o->constraints, o->initial.depths);
-  return status == QMAT_OK ? qmat_decimation_run(run) : status;
-}
-
-void qmat_ordered_collapses_uninit(qmat_ordered_collapses *o) {
-  qmat_decimation_uninit(&o->decimation);
-  qmat_surface_free(o->surface);
 }

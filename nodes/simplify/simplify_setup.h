@@ -87,22 +87,10 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
 /* The rules for the parameters. */
 qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *params, const qmat_initial_medial *initial);
 
+/* Sets what `compat` sets. */
+void qmat_simplify_apply_compatibility(qmat_simplify_params *params);
+
 /* Whether the parameters select collapses that do not depend on epsilon. */
 bool qmat_simplify_in_order(const qmat_simplify_params *params);
-
-/* Collapses that do not depend on epsilon, and their result. */
-typedef struct qmat_ordered_collapses {
-  qmat_simplify_params params; /* with what compat sets */
-  qmat_surface *surface;
-  qmat_initial_medial initial;
-  qmat_constraint_points constraints;
-  qmat_decimation decimation;
-} qmat_ordered_collapses;
-
-/* Does these collapses. Inputs and statuses are those of qmat_simplify_prepare. Free with
- * qmat_ordered_collapses_uninit, also after a failure. */
-qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplify_params *params,
-                                       const qmat_value *const inputs[], qmat_ordered_collapses *collapses);
-void qmat_ordered_collapses_uninit(qmat_ordered_collapses *collapses);
 
 #endif

@@ -6,9 +6,6 @@
 
 #include "nodes/measure/envelope_to_surface.h"
 
-/* The limit of walls tried per void. */
-enum { MOST_WALLS = 12 };
-
 /* Removes a triangle, not its edges; the order of the others stays. */
 static void remove_triangle(qmat_medial *medial, size_t triangle) {
   uint32_t *row = &medial->triangles[3 * triangle];
@@ -28,7 +25,7 @@ static qmat_status open_void(const qmat_simplification *s, qmat_medial *unit, bo
   size_t count;
   *opened = false;
   qmat_status status = qmat_topology_find_walls(s->context, unit, &walls, &count);
-  for (size_t i = 0; i < count && i < MOST_WALLS && status == QMAT_OK && !*opened; i++) {
+  for (size_t i = 0; i < count && i < QMAT_MOST_WALLS && status == QMAT_OK && !*opened; i++) {
     uint32_t corners[3];
     memcpy(corners, &unit->triangles[3 * (size_t)walls[i]], sizeof corners);
     qmat_medial_errors errors = {.surface_to_envelope = 0};

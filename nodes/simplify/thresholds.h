@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_THRESHOLDS_H
+#define QMAT_NODES_SIMPLIFY_THRESHOLDS_H
+
+/* The thresholds of medial.simplify, in one table. "Derived" ones follow from another number; the others were measured
+ * on the models of the ablation table (README.md). Steps within a solver are constants of its file. */
+
+/* ---- shares of epsilon ---- */
+
+/* The reported surface-to-envelope error exceeds the true one by at most the first share, but is never below the
+ * second: the maximum over a plateau of small errors takes too many queries. */
+static const double qmat_error_tolerance = 0.01, qmat_least_reported = 0.5;
+
+/* The dense collapse uses this share of the error; the rest is for the constraint points that are found later. */
+static const double qmat_dense_share = 0.9;
+
+/* Found points inside the solid must be as deep in the envelope as this share. */
+static const double qmat_required_depth_share = 0.05;
+
+/* The fault of wrong Betti numbers: a result with the right ones may be worse by this share. */
+static const double qmat_topology_fault = 0.05;
+
+/* ---- repetitions: none was reached on a model that ended within epsilon ---- */
+
+enum {
+  QMAT_MOST_ROUNDS = 8,       /* of collapses, each with the points found in the one before */
+  QMAT_MOST_JOINT_REFITS = 3, /* the same for joint refits */
+  QMAT_MOST_FILLINGS = 6,     /* of cavities: filling one can expose another */
+  QMAT_MOST_WALLS = 12,       /* tried per void */
+  QMAT_MOST_FITS = 6          /* of a neighbourhood, each with the newest failure as a target */
+};
+
+/* ---- points of a fit: the tests use all of them, so that a fit may use fewer ---- */
+
+enum {
+  QMAT_FITTED_POINTS = 256,       /* of one sphere */
+  QMAT_FINAL_REFIT_POINTS = 1024, /* of one sphere, where the error itself counts */
+  QMAT_FITTED_TARGETS = 512,      /* of a neighbourhood */
+  QMAT_NEIGHBOURHOOD_SPHERES = 12 /* 48 unknowns: a solve costs about as much as a pass over the targets */
+};
+
+/* ---- multiples of the threshold at which a fit goes on ---- */
+
+/* A fitted sphere is tested up to the first multiple: the fit knows only part of the points. An edge whose fit is worse
+ * than the second is tried again only when a sphere nearby disappears, not when one moves. */
+static const double qmat_test_ratio = 1.1, qmat_retry_ratio = 2;
+
+/* A neighbourhood is fitted up to the first multiple, of the fit of the single sphere, and tested up to the second. */
+static const double qmat_neighbourhood_ratio = 1.3, qmat_placement_ratio = 1.02;
+
+/* In joint refits the spheres have been fitted before: a single fit gives up at this multiple. */
+static const double qmat_early_exit_share = 0.6;
+
+/* The margin of a refused point that becomes a target; derived from qmat_placement_ratio. */
+static const double qmat_target_margin = 0.02;
+
+/* A move of a sphere has to lower its error by at least this share of the error. */
+static const double qmat_least_gain = 0.02;
+
+/* ---- sizes ---- */
+
+/* The largest number of vertices of a piece of the dense medial mesh, and the share that remains. A
+ * piece whose vertices coincide may be larger. */
+enum { QMAT_MOST_PIECE_VERTICES = 1 << 14 };
+static const double qmat_piece_share = 0.25;
+
+/* Thresholds that rise double every so many levels: steps of 6 %. */
+enum { QMAT_LEVELS_TO_A_DOUBLING = 12 };
+
+/* Collapses in order do not depend on epsilon: their constraint points are made for this multiple of the finest
+ * threshold. */
+static const double qmat_constraint_error = 2;
+
+#endif
