@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/frame.h"
+
 size_t qmat_param_count(const qmat_node *node) {
   size_t count = 0;
   while (node->params && node->params[count].name) count++;
@@ -119,6 +121,19 @@ static bool float_in_range(const qmat_param *param, double value) {
   return isfinite(value) && value >= param->min && value <= param->max;
 }
 
+/* Whether the parameter is a length in metres, which is stored negated. */
+static bool is_in_meters(const qmat_param *param, double value) {
+  return (param->flags & QMAT_PARAM_RELATIVE) && value < 0 && isfinite(value);
+}
+
+static bool has_meters(const qmat_node *node, const void *params) {
+  for (size_t i = 0; i < qmat_param_count(node); i++) {
+    const qmat_param *param = &node->params[i];
+    if (param->type == QMAT_PARAM_FLOAT && is_in_meters(param, *(const double *)const_slot(param, params))) return true;
+  }
+  return false;
+}
+
 static qmat_status parse_bool(qmat_context *context, const qmat_param *param, const char *text, bool *value) {
   static const char *const words[] = {"false", "true", "no", "yes", "off", "on"};
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
@@ -146,11 +161,18 @@ static qmat_status parse_int(qmat_context *context, const qmat_param *param, con
 
 static qmat_status parse_float(qmat_context *context, const qmat_param *param, const char *text, double *value) {
   double number;
+  const bool is_length = param->flags & QMAT_PARAM_RELATIVE;
+  if (is_length && qmat_parse_length(text, &number)) {
+    if (!(number >= 0) || !isfinite(number)) return fail_range(context, param, text);
+    *value = 0 - number;
+    return QMAT_OK;
+  }
   if (!qmat_parse_number(text, &number)) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a number, not '%s'", param->name, text);
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a number%s, not '%s'", param->name,
+              is_length ? ", a percentage, or a length in mm, cm, m, in or ft" : "", text);
     return qmat_fail_field(context, param->name);
   }
-  if (!(param->flags & QMAT_PARAM_RELATIVE) && strchr(text, '%') != NULL) {
+  if (!is_length && strchr(text, '%') != NULL) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%s must be a plain number, not the percentage %s", param->name, text);
     return qmat_fail_field(context, param->name);
   }
@@ -220,7 +242,8 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
     char text[40];
     bool in_range = true;
     if (param->type == QMAT_PARAM_INT) in_range = int_in_range(param, *(const int64_t *)place);
-    if (param->type == QMAT_PARAM_FLOAT) in_range = float_in_range(param, *(const double *)place);
+    if (param->type == QMAT_PARAM_FLOAT)
+      in_range = is_in_meters(param, *(const double *)place) || float_in_range(param, *(const double *)place);
     if (!in_range) {
       qmat_param_format(param, params, text, sizeof text);
       return fail_range(context, param, text);
@@ -238,7 +261,55 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
       return qmat_fail_field(context, param->name);
     }
   }
-  return node->check != NULL ? node->check(context, params) : QMAT_OK;
+  return node->check != NULL && !has_meters(node, params) ? node->check(context, params) : QMAT_OK;
+}
+
+/* The diagonal of the first input that is a mesh or a chain, in metres; 0: not known. */
+static qmat_status find_diagonal(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[],
+                                 double *meters) {
+  *meters = 0;
+  for (size_t i = 0; i < qmat_input_count(node); i++) {
+    if (!inputs[i]) continue;
+    if (inputs[i]->type == QMAT_CHAIN) {
+      *meters = ((const qmat_chain *)inputs[i])->meters_per_diagonal;
+      return QMAT_OK;
+    }
+    if (inputs[i]->type != QMAT_MESH) continue;
+    qmat_frame frame;
+    const qmat_status status = qmat_frame_of_mesh(context, (const qmat_mesh *)inputs[i], &frame);
+    if (status == QMAT_OK) *meters = frame.diagonal * ((const qmat_mesh *)inputs[i])->meters_per_unit;
+    return status;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status fail_unit(qmat_context *context, const qmat_param *param, const char *text) {
+  qmat_fail(context, QMAT_ERROR_USAGE, "%s is %s, but the model has no unit of length", param->name, text);
+  qmat_fail_hint(context, "type a share of the diagonal, such as 1%%, or state the file's unit: --set model.unit=mm");
+  return qmat_fail_field(context, param->name);
+}
+
+/* Makes the lengths in metres of `params`, a copy, shares of the diagonal. */
+static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[],
+                                   void *params) {
+  double diagonal;
+  const qmat_status status = find_diagonal(context, node, inputs, &diagonal);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < qmat_param_count(node); i++) {
+    const qmat_param *param = &node->params[i];
+    double *value = slot(param, params);
+    if (param->type != QMAT_PARAM_FLOAT || !is_in_meters(param, *value)) continue;
+    char text[64];
+    qmat_param_format(param, params, text, sizeof text);
+    if (!(diagonal > 0)) return fail_unit(context, param, text);
+    *value = -*value / diagonal;
+    if (float_in_range(param, *value)) continue;
+    char length[48], given[128];
+    qmat_format_length(diagonal, length);
+    snprintf(given, sizeof given, "%s of a diagonal of %s", text, length);
+    return fail_range(context, param, given);
+  }
+  return node->check ? node->check(context, params) : QMAT_OK;
 }
 
 static bool fits(const qmat_port *port, const qmat_value *value) {
@@ -284,6 +355,19 @@ static qmat_status check_outputs(qmat_context *context, const qmat_node *node, q
   return QMAT_OK;
 }
 
+/* Runs the node with shares for its lengths. */
+static qmat_status run_resolved(qmat_context *context, const qmat_node *node, const void *params,
+                                const qmat_value *const inputs[], qmat_value *outputs[]) {
+  if (!has_meters(node, params)) return node->run(context, params, inputs, outputs);
+  void *own = qmat_alloc(1, node->params_size);
+  if (!own) return qmat_fail_memory(context, "parameters");
+  memcpy(own, params, node->params_size);
+  qmat_status status = resolve_lengths(context, node, inputs, own);
+  if (status == QMAT_OK) status = node->run(context, own, inputs, outputs);
+  qmat_free(own);
+  return status;
+}
+
 qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
                           const qmat_value *const inputs[], qmat_value *outputs[]) {
   const char *outer = context->node_type;
@@ -294,7 +378,7 @@ qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const vo
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "");
   if (status == QMAT_OK) {
     context->error.status = QMAT_OK;
-    status = node->run(context, params, inputs, outputs);
+    status = run_resolved(context, node, params, inputs, outputs);
     if (status == QMAT_OK) {
       status = check_outputs(context, node, outputs);
     } else if (context->error.status != status) {
@@ -321,9 +405,12 @@ void qmat_param_format(const qmat_param *param, const void *params, char *text, 
     case QMAT_PARAM_INT:
       snprintf(text, size, "%lld", (long long)*(const int64_t *)place);
       break;
-    case QMAT_PARAM_FLOAT:
-      qmat_format_number(*(const double *)place, text, size);
+    case QMAT_PARAM_FLOAT: {
+      const double value = *(const double *)place;
+      qmat_format_number(is_in_meters(param, value) ? -value : value, text, size);
+      if (is_in_meters(param, value)) snprintf(text + strlen(text), size - strlen(text), "m");
       break;
+    }
     case QMAT_PARAM_ENUM: {
       const int choice = *(const int *)place;
       if (choice >= 0 && (size_t)choice < choice_count(param)) snprintf(text, size, "%s", param->choices[choice]);

@@ -22,7 +22,8 @@ typedef enum qmat_param_type {
 
 enum {
   QMAT_PARAM_REQUIRED = 1,      /* a string or path without a default */
-  QMAT_PARAM_RELATIVE = 2,      /* a fraction of the bounding-box diagonal; "1%" is read as 0.01 */
+  QMAT_PARAM_RELATIVE = 2,      /* a length: a fraction of the bounding-box diagonal, "1%" is read as 0.01; or "5mm",
+                                   which is stored as minus its metres until qmat_node_run makes it a fraction */
   QMAT_PARAM_OUTPUT_FORMAT = 4, /* an enum that is set by the extension of an output path */
   QMAT_PARAM_INPUT_FILE = 8     /* a file that the node reads */
 };
@@ -41,8 +42,9 @@ typedef struct qmat_param {
 } qmat_param;
 
 /* Rows of a parameter table. `params` is the node's parameter struct; `field` is its member and the parameter's name. A
- * length is a share of the diagonal of the model's bounding box, which may be written "1%". The default of QMAT_BOOL is
- * no. Rows with other flags are written out. */
+ * length is a share of the diagonal of the model's bounding box, which may be written "1%", or a length with a unit
+ * ("5mm") where the model has one. A node's `run` always gets the share. The default of QMAT_BOOL is no. Rows with
+ * other flags are written out. */
 #define QMAT_NUMBER(params, field, kind, unit_text, value, least, most, text, set)                                    \
   {                                                                                                                   \
     .name = #field, .unit = unit_text, .doc = text, .type = kind, .default_number = value, .min = least, .max = most, \
@@ -76,6 +78,7 @@ typedef struct qmat_port {
 typedef enum qmat_summary_kind {
   QMAT_SUMMARY_SUM,   /* a count: the sum */
   QMAT_SUMMARY_BOUND, /* an upper bound, as a fraction: the largest */
+  QMAT_SUMMARY_SIZE,  /* an upper bound that may be missing: the largest; left out unless every report has it */
   QMAT_SUMMARY_ALL,   /* a flag: whether all are true; left out unless every report has it */
   QMAT_SUMMARY_ANY,   /* a flag: left out unless it is true in one of them */
   QMAT_SUMMARY_INPUT  /* not in the report: the count of that name (qmat_value_count_rows) of the node's first input
@@ -118,7 +121,8 @@ typedef struct qmat_node {
   const qmat_port *outputs;                  /* ended by a row without a name */
   const qmat_library *const *libraries;      /* ended by NULL; NULL: none */
   const qmat_report_summary *report_summary; /* of its first report output; NULL: not part of a run's summary */
-  /* Checks rules between parameters; NULL: none. Fails with qmat_fail and qmat_fail_field. */
+  /* Checks rules between parameters; NULL: none. Fails with qmat_fail and qmat_fail_field. Lengths with a unit are
+   * shares by then, so that the check waits for the node's inputs. */
   qmat_status (*check)(qmat_context *context, const void *params);
   /* Checks the lengths of the lists at inputs that take lists as a whole; NULL: none. `counts` has one number per
    * input, 0 for an unconnected one. Fails like `check`. Called by qmat_node_run, and by the runner as soon as the
@@ -148,12 +152,13 @@ void qmat_params_default(const qmat_node *node, void *params);
 qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
                              void *params);
 
-/* Runs a node whose parameters have been checked. `inputs` and `outputs` hold one pointer per port. Both are checked
- * against the descriptor. An input that is missing, not sealed or of another type, or a list of a wrong length, is
- * QMAT_ERROR_USAGE; the error names the port and the node does not run. An output that is missing, not sealed or of
- * another type is QMAT_ERROR_INTERNAL. On failure every output is NULL and an error is recorded; on success the caller
- * releases the outputs. Reports progress 0 of 0 before the node starts, so a run can be cancelled between nodes. Frees
- * the context's scratch memory. */
+/* Runs a node whose parameters have been checked. Lengths with a unit become shares of the diagonal of the first input
+ * that is a mesh or a chain; where that has no unit, QMAT_ERROR_USAGE. `inputs` and `outputs` hold one pointer per
+ * port. Both are checked against the descriptor. An input that is missing, not sealed or of another type, or a list of
+ * a wrong length, is QMAT_ERROR_USAGE; the error names the port and the node does not run. An output that is missing,
+ * not sealed or of another type is QMAT_ERROR_INTERNAL. On failure every output is NULL and an error is recorded; on
+ * success the caller releases the outputs. Reports progress 0 of 0 before the node starts, so a run can be cancelled
+ * between nodes. Frees the context's scratch memory. */
 qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
                           const qmat_value *const inputs[], qmat_value *outputs[]);
 

@@ -112,6 +112,27 @@ bool qmat_parse_number(const char *text, double *number) {
   return true;
 }
 
+bool qmat_parse_length(const char *text, double *meters) {
+  /* Dividing by a power of ten rounds once: 5mm and 0.5cm are the same number. */
+  static const struct {
+    const char *name;
+    double factor, divisor;
+  } units[] = {{"mm", 1, 1000}, {"cm", 1, 100}, {"in", 0.0254, 1}, {"ft", 0.3048, 1}, {"m", 1, 1}};
+  const size_t length = strlen(text);
+  for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+    const size_t unit = strlen(units[i].name), digits = length - unit;
+    char number_text[64];
+    double number;
+    if (length <= unit || digits >= sizeof number_text || strcmp(text + digits, units[i].name) != 0) continue;
+    memcpy(number_text, text, digits);
+    number_text[digits] = '\0';
+    if (strchr(number_text, '%') || !qmat_parse_number(number_text, &number)) return false;
+    *meters = number * units[i].factor / units[i].divisor;
+    return true;
+  }
+  return false;
+}
+
 void qmat_format_number(double number, char *text, size_t size) {
   if (size == 0) return;
   text[0] = '\0';
@@ -171,6 +192,22 @@ void qmat_format_bound(double fraction, char *text) {
   char number[40];
   qmat_format_number(ceil(percent * scale * (1 - 1e-12)) / scale, number, sizeof number);
   snprintf(text, 48, "%s %%", number);
+}
+
+void qmat_format_length(double meters, char *text) {
+  static const struct {
+    const char *unit;
+    double scale, below;
+  } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, INFINITY}};
+  size_t i = 0;
+  while (meters >= units[i].below) i++;
+  const double value = meters * units[i].scale;
+  char number[40] = "0";
+  if (value > 0) {
+    const double digits = floor(1 - floor(log10(value))), scale = pow(10, digits > 0 ? digits : 0);
+    qmat_format_number(ceil(value * scale * (1 - 1e-12)) / scale, number, sizeof number);
+  }
+  snprintf(text, 48, "%s %s", number, units[i].unit);
 }
 
 static size_t smaller(size_t a, size_t b) {

@@ -29,6 +29,9 @@ bool qmat_is_part_name(const char *name);
  * 0.001. Blanks, hexadecimal digits, infinities and NaN are rejected. On false, `*number` is unchanged. */
 bool qmat_parse_number(const char *text, double *number);
 
+/* Parses a decimal number with a unit of length: mm, cm, m, in or ft. `*meters` is unchanged on false. */
+bool qmat_parse_length(const char *text, double *meters);
+
 /* Writes the shortest decimal text that parses back to the same double. 32 bytes are enough; the text is always
  * terminated when size > 0. */
 void qmat_format_number(double number, char *text, size_t size);
@@ -39,6 +42,9 @@ void qmat_format_count(uint64_t count, char *text);
 void qmat_format_bytes(uint64_t bytes, char *text);
 /* An upper bound as a percentage with two digits, rounded up: 0.00977 as "0.98 %". `text` holds at least 48 bytes. */
 void qmat_format_bound(double fraction, char *text);
+
+/* A length as "4.9 mm", "12 cm" or "3.1 m", with two digits, rounded up. `text` holds at least 48 bytes. */
+void qmat_format_length(double meters, char *text);
 
 /* The name nearest to `text` by edit distance among `count` names, or NULL when none is near. */
 const char *qmat_nearest_name(const char *text, const char *const *names, size_t count);

@@ -145,7 +145,7 @@ void qmat_param_describe(const qmat_node *type, const qmat_param *param, const v
     if (is_bound(param, param->max)) put(&writer, is_bound(param, param->min) ? " to %s" : " of at most %s", max);
   }
   if (param->unit && *param->unit && strcmp(param->unit, "1") != 0) put(&writer, " (%s)", param->unit);
-  if (param->flags & QMAT_PARAM_RELATIVE) put(&writer, ", \"1%%\" is 0.01");
+  if (param->flags & QMAT_PARAM_RELATIVE) put(&writer, ", \"1%%\" is 0.01; or a length, \"5mm\"");
   if (param->flags & QMAT_PARAM_REQUIRED) {
     put(&writer, ", required");
     return;

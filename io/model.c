@@ -163,13 +163,21 @@ static qmat_scene *make_scene(const char *path, qmat_format format) {
   return NULL;
 }
 
-/* Sets the unit of length and the up axis that the reader reported. */
-static void set_units(qmat_scene *scene, qmat_format format, const json_t *report) {
-  if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) scene->meters_per_unit = 1;
-  if (format != QMAT_FORMAT_USD) return;
+static double unit_of_usd(const json_t *report) {
   const double unit = json_real_value(json_object_get(report, "meters_per_unit"));
+  return unit > 0 ? unit : 0;
+}
+
+static bool states_unit(qmat_format format) {
+  return format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_USD;
+}
+
+/* Sets the unit of length and the up axis that the reader reported; `given` is the unit of a file that states none. */
+static void set_units(qmat_scene *scene, qmat_format format, const json_t *report, double given) {
+  scene->meters_per_unit = states_unit(format) ? 1 : given;
+  if (format != QMAT_FORMAT_USD) return;
   const char *up = json_string_value(json_object_get(report, "up_axis"));
-  scene->meters_per_unit = unit > 0 ? unit : 0;
+  scene->meters_per_unit = unit_of_usd(report);
   scene->is_z_up = up && up[0] == 'Z';
 }
 
@@ -178,6 +186,7 @@ static qmat_status read_whole(qmat_context *context, qmat_format format, const c
   qmat_soup soup = {0};
   qmat_mesh *made = NULL;
   qmat_status status = read_surface(context, format, path, bytes, &soup, report);
+  if (format == QMAT_FORMAT_USD) soup.meters_per_unit = unit_of_usd(report);
   if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made, report);
   qmat_soup_uninit(&soup);
   *mesh = made ? &made->base : NULL;
@@ -343,7 +352,11 @@ qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, cons
     status = qmat_fail_memory(context, "the report");
     goto done;
   }
-  if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) {
+  if (options->meters_per_unit > 0 && states_unit(format)) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%s states its unit of length itself", formats[format].title);
+    qmat_fail_at(context, path, 0, 0);
+    status = qmat_fail_field(context, "unit");
+  } else if (format == QMAT_FORMAT_GLTF || format == QMAT_FORMAT_GLB) {
     status = read_gltf(context, format, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
   } else if (format == QMAT_FORMAT_USD) {
     status = read_usd(context, path, &bytes, options, choice, made_scene, &made_mesh, made_report->root);
@@ -355,7 +368,7 @@ qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, cons
   } else {
     status = read_whole(context, format, path, &bytes, options, &made_mesh, made_report->root);
   }
-  if (status == QMAT_OK) set_units(made_scene, format, made_report->root);
+  if (status == QMAT_OK) set_units(made_scene, format, made_report->root, options->meters_per_unit);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_scene->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &made_report->base);
 

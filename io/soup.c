@@ -168,6 +168,7 @@ typedef struct conversion {
   const qmat_soup *soup;
   const char *path;
   bool drops_defects;
+  double unit_of_file; /* where the soup has none */
   qmat_arena arena;    /* separate, so that scratch memory is freed before the mesh is oriented */
   uint8_t *dropped;    /* per facet */
   uint32_t *welded;    /* per vertex: the first vertex at the same position */
@@ -447,6 +448,7 @@ static qmat_status fill_mesh(conversion *c, qmat_mesh *mesh) {
     for (size_t k = 0; k < 3; k++) mesh->positions[3 * (size_t)numbers[v] + k] = soup->positions[3 * v + k] + 0.0;
   }
   for (size_t i = 0; i < 3 * c->triangle_count; i++) c->triangles[i] = numbers[c->triangles[i]];
+  mesh->meters_per_unit = soup->meters_per_unit > 0 ? soup->meters_per_unit : c->unit_of_file;
   mesh->vertex_count = used;
   mesh->triangles = c->triangles;
   mesh->triangle_count = c->triangle_count;
@@ -489,8 +491,11 @@ static qmat_status fill_report(conversion *c, const qmat_mesh *mesh, const qmat_
 
 qmat_status qmat_soup_to_mesh(qmat_context *context, const qmat_soup *soup, const char *path,
                               const qmat_read_options *options, qmat_mesh **mesh, json_t *report) {
-  conversion c = {
-      .context = context, .soup = soup, .path = path, .drops_defects = options->defects == QMAT_DEFECTS_DROP};
+  conversion c = {.context = context,
+                  .soup = soup,
+                  .path = path,
+                  .drops_defects = options->defects == QMAT_DEFECTS_DROP,
+                  .unit_of_file = options->meters_per_unit};
   qmat_connectivity facts;
   *mesh = NULL;
   qmat_mesh *made = qmat_mesh_new();

@@ -19,8 +19,9 @@ typedef struct qmat_soup {
   uint32_t *facet_ordinals; /* the number of facet f in the file, from 0 */
   int *facet_lines;         /* its line in the file, from 1; 0: the format has no lines */
   size_t corner_count, corner_capacity;
-  uint32_t *corners; /* corner_count vertex indices */
-  qmat_cage cage;    /* subdivision surfaces, copied into the mesh unchanged */
+  uint32_t *corners;      /* corner_count vertex indices */
+  double meters_per_unit; /* of the mesh; 0: unknown */
+  qmat_cage cage;         /* subdivision surfaces, copied into the mesh unchanged */
   size_t cage_capacities[QMAT_CAGE_ARRAYS];
   double deviation; /* of the facets from the surface that they stand for, copied into the mesh; 0: exact */
 } qmat_soup;
@@ -31,6 +32,7 @@ typedef enum qmat_defects { QMAT_DEFECTS_REFUSE, QMAT_DEFECTS_DROP } qmat_defect
 typedef struct qmat_read_options {
   qmat_defects defects;
   size_t segments; /* sides of the polygons for circles of USD's round solids; 0: 64 */
+  double meters_per_unit; /* of files that state no unit; 0: unknown */
 } qmat_read_options;
 
 /* Reserves room for that many additional elements. Readers check the counts against the file size before the call.

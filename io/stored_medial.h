@@ -11,6 +11,7 @@ typedef enum qmat_certificate { QMAT_CERTIFICATE_UNKNOWN, QMAT_CERTIFICATE_NO, Q
 /* The errors of a medial mesh, in units of the diagonal. NAN: not known. */
 typedef struct qmat_stated_errors {
   double diagonal; /* in model units; 0 or NAN: not known */
+  double meters_per_unit;
   double epsilon;
   double error_out; /* surface to envelope */
   double error_in;  /* envelope to surface */

@@ -32,6 +32,7 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->triangle_count = medial->triangle_count;
   chain->sample_count = o->constraints.sample_count;
   chain->collapse_count = log->count;
+  chain->meters_per_diagonal = qmat_surface_mesh(o->surface)->meters_per_unit * frame->diagonal;
   /* medial.lod compares these errors with epsilon; medial.simplify subtracts the deviation from epsilon instead. */
   for (size_t i = 0; i < log->count; i++) chain->errors[i] += qmat_constraint_share * deviation;
   /* Mapped from the unit frame as in medial.simplify, for the same bytes. */

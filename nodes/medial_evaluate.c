@@ -206,6 +206,12 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
     bad |= json_object_set_new(report->root, lengths[i].key, json_real(lengths[i].value));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
     bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
+  const double meters = mesh->meters_per_unit * lengths[0].value; /* of the diagonal */
+  if (meters > 0) {
+    bad |= json_object_set_new(report->root, "meters_per_unit", json_real(mesh->meters_per_unit));
+    bad |= json_object_set_new(report->root, "surface_to_envelope_meters", json_real(meters * surface_to_envelope));
+    bad |= json_object_set_new(report->root, "envelope_to_surface_meters", json_real(meters * envelope_to_surface));
+  }
   if (e->deviation > 0) bad |= json_object_set_new(report->root, "deviation", json_real(e->deviation));
   if (bad) return qmat_fail_memory(e->context, "the report");
   const qmat_status status = qmat_topology_report(e->context, &e->unit, e->surface, report->root);
@@ -263,7 +269,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 6,
+    .version = 7,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

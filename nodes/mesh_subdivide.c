@@ -45,6 +45,7 @@ typedef struct subdivision {
   group groups[GROUPS];
   size_t surface_count;    /* subdivided ones */
   double source_deviation; /* of surfaces that are not subdivided */
+  double meters_per_unit;
 } subdivision;
 
 /* The mesh of a level, and its distance from the limit surface in diagonals. */
@@ -297,7 +298,7 @@ static qmat_status measure_level(qmat_context *context, const qmat_surface *surf
 static qmat_status make_attempt(const subdivision *s, int level, int depth, attempt *a, json_t *report) {
   qmat_context *context = s->context;
   qmat_limit_level limits[GROUPS] = {0};
-  qmat_soup soup = {0};
+  qmat_soup soup = {.meters_per_unit = s->meters_per_unit};
   qmat_surface *surface = NULL;
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP}; /* scene.read has refused them where it should */
   *a = (attempt){.mesh = NULL};
@@ -433,7 +434,7 @@ static qmat_status subdivide(subdivision *s, const qmat_mesh *mesh, attempt *bes
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
-  subdivision s = {.context = context, .params = params};
+  subdivision s = {.context = context, .params = params, .meters_per_unit = mesh->meters_per_unit};
   attempt best = {.mesh = NULL};
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");

@@ -8,8 +8,11 @@ typedef struct scene_read_params {
   const char *mesh;
   int defects; /* qmat_defects */
   int64_t segments;
+  int unit;
 } scene_read_params;
 
+static const char *const unit_choices[] = {"file", "mm", "cm", "m", "in", "ft", NULL};
+static const double units_in_meters[] = {0, 0.001, 0.01, 1, 0.0254, 0.3048};
 static const char *const defects_choices[] = {"refuse", "drop", NULL};
 
 static const qmat_param params[] = {
@@ -31,6 +34,9 @@ static const qmat_param params[] = {
               "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped and counted"),
     QMAT_INT(scene_read_params, segments, "sides", 64, 8, 1024,
              "Sides of the polygons that stand for the circles of USD's spheres, capsules, cylinders and cones"),
+    QMAT_ENUM(
+        scene_read_params, unit, unit_choices, 0,
+        "The unit of length of an OBJ, OFF, PLY or STL file, for lengths such as epsilon=5mm; file: as it states"),
     {0}};
 
 enum { SCENE, MESH, REPORT };
@@ -51,7 +57,9 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
                        qmat_value *made[]) {
   (void)inputs;
   const scene_read_params *p = raw_params;
-  const qmat_read_options options = {.defects = (qmat_defects)p->defects, .segments = (size_t)p->segments};
+  const qmat_read_options options = {.defects = (qmat_defects)p->defects,
+                                     .segments = (size_t)p->segments,
+                                     .meters_per_unit = units_in_meters[p->unit]};
   qmat_scene *scene;
   qmat_value *mesh;
   qmat_report *report;
@@ -68,7 +76,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 7,
+    .version = 8,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "

@@ -69,6 +69,7 @@ static const qmat_value *given_for(const qmat_value *value, size_t index) {
 static qmat_stated_errors errors_of(const qmat_medial *medial, const qmat_report *report) {
   const double stated = reported(report, "diagonal");
   return (qmat_stated_errors){.diagonal = stated > 0 || !medial ? stated : diagonal_of(medial),
+                              .meters_per_unit = reported(report, "meters_per_unit"),
                               .epsilon = reported(report, "epsilon"),
                               .error_out = reported(report, "surface_to_envelope"),
                               .error_in = reported(report, "envelope_to_surface"),
@@ -168,6 +169,12 @@ static bool put_stated(json_t *report, const qmat_medial *medial, const qmat_sta
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
     if (!isfinite(numbers[i].value)) return done;
     done = json_object_set_new(report, numbers[i].key, json_real(numbers[i].value)) == 0 && done;
+  }
+  const double meters = stated->meters_per_unit * stated->diagonal;
+  if (meters > 0) {
+    done =
+        json_object_set_new(report, "surface_to_envelope_meters", json_real(meters * stated->error_out)) == 0 && done;
+    done = json_object_set_new(report, "envelope_to_surface_meters", json_real(meters * stated->error_in)) == 0 && done;
   }
   if (stated->certified != QMAT_CERTIFICATE_UNKNOWN)
     done =

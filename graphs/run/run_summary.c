@@ -37,6 +37,12 @@ static bool merge_entry(const qmat_summary_entry *entry, const json_t *report, b
       if (!json_is_number(value)) return false;
       json_object_set_new(summary, entry->key, json_real(first ? number : fmax(number, json_real_value(before))));
       return true;
+    case QMAT_SUMMARY_SIZE:
+      if (json_is_number(value) && (first || before))
+        json_object_set_new(summary, entry->key, json_real(first ? number : fmax(number, json_real_value(before))));
+      else
+        json_object_del(summary, entry->key);
+      return true;
     case QMAT_SUMMARY_ALL:
       if (json_is_boolean(value) && (first || before))
         json_object_set_new(summary, entry->key, json_boolean(json_is_true(value) && (first || json_is_true(before))));
@@ -101,7 +107,7 @@ static void merge_written(const qmat_run *run, const qmat_report_summary *type, 
     if (!step->done || !step->report || run->graph->nodes[step->node].type->report_summary != type) continue;
     json_t *written = makes_files(run, step) ? summarise_step(run, step) : NULL;
     for (const qmat_summary_entry *entry = type->entries; written && entry->key; entry++) {
-      const bool is_bound = entry->kind == QMAT_SUMMARY_BOUND;
+      const bool is_bound = entry->kind == QMAT_SUMMARY_BOUND || entry->kind == QMAT_SUMMARY_SIZE;
       if (is_bound || (entry->kind == QMAT_SUMMARY_ALL && json_object_get(summary, entry->key)))
         merge_entry(entry, written, first && is_bound, summary);
     }

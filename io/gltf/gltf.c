@@ -70,8 +70,13 @@ static qmat_status read_triangles(qmat_context *context, const qmat_gltf_documen
     buffers[i] = (qmat_gltf_bytes){.bytes = document->buffers[i].bytes, .size = document->buffers[i].size};
   target to = {.context = context, .soups = soups};
   size_t most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * (document->data_size + document->decoded_size);
-  qmat_status status = qmat_gltf_triangles(context, document->text, document->text_length, buffers, most, meshes,
-                                           mesh_count, add_to_soup, &to, &counts);
+  double *scales = qmat_alloc(mesh_count, sizeof *scales);
+  qmat_status status = scales ? qmat_gltf_triangles(context, document->text, document->text_length, buffers, most,
+                                                    meshes, mesh_count, scales, add_to_soup, &to, &counts)
+                              : qmat_fail_memory(context, "a glTF asset");
+  soups[0].meters_per_unit = 1; /* glTF is in metres, and nodes scale meshes */
+  for (size_t i = 0; meshes && i < mesh_count && status == QMAT_OK; i++) soups[i].meters_per_unit = scales[i];
+  qmat_free(scales);
   if (status == QMAT_OK) status = add_report(context, &counts, meshes == NULL, document, report);
   qmat_free(buffers);
   return status;

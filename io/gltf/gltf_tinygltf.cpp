@@ -87,6 +87,29 @@ bool mirrors(const Matrix &m) {
          0;
 }
 
+/* The largest singular value of the linear part: the root of the largest eigenvalue of its square, in closed form
+ * (Smith, "Eigenvalues of a symmetric 3 x 3 matrix", 1961). */
+double largest_stretch(const Matrix &m) {
+  double a[3][3];
+  for (size_t i = 0; i < 3; i++) {
+    for (size_t j = 0; j < 3; j++)
+      a[i][j] = m[4 * i] * m[4 * j] + m[4 * i + 1] * m[4 * j + 1] + m[4 * i + 2] * m[4 * j + 2];
+  }
+  const double mean = (a[0][0] + a[1][1] + a[2][2]) / 3;
+  for (size_t i = 0; i < 3; i++) a[i][i] -= mean;
+  double spread = 0;
+  for (size_t i = 0; i < 3; i++) {
+    for (size_t j = 0; j < 3; j++) spread += a[i][j] * a[i][j];
+  }
+  spread = std::sqrt(spread / 6);
+  if (!(spread > 1e-12 * mean)) return std::sqrt(mean); /* it scales evenly */
+  const double determinant = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+                             a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+                             a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+  const double half = std::max(-1.0, std::min(1.0, determinant / (spread * spread * spread) / 2));
+  return std::sqrt(std::max(mean + 2 * spread * std::cos(std::acos(half) / 3), 0.0));
+}
+
 Matrix local_matrix(const qmat_tinygltf::Node &node) {
   Matrix m = kIdentity;
   if (node.matrix.size() == 16) {
@@ -186,10 +209,12 @@ class Reader {
     }
   }
 
-  void read_meshes(const uint32_t *meshes, size_t count) {
+  void read_meshes(const uint32_t *meshes, size_t count, double *scales) {
+    find_globals();
     for (which_ = 0; which_ < count; which_++) {
       must(qmat_progress(context_, which_, count, "meshes"));
       const qmat_tinygltf::Mesh &mesh = model_.meshes[meshes[which_]];
+      scales[which_] = scale_of(meshes[which_]);
       for (const qmat_tinygltf::Primitive &primitive : mesh.primitives) {
         if (primitive.attributes.empty()) {
           counts_->primitives_skipped++;
@@ -419,6 +444,22 @@ class Reader {
     return matrices;
   }
 
+  /* The largest length that the nodes of a mesh, or its joints, make of a unit. */
+  double scale_of(size_t mesh) {
+    double scale = 0;
+    for (size_t i = 0; i < model_.nodes.size(); i++) {
+      const qmat_tinygltf::Node &node = model_.nodes[i];
+      if (node.mesh != static_cast<int>(mesh)) continue;
+      if (node.skin < 0) {
+        scale = std::max(scale, largest_stretch(globals_[i]));
+        continue;
+      }
+      for (const Matrix &m : joint_matrices(model_.skins[static_cast<size_t>(node.skin)]))
+        scale = std::max(scale, largest_stretch(m));
+    }
+    return scale > 0 && std::isfinite(scale) ? scale : 1;
+  }
+
   void apply_skin(const Shape &shape, size_t skin_id, const std::vector<double> &local) {
     const std::vector<Matrix> matrices = joint_matrices(model_.skins[skin_id]);
     const size_t vertices = local.size() / 3;
@@ -509,7 +550,7 @@ class Reader {
 
 qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t text_length,
                                 const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes, size_t mesh_count,
-                                qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts) {
+                                double *scales, qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts) {
   *counts = {};
   try {
     if (text_length > std::numeric_limits<unsigned int>::max()) return qmat_fail_memory(context, "the JSON of a glTF");
@@ -520,7 +561,7 @@ qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t 
       return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "tinygltf: %s", errors.c_str());
     Reader reader(context, model, buffers, most, sink, user, counts);
     if (meshes) {
-      reader.read_meshes(meshes, mesh_count);
+      reader.read_meshes(meshes, mesh_count, scales);
     } else {
       reader.read_scene();
     }

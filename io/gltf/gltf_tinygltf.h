@@ -29,12 +29,13 @@ typedef struct qmat_gltf_counts {
 /* Passes triangles to `sink`. If `meshes` is NULL: the first scene in world space, node by node, parents first. Else:
  * the meshes with those mesh_count valid ids, each in its own space, with the mesh's morph weights and without
  * skinning. `text` is the JSON of qmat_gltf_document_read; its buffer views refer to `buffers`. Indices, joint ids and
- * Draco data are checked here because they depend on the data. No exception escapes. QMAT_ERROR_FORMAT with the
- * element, QMAT_ERROR_GEOMETRY beyond `most` vertices or triangles, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY,
- * QMAT_CANCELLED. */
+ * Draco data are checked here because they depend on the data. `scales` (mesh_count numbers, NULL with `meshes`) gets
+ * for each mesh the largest length that its nodes, or the joints of its skin, make of a unit; 1 where that is no
+ * length. No exception escapes. QMAT_ERROR_FORMAT with the element, QMAT_ERROR_GEOMETRY beyond `most` vertices or
+ * triangles, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. */
 qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t text_length,
                                 const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes, size_t mesh_count,
-                                qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts);
+                                double *scales, qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts);
 
 #ifdef __cplusplus
 }

@@ -11,6 +11,8 @@ static const qmat_summary_entry entries[] = {
     {"epsilon", NULL, QMAT_SUMMARY_BOUND},
     {"surface_to_envelope", "surface to envelope", QMAT_SUMMARY_BOUND},
     {"envelope_to_surface", "envelope to surface", QMAT_SUMMARY_BOUND},
+    {"surface_to_envelope_meters", NULL, QMAT_SUMMARY_SIZE},
+    {"envelope_to_surface_meters", NULL, QMAT_SUMMARY_SIZE},
     {"certified", NULL, QMAT_SUMMARY_ALL},
     {"estimate", NULL, QMAT_SUMMARY_ANY},
     {0},
@@ -36,13 +38,24 @@ static void describe_model(const json_t *summary, char *text, size_t size) {
     snprintf(text, size, "%s", what);
 }
 
+/* " (4.9 mm)", or nothing. `text` holds at least 56 bytes. */
+static void describe_size(const json_t *meters, char *text) {
+  char size[48];
+  text[0] = '\0';
+  if (!meters) return;
+  qmat_format_length(json_real_value(meters), size);
+  snprintf(text, 56, " (%s)", size);
+}
+
 static void write_sentence(const char *name, const json_t *summary, char *text, size_t size) {
   const json_t *certified = json_object_get(summary, "certified");
   const uint64_t sphere_count = count_of(summary, "spheres");
-  char spheres[32], out[48], in[48], model[144];
+  char spheres[32], out[48], in[48], out_size[56], in_size[56], model[144];
   qmat_format_count(sphere_count, spheres);
   qmat_format_bound(json_real_value(json_object_get(summary, "surface_to_envelope")), out);
   qmat_format_bound(json_real_value(json_object_get(summary, "envelope_to_surface")), in);
+  describe_size(json_object_get(summary, "surface_to_envelope_meters"), out_size);
+  describe_size(json_object_get(summary, "envelope_to_surface_meters"), in_size);
   describe_model(summary, model, sizeof model);
   const char *proof = "";
   if (json_is_true(certified))
@@ -52,11 +65,11 @@ static void write_sentence(const char *name, const json_t *summary, char *text, 
   else if (certified && json_real_value(json_object_get(summary, "epsilon")) > 0)
     proof = " (not certified)";
   snprintf(text, size,
-           "%s: %s sphere%s %s; no surface point is farther than %s of the %s from the envelope, and %s %s%s%s.", name,
-           spheres, sphere_count == 1 ? " describes" : "s describe", model, out,
-           count_of(summary, "meshes") > 1 ? "mesh's diagonal" : "diagonal",
+           "%s: %s sphere%s %s; no surface point is farther than %s of the %s%s from the envelope, and %s %s%s%s%s.",
+           name, spheres, sphere_count == 1 ? " describes" : "s describe", model, out,
+           count_of(summary, "meshes") > 1 ? "mesh's diagonal" : "diagonal", out_size,
            certified ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most", in,
-           certified ? " from the surface" : "", proof);
+           in_size, certified ? " from the surface" : "", proof);
 }
 
 const qmat_report_summary qmat_medial_summary = {.entries = entries, .sentence = write_sentence};

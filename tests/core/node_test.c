@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "core/hash.h"
+#include "core/value.h"
 #include "tests/locale.h"
 
 typedef struct example_params {
@@ -200,8 +201,12 @@ static void test_bad_texts_are_refused_by_name_and_range(void **state) {
   assert_refused("seed", "9223372036854775808", "seed is out of range: 9223372036854775808");
   assert_refused("seed", "-9223372036854775809", "seed is out of range: -9223372036854775809");
   assert_refused("epsilon", "3", "epsilon must be between 0 and 1 (diagonal), not 3");
-  assert_refused("epsilon", "nan", "epsilon must be a number, not 'nan'");
-  assert_refused("epsilon", "0,5", "epsilon must be a number, not '0,5'");
+  assert_refused("epsilon", "nan",
+                 "epsilon must be a number, a percentage, or a length in mm, cm, m, in or ft, not 'nan'");
+  assert_refused("epsilon", "-5mm", "epsilon must be between 0 and 1 (diagonal), not -5mm");
+  assert_refused("weight", "5mm", "weight must be a number, not '5mm'");
+  assert_refused("epsilon", "0,5",
+                 "epsilon must be a number, a percentage, or a length in mm, cm, m, in or ft, not '0,5'");
   assert_refused("angle", "90.5", "angle must be at most 90 (degrees), not 90.5");
   assert_refused("weight", "-1e-9", "weight must be at least 0, not -1e-9");
   assert_refused("method", "greddy", "method must be pairs, greedy or none, not 'greddy' (did you mean 'greedy'?)");
@@ -245,6 +250,103 @@ static void test_the_check_asks_for_required_texts_ranges_and_rules(void **state
   assert_int_equal(qmat_params_check(&context, &example, &params), QMAT_ERROR_USAGE);
   assert_string_equal(context.error.message, "rays must be between 1 and 1000 (rays), not 1001");
   assert_int_equal(qmat_params_check(&context, &bare, NULL), QMAT_OK);
+}
+
+/* A box of 3 by 4 by 12 units, whose diagonal is 13, in the given unit. */
+static qmat_mesh *make_box(double meters_per_unit) {
+  qmat_context context = {0};
+  qmat_mesh *mesh = qmat_mesh_new();
+  mesh->vertex_count = 8;
+  mesh->triangle_count = 2;
+  mesh->positions = qmat_alloc(24, sizeof *mesh->positions);
+  mesh->triangles = qmat_alloc(6, sizeof *mesh->triangles);
+  const double sides[3] = {3, 4, 12};
+  for (size_t i = 0; i < 24; i++) mesh->positions[i] = (i / 3 >> (i % 3) & 1) != 0 ? sides[i % 3] : 0;
+  const uint32_t corners[6] = {0, 1, 2, 7, 6, 5};
+  memcpy(mesh->triangles, corners, sizeof corners);
+  mesh->meters_per_unit = meters_per_unit;
+  assert_int_equal(qmat_value_seal(&context, &mesh->base), QMAT_OK);
+  return mesh;
+}
+
+static double seen_epsilon;
+static int checked;
+
+static qmat_status see_epsilon(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                               qmat_value *outputs[]) {
+  (void)inputs;
+  seen_epsilon = ((const example_params *)params)->epsilon;
+  outputs[0] = &qmat_medial_new()->base;
+  return qmat_value_seal(context, outputs[0]);
+}
+
+static qmat_status check_epsilon(qmat_context *context, const void *params) {
+  (void)context;
+  checked++;
+  assert_true(((const example_params *)params)->epsilon >= 0);
+  return QMAT_OK;
+}
+
+/* Runs a node on a box with that epsilon; what the node sees is in seen_epsilon. */
+static qmat_status run_with(qmat_context *context, const char *epsilon, double meters_per_unit) {
+  qmat_node node = example;
+  node.run = see_epsilon;
+  node.check = check_epsilon;
+  example_params params;
+  qmat_params_default(&node, &params);
+  params.path = "a.off";
+  assert_int_equal(parse(context, "epsilon", epsilon, &params), QMAT_OK);
+  assert_int_equal(qmat_params_check(context, &node, &params), QMAT_OK);
+  const example_params before = params;
+  qmat_mesh *box = make_box(meters_per_unit);
+  const qmat_value *inputs[2] = {&box->base, NULL};
+  qmat_value *output;
+  const qmat_status status = qmat_node_run(context, &node, &params, inputs, &output);
+  assert_memory_equal(&params, &before, sizeof params);
+  qmat_value_release(output);
+  qmat_value_release(&box->base);
+  return status;
+}
+
+static void test_a_length_with_a_unit_is_a_share_of_the_diagonal_when_the_node_runs(void **state) {
+  (void)state;
+  static const struct {
+    const char *text;
+    double meters_per_unit, share;
+  } lengths[] = {{"13mm", 0.01, 0.1},     {"1.3cm", 0.01, 0.1},    {"0.013m", 0.01, 0.1}, {"13mm", 0.001, 1},
+                 {"1in", 1, 0.0254 / 13}, {"1ft", 1, 0.3048 / 13}, {"0mm", 0, 0},         {"1%", 0, 0.01}};
+  qmat_context context = {0};
+  for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+    checked = 0;
+    assert_int_equal(run_with(&context, lengths[i].text, lengths[i].meters_per_unit), QMAT_OK);
+    assert_true(fabs(seen_epsilon - lengths[i].share) < 1e-15);
+    assert_int_equal(checked, 1); /* once, on shares */
+  }
+  assert_int_equal(run_with(&context, "13mm", 0), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message, "epsilon is 0.013m, but the model has no unit of length");
+  assert_string_equal(context.error.field, "epsilon");
+  assert_non_null(strstr(context.error.hint, "--set model.unit=mm"));
+  assert_int_equal(run_with(&context, "26mm", 0.001), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.message,
+                      "epsilon must be between 0 and 1 (diagonal), not 0.026m of a diagonal of 13 mm");
+}
+
+/* Keys of the cache are made of the canonical text. */
+static void test_equal_lengths_have_one_canonical_text(void **state) {
+  (void)state;
+  static const char *const texts[] = {"5mm", "0.5cm", "0.005m", "5e-3m", "+5.0mm"};
+  qmat_context context = {0};
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    example_params params, again;
+    char text[32];
+    qmat_params_default(&example, &params);
+    qmat_params_default(&example, &again);
+    assert_int_equal(parse(&context, "epsilon", texts[i], &params), QMAT_OK);
+    qmat_param_format(qmat_param_find(&example, "epsilon"), &params, text, sizeof text);
+    assert_string_equal(text, "0.005m");
+    assert_int_equal(parse(&context, "epsilon", text, &again), QMAT_OK);
+    assert_memory_equal(&again.epsilon, &params.epsilon, sizeof params.epsilon);
+  }
 }
 
 static void test_formatted_values_read_back_to_themselves(void **state) {
@@ -324,6 +426,8 @@ int main(void) {
       cmocka_unit_test(test_bad_texts_are_refused_by_name_and_range),
       cmocka_unit_test(test_negative_zero_is_read_as_zero),
       cmocka_unit_test(test_the_check_asks_for_required_texts_ranges_and_rules),
+      cmocka_unit_test(test_a_length_with_a_unit_is_a_share_of_the_diagonal_when_the_node_runs),
+      cmocka_unit_test(test_equal_lengths_have_one_canonical_text),
       cmocka_unit_test(test_formatted_values_read_back_to_themselves),
       cmocka_unit_test(test_formatting_cuts_at_the_size_given),
       cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),

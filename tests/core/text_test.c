@@ -186,6 +186,33 @@ static void test_counts_sizes_and_bounds_are_written_for_people(void **state) {
   }
 }
 
+static void test_lengths_are_rounded_up_in_a_fitting_unit(void **state) {
+  (void)state;
+  static const struct {
+    double meters;
+    const char *text;
+  } lengths[] = {{0, "0 mm"},      {1.2345e-6, "0.0013 mm"}, {0.0049, "4.9 mm"}, {0.00491, "5 mm"}, {0.0999, "100 mm"},
+                 {0.123, "13 cm"}, {0.98, "98 cm"},          {1, "1 m"},         {3.14, "3.2 m"},   {1234, "1234 m"}};
+  char text[48];
+  for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+    qmat_format_length(lengths[i].meters, text);
+    assert_string_equal(text, lengths[i].text);
+  }
+}
+
+static void test_lengths_are_read_with_their_unit(void **state) {
+  (void)state;
+  static const char *const bad[] = {"5", "mm", "", "5 mm", "5%mm", "5MM", "5km", "1e400m", "0x5mm", "5mmm", "nanm"};
+  double meters = 7;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_false(qmat_parse_length(bad[i], &meters));
+  assert_true(meters == 7);
+  assert_true(qmat_parse_length("5mm", &meters) && meters == 0.005);
+  assert_true(qmat_parse_length("-2.5cm", &meters) && meters == -0.025);
+  assert_true(qmat_parse_length("1e2m", &meters) && meters == 100);
+  assert_true(qmat_parse_length("1in", &meters) && meters == 0.0254);
+  assert_true(qmat_parse_length("1ft", &meters) && meters == 0.3048);
+}
+
 static void test_copied_texts_are_equal_and_apart(void **state) {
   (void)state;
   const char *text = "caf\xc3\xa9";
@@ -257,6 +284,8 @@ int main(void) {
       cmocka_unit_test(test_copied_texts_are_equal_and_apart),
       cmocka_unit_test(test_utf8_is_told_from_other_bytes),
       cmocka_unit_test(test_repaired_text_is_utf8_and_keeps_its_valid_end),
+      cmocka_unit_test(test_lengths_are_rounded_up_in_a_fitting_unit),
+      cmocka_unit_test(test_lengths_are_read_with_their_unit),
       cmocka_unit_test(test_part_names_lead_below_their_folder),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

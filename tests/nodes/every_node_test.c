@@ -729,6 +729,27 @@ static void test_every_parameter_at_its_bounds_runs_or_is_refused_by_name(void *
   }
 }
 
+/* The meshes of the tests have no unit, so a length with a unit is refused by name, before the node runs. */
+static void test_every_length_may_have_a_unit_and_needs_a_model_with_one(void **state) {
+  (void)state;
+  for (size_t i = 0; i < qmat_node_count; i++) {
+    const qmat_node *node = qmat_nodes[i];
+    for (size_t row = 0; row < qmat_param_count(node); row++) {
+      const qmat_param *param = &node->params[row];
+      if (!(param->flags & QMAT_PARAM_RELATIVE)) continue;
+      subject run = subject_of(node);
+      qmat_context context = {0};
+      assert_int_equal(qmat_param_parse(&context, node, param, "5mm", run.params), QMAT_OK);
+      assert_int_equal(qmat_params_check(&context, node, run.params), QMAT_OK);
+      assert_int_equal(execute(&context, &run), QMAT_ERROR_USAGE);
+      assert_string_equal(context.error.field, param->name);
+      assert_non_null(strstr(context.error.message, "has no unit of length"));
+      qmat_context_uninit(&context);
+      subject_uninit(&run);
+    }
+  }
+}
+
 static void check_refused(const qmat_node *node, const qmat_param *param, const char *text) {
   qmat_context context = {0};
   void *params = qmat_calloc(1, node->params_size);
@@ -1116,6 +1137,7 @@ int main(int argc, char **argv) {
       cmocka_unit_test(test_defaults_pass_the_check_and_run),
       cmocka_unit_test(test_optional_inputs_may_be_left_out),
       cmocka_unit_test(test_every_parameter_at_its_bounds_runs_or_is_refused_by_name),
+      cmocka_unit_test(test_every_length_may_have_a_unit_and_needs_a_model_with_one),
       cmocka_unit_test(test_parameters_beyond_their_bounds_are_refused_by_name),
       cmocka_unit_test(test_any_number_of_threads_and_any_run_gives_the_same_bytes),
       cmocka_unit_test(test_inputs_and_parameters_are_left_as_they_were),

@@ -19,6 +19,8 @@ static int tear_down(void **state) {
 }
 
 /* Runs the node on a file of this content; `outputs` holds scene, mesh and report. */
+static const char *given_unit; /* NULL: the default */
+
 static qmat_status run(qmat_context *context, const char *content, const char *defects, qmat_value *outputs[3]) {
   const qmat_node *node = &qmat_node_scene_read;
   uint64_t params[8];
@@ -29,6 +31,8 @@ static qmat_status run(qmat_context *context, const char *content, const char *d
   if (defects) {
     assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "defects"), defects, params), QMAT_OK);
   }
+  if (given_unit)
+    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "unit"), given_unit, params), QMAT_OK);
   assert_int_equal(qmat_params_check(context, node, params), QMAT_OK);
   if (content) write_file(path, content, strlen(content));
   for (int i = 0; i < 3; i++) outputs[i] = NULL;
@@ -100,6 +104,25 @@ static void test_defects_are_dropped_unless_they_are_to_be_refused(void **state)
   qmat_context_uninit(&context);
 }
 
+static void test_a_file_without_a_unit_gets_the_one_that_is_given(void **state) {
+  (void)state;
+  static const struct {
+    const char *unit;
+    double meters;
+  } units[] = {{"file", 0}, {"mm", 0.001}, {"cm", 0.01}, {"m", 1}, {"in", 0.0254}, {"ft", 0.3048}};
+  for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+    qmat_context context = {0};
+    qmat_value *outputs[3];
+    given_unit = units[i].unit;
+    assert_int_equal(run(&context, cube, NULL, outputs), QMAT_OK);
+    given_unit = NULL;
+    assert_true(((const qmat_scene *)outputs[0])->meters_per_unit == units[i].meters);
+    assert_true(((const qmat_mesh *)outputs[1])->meters_per_unit == units[i].meters);
+    release(outputs);
+    qmat_context_uninit(&context);
+  }
+}
+
 static void test_a_missing_file_is_named(void **state) {
   (void)state;
   qmat_context context = {.node_id = "model", .node_type = "scene.read"};
@@ -128,6 +151,7 @@ int main(void) {
       cmocka_unit_test(test_the_node_gives_scene_mesh_and_report),
       cmocka_unit_test(test_equal_files_give_equal_digests),
       cmocka_unit_test(test_defects_are_dropped_unless_they_are_to_be_refused),
+      cmocka_unit_test(test_a_file_without_a_unit_gets_the_one_that_is_given),
       cmocka_unit_test(test_a_missing_file_is_named),
       cmocka_unit_test(test_an_unknown_choice_is_refused),
   };

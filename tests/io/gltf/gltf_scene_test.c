@@ -195,6 +195,8 @@ static void test_meshes_are_read_once_each_in_their_own_space(void **state) {
         high = fmax(high, mesh->positions[3 * v]);
       }
       assert_true(low == 0 && high == lengths[i]); /* the node's translation is not in it */
+      /* The largest scale of its nodes: the first mesh is also on one that scales by 1, 2 and 3. */
+      assert_true(fabs(mesh->meters_per_unit - (i == 0 ? 3 : 1)) < 1e-12);
     }
     const json_t *meshes = json_object_get(f.report->root, "meshes");
     assert_int_equal(json_integer_value(json_object_get(json_array_get(meshes, 0), "nodes")), 2);
