@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/frame.h"
-
 size_t qmat_param_count(const qmat_node *node) {
   size_t count = 0;
   while (node->params && node->params[count].name) count++;
@@ -264,23 +262,28 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
   return node->check != NULL && !has_meters(node, params) ? node->check(context, params) : QMAT_OK;
 }
 
-/* The diagonal of the first input that is a mesh or a chain, in metres; 0: not known. */
-static qmat_status find_diagonal(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[],
-                                 double *meters) {
-  *meters = 0;
-  for (size_t i = 0; i < qmat_input_count(node); i++) {
-    if (!inputs[i]) continue;
-    if (inputs[i]->type == QMAT_CHAIN) {
-      *meters = ((const qmat_chain *)inputs[i])->meters_per_diagonal;
-      return QMAT_OK;
+/* The diagonal of the box of the vertices that triangles use, in model units. */
+static double diagonal_of(const qmat_mesh *mesh) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    const double *vertex = mesh->positions + 3 * (size_t)mesh->triangles[i];
+    for (size_t k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], vertex[k]);
+      high[k] = fmax(high[k], vertex[k]);
     }
-    if (inputs[i]->type != QMAT_MESH) continue;
-    qmat_frame frame;
-    const qmat_status status = qmat_frame_of_mesh(context, (const qmat_mesh *)inputs[i], &frame);
-    if (status == QMAT_OK) *meters = frame.diagonal * ((const qmat_mesh *)inputs[i])->meters_per_unit;
-    return status;
   }
-  return QMAT_OK;
+  return mesh->triangle_count > 0 ? hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]) : 0;
+}
+
+/* The diagonal of the first input that is a mesh or a chain, in metres; 0: not known. */
+static double find_diagonal(const qmat_node *node, const qmat_value *const inputs[]) {
+  for (size_t i = 0; i < qmat_input_count(node); i++) {
+    if (inputs[i] && inputs[i]->type == QMAT_CHAIN) return ((const qmat_chain *)inputs[i])->meters_per_diagonal;
+    if (!inputs[i] || inputs[i]->type != QMAT_MESH) continue;
+    const qmat_mesh *mesh = (const qmat_mesh *)inputs[i];
+    return mesh->meters_per_unit > 0 ? diagonal_of(mesh) * mesh->meters_per_unit : 0;
+  }
+  return 0;
 }
 
 static qmat_status fail_unit(qmat_context *context, const qmat_param *param, const char *text) {
@@ -292,19 +295,17 @@ static qmat_status fail_unit(qmat_context *context, const qmat_param *param, con
 /* Makes the lengths in metres of `params`, a copy, shares of the diagonal. */
 static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node, const qmat_value *const inputs[],
                                    void *params) {
-  double diagonal;
-  const qmat_status status = find_diagonal(context, node, inputs, &diagonal);
-  if (status != QMAT_OK) return status;
+  const double diagonal = find_diagonal(node, inputs);
   for (size_t i = 0; i < qmat_param_count(node); i++) {
     const qmat_param *param = &node->params[i];
     double *value = slot(param, params);
     if (param->type != QMAT_PARAM_FLOAT || !is_in_meters(param, *value)) continue;
-    char text[64];
+    char text[48];
     qmat_param_format(param, params, text, sizeof text);
     if (!(diagonal > 0)) return fail_unit(context, param, text);
     *value = -*value / diagonal;
     if (float_in_range(param, *value)) continue;
-    char length[48], given[128];
+    char length[48], given[160];
     qmat_format_length(diagonal, length);
     snprintf(given, sizeof given, "%s of a diagonal of %s", text, length);
     return fail_range(context, param, given);
