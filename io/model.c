@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/model.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "io/gltf/gltf.h"
@@ -8,6 +9,7 @@
 #include "io/gltf/gltf_keep.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/scanner.h"
+#include "io/stretch.h"
 #include "io/usd/usd_model.h"
 
 static const struct {
@@ -324,6 +326,15 @@ static qmat_status read_usd(qmat_context *context, const char *path, const qmat_
                             json_t *report) {
   qmat_usd_meshes meshes;
   qmat_status status = qmat_usd_read_meshes(context, bytes, path, choice, options->segments, scene, &meshes, report);
+  const double unit = unit_of_usd(report);
+  for (size_t k = 0; k < scene->placement_count && status == QMAT_OK; k++) {
+    qmat_soup *soup = &meshes.soups[scene->placed[k]];
+    soup->meters_per_unit = fmax(soup->meters_per_unit, unit * qmat_largest_stretch(scene->placements + 16 * k));
+  }
+  for (size_t i = 0; i < meshes.count && status == QMAT_OK; i++) { /* merged, or flattened by what places them */
+    const double found = meshes.soups[i].meters_per_unit;
+    if (!(found > 0) || !isfinite(found)) meshes.soups[i].meters_per_unit = unit;
+  }
   const separate_meshes from = {
       .count = meshes.count, .ids = meshes.ids, .soups = meshes.soups, .names = meshes.names, .uses = meshes.uses};
   if (status == QMAT_OK) status = make_meshes(context, path, &from, options, mesh, report);

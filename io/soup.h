@@ -31,7 +31,7 @@ typedef enum qmat_defects { QMAT_DEFECTS_REFUSE, QMAT_DEFECTS_DROP } qmat_defect
 
 typedef struct qmat_read_options {
   qmat_defects defects;
-  size_t segments; /* sides of the polygons for circles of USD's round solids; 0: 64 */
+  size_t segments;        /* sides of the polygons for circles of USD's round solids; 0: 64 */
   double meters_per_unit; /* of files that state no unit; 0: unknown */
 } qmat_read_options;
 

@@ -38,6 +38,7 @@
 
 #include "io/draco_draco.h"
 #include "io/gltf/gltf_tinygltf.h"
+#include "io/stretch.h"
 
 namespace {
 
@@ -85,29 +86,6 @@ bool mirrors(const Matrix &m) {
   return m[0] * (m[5] * m[10] - m[9] * m[6]) - m[4] * (m[1] * m[10] - m[9] * m[2]) +
              m[8] * (m[1] * m[6] - m[5] * m[2]) <
          0;
-}
-
-/* The largest singular value of the linear part: the root of the largest eigenvalue of its square, in closed form
- * (Smith, "Eigenvalues of a symmetric 3 x 3 matrix", 1961). */
-double largest_stretch(const Matrix &m) {
-  double a[3][3];
-  for (size_t i = 0; i < 3; i++) {
-    for (size_t j = 0; j < 3; j++)
-      a[i][j] = m[4 * i] * m[4 * j] + m[4 * i + 1] * m[4 * j + 1] + m[4 * i + 2] * m[4 * j + 2];
-  }
-  const double mean = (a[0][0] + a[1][1] + a[2][2]) / 3;
-  for (size_t i = 0; i < 3; i++) a[i][i] -= mean;
-  double spread = 0;
-  for (size_t i = 0; i < 3; i++) {
-    for (size_t j = 0; j < 3; j++) spread += a[i][j] * a[i][j];
-  }
-  spread = std::sqrt(spread / 6);
-  if (!(spread > 1e-12 * mean)) return std::sqrt(mean); /* it scales evenly */
-  const double determinant = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
-                             a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-                             a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-  const double half = std::max(-1.0, std::min(1.0, determinant / (spread * spread * spread) / 2));
-  return std::sqrt(std::max(mean + 2 * spread * std::cos(std::acos(half) / 3), 0.0));
 }
 
 Matrix local_matrix(const qmat_tinygltf::Node &node) {
@@ -451,11 +429,11 @@ class Reader {
       const qmat_tinygltf::Node &node = model_.nodes[i];
       if (node.mesh != static_cast<int>(mesh)) continue;
       if (node.skin < 0) {
-        scale = std::max(scale, largest_stretch(globals_[i]));
+        scale = std::max(scale, qmat_largest_stretch(globals_[i].data()));
         continue;
       }
       for (const Matrix &m : joint_matrices(model_.skins[static_cast<size_t>(node.skin)]))
-        scale = std::max(scale, largest_stretch(m));
+        scale = std::max(scale, qmat_largest_stretch(m.data()));
     }
     return scale > 0 && std::isfinite(scale) ? scale : 1;
   }
