@@ -180,6 +180,7 @@ static qmat_status check_samples(qmat_context *context, const qmat_value *value)
 static const qmat_value_row medial_rows[] = {ARRAY(qmat_medial, spheres, F64, sphere_count, 4),
                                              ARRAY(qmat_medial, edges, U32, edge_count, 2),
                                              ARRAY(qmat_medial, triangles, U32, triangle_count, 3),
+                                             SCALAR(qmat_medial, sheet_sphere_count, SIZE),
                                              ARRAY(qmat_medial, region_offsets, U32, region_offset_count, 1),
                                              ARRAY(qmat_medial, region_samples, U32, region_sample_count, 1),
                                              ARRAY(qmat_medial, joints, U32, skinned_count, 4),
@@ -230,21 +231,22 @@ static qmat_status check_medial(qmat_context *context, const qmat_value *value) 
   }
   if (status == QMAT_OK)
     status = qmat_check_sides(context, medial->edges, medial->edge_count, medial->triangles, medial->triangle_count);
+  if (status == QMAT_OK && medial->sheet_sphere_count > medial->sphere_count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu of %zu spheres", medial->sheet_sphere_count, medial->sphere_count);
+    return qmat_fail_field(context, "sheet_sphere_count");
+  }
   if (status == QMAT_OK) status = check_regions(context, medial);
   if (status != QMAT_OK) return status;
   return qmat_check_skin(context, medial->joints, medial->weights, medial->skinned_count, medial->sphere_count,
                          "sphere");
 }
 
-static const qmat_value_row chain_rows[] = {ARRAY(qmat_chain, spheres, F64, sphere_count, 4),
-                                            ARRAY(qmat_chain, edges, U32, edge_count, 2),
-                                            ARRAY(qmat_chain, triangles, U32, triangle_count, 3),
-                                            ARRAY(qmat_chain, owners, U32, sample_count, 1),
-                                            ARRAY(qmat_chain, ends, U32, collapse_count, 2),
-                                            ARRAY(qmat_chain, merged, F64, collapse_count, 4),
-                                            ARRAY(qmat_chain, errors, F64, collapse_count, 1),
-                                            SCALAR(qmat_chain, meters_per_diagonal, NUMBER),
-                                            END};
+static const qmat_value_row chain_rows[] = {
+    ARRAY(qmat_chain, spheres, F64, sphere_count, 4),     ARRAY(qmat_chain, edges, U32, edge_count, 2),
+    ARRAY(qmat_chain, triangles, U32, triangle_count, 3), SCALAR(qmat_chain, sheet_sphere_count, SIZE),
+    ARRAY(qmat_chain, owners, U32, sample_count, 1),      ARRAY(qmat_chain, ends, U32, collapse_count, 2),
+    ARRAY(qmat_chain, merged, F64, collapse_count, 4),    ARRAY(qmat_chain, errors, F64, collapse_count, 1),
+    SCALAR(qmat_chain, meters_per_diagonal, NUMBER),      END};
 
 /* Every collapse joins two different spheres that no earlier collapse has removed. */
 static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
@@ -277,7 +279,8 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
                                .triangle_count = chain->triangle_count,
                                .spheres = chain->spheres,
                                .edges = chain->edges,
-                               .triangles = chain->triangles};
+                               .triangles = chain->triangles,
+                               .sheet_sphere_count = chain->sheet_sphere_count};
   qmat_status status = check_medial(context, &initial.base);
   if (status == QMAT_OK) status = qmat_check_u32_count(context, chain->sample_count, "samples");
   if (status != QMAT_OK) return status;

@@ -115,9 +115,10 @@ typedef struct qmat_samples {
 typedef struct qmat_medial {
   qmat_value base;
   size_t sphere_count, edge_count, triangle_count;
-  double *spheres;     /* 4 * sphere_count: x y z radius */
-  uint32_t *edges;     /* 2 * edge_count: lower id first, sorted; contains every side of every triangle */
-  uint32_t *triangles; /* 3 * triangle_count: ids ascending within a triangle, triangles sorted */
+  double *spheres;           /* 4 * sphere_count: x y z radius */
+  uint32_t *edges;           /* 2 * edge_count: lower id first, sorted; contains every side of every triangle */
+  uint32_t *triangles;       /* 3 * triangle_count: ids ascending within a triangle, triangles sorted */
+  size_t sheet_sphere_count; /* the first so many spheres are those of sheets; 0: none, or not known */
   /* The responsible region (eq. 11) of sphere i is region_samples[region_offsets[i] .. region_offsets[i + 1]).
    * region_offsets is NULL when no regions are known. */
   size_t region_offset_count, region_sample_count; /* sphere_count + 1, or 0; the length of region_samples */
@@ -135,9 +136,10 @@ typedef struct qmat_medial {
 typedef struct qmat_chain {
   qmat_value base;
   size_t sphere_count, edge_count, triangle_count; /* of the initial medial mesh */
-  double *spheres;                                 /* spheres, edges and triangles as in qmat_medial */
+  double *spheres;                                 /* spheres to sheets as in qmat_medial */
   uint32_t *edges;
   uint32_t *triangles;
+  size_t sheet_sphere_count;
   size_t sample_count;
   uint32_t *owners; /* sample_count: the initial sphere whose region contains a sample; UINT32_MAX: none */
   size_t collapse_count;

@@ -30,6 +30,7 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   chain->sphere_count = medial->sphere_count;
   chain->edge_count = medial->edge_count;
   chain->triangle_count = medial->triangle_count;
+  chain->sheet_sphere_count = medial->sheet_sphere_count;
   chain->sample_count = o->constraints.sample_count;
   chain->collapse_count = log->count;
   chain->meters_per_diagonal = qmat_surface_mesh(o->surface)->meters_per_unit * frame->diagonal;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.delaunay: the initial medial mesh from the Delaunay tetrahedra of surface samples (Algorithm 1). */
+#include "core/geometry/sheets.h"
 #include "core/geometry/thickness.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/sampled_solid.h"
@@ -10,14 +11,14 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
   const qmat_field *thickness = (const qmat_field *)inputs[1];
   const qmat_samples *samples = (const qmat_samples *)inputs[2];
-  qmat_surface *surface = NULL;
+  qmat_surface *solids = NULL;
   qmat_medial *medial = NULL;
   qmat_report *report = NULL;
   qmat_status status = qmat_thickness_check(context, mesh, thickness, samples);
-  if (status == QMAT_OK) status = qmat_surface_new(context, mesh, &surface);
+  if (status == QMAT_OK && qmat_has_solids(mesh)) status = qmat_surface_new_of_solids(context, mesh, &solids);
   if (status == QMAT_OK && !(report = qmat_report_new())) status = qmat_fail_memory(context, "the report");
   if (status == QMAT_OK)
-    status = qmat_voronoi_dual_make(context, params, surface, thickness, samples, NULL, &medial, report);
+    status = qmat_voronoi_dual_make(context, params, mesh, solids, thickness, samples, NULL, &medial, report);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   if (status == QMAT_OK) {
     outputs[0] = &medial->base;
@@ -26,7 +27,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     qmat_value_release(medial ? &medial->base : NULL);
     qmat_value_release(report ? &report->base : NULL);
   }
-  qmat_surface_free(surface);
+  qmat_surface_free(solids);
   return status;
 }
 
@@ -50,7 +51,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 5,
+    .version = 6,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
@@ -59,7 +60,9 @@ const qmat_node qmat_node_medial_delaunay = {
         "Delaunay edges that they surround.\n\n"
         "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
         "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
-        "where one surface component contains several.",
+        "where one surface component contains several.\n\n"
+        "Sheets are medial meshes already: each of their triangles becomes a slab, with spheres of half the sheet "
+        "thickness at its corners.",
     .citation = "Section 3.2, Algorithm 1",
     .params_size = sizeof(qmat_voronoi_dual_params),
     .params = params,

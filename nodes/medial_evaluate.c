@@ -125,7 +125,7 @@ static qmat_status count_spheres_outside(evaluation *e) {
   if (!centres || !inside) return qmat_fail_memory(e->context, "medial spheres");
   for (size_t i = 0; i < count; i++) memcpy(&centres[3 * i], &e->unit.spheres[4 * i], 3 * sizeof *centres);
   qmat_surface_inside_many(e->surface, centres, count, inside, qmat_threads(e->context));
-  for (size_t i = 0; i < count; i++)
+  for (size_t i = e->unit.sheet_sphere_count; i < count; i++)
     if (!inside[i] && !isfinite(qmat_surface_distance(e->surface, &centres[3 * i], beside_surface, NULL, NULL)))
       e->spheres_outside++;
   return QMAT_OK;
@@ -279,11 +279,13 @@ const qmat_node qmat_node_medial_evaluate = {
         "Bounds come from branch and bound and hold between samples. Keys with _at_least are lower bounds, attained at "
         "a point. Keys with _sampled or _mean come from samples and bound nothing. The upper bounds of the envelope's "
         "errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
-        "certified means: the surface is closed and oriented, and both errors are at most epsilon. For an open "
-        "surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope fills, is not "
+        "certified means: the surface is closed and oriented, sheets aside, and both errors are at most epsilon. For "
+        "an open surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope "
+        "fills, is not "
         "bounded; surface_depth_in_envelope_sampled shows it.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
-        "are Betti numbers over Z/2; those of the solid (_of_solid) are missing where the surface is open or has an "
+        "are Betti numbers over Z/2; those of the solid and its sheets (_of_solid) are missing where the surface is "
+        "open or has an "
         "edge of more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),

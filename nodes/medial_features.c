@@ -7,6 +7,7 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
 #include "core/geometry/medial_build.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 #include "core/json_text.h"
 #include "nodes/initial/creases.h"
@@ -110,8 +111,9 @@ static qmat_status divide_edge(feature_builder *b, uint32_t from, uint32_t to) {
 
 static qmat_status place_features(feature_builder *b) {
   qmat_crease_edges edges;
+  const qmat_mesh solids = qmat_mesh_of_solids(b->mesh);
   qmat_status status =
-      qmat_crease_edges_find(b->context, b->mesh, b->positions, b->params->angle, b->params->shortest, &edges);
+      qmat_crease_edges_find(b->context, &solids, b->positions, b->params->angle, b->params->shortest, &edges);
   if (status == QMAT_OK)
     status = qmat_creases_chain(b->context, &edges, b->positions, 3, b->mesh->vertex_count, &b->creases);
   b->feature_of_vertex = qmat_arena_alloc(&b->context->arena, b->mesh->vertex_count, sizeof *b->feature_of_vertex);
@@ -330,6 +332,7 @@ static qmat_status set_regions(const feature_builder *b, qmat_medial *medial) {
 static qmat_status make_medial(feature_builder *b, qmat_medial *medial) {
   const qmat_medial *m = b->initial;
   medial->sphere_count = m->sphere_count + b->feature_count;
+  medial->sheet_sphere_count = m->sheet_sphere_count;
   medial->spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *medial->spheres);
   if (!medial->spheres) return qmat_fail_memory(b->context, "medial spheres");
   memcpy(medial->spheres, m->spheres, 4 * m->sphere_count * sizeof *medial->spheres);

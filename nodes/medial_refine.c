@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_complex.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/thickness.h"
 #include "core/geometry/vector.h"
 #include "core/json_text.h"
@@ -40,6 +41,7 @@ typedef struct {
   qmat_context *context;
   const medial_refine_params *params;
   const qmat_mesh *mesh;
+  qmat_mesh solids; /* the mesh without its sheets, which need no samples */
   const qmat_field *thickness;
   qmat_frame frame;
   double *positions; /* 3 per vertex, unit frame */
@@ -68,7 +70,7 @@ static qmat_status find_far_points(const refiner *r, double limit, refinement *f
   qmat_constraint_points places;
   qmat_status status = qmat_complex_init(context, &complex, medial, spheres);
   if (status == QMAT_OK)
-    status = qmat_surface_places_make(context, r->mesh, r->positions, found->samples, points, medial, &complex,
+    status = qmat_surface_places_make(context, &r->solids, r->positions, found->samples, points, medial, &complex,
                                       r->spacing, QMAT_MOST_CONSTRAINT_POINTS, limit, &places);
   qmat_complex_uninit(&complex);
   if (status != QMAT_OK) return status;
@@ -96,12 +98,12 @@ static qmat_status refine(const refiner *r, const qmat_surface *surface, const r
   const qmat_arena kept = context->arena; /* a round's scratch memory is released before the next round */
   context->arena = (qmat_arena){NULL};
   qmat_point_grid far;
-  const qmat_resampling where = {r->mesh, &r->frame, r->positions, &far, r->around, spacing};
+  const qmat_resampling where = {&r->solids, &r->frame, r->positions, &far, r->around, spacing};
   qmat_status status = qmat_point_grid_init(context, from->far_points, from->far_count, &far);
   if (status == QMAT_OK)
     status = qmat_samples_densify(context, &where, from->samples, from->reaches, &to->samples, &to->reaches);
   if (status == QMAT_OK && to->samples)
-    status = qmat_voronoi_dual_make(context, &r->params->dual, surface, r->thickness, to->samples, to->reaches,
+    status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples, to->reaches,
                                     &to->medial, NULL);
   if (status == QMAT_OK && to->samples) status = find_far_points(r, limit, to);
   qmat_arena_uninit(&context->arena);
@@ -119,7 +121,7 @@ static bool is_better(const refinement *a, const refinement *b) {
  * is the limit. `*best` is the last round that improved. */
 static qmat_status refine_in_rounds(const refiner *r, double limit, refinement *rounds, size_t *best) {
   qmat_surface *surface;
-  qmat_status status = qmat_surface_new(r->context, r->mesh, &surface);
+  qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
   size_t newest = 0;
   double spacing = limit;
   for (int64_t i = 0; i < r->params->rounds && rounds[newest].far_count > 0 && status == QMAT_OK; i++) {
@@ -144,7 +146,7 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   const medial_refine_params *params = r->params;
   const double epsilon = params->epsilon - r->mesh->deviation / r->frame.diagonal;
   *best = 0;
-  if (!(params->epsilon > 0) || !(epsilon > 0)) return QMAT_OK;
+  if (!(params->epsilon > 0) || !(epsilon > 0) || !qmat_has_solids(r->mesh)) return QMAT_OK;
   r->positions = qmat_arena_alloc(&r->context->arena, r->mesh->vertex_count, 3 * sizeof *r->positions);
   if (!r->positions) return qmat_fail_memory(r->context, "the vertices");
   qmat_frame_to_unit(&r->frame, r->mesh->positions, r->mesh->vertex_count, r->positions);
@@ -175,6 +177,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   refiner r = {.context = context,
                .params = raw_params,
                .mesh = (const qmat_mesh *)inputs[0],
+               .solids = qmat_mesh_of_solids((const qmat_mesh *)inputs[0]),
                .thickness = (const qmat_field *)inputs[1]};
   refinement rounds[MOST_ROUNDS + 1] = {
       {.samples = (qmat_samples *)qmat_value_retain(inputs[2]), .medial = (qmat_medial *)qmat_value_retain(inputs[3])}};
@@ -232,7 +235,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 2,
+    .version = 3,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "

@@ -9,6 +9,7 @@
 #include "core/node.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/skin/envelope_surface.h"
+#include "nodes/skin/flat_primitives.h"
 #include "nodes/skin/skin_surface_cgal.h"
 
 /* The limit of balls for CGAL: so many may take 45 seconds. */
@@ -29,9 +30,10 @@ typedef struct skin {
   qmat_context *context;
   const medial_skin_params *params;
   const qmat_medial *medial;
+  qmat_medial solid, flat; /* its slabs and cones with a positive radius, and the others; spheres in model units */
   qmat_frame frame;
-  double *spheres; /* in the unit frame */
-  qmat_envelope *envelope;
+  double *spheres;         /* in the unit frame */
+  qmat_envelope *envelope; /* of `solid` */
   qmat_skin_triangles surface;
   qmat_envelope_grid grid;
   size_t ball_count;
@@ -54,6 +56,7 @@ static qmat_status find_frame(skin *s) {
   const bool *joined = joined_spheres(medial, &s->context->arena);
   if (!joined) return qmat_fail_memory(s->context, "medial spheres");
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, largest = 0;
+  const size_t flat_count = s->flat.triangle_count + s->flat.edge_count;
   for (size_t i = 0; i < medial->sphere_count; i++) {
     const double *sphere = medial->spheres + 4 * i;
     largest = fmax(largest, sphere[3]);
@@ -63,7 +66,7 @@ static qmat_status find_frame(skin *s) {
       high[k] = fmax(high[k], sphere[k] + sphere[3]);
     }
   }
-  if (!(largest > 0)) {
+  if (!(largest > 0) && (flat_count == 0 || s->params->method != METHOD_ENVELOPE)) {
     qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "every sphere has radius 0, so the medial mesh encloses nothing");
     return qmat_fail_field(s->context, "medial");
   }
@@ -262,10 +265,11 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
   if (status != QMAT_OK) return status;
   json_int_t vertices = (json_int_t)surface->vertex_count, triangles = (json_int_t)surface->triangle_count;
   bool envelope = s->params->method == METHOD_ENVELOPE;
-  json_t *root = json_pack("{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f}", "method", envelope ? "envelope" : "skin_surface",
-                           "vertices", vertices, "triangles", triangles, "components", (json_int_t)components,
-                           "euler_characteristic", vertices - triangles / 2, "diagonal", s->frame.diagonal,
-                           "error_at_vertices", at_vertices, "error_at_centroids", at_centroids);
+  json_t *root = json_pack(
+      "{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I}", "method", envelope ? "envelope" : "skin_surface",
+      "vertices", vertices, "triangles", triangles, "components", (json_int_t)components, "euler_characteristic",
+      vertices - triangles / 2, "diagonal", s->frame.diagonal, "error_at_vertices", at_vertices, "error_at_centroids",
+      at_centroids, "flat_slabs", (json_int_t)s->flat.triangle_count, "flat_cones", (json_int_t)s->flat.edge_count);
   json_t *details = envelope
                         ? json_pack("{s:f, s:f, s:f, s:I, s:I, s:f, s:I}", "cell_size", s->grid.base, "cell_size_model",
                                     s->grid.base * s->frame.diagonal, "finest_cell_size", s->grid.finest, "cells",
@@ -280,6 +284,25 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
   return status;
 }
 
+static bool has_volume(const skin *s) {
+  for (size_t i = 0; i < s->medial->sphere_count; i++)
+    if (s->medial->spheres[4 * i + 3] > 0) return true;
+  return false;
+}
+
+/* The surface of all that has a volume. */
+static qmat_status make_closed_surface(skin *s) {
+  const qmat_medial *solid = &s->solid;
+  const medial_skin_params *params = s->params;
+  const qmat_status status =
+      qmat_envelope_new(s->context, s->spheres, solid->sphere_count, solid->edges, solid->edge_count, solid->triangles,
+                        solid->triangle_count, &s->envelope);
+  if (status != QMAT_OK) return status;
+  if (params->method != METHOD_ENVELOPE) return make_skin_surface(s);
+  return qmat_envelope_surface(s->context, s->envelope, s->spheres, solid->sphere_count, 1 / (double)params->resolution,
+                               (int)params->detail, &s->surface, &s->grid);
+}
+
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const medial_skin_params *params = raw_params;
@@ -287,25 +310,21 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_report *report = qmat_report_new();
   qmat_status status = mesh && report ? QMAT_OK : qmat_fail_memory(context, "the skin");
+  if (status == QMAT_OK) status = qmat_flat_primitives_separate(context, s.medial, &s.solid, &s.flat);
   if (status == QMAT_OK) status = find_frame(&s);
-  if (status == QMAT_OK) {
-    status = qmat_envelope_new(context, s.spheres, s.medial->sphere_count, s.medial->edges, s.medial->edge_count,
-                               s.medial->triangles, s.medial->triangle_count, &s.envelope);
-  }
-  if (status == QMAT_OK) {
-    status = params->method == METHOD_ENVELOPE
-                 ? qmat_envelope_surface(context, s.envelope, s.spheres, s.medial->sphere_count,
-                                         1 / (double)params->resolution, (int)params->detail, &s.surface, &s.grid)
-                 : make_skin_surface(&s);
-  }
+  if (status == QMAT_OK && has_volume(&s)) status = make_closed_surface(&s);
   if (status == QMAT_OK) status = fill_report(&s, report);
+  if (status == QMAT_OK)
+    status = qmat_flat_primitives_append(context, &s.flat, s.spheres,
+                                         ldexp(1 / (double)params->resolution, -(int)params->detail), &s.surface);
   if (status == QMAT_OK) {
     qmat_frame_to_model(&s.frame, s.surface.positions, s.surface.vertex_count, s.surface.positions);
     mesh->vertex_count = s.surface.vertex_count;
     mesh->triangle_count = s.surface.triangle_count;
     mesh->positions = s.surface.positions;
     mesh->triangles = s.surface.triangles;
-    mesh->closed = mesh->oriented = true;
+    mesh->closed = s.flat.triangle_count == 0;
+    mesh->oriented = true;
     s.surface = (qmat_skin_triangles){0};
     status = qmat_value_seal(context, &mesh->base);
   }
@@ -356,13 +375,15 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 1,
+    .version = 2,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
         "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
-        "the report counts them. The mesh is always a closed 2-manifold.\n\n"
+        "the report counts them. The mesh is a closed 2-manifold.\n\n"
+        "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
+        "as prisms of three sides. The counts and distances of the report are without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
         "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
         "The report has the largest distance from the envelope at vertices and at triangle centroids, as a fraction of "

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/geometry/frame.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/thickness.h"
 #include "core/geometry/triangle.h"
 #include "core/hash.h"
@@ -127,7 +128,7 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     for (int k = 0; k < 3 && areas[i] > 0; k++) note_area(at_vertices + ids[k], areas[i], (uint32_t)i);
   }
   const double floor_area = SMALLEST_NEIGHBOUR * median_area(areas, mesh->triangle_count, scratch);
-  counts->threshold = qmat_thickness_threshold(thickness, params->theta);
+  counts->threshold = qmat_thickness_threshold(mesh, thickness, params->theta);
   if (params->spacing > 0) {
     spaced->on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *spaced->on_sides);
     spaced->in_rows = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *spaced->in_rows);
@@ -318,6 +319,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
                        qmat_value *outputs[]) {
   const mesh_sample_params *params = raw_params;
   const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  const qmat_mesh solids = qmat_mesh_of_solids(mesh);
   const qmat_field *thickness = (const qmat_field *)inputs[1];
   qmat_samples *samples = qmat_samples_new();
   qmat_report *report = qmat_report_new();
@@ -334,10 +336,10 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   status = check_inputs(context, mesh, thickness);
   if (status == QMAT_OK) status = measure_areas(context, mesh, unit_positions, areas);
   if (status == QMAT_OK)
-    status = count_samples(context, params, mesh, unit_positions, thickness, areas, offsets, &spaced, &counts);
+    status = count_samples(context, params, &solids, unit_positions, thickness, areas, offsets, &spaced, &counts);
   if (status != QMAT_OK) goto done;
   const uint64_t most = (uint64_t)params->max_samples;
-  limit_samples(offsets, mesh->triangle_count, most > mesh->vertex_count ? most - mesh->vertex_count : 0, &counts);
+  limit_samples(offsets, solids.triangle_count, most > mesh->vertex_count ? most - mesh->vertex_count : 0, &counts);
 
   samples->vertex_count = mesh->vertex_count;
   samples->count = mesh->vertex_count + counts.added;
@@ -349,7 +351,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     goto done;
   }
   status = sample_vertices(context, mesh, samples);
-  if (status == QMAT_OK) status = sample_facets(context, params, mesh, unit_positions, offsets, &spaced, samples);
+  if (status == QMAT_OK) status = sample_facets(context, params, &solids, unit_positions, offsets, &spaced, samples);
   if (status == QMAT_OK) status = fill_report(context, mesh, &counts, report);
   if (status == QMAT_OK) status = qmat_value_seal(context, &samples->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
@@ -394,10 +396,11 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_mesh_sample = {
     .name = "mesh.sample",
-    .version = 1,
+    .version = 2,
     .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
-        "Every vertex is a sample. A facet gets further samples for its area relative to its smallest neighbour, and "
+        "Every vertex is a sample. Sheets have no other samples. A facet of a solid gets further samples for its area "
+        "relative to its smallest neighbour, and "
         "n_f more if it is thin. Neighbours count as at least a thousandth of the median area; degenerate facets are "
         "ignored.\n\n"
         "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "

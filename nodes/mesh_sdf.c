@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
 #include "core/node.h"
@@ -280,45 +281,51 @@ static qmat_status measure_facets(qmat_context *context, const measuring *m, boo
   return QMAT_OK;
 }
 
-static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
-                       qmat_value *outputs[]) {
-  const mesh_sdf_params *params = raw_params;
-  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
-  const size_t ray_count = (size_t)params->rays;
-  qmat_surface *surface = NULL;
-  qmat_field *field = NULL;
-  qmat_status status = qmat_surface_new(context, mesh, &surface);
-  if (status != QMAT_OK) {
-    qmat_fail_field(context, "mesh");
-    goto done;
-  }
-
+/* Fills the values of the facets of solids, in model units. */
+static qmat_status measure_solids(qmat_context *context, const mesh_sdf_params *params, const qmat_mesh *mesh,
+                                  double *values) {
+  const size_t count = qmat_solid_triangle_count(mesh), ray_count = (size_t)params->rays;
+  qmat_surface *surface;
+  qmat_status status = qmat_surface_new_of_solids(context, mesh, &surface);
+  if (status != QMAT_OK) return qmat_fail_field(context, "mesh");
   cone_ray *rays = qmat_arena_alloc(&context->arena, ray_count, sizeof *rays);
-  uint8_t *states = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *states);
-  uint32_t *representatives = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *representatives);
-  field = qmat_field_new();
+  uint8_t *states = qmat_arena_alloc(&context->arena, count, sizeof *states);
+  uint32_t *representatives = qmat_arena_alloc(&context->arena, count, sizeof *representatives);
+  if (rays && states && representatives) {
+    make_cone(params->cone_angle, ray_count, rays);
+    const measuring m = {surface, rays, ray_count, representatives, states, values};
+    status = find_representatives(context, surface, params->spacing, representatives);
+    if (status == QMAT_OK) status = measure_facets(context, &m, true);
+    if (status == QMAT_OK && params->spacing > 0) status = measure_facets(context, &m, false);
+    if (status == QMAT_OK) status = fill_gaps(context, surface, states, values);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) values[i] *= qmat_surface_frame(surface)->diagonal;
+  } else {
+    status = qmat_fail_memory(context, "the thickness");
+  }
+  qmat_surface_free(surface);
+  return status;
+}
+
+static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  qmat_status status = QMAT_OK;
+  qmat_field *field = qmat_field_new();
   if (field) {
     field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
     field->unit = qmat_strdup("model unit");
   }
-  if (!rays || !states || !representatives || !field || !field->values || field->unit == NULL) {
+  if (!field || !field->values || field->unit == NULL) {
     status = qmat_fail_memory(context, "the thickness");
     goto done;
   }
   field->count = mesh->triangle_count;
   field->domain = QMAT_PER_FACET;
-
-  make_cone(params->cone_angle, ray_count, rays);
-  const measuring m = {surface, rays, ray_count, representatives, states, field->values};
-  status = find_representatives(context, surface, params->spacing, representatives);
-  if (status == QMAT_OK) status = measure_facets(context, &m, true);
-  if (status == QMAT_OK && params->spacing > 0) status = measure_facets(context, &m, false);
-  if (status == QMAT_OK) status = fill_gaps(context, surface, states, field->values);
+  if (qmat_has_solids(mesh)) status = measure_solids(context, params, mesh, field->values);
   if (status != QMAT_OK) goto done;
-  for (size_t i = 0; i < field->count; i++) field->values[i] *= qmat_surface_frame(surface)->diagonal;
+  for (size_t i = qmat_solid_triangle_count(mesh); i < field->count; i++) field->values[i] = mesh->sheet_thickness;
   status = qmat_value_seal(context, &field->base);
 done:
-  qmat_surface_free(surface);
   if (status == QMAT_OK) {
     outputs[0] = &field->base;
   } else if (field) {
@@ -351,7 +358,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_mesh_sdf = {
     .name = "mesh.sdf",
-    .version = 2,
+    .version = 3,
     .summary = "Measures how thick a solid is at each facet",
     .doc =
         "Each facet casts a fixed pattern of rays from its centroid into the solid, within a cone around the inward "
@@ -359,7 +366,8 @@ const qmat_node qmat_node_mesh_sdf = {
         "the ray lengths within 1.5 median absolute deviations of their median; the weight is the inverse of the angle "
         "to the normal. It is neither smoothed nor normalised.\n\n"
         "Facets without a valid ray take the median of the facets at their corners, or the mean of all. Degenerate "
-        "facets take the value of the nearest facet at their corners. On meshes much finer than the spacing only some "
+        "facets take the value of the nearest facet at their corners. Sheets have their own thickness. On meshes much "
+        "finer than the spacing only some "
         "facets are measured, and their neighbours take their values.",
     .citation =
         "Section 3.2; Shapira et al. 2008, Consistent mesh partitioning and skeletonisation using the shape diameter "

@@ -99,6 +99,25 @@ static inline qmat_mesh *shape_sphere(double radius, uint32_t rings) {
   return mesh;
 }
 
+/* Adds a sheet of `across` x `up` quads: place(u, v, point) with u and v from 0 to 1. Nothing may be added but
+ * sheets afterwards. */
+static inline void shape_add_sheet(qmat_mesh *mesh, uint32_t across, uint32_t up,
+                                   void (*place)(double u, double v, double point[3])) {
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  for (uint32_t j = 0; j <= up; j++)
+    for (uint32_t i = 0; i <= across; i++) {
+      double p[3];
+      place((double)i / across, (double)j / up, p);
+      shape_vertex(mesh, p[0], p[1], p[2]);
+    }
+  for (uint32_t j = 0; j < up; j++)
+    for (uint32_t i = 0; i < across; i++) {
+      const uint32_t a = first + j * (across + 1) + i;
+      shape_quad(mesh, a, a + 1, a + across + 2, a + across + 1);
+    }
+  mesh->sheet_triangle_count += 2 * (size_t)across * up;
+}
+
 /* A torus around the z axis. */
 static inline qmat_mesh *shape_torus(double big, double small, uint32_t around, uint32_t across) {
   qmat_mesh *mesh = shape_new();
@@ -188,9 +207,9 @@ static inline int shape_compare_edges(const void *left, const void *right) {
   return a->high < b->high ? -1 : a->high > b->high;
 }
 
-/* Sets closed and oriented by looking at every edge, and seals. */
+/* Sets closed and oriented by looking at every edge of the solids, and seals. */
 static inline qmat_mesh *shape_seal(qmat_mesh *mesh) {
-  const size_t count = 3 * mesh->triangle_count;
+  const size_t count = 3 * (mesh->triangle_count - mesh->sheet_triangle_count);
   shape_edge *edges = calloc(count + 1, sizeof *edges);
   assert_non_null(edges);
   for (size_t i = 0; i < count; i++) {

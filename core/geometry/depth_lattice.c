@@ -40,12 +40,8 @@ double qmat_depth_lattice_exact(qmat_depth_lattice *lattice, const double point[
 }
 
 double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double point[3], double near, double distance) {
-  const double gap = distance * (1 + 1e-9) + side_margin;
-  const double depth = qmat_surface_distance(lattice->surface, point, fabs(near) + gap, NULL, NULL);
-  if (!(depth < INFINITY)) return qmat_depth_lattice_exact(lattice, point);
   lattice->queries++;
-  const bool inside = fabs(near) > gap ? near > 0 : qmat_surface_inside(lattice->surface, point);
-  return inside ? depth : -depth;
+  return -qmat_surface_signed_distance_near(lattice->surface, point, -near, distance * (1 + 1e-9) + side_margin);
 }
 
 /* The key of the cube that contains a point, and the slot of that cube. */
@@ -76,7 +72,7 @@ double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double 
   double found;
   if (near > gap && depth < near + gap) {
     lattice->queries++;
-    found = qmat_surface_distance(lattice->surface, point, depth, NULL, NULL);
+    found = qmat_surface_depth_up_to(lattice->surface, point, depth);
   } else {
     found = qmat_depth_lattice_exact_near(lattice, point, near, distance);
   }

@@ -104,6 +104,25 @@ double qmat_quadric_error(const qmat_quadric *quadric, const double x[4]) {
   return error > 0 ? error : 0;
 }
 
+bool qmat_quadric_minimise_centre(const qmat_quadric *quadric, double x[4]) {
+  const double *a = quadric->a;
+  const double least = 1e-9 * (a[0] + a[4] + a[7] + a[9]);
+  if (!(least > 0) || !(a[0] > least)) return false;
+  const double l10 = a[1] / a[0], l20 = a[2] / a[0];
+  const double d1 = a[4] - l10 * a[1];
+  if (!(d1 > least)) return false;
+  const double u12 = a[5] - l10 * a[2], l21 = u12 / d1;
+  const double d2 = a[7] - l20 * a[2] - l21 * u12;
+  if (!(d2 > least)) return false;
+  const double y0 = -0.5 * quadric->b[0] - a[3] * x[3];
+  const double y1 = -0.5 * quadric->b[1] - a[6] * x[3] - l10 * y0;
+  const double y2 = -0.5 * quadric->b[2] - a[8] * x[3] - l20 * y0 - l21 * y1;
+  x[2] = y2 / d2;
+  x[1] = y1 / d1 - l21 * x[2];
+  x[0] = y0 / a[0] - l10 * x[1] - l20 * x[2];
+  return true;
+}
+
 bool qmat_quadric_minimise(const qmat_quadric *quadric, double x[4]) {
   const double *a = quadric->a;
   const double least = 1e-9 * (a[0] + a[4] + a[7] + a[9]);

@@ -37,4 +37,7 @@ double qmat_quadric_error(const qmat_quadric *quadric, const double x[4]);
 /* The sphere of least error. False when A is singular: a pivot of its LDL' factorisation is below 1e-9 of its trace. */
 bool qmat_quadric_minimise(const qmat_quadric *quadric, double x[4]);
 
+/* The same for the given radius x[3]: only the centre is found. */
+bool qmat_quadric_minimise_centre(const qmat_quadric *quadric, double x[4]);
+
 #endif

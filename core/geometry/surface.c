@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/triangle_blocks.h"
 #include "core/geometry/vector.h"
@@ -32,12 +33,16 @@ typedef struct winding_node {
 
 struct qmat_surface {
   const qmat_mesh *mesh;
+  qmat_mesh solids;   /* the mesh without its sheets; `mesh` may point to it */
+  size_t solid_count; /* triangles that bound solids */
   qmat_frame frame;
   double *positions;
-  double low[3], high[3];
+  double low[3], high[3]; /* of the solids */
   RTCDevice device;
   RTCScene scene;
-  qmat_triangle_blocks *blocks; /* for distances */
+  qmat_triangle_blocks *blocks;       /* for distances to solids; NULL: the mesh has sheets only */
+  qmat_triangle_blocks *sheet_blocks; /* NULL: the mesh has no sheets */
+  double half_thickness;              /* of sheets */
   /* The winding number tree of a surface that is not closed and oriented. Node 1 is the root; node k has the children
    * 2 k and 2 k + 1; leaf k is node leaf_count + k and contains the triangles
    * order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
@@ -207,7 +212,7 @@ static double solid_angle(const qmat_surface *surface, uint32_t triangle, const 
 }
 
 static void leaf_range(const qmat_surface *surface, size_t leaf, size_t *begin, size_t *end) {
-  const size_t n = surface->mesh->triangle_count;
+  const size_t n = surface->solid_count;
   /* This is leaf * n / leaf_count without overflow. */
   const size_t share = n / surface->leaf_count, rest = n % surface->leaf_count;
   *begin = leaf * share + leaf * rest / surface->leaf_count;
@@ -255,18 +260,64 @@ void qmat_surface_inside_many(const qmat_surface *surface, const double *points,
 
 /* --- distance --------------------------------------------------------------------------------------------------- */
 
+static double solid_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
+                             uint32_t *triangle) {
+  return surface->blocks ? qmat_triangle_blocks_distance(surface->blocks, point, limit, closest, triangle) : INFINITY;
+}
+
 double qmat_surface_distance(const qmat_surface *surface, const double point[3], double limit, double *closest,
                              uint32_t *triangle) {
-  return qmat_triangle_blocks_distance(surface->blocks, point, limit, closest, triangle);
+  const double solid = solid_distance(surface, point, limit, closest, triangle);
+  if (!surface->sheet_blocks) return solid;
+  double place[3];
+  uint32_t id;
+  const double reach = fmin(limit, solid) + surface->half_thickness;
+  const double sheet =
+      fabs(qmat_triangle_blocks_distance(surface->sheet_blocks, point, reach, place, &id) - surface->half_thickness);
+  if (!(sheet < solid && sheet <= limit)) return solid;
+  if (closest) memcpy(closest, place, sizeof place);
+  if (triangle) *triangle = (uint32_t)surface->solid_count + id;
+  return sheet;
+}
+
+/* The signed distance where its size is at most `limit`; else it may be infinite. */
+static double signed_distance_within(const qmat_surface *surface, const double point[3], double limit) {
+  const bool inside = qmat_surface_inside(surface, point);
+  double distance = solid_distance(surface, point, limit, NULL, NULL);
+  if (inside) distance = -distance;
+  const double reach = fmin(limit, distance) + surface->half_thickness;
+  if (!surface->sheet_blocks || !(reach >= 0)) return distance;
+  return fmin(distance,
+              qmat_triangle_blocks_distance(surface->sheet_blocks, point, reach, NULL, NULL) - surface->half_thickness);
 }
 
 double qmat_surface_distance_to_triangle(const qmat_surface *surface, const double point[3], uint32_t triangle) {
-  return qmat_triangle_blocks_distance_to(surface->blocks, triangle, point);
+  if (triangle < surface->solid_count) return qmat_triangle_blocks_distance_to(surface->blocks, triangle, point);
+  const double distance =
+      qmat_triangle_blocks_distance_to(surface->sheet_blocks, triangle - (uint32_t)surface->solid_count, point);
+  return fmax(distance - surface->half_thickness, surface->half_thickness);
 }
 
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]) {
-  const double distance = qmat_surface_distance(surface, point, INFINITY, NULL, NULL);
-  return qmat_surface_inside(surface, point) ? -distance : distance;
+  return signed_distance_within(surface, point, INFINITY);
+}
+
+double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap) {
+  const double limit = fabs(near) + gap;
+  double distance;
+  if (near > gap)
+    distance = qmat_surface_distance(surface, point, limit, NULL, NULL);
+  else if (near < -gap && (!surface->sheet_blocks || surface->half_thickness == 0))
+    distance = -solid_distance(surface, point, limit, NULL, NULL);
+  else
+    distance = signed_distance_within(surface, point, limit);
+  return isfinite(distance) ? distance : qmat_surface_signed_distance(surface, point);
+}
+
+double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[3], double limit) {
+  if (!surface->sheet_blocks || surface->half_thickness == 0) return solid_distance(surface, point, limit, NULL, NULL);
+  const double depth = -qmat_surface_signed_distance(surface, point);
+  return depth <= limit ? depth : INFINITY;
 }
 
 /* --- building --------------------------------------------------------------------------------------------------- */
@@ -335,7 +386,7 @@ static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t be
 }
 
 static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
-  const size_t n = surface->mesh->triangle_count;
+  const size_t n = surface->solid_count;
   size_t leaf_count = 1;
   while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
   sort_item *items = qmat_alloc(n, sizeof *items);
@@ -432,14 +483,19 @@ static qmat_status build_scene(qmat_context *context, qmat_surface *surface) {
   if (!vertices) goto check;
   for (size_t i = 0; i < 3 * mesh->vertex_count; i++) vertices[i] = (float)surface->positions[i];
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh->triangles, 0,
-                             3 * sizeof(uint32_t), mesh->triangle_count);
+                             3 * sizeof(uint32_t), surface->solid_count);
   rtcSetGeometryUserData(geometry, surface);
   rtcSetGeometryOccludedFilterFunction(geometry, record_hit);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(surface->scene, geometry);
   rtcCommitScene(surface->scene);
-  status = qmat_triangle_blocks_new(context, surface->device, surface->positions, mesh->triangles, mesh->triangle_count,
-                                    &surface->blocks);
+  if (surface->solid_count > 0)
+    status = qmat_triangle_blocks_new(context, surface->device, surface->positions, mesh->triangles,
+                                      surface->solid_count, &surface->blocks);
+  if (status == QMAT_OK && mesh->sheet_triangle_count > 0)
+    status = qmat_triangle_blocks_new(context, surface->device, surface->positions,
+                                      mesh->triangles + 3 * surface->solid_count, mesh->sheet_triangle_count,
+                                      &surface->sheet_blocks);
 check:
   if (status == QMAT_OK) status = embree_status(context, surface->device, &message);
   if (status == QMAT_OK && (!surface->scene || !geometry))
@@ -450,12 +506,16 @@ done:
   return status;
 }
 
-qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
+static qmat_status make_surface(qmat_context *context, const qmat_mesh *mesh, bool with_sheets,
+                                qmat_surface **surface) {
   *surface = NULL;
   qmat_surface *made = qmat_calloc(1, sizeof *made);
   if (!made) return qmat_fail_memory(context, "a surface");
-  made->mesh = mesh;
+  made->solids = qmat_mesh_of_solids(mesh);
+  made->mesh = with_sheets ? mesh : &made->solids;
+  made->solid_count = made->solids.triangle_count;
   qmat_status status = qmat_frame_of_mesh(context, mesh, &made->frame);
+  made->half_thickness = status == QMAT_OK ? 0.5 * mesh->sheet_thickness / made->frame.diagonal : 0;
   if (status != QMAT_OK) goto failed;
   made->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *made->positions);
   if (!made->positions) {
@@ -467,7 +527,7 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
     made->low[axis] = INFINITY;
     made->high[axis] = -INFINITY;
   }
-  for (size_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
+  for (size_t corner = 0; corner < 3 * made->solid_count; corner++) {
     const double *p = made->positions + 3 * (size_t)mesh->triangles[corner];
     for (int axis = 0; axis < 3; axis++) {
       made->low[axis] = fmin(made->low[axis], p[axis]);
@@ -477,7 +537,7 @@ qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_
   status = build_scene(context, made);
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status != QMAT_OK) goto failed;
-  if (!(mesh->closed && mesh->oriented)) {
+  if (!(mesh->closed && mesh->oriented) && made->solid_count > 0) {
     status = build_winding_tree(context, made);
     if (status != QMAT_OK) goto failed;
   }
@@ -488,9 +548,18 @@ failed:
   return status;
 }
 
+qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
+  return make_surface(context, mesh, true, surface);
+}
+
+qmat_status qmat_surface_new_of_solids(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
+  return make_surface(context, mesh, false, surface);
+}
+
 void qmat_surface_free(qmat_surface *surface) {
   if (!surface) return;
   qmat_triangle_blocks_free(surface->blocks);
+  qmat_triangle_blocks_free(surface->sheet_blocks);
   if (surface->scene) rtcReleaseScene(surface->scene);
   if (surface->device) rtcReleaseDevice(surface->device);
   qmat_free(surface->positions);

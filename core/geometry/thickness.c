@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "core/geometry/sheets.h"
+
 qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                                  const qmat_samples *samples) {
   if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
@@ -27,11 +29,12 @@ qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, c
   return QMAT_OK;
 }
 
-double qmat_thickness_threshold(const qmat_field *thickness, double ratio) {
-  if (thickness->count == 0) return 0;
+double qmat_thickness_threshold(const qmat_mesh *mesh, const qmat_field *thickness, double ratio) {
+  const size_t count = qmat_solid_triangle_count(mesh);
+  if (count == 0) return 0;
   double sum = 0;
-  for (size_t i = 0; i < thickness->count; i++) sum += thickness->values[i];
-  return ratio * (sum / (double)thickness->count);
+  for (size_t i = 0; i < count; i++) sum += thickness->values[i];
+  return ratio * (sum / (double)count);
 }
 
 void qmat_thickness_of_samples(const qmat_mesh *mesh, const qmat_field *thickness, const qmat_samples *samples,

@@ -10,9 +10,9 @@
 qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                                  const qmat_samples *samples);
 
-/* The threshold theta of eq. 8 in the field's unit: `ratio` times the mean thickness of the facets, not weighted by
- * area. */
-double qmat_thickness_threshold(const qmat_field *thickness, double ratio);
+/* The threshold theta of eq. 8 in the field's unit: `ratio` times the mean thickness of the facets of solids, not
+ * weighted by area; 0 without any. `thickness` has a value for each facet of the mesh. */
+double qmat_thickness_threshold(const qmat_mesh *mesh, const qmat_field *thickness, double ratio);
 
 /* The thickness at each sample: the minimum of its facets at a vertex, its facet's value at any other sample. `out` has
  * samples->count doubles. */

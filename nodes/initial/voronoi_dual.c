@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/thickness.h"
 #include "core/json_text.h"
 #include "nodes/initial/delaunay_cgal.h"
@@ -212,10 +213,10 @@ static qmat_status make_medial(qmat_dual_complex *d, qmat_medial *medial, size_t
   if (status == QMAT_OK) status = set_regions(d, medial);
   if (status != QMAT_OK) return status;
   qmat_frame_spheres_to_model(qmat_surface_frame(d->surface), medial->spheres, medial->sphere_count, medial->spheres);
-  return qmat_value_seal(d->context, &medial->base);
+  return QMAT_OK;
 }
 
-/* Triangulates the samples that represent themselves. */
+/* Triangulates the samples of solids that represent themselves. */
 static qmat_status triangulate(qmat_dual_complex *d) {
   qmat_arena *arena = &d->context->arena;
   const size_t count = d->samples->count;
@@ -223,7 +224,7 @@ static qmat_status triangulate(qmat_dual_complex *d) {
   double *points = qmat_arena_alloc(arena, count, 3 * sizeof *points);
   if (!sites || !points) return qmat_fail_memory(d->context, "samples");
   for (size_t i = 0; i < count; i++) {
-    if (d->representatives[i] != i) continue;
+    if (d->representatives[i] != i || d->samples->facets[i] >= d->mesh->triangle_count) continue;
     memcpy(&points[3 * d->site_count], &d->points[3 * i], 3 * sizeof *points);
     sites[d->site_count++] = (uint32_t)i;
   }
@@ -245,6 +246,7 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
     size_t value;
   } counts[] = {
       {"samples", d->samples->count},
+      {"sheet_spheres", medial->sheet_sphere_count},
       {"samples_triangulated", d->site_count},
       {"tetrahedra", d->cells.count},
       {"circumcentres", made->by_kind[QMAT_CELL_CIRCUMCENTRE]},
@@ -276,7 +278,7 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
   if (!points || !values || !thin || !representatives) return qmat_fail_memory(context, "samples");
   qmat_frame_to_unit(qmat_surface_frame(d->surface), d->samples->positions, count, points);
   qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
-  const double theta = qmat_thickness_threshold(thickness, d->params->theta);
+  const double theta = qmat_thickness_threshold(d->mesh, thickness, d->params->theta);
   for (size_t i = 0; i < count; i++) thin[i] = values[i] <= theta;
   d->points = points;
   d->thin = thin;
@@ -297,20 +299,21 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
   return qmat_dual_components_join(d, &made->joined);
 }
 
-qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dual_params *params,
-                                   const qmat_surface *surface, const qmat_field *thickness,
-                                   const qmat_samples *samples, const double *reaches, qmat_medial **medial,
-                                   qmat_report *report) {
-  qmat_dual_complex d = {
-      .context = context, .params = params, .mesh = qmat_surface_mesh(surface), .samples = samples, .surface = surface};
+qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dual_params *params, const qmat_mesh *mesh,
+                                   const qmat_surface *solids, const qmat_field *thickness, const qmat_samples *samples,
+                                   const double *reaches, qmat_medial **medial, qmat_report *report) {
+  qmat_dual_complex d = {.context = context, .params = params, .samples = samples, .surface = solids};
   dual_counts made = {.refined = 0};
-  *medial = NULL;
-  qmat_status status = find_dual(&d, thickness, reaches, &made);
-  if (status == QMAT_OK) {
-    *medial = qmat_medial_new();
-    status = *medial ? make_medial(&d, *medial, &made.refined) : qmat_fail_memory(context, "the medial mesh");
+  *medial = qmat_medial_new();
+  qmat_status status = *medial ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
+  if (status == QMAT_OK && solids) {
+    d.mesh = qmat_surface_mesh(solids);
+    status = find_dual(&d, thickness, reaches, &made);
+    if (status == QMAT_OK) status = make_medial(&d, *medial, &made.refined);
   }
+  if (status == QMAT_OK && mesh->sheet_triangle_count > 0) status = qmat_sheet_slabs_prepend(context, mesh, *medial);
   if (status == QMAT_OK && report) status = make_report(&d, *medial, &made, report);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &(*medial)->base);
   if (status != QMAT_OK && *medial) {
     qmat_value_release(&(*medial)->base);
     *medial = NULL;

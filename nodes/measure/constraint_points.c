@@ -7,6 +7,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_distance.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "nodes/measure/interior_points.h"
@@ -372,7 +373,8 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   const double *positions = qmat_surface_positions(surface);
   const double spacing = epsilon, depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
   size_t capacity = 0;
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
+  const size_t facets = qmat_solid_triangle_count(mesh);
+  for (size_t t = 0; t < facets; t++) {
     const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
     capacity += grid_points(&g, spacing) + 1;
   }
@@ -380,9 +382,9 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
   if (!shell->places || !points) return qmat_fail_memory(context, "constraint points");
   size_t count = 0;
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
+  for (size_t t = 0; t < facets; t++) {
     if (t % SLICE == 0) {
-      const qmat_status status = qmat_progress(context, t, mesh->triangle_count, "constraint points");
+      const qmat_status status = qmat_progress(context, t, facets, "constraint points");
       if (status != QMAT_OK) return status;
     }
     const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);

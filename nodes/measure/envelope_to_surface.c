@@ -219,23 +219,25 @@ static void fetch_bounds(const qmat_envelope_to_surface *tracker, const qmat_com
 bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4]) {
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
+  const double least = collapse->kept < tracker->sheet_vertices ? -INFINITY : 0;
   double depth = -INFINITY, gap;
   fetch_bounds(tracker, complex, collapse);
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
     depth = qmat_larger(depth,
                         tracker->depths[ends[e]] - qmat_point_distance(sphere, &complex->spheres[4 * (size_t)ends[e]]));
-  if (!(depth > 0 && sphere[3] - depth <= tracker->limit)) {
+  if (!(depth > least && sphere[3] - depth <= tracker->limit)) {
     const double near = qmat_depth_lattice_near(&tracker->lattice, sphere, &gap);
     depth = qmat_larger(depth, near - gap);
-    if (!(depth > 0 && sphere[3] - depth <= tracker->limit))
+    if (!(depth > least && sphere[3] - depth <= tracker->limit))
       depth = qmat_depth_lattice_exact_near(&tracker->lattice, sphere, near, gap);
   }
   tracker->sphere_depth = depth;
-  return depth > 0 && sphere[3] - depth <= tracker->limit;
+  return depth > least && sphere[3] - depth <= tracker->limit;
 }
 
 bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                              const qmat_collapse *collapse, const double sphere[4]) {
+  if (collapse->kept < tracker->sheet_vertices) return true;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
     if (sphere[3] == 0 && other[3] == 0) continue; /* a crease lies on the surface */

@@ -16,6 +16,7 @@ typedef struct qmat_envelope_to_surface {
   qmat_depth_lattice lattice;
   double limit;
   double *depths;          /* per vertex: a lower bound of its depth */
+  size_t sheet_vertices;   /* the first so many vertices are of sheets, and need not lie inside */
   double *edge_bounds;     /* per edge: an upper bound of h over it */
   double *triangle_bounds; /* per triangle */
   /* The results of the newest test: bounds of the merged vertex and of its star. */

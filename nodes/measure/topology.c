@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
@@ -344,8 +345,27 @@ static bool separates(const qmat_surface *surface, const shell *s) {
   return qmat_surface_inside(surface, behind) && !qmat_surface_inside(surface, before);
 }
 
+/* Adds the topology of the sheets of the mesh. */
+static qmat_status add_sheets(qmat_context *context, const qmat_mesh *mesh, qmat_topology *topology) {
+  if (mesh->sheet_triangle_count == 0 || !topology->known) return QMAT_OK;
+  qmat_medial *medial = qmat_medial_new();
+  qmat_topology sheets;
+  qmat_status status =
+      medial ? qmat_sheet_slabs_prepend(context, mesh, medial) : qmat_fail_memory(context, "the topology");
+  if (status == QMAT_OK) status = qmat_topology_of_medial(context, medial, &sheets);
+  qmat_value_release(medial ? &medial->base : NULL);
+  if (status != QMAT_OK) return status;
+  topology->known = sheets.known;
+  topology->components += sheets.components;
+  topology->loops += sheets.loops;
+  topology->voids += sheets.voids;
+  topology->euler += sheets.euler;
+  return QMAT_OK;
+}
+
 qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *surface, qmat_topology *topology) {
-  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const qmat_mesh *whole = qmat_surface_mesh(surface);
+  const qmat_mesh solids = qmat_mesh_of_solids(whole), *mesh = &solids;
   *topology = (qmat_topology){.known = mesh->closed && mesh->oriented && mesh->triangle_count < UINT32_MAX / 3};
   if (!topology->known) return QMAT_OK;
   uint32_t *shells = qmat_sets_new(context, mesh->triangle_count),
@@ -378,5 +398,5 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
       topology->voids++;
   }
   topology->euler = (int64_t)(topology->components + topology->voids) - (int64_t)topology->loops;
-  return QMAT_OK;
+  return add_sheets(context, whole, topology);
 }

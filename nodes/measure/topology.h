@@ -33,8 +33,8 @@ qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat
 /* Computes the topology of the solid within a closed and oriented surface. Outward shells bound its components, inward
  * shells its voids, and the genus of either counts its loops. Shells that do not separate inside from outside
  * (contained in another, or without volume) are left out; shells that cross count separately. Not known for an open
- * surface, or with an edge of more than two triangles. Linear but for a sort of each vertex's edges. QMAT_ERROR_MEMORY.
- * */
+ * surface, or with an edge of more than two triangles. Sheets count as simplicial complexes of their own, whatever they
+ * touch. Linear but for a sort of each vertex's edges. QMAT_ERROR_MEMORY. */
 qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *surface, qmat_topology *topology);
 
 #endif

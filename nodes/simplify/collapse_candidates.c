@@ -27,21 +27,38 @@ void qmat_candidates_add(qmat_candidates *c, const qmat_quadric *quadric, const 
   qmat_candidates_insert(c, sphere, qmat_quadric_error(quadric, sphere));
 }
 
-void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
-                          qmat_candidates *c) {
+static void find_candidates(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge, bool on_sheet,
+                            qmat_candidates *c) {
   const qmat_quadric quadric = qmat_merged_quadric(complex, quadrics, edge);
   const uint32_t *ends = &complex->edges[2 * (size_t)edge];
   const double *a = &complex->spheres[4 * (size_t)ends[0]], *b = &complex->spheres[4 * (size_t)ends[1]];
-  double sphere[4];
+  double sphere[4] = {0, 0, 0, a[3]};
   c->count = 0;
   const double reach = 2 * qmat_point_distance(a, b) + fabs(a[3] - b[3]);
-  if (qmat_quadric_minimise(&quadric, sphere) && sphere[3] > 0 &&
-      fmin(qmat_point_distance(sphere, a), qmat_point_distance(sphere, b)) <= reach)
+  if (on_sheet) { /* where errors are equal, as in a plane, vertices stay where they are */
+    qmat_candidates_add(c, &quadric, a);
+    qmat_candidates_add(c, &quadric, b);
+  }
+  const bool found = on_sheet ? qmat_quadric_minimise_centre(&quadric, sphere)
+                              : qmat_quadric_minimise(&quadric, sphere) && sphere[3] > 0;
+  if (found && fmin(qmat_point_distance(sphere, a), qmat_point_distance(sphere, b)) <= reach)
     qmat_candidates_add(c, &quadric, sphere);
-  qmat_candidates_add(c, &quadric, a);
-  qmat_candidates_add(c, &quadric, b);
+  if (!on_sheet) {
+    qmat_candidates_add(c, &quadric, a);
+    qmat_candidates_add(c, &quadric, b);
+  }
   for (int k = 0; k < 4; k++) sphere[k] = 0.5 * (a[k] + b[k]);
   qmat_candidates_add(c, &quadric, sphere);
+}
+
+void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                          qmat_candidates *c) {
+  find_candidates(complex, quadrics, edge, false, c);
+}
+
+void qmat_candidates_find_on_sheet(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                                   qmat_candidates *c) {
+  find_candidates(complex, quadrics, edge, true, c);
 }
 
 void qmat_candidates_find_published(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,

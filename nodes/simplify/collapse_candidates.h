@@ -26,6 +26,10 @@ void qmat_candidates_add(qmat_candidates *candidates, const qmat_quadric *quadri
 void qmat_candidates_find(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
                           qmat_candidates *candidates);
 
+/* The same for an edge of a sheet: all spheres keep the radius of its ends. */
+void qmat_candidates_find_on_sheet(const qmat_complex *complex, const qmat_quadric *quadrics, uint32_t edge,
+                                   qmat_candidates *candidates);
+
 /* The candidate of the public Q-MAT code: the sphere of least error, inside the model or not; the middle where its
  * radius is negative or it is more than a diagonal away. Without a sphere of least error: the best of both ends and the
  * middle, or the middle for an edge without slabs. */

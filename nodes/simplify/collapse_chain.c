@@ -80,6 +80,7 @@ qmat_status qmat_chain_extract(qmat_context *context, const qmat_chain *chain, s
     if (roots[v] != v) continue;
     memcpy(&medial->spheres[4 * (size_t)next], &chain->spheres[4 * v], 4 * sizeof(double));
     ids[v] = next++;
+    medial->sheet_sphere_count += v < chain->sheet_sphere_count;
   }
   for (size_t v = 0; v < spheres; v++)
     if (roots[v] != v) ids[v] = ids[roots[v]];

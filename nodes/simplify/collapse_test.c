@@ -43,8 +43,9 @@ bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, q
 
 /* Neighbours shared by both ends span a slab with the edge, and the ends span no slab with a common edge. */
 bool qmat_decimation_keeps_topology(const qmat_decimation *s) {
-  if (s->rules.topology != QMAT_TOPOLOGY_PRESERVE) return true;
   const qmat_collapse *c = &s->collapse;
+  if (qmat_decimation_is_of_sheet(s, c->kept) != qmat_decimation_is_of_sheet(s, c->removed)) return false;
+  if (s->rules.topology != QMAT_TOPOLOGY_PRESERVE) return true;
   size_t shared_neighbours = 0, shared_edges = 0;
   for (size_t n = 0; n < c->neighbour_count; n++)
     shared_neighbours += c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
@@ -70,7 +71,8 @@ static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *spher
   const bool kept =
       qmat_envelope_to_surface_test_sphere(&s->envelope_tracker, &s->complex, &s->collapse, sphere) || on_surface;
   s->refusal = QMAT_REFUSED_BY_SPHERE;
-  const bool inside = s->rules.published || on_surface || s->envelope_tracker.sphere_depth > 0;
+  const bool inside = s->rules.published || on_surface || s->envelope_tracker.sphere_depth > 0 ||
+                      qmat_decimation_is_of_sheet(s, s->collapse.kept);
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return QMAT_COLLAPSE_REFUSED;
   s->refusal = QMAT_REFUSED_BY_MIDPOINT;
   if (!s->rules.published &&

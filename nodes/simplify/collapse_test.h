@@ -31,8 +31,9 @@ bool qmat_decimation_is_protected(const qmat_decimation *decimation, uint32_t ve
 bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_t edge, qmat_candidates *candidates,
                                       bool *bound);
 
-/* Whether the topology policy allows the newest preview: with QMAT_TOPOLOGY_PRESERVE it has to satisfy the link
- * condition (Attali et al. 2011), which preserves the homotopy type. */
+/* Whether the topology policy allows the newest preview. Spheres of sheets and solids never merge. With
+ * QMAT_TOPOLOGY_PRESERVE it has to satisfy the link condition (Attali et al. 2011), which preserves the homotopy type.
+ */
 bool qmat_decimation_keeps_topology(const qmat_decimation *decimation);
 
 /* Whether the newest preview may be done with this sphere (4 doubles): inside the model, and both errors within the

@@ -2,7 +2,10 @@
 #include "nodes/simplify/cost_rows.h"
 
 static qmat_status find_slab(qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
-  qmat_candidates_find(&s->complex, s->quadrics, edge, c);
+  if (qmat_decimation_is_of_sheet(s, s->complex.edges[2 * (size_t)edge]))
+    qmat_candidates_find_on_sheet(&s->complex, s->quadrics, edge, c);
+  else
+    qmat_candidates_find(&s->complex, s->quadrics, edge, c);
   return QMAT_OK;
 }
 

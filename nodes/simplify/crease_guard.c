@@ -11,13 +11,13 @@ static const double *point_at(const qmat_crease_guard *g, size_t place) {
 }
 
 /* Numbers the spheres of radius zero, and finds the edges between them. */
-static qmat_status find_features(qmat_context *context, const qmat_complex *complex, qmat_crease_guard *guard,
-                                 qmat_crease_edges *edges) {
+static qmat_status find_features(qmat_context *context, const qmat_complex *complex, size_t first,
+                                 qmat_crease_guard *guard, qmat_crease_edges *edges) {
   qmat_arena *arena = &context->arena;
   guard->features = qmat_arena_alloc(arena, complex->vertex_count, sizeof *guard->features);
   if (!guard->features) return qmat_fail_memory(context, "sharp features");
   for (size_t v = 0; v < complex->vertex_count; v++)
-    guard->features[v] = complex->spheres[4 * v + 3] == 0 ? (uint32_t)guard->feature_count++ : QMAT_NONE;
+    guard->features[v] = v >= first && complex->spheres[4 * v + 3] == 0 ? (uint32_t)guard->feature_count++ : QMAT_NONE;
   guard->left = guard->feature_count;
   if (guard->feature_count == 0) {
     guard->features = NULL;
@@ -48,11 +48,12 @@ static void *copy_of(qmat_context *context, const void *array, size_t count, siz
   return copy;
 }
 
-qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, qmat_crease_guard *guard) {
+qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, size_t first,
+                                   qmat_crease_guard *guard) {
   qmat_arena *arena = &context->arena;
   qmat_crease_edges edges = {.count = 0};
   *guard = (qmat_crease_guard){.feature_count = 0};
-  qmat_status status = find_features(context, complex, guard, &edges);
+  qmat_status status = find_features(context, complex, first, guard, &edges);
   if (status != QMAT_OK || guard->feature_count == 0) return status;
   status = qmat_creases_chain(context, &edges, guard->points, 3, guard->feature_count, &guard->creases);
   if (status != QMAT_OK) return status;

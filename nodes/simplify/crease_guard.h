@@ -26,7 +26,8 @@ typedef struct qmat_crease_guard {
 
 /* Guards the spheres of radius zero of a complex without collapses, and the edges between two of them.
  * QMAT_ERROR_MEMORY. Cost: linear. */
-qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, qmat_crease_guard *guard);
+qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, size_t first,
+                                   qmat_crease_guard *guard);
 
 /* Makes a guard of the same features for another complex with `vertex_count` vertices: `ids` maps the live vertices to
  * its vertices. `from` is unchanged and has to outlive `guard`. QMAT_ERROR_MEMORY. */

@@ -85,7 +85,7 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
     else
       qmat_medial_quadrics_add(c, s->quadrics);
     if (s->rules.features == QMAT_FEATURES_SHARP) {
-      const qmat_status status = qmat_crease_guard_init(context, c, &s->creases);
+      const qmat_status status = qmat_crease_guard_init(context, c, s->sheet_vertices, &s->creases);
       if (status != QMAT_OK) return status;
     }
   }
@@ -104,6 +104,7 @@ qmat_status qmat_decimation_init(qmat_decimation *s, const qmat_constraint_point
                                          !qmat_decimation_is_two_sided(s) ? INFINITY
                                          : qmat_decimation_in_order(s)    ? s->rules.finest
                                                                           : s->rules.limit);
+  s->envelope_tracker.sheet_vertices = s->sheet_vertices;
   if (qmat_decimation_is_two_sided(s)) s->envelope_tracker.limit = limit;
   if (status != QMAT_OK || !qmat_decimation_in_order(s)) return status;
   return qmat_rising_threshold_start(s);
@@ -274,6 +275,7 @@ static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
         qmat_crease_guard_is_feature(&s->creases, v))
       continue;
     s->converged[v] = 1;
+    s->fit.keeps_radius = qmat_decimation_is_of_sheet(s, v);
     qmat_status status = report_progress(s);
     if (status == QMAT_OK) status = qmat_complex_preview_move(s->context, &s->complex, v, &s->collapse);
     if (status == QMAT_OK)

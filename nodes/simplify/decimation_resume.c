@@ -30,12 +30,14 @@ qmat_status qmat_decimation_extract(const qmat_decimation *s, qmat_medial *media
   uint32_t *edges = qmat_arena_alloc(arena, c->live_edges, 2 * sizeof *edges);
   uint32_t *triangles = qmat_arena_alloc(arena, c->live_triangles, 3 * sizeof *triangles);
   medial->sphere_count = c->live_vertices;
+  medial->sheet_sphere_count = 0;
   medial->spheres = qmat_alloc(c->live_vertices, 4 * sizeof(double));
   if (!ids || !edges || !triangles || !medial->spheres) return qmat_fail_memory(s->context, "the medial mesh");
   uint32_t next = 0;
   for (size_t v = 0; v < c->vertex_count; v++) {
     ids[v] = QMAT_NONE;
     if (!c->vertex_alive[v]) continue;
+    medial->sheet_sphere_count += qmat_decimation_is_of_sheet(s, (uint32_t)v);
     memcpy(&medial->spheres[4 * (size_t)next], &c->spheres[4 * v], 4 * sizeof(double));
     ids[v] = next++;
   }
@@ -79,6 +81,7 @@ qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_media
   uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);
   double *depths = qmat_arena_alloc(arena, left->sphere_count, sizeof *depths);
   to->quadrics = qmat_arena_calloc(arena, left->sphere_count, sizeof *to->quadrics);
+  to->sheet_vertices = left->sheet_sphere_count;
   qmat_constraint_points further;
   qmat_status status = ids && depths && to->quadrics ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
   if (status == QMAT_OK) status = qmat_complex_init(context, &to->complex, left, NULL);

@@ -60,6 +60,7 @@ typedef struct qmat_decimation {
   qmat_decimation_rules rules;
   qmat_surface *surface;
   qmat_complex complex;
+  size_t sheet_vertices;  /* the first so many vertices are those of sheets */
   qmat_quadric *quadrics; /* per vertex */
   qmat_edge_heap heap;
   const qmat_constraint_points *constraints;
@@ -94,6 +95,11 @@ static inline bool qmat_decimation_in_order(const qmat_decimation *s) {
 
 static inline bool qmat_decimation_is_two_sided(const qmat_decimation *s) {
   return s->rules.error == QMAT_ERROR_TWO_SIDED;
+}
+
+/* Whether a vertex belongs to a sheet. Its sphere keeps its radius, and never merges with one of a solid. */
+static inline bool qmat_decimation_is_of_sheet(const qmat_decimation *s, uint32_t vertex) {
+  return vertex < s->sheet_vertices;
 }
 
 /* Whether a constraint point lies inside the solid, not on its surface. */

@@ -10,6 +10,7 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const 
                                        qmat_collapse_outcome *result) {
   double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
   int least = 0;
+  s->fit.keeps_radius = qmat_decimation_is_of_sheet(s, s->collapse.kept);
   qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
                                               s->constraints->surface_count, QMAT_FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
@@ -147,6 +148,7 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
         !(s->protecting && qmat_decimation_is_protected(s, c->neighbours[n])))
       others[count++] = c->neighbours[n];
+  s->neighbourhood.keeps_radii = qmat_decimation_is_of_sheet(s, c->kept);
   qmat_status status =
       qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, s->fitted,
                                    others, count, s->constraints->surface_count, s->threshold);

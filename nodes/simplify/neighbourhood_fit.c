@@ -190,7 +190,7 @@ static void add_target(const qmat_neighbourhood_fit *fit, const qmat_complex *co
   if (!(length > 0)) return;
   for (int k = 0; k < 3; k++) {
     if (item->moving[k] < 0 || !(weights[k] > 0)) continue;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < (fit->keeps_radii ? 3 : 4); i++) {
       columns[count] = 4 * item->moving[k] + i;
       row[count++] = i < 3 ? -weights[k] * (target->point[i] - foot[i]) / length : -weights[k];
     }
@@ -272,7 +272,7 @@ void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex 
     if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * fit->threshold) || !solve(&e)) return;
     for (int i = 0; i < fit->count; i++) {
       for (int k = 0; k < 4; k++) current[i][k] += e.b[4 * i + k] / (1 + 0.5 * powers[step]);
-      if (!(current[i][3] > 0)) return;
+      if (!fit->keeps_radii && !(current[i][3] > 0)) return;
     }
   }
 }

@@ -14,6 +14,7 @@ typedef struct qmat_neighbourhood_fit {
   uint32_t vertices[QMAT_NEIGHBOURHOOD_SPHERES]; /* the kept one of the collapse first */
   double spheres[QMAT_NEIGHBOURHOOD_SPHERES][4]; /* of these; the complex is unchanged */
   int count;
+  bool keeps_radii; /* spheres are moved only, as those of sheets */
   double threshold; /* the largest |F| at the surface */
   double worst;     /* the error of the previous step; 0: there was none */
   struct qmat_fit_primitive *primitives;

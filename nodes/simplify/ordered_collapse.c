@@ -27,6 +27,7 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   if (status != QMAT_OK) return status;
   run->context = context;
   run->surface = o->surface;
+  run->sheet_vertices = medial->sheet_sphere_count;
   run->rules = qmat_simplify_rules(&o->params, &o->initial);
   status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)

@@ -7,16 +7,18 @@
 
 #include "core/geometry/medial_build.h"
 
-static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex) {
-  for (size_t v = 0; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
+static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex, size_t first) {
+  for (size_t v = first; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
     if (complex->spheres[4 * v + 3] == 0) return true;
   return false;
 }
 
-bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex) {
+bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex,
+                                   size_t sheet_vertices) {
   return complex->vertex_count > QMAT_MOST_PIECE_VERTICES && rules->on_exceed == QMAT_EXCEED_SKIP &&
          rules->cost == QMAT_COST_SLAB && !rules->published && rules->protect == QMAT_PROTECT_OFF &&
-         (double)rules->vertices <= qmat_piece_share * (double)complex->vertex_count && !has_features(rules, complex);
+         (double)rules->vertices <= qmat_piece_share * (double)complex->vertex_count &&
+         !has_features(rules, complex, sheet_vertices);
 }
 
 /* Row numbers sorted by piece: those of piece p are items[starts[p]] to items[starts[p + 1] - 1]. Rows with vertices of
@@ -212,6 +214,7 @@ static qmat_status start_piece(qmat_context *context, const partition *d, size_t
     depths[i] = d->depths[vertices[i]];
     locked[i] = d->locked[vertices[i]];
     own->quadrics[i] = whole->quadrics[vertices[i]];
+    own->sheet_vertices += qmat_decimation_is_of_sheet(whole, vertices[i]); /* in rising order */
   }
   own->locked = locked;
   own->rules.refits = 0;
@@ -410,8 +413,9 @@ static qmat_status join_pieces(partition *d) {
     return qmat_fail_memory(d->context, "the medial mesh");
   }
   double *spheres = whole->complex.spheres;
-  size_t count = 0;
+  size_t count = 0, sheet_vertices = 0;
   for (size_t v = 0; v < before; v++) {
+    sheet_vertices += !d->gone[v] && qmat_decimation_is_of_sheet(whole, (uint32_t)v);
     ids[v] = d->gone[v] ? QMAT_NONE : (uint32_t)count;
     if (d->gone[v]) continue;
     memmove(&spheres[4 * count], &spheres[4 * v], 4 * sizeof *spheres);
@@ -419,6 +423,7 @@ static qmat_status join_pieces(partition *d) {
     whole->quadrics[count++] = whole->quadrics[v];
   }
   medial->sphere_count = count;
+  whole->sheet_vertices = sheet_vertices;
   for (size_t i = 0; i < 3 * d->constraints->count; i++)
     if (d->constraints->witnesses[i] != QMAT_NONE) d->constraints->witnesses[i] = ids[d->constraints->witnesses[i]];
   qmat_status status = join(d, ids, medial);

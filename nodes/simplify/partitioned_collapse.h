@@ -5,8 +5,10 @@
 #include "nodes/simplify/decimation.h"
 
 /* Whether the first collapses of a medial mesh can be done in pieces: it is large enough for two, the rules depend on
- * the neighbourhood of a collapse only and not on the order of all, and no sphere of radius zero has to stay. */
-bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex);
+ * the neighbourhood of a collapse only and not on the order of all, and no sphere of radius zero has to stay, those of
+ * sheets aside. */
+bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex,
+                                   size_t sheet_vertices);
 
 /* Does the first collapses of a dense medial mesh in pieces, down to a quarter of its vertices. The pieces are boxes of
  * space; in each the edges collapse in the order of their costs. Vertices with an edge to another piece stay.

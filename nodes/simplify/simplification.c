@@ -134,6 +134,7 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation_uninit(dense);
   *dense = (qmat_decimation){
       .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state)};
+  dense->sheet_vertices = s->initial->sheet_sphere_count;
   qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
   const bool inside = s->params.error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
@@ -143,7 +144,7 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   dense->rules.share = qmat_dense_share;
   dense->rules.refits = 0;
   if (status == QMAT_OK)
-    status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex)
+    status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex, dense->sheet_vertices)
                  ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
                  : qmat_decimation_init(dense, &s->constraints, s->state.depths);
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;

@@ -16,6 +16,7 @@ const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
 
 /* The exact depth at the centre of a medial sphere. Most spheres are inscribed: a query within the radius finds it. */
 static double depth_of(const qmat_surface *surface, const double *sphere) {
+  if (qmat_surface_mesh(surface)->sheet_triangle_count > 0) return -qmat_surface_signed_distance(surface, sphere);
   double depth = qmat_surface_distance(surface, sphere, sphere[3] * (1 + 1e-6) + 1e-9, NULL, NULL);
   if (!(depth < INFINITY)) depth = qmat_surface_distance(surface, sphere, INFINITY, NULL, NULL);
   return qmat_surface_inside(surface, sphere) ? depth : -depth;
@@ -80,7 +81,7 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   uint8_t *thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *thin);
   if (!depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
   qmat_thickness_of_samples(mesh, thickness, samples, values);
-  const double theta = qmat_thickness_threshold(thickness, params->theta);
+  const double theta = qmat_thickness_threshold(mesh, thickness, params->theta);
   for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
   *initial = (qmat_initial_medial){spheres, depths, thin};
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);

@@ -120,8 +120,10 @@ qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fi
     }
     if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * give_up_error)) return QMAT_OK;
     add_damping(&sum, current);
-    double next[4];
-    if (!qmat_quadric_minimise(&sum, next) || !(next[3] > 0)) return QMAT_OK;
+    double next[4] = {0, 0, 0, current[3]};
+    if (fit->keeps_radius ? !qmat_quadric_minimise_centre(&sum, next)
+                          : !qmat_quadric_minimise(&sum, next) || !(next[3] > 0))
+      return QMAT_OK;
     memcpy(current, next, sizeof current);
   }
 }

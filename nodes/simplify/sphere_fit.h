@@ -10,6 +10,7 @@
 typedef struct qmat_sphere_fit {
   uint32_t *points; /* the constraint points of the newest fit */
   size_t count, capacity;
+  bool keeps_radius; /* spheres are moved only, as those of sheets */
 } qmat_sphere_fit;
 
 void qmat_sphere_fit_uninit(qmat_sphere_fit *fit);

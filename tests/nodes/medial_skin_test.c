@@ -225,7 +225,7 @@ static qmat_medial *soup(uint64_t seed) {
   for (size_t i = 0; i < COUNT; i++) {
     for (size_t k = 0; k < 3; k++) spheres[4 * i + k] = qmat_hash_unit(qmat_hash3(seed, i, k));
     const double r = qmat_hash_unit(qmat_hash3(seed, i, 3));
-    spheres[4 * i + 3] = i % 10 == 0 ? 0 : 0.15 * r * r * r;
+    spheres[4 * i + 3] = i % 10 == 0 && i < 20 ? 0 : 0.15 * r * r * r; /* no primitive has only these */
   }
   for (size_t i = 0; i < 40; i++) {
     edges[2 * i] = (uint32_t)(qmat_hash3(seed + 50, i, 0) % 59);
@@ -496,7 +496,7 @@ static void test_errors_name_the_input_or_the_parameter(void **unused) {
   for (int i = 0; i < 2; i++) {
     expect_error(medial_of(NULL, 0, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
     const double zero[] = {0, 0, 0, 0, 1, 0, 0, 0};
-    expect_error(medial_of(zero, 2, (uint32_t[]){0, 1}, 1, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
+    expect_error(medial_of(zero, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
     const double huge[] = {-1e308, 0, 0, 1e308, 1e308, 0, 0, 1e308};
     expect_error(medial_of(huge, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
   }
@@ -506,6 +506,29 @@ static void test_errors_name_the_input_or_the_parameter(void **unused) {
   expect_error(medial_of(sheet, 3, NULL, 0, triangle, 1), "method=skin_surface", QMAT_ERROR_GEOMETRY, "spacing");
   expect_error(medial_of(sheet, 3, NULL, 0, triangle, 1), "resolution=2048 detail=6", QMAT_ERROR_GEOMETRY,
                "resolution");
+}
+
+static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unused) {
+  (void)unused;
+  const double spheres[] = {0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 4, 5, 0, 9, 9, 9, 1};
+  qmat_context context = {0};
+  skin_result result;
+  const uint32_t cone[] = {2, 3}, slab[] = {0, 1, 2};
+  assert_int_equal(try_skin(&context, medial_of(spheres, 4, cone, 1, slab, 1), "", &result), QMAT_OK);
+  assert_int_equal(result.mesh->triangle_count, 2 + 8);
+  assert_near(number_of(result, "flat_slabs"), 1, 0);
+  assert_near(number_of(result, "flat_cones"), 1, 0);
+  assert_near(number_of(result, "triangles"), 0, 0);
+  assert_true(result.mesh->oriented && !result.mesh->closed);
+  /* Both sides of the slab cancel; the prism is six times its third and turned outwards. */
+  const double side = sqrt(3) * number_of(result, "diagonal") / 1024, prism = sqrt(3) / 4 * side * side * 5;
+  assert_near(volume_of(result.mesh), prism, 1e-9 * prism);
+  release(result);
+  assert_int_equal(try_skin(&context, medial_of(spheres, 5, cone, 1, slab, 1), "resolution=32", &result), QMAT_OK);
+  assert_int_equal(result.mesh->triangle_count, 10 + (size_t)number_of(result, "triangles"));
+  assert_near(number_of(result, "components"), 1, 0);
+  release(result);
+  qmat_context_uninit(&context);
 }
 
 static bool stop_at(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
@@ -534,6 +557,7 @@ int main(void) {
       cmocka_unit_test(test_a_ring_of_cones_is_a_torus),
       cmocka_unit_test(test_separate_spheres_are_separate_components),
       cmocka_unit_test(test_every_soup_of_primitives_is_a_closed_manifold),
+      cmocka_unit_test(test_flat_slabs_have_two_sides_and_flat_cones_are_prisms),
       cmocka_unit_test(test_thin_parts_stay_connected),
       cmocka_unit_test(test_cells_are_finer_where_radii_are_small),
       cmocka_unit_test(test_spheres_inside_others_change_nothing),

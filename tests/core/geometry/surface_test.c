@@ -717,7 +717,11 @@ static void test_thickness_takes_minimum_at_vertices_and_facet_value_at_samples(
   assert_near(out[3], 2, 0);
   assert_true(isinf(out[4]));
   assert_near(out[5], 4, 0);
-  assert_near(qmat_thickness_threshold(&field, 0.5), 1.5, 0);
+  assert_near(qmat_thickness_threshold(mesh, &field, 0.5), 1.5, 0);
+  mesh->sheet_triangle_count = 1;
+  assert_near(qmat_thickness_threshold(mesh, &field, 0.5), 1.5, 0);
+  mesh->sheet_triangle_count = 3;
+  assert_near(qmat_thickness_threshold(mesh, &field, 0.5), 0, 0);
   qmat_value_release(&mesh->base);
 }
 

@@ -37,7 +37,7 @@ static void guarded_init(guarded *g, const double *spheres, size_t count, const 
   assert_int_equal(qmat_medial_set_simplices(&g->context, g->medial, edges, edge_count, NULL, 0), QMAT_OK);
   assert_int_equal(qmat_complex_init(&g->context, &g->complex, g->medial, NULL), QMAT_OK);
   g->quadrics = qmat_calloc(count, sizeof *g->quadrics);
-  assert_int_equal(qmat_crease_guard_init(&g->context, &g->complex, &g->guard), QMAT_OK);
+  assert_int_equal(qmat_crease_guard_init(&g->context, &g->complex, 0, &g->guard), QMAT_OK);
 }
 
 static void guarded_uninit(guarded *g) {

@@ -141,7 +141,7 @@ static int tear_down(void **state) {
 static void collapse(sheet *s, int threads) {
   start(s);
   s->context.threads = threads;
-  assert_true(qmat_can_collapse_partitioned(&s->run.rules, &s->run.complex));
+  assert_true(qmat_can_collapse_partitioned(&s->run.rules, &s->run.complex, 0));
   assert_int_equal(qmat_collapse_partitioned(&s->run, &s->constraints, s->depths), QMAT_OK);
 }
 
@@ -242,26 +242,26 @@ static void test_what_depends_on_the_order_is_not_done_in_parts(void **state) {
   qmat_decimation_rules *rules = &s->run.rules;
   const qmat_decimation_rules good = *rules;
   qmat_complex *c = &s->run.complex;
-  assert_true(qmat_can_collapse_partitioned(rules, c));
+  assert_true(qmat_can_collapse_partitioned(rules, c, 0));
   rules->on_exceed = QMAT_EXCEED_RAISE;
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   *rules = good;
   rules->cost = QMAT_COST_PMAT;
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   *rules = good;
   rules->protect = QMAT_PROTECT_LATE;
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   *rules = good;
   rules->published = true;
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   *rules = good;
   rules->vertices = SPHERES / 2;
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   *rules = good;
   c->spheres[3] = 0; /* a sharp feature */
-  assert_false(qmat_can_collapse_partitioned(rules, c));
+  assert_false(qmat_can_collapse_partitioned(rules, c, 0));
   rules->features = QMAT_FEATURES_NONE;
-  assert_true(qmat_can_collapse_partitioned(rules, c));
+  assert_true(qmat_can_collapse_partitioned(rules, c, 0));
   end(s);
 }
 

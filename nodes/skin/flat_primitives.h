@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SKIN_FLAT_PRIMITIVES_H
+#define QMAT_NODES_SKIN_FLAT_PRIMITIVES_H
+
+#include "core/context.h"
+#include "core/value_types.h"
+#include "nodes/skin/skin_triangles.h"
+
+/* Slabs and cones of radius zero: sheets that enclose nothing. */
+
+/* Copies to `solid` the slabs and cones of `medial` that have a positive radius, and counts the others, of which cones
+ * only where no slab has them. `solid` borrows the spheres of `medial`; its rows are in the context's arena.
+ * QMAT_ERROR_MEMORY. Linear but for finding edges. */
+qmat_status qmat_flat_primitives_separate(qmat_context *context, const qmat_medial *medial, qmat_medial *solid,
+                                          qmat_medial *flat);
+
+/* Appends to `surface` both sides of each flat slab, with vertices of their own, and a prism of three sides around each
+ * flat cone, with the given radius. `spheres`: 4 doubles per sphere, in the frame of the surface. On QMAT_ERROR_MEMORY
+ * the surface is unchanged. Linear. */
+qmat_status qmat_flat_primitives_append(qmat_context *context, const qmat_medial *flat, const double *spheres,
+                                        double radius, qmat_skin_triangles *surface);
+
+#endif
