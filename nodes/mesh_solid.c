@@ -295,7 +295,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * triangle_count; i++) mesh->triangles[i] = numbers[triangles[i]];
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
-  mesh->closed = mesh->oriented = s->sheets.count == 0;
+  mesh->closed = mesh->oriented = true;
   mesh->deviation = s->mesh->deviation + s->weld.moved * s->frame.diagonal;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   if (s->sheets.count > 0)
