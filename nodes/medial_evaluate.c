@@ -281,12 +281,10 @@ const qmat_node qmat_node_medial_evaluate = {
         "errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
         "certified means: the surface is closed and oriented, sheets aside, and both errors are at most epsilon. For "
         "an open surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope "
-        "fills, is not "
-        "bounded; surface_depth_in_envelope_sampled shows it.\n\n"
+        "fills, is not bounded; surface_depth_in_envelope_sampled shows it.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
         "are Betti numbers over Z/2; those of the solid and its sheets (_of_solid) are missing where the surface is "
-        "open or has an "
-        "edge of more than two triangles.",
+        "open or has an edge of more than two triangles.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),
     .params = params,

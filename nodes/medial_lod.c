@@ -71,7 +71,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_lod = {
     .name = "medial.lod",
-    .version = 2,
+    .version = 3,
     .summary = "Extracts a medial mesh of any number of spheres or any error from a chain",
     .doc =
         "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at the "
