@@ -56,6 +56,8 @@ typedef struct lifted_step {
   qmat_make_item_fn *make;
   void *user;
   pthread_mutex_t lock;   /* of the cache, the step's counters and the next two */
+  const size_t *items;    /* those that are run: equal items are run once */
+  bool *hits;             /* per item: its result came from the cache */
   size_t first_unusable;  /* the first item that the node cannot process; SIZE_MAX: none */
   qmat_error first_error; /* why */
 } lifted_step;
@@ -79,8 +81,9 @@ static qmat_status leave_out(lifted_step *lifted, qmat_context *context, size_t 
 }
 
 /* Makes the step's outputs for one item. Runs in one of the threads of qmat_run_items. */
-static qmat_status run_item(void *user, qmat_context *context, size_t item) {
+static qmat_status run_item(void *user, qmat_context *context, size_t at) {
   lifted_step *lifted = user;
+  const size_t item = lifted->items[at];
   qmat_run_step *step = lifted->step;
   const qmat_node *type = lifted->run->graph->nodes[step->node].type;
   for (size_t port = 0; port < qmat_input_count(type); port++) {
@@ -95,6 +98,7 @@ static qmat_status run_item(void *user, qmat_context *context, size_t item) {
   for (size_t port = 0; port < qmat_output_count(type) && status == QMAT_OK; port++)
     lifted->outputs[port]->items[item] = qmat_value_retain(one.slots[port].value);
   pthread_mutex_lock(&lifted->lock);
+  lifted->hits[item] = hit;
   if (hit) step->lifted_hits++;
   pthread_mutex_unlock(&lifted->lock);
   qmat_run_uninit(&one);
@@ -108,6 +112,45 @@ static size_t item_size(const qmat_node *type, const qmat_value *const *inputs, 
     if (inputs[port] && inputs[port]->type == QMAT_LIST && !type->inputs[port].list)
       size += qmat_value_bytes(qmat_value_at(inputs[port], item));
   return size;
+}
+
+/* Whether two items of the lists have equal inputs, so that the node makes the same of both. */
+static bool are_equal(const lifted_step *lifted, const qmat_node *type, size_t a, size_t b) {
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    const qmat_value *input = lifted->inputs[port];
+    if (!input || input->type != QMAT_LIST || type->inputs[port].list) continue;
+    if (!qmat_digest_equal(&qmat_value_at(input, a)->digest, &qmat_value_at(input, b)->digest)) return false;
+  }
+  return true;
+}
+
+/* Lists the items that differ from every earlier one. `equals` gets for each item the first one that equals it. */
+static size_t find_different(const lifted_step *lifted, const qmat_node *type, size_t count, size_t *items,
+                             size_t *equals) {
+  size_t different = 0;
+  for (size_t i = 0; i < count; i++) {
+    size_t k = 0;
+    while (k < different && !are_equal(lifted, type, items[k], i)) k++;
+    if (k == different) items[different++] = i;
+    equals[i] = items[k];
+  }
+  return different;
+}
+
+/* Gives the items that were not run what was made of their equals. */
+static void copy_results(lifted_step *lifted, const qmat_node *type, size_t count, const size_t *equals) {
+  for (size_t i = 0; i < count; i++) {
+    if (equals[i] == i) continue;
+    bool is_left_out = false;
+    for (size_t port = 0; port < qmat_input_count(type); port++) {
+      const qmat_value *input = lifted->inputs[port];
+      if (input && !type->inputs[port].list && qmat_value_failure(qmat_value_at(input, i))) is_left_out = true;
+    }
+    lifted->step->lifted_left_out += is_left_out;
+    lifted->step->lifted_hits += lifted->hits[equals[i]];
+    for (size_t port = 0; port < qmat_output_count(type); port++)
+      lifted->outputs[port]->items[i] = qmat_value_retain(lifted->outputs[port]->items[equals[i]]);
+  }
 }
 
 /* Fails when every item failed, with the first item's error. */
@@ -125,14 +168,24 @@ static qmat_status check_any_made(const lifted_step *lifted, qmat_context *conte
 
 static qmat_status run_items(qmat_context *context, lifted_step *lifted, const qmat_list *first) {
   const qmat_node *type = lifted->run->graph->nodes[lifted->step->node].type;
-  size_t *sizes = qmat_alloc(first->count, sizeof *sizes), failed;
-  if (!sizes) return qmat_fail_memory(context, "values");
-  for (size_t i = 0; i < first->count; i++) sizes[i] = item_size(type, lifted->inputs, i);
-  pthread_mutex_init(&lifted->lock, NULL);
-  qmat_status status = qmat_run_items(context, first->count, sizes, "meshes", run_item, lifted, &failed);
-  pthread_mutex_destroy(&lifted->lock);
+  size_t *sizes = qmat_alloc(first->count, sizeof *sizes), *items = qmat_alloc(first->count, sizeof *items),
+         *equals = qmat_alloc(first->count, sizeof *equals), failed = SIZE_MAX;
+  lifted->hits = qmat_calloc(first->count, sizeof *lifted->hits);
+  qmat_status status = sizes && items && equals && lifted->hits ? QMAT_OK : qmat_fail_memory(context, "values");
+  if (status == QMAT_OK) {
+    const size_t different = find_different(lifted, type, first->count, items, equals);
+    lifted->items = items;
+    for (size_t i = 0; i < different; i++) sizes[i] = item_size(type, lifted->inputs, items[i]);
+    pthread_mutex_init(&lifted->lock, NULL);
+    status = qmat_run_items(context, different, sizes, "meshes", run_item, lifted, &failed);
+    pthread_mutex_destroy(&lifted->lock);
+  }
+  if (failed != SIZE_MAX) qmat_fail_within(context, first->names[items[failed]]);
+  if (status == QMAT_OK) copy_results(lifted, type, first->count, equals);
   qmat_free(sizes);
-  if (failed != SIZE_MAX) qmat_fail_within(context, first->names[failed]);
+  qmat_free(items);
+  qmat_free(equals);
+  qmat_free(lifted->hits);
   if (status == QMAT_OK && qmat_output_count(type) > 0) status = check_any_made(lifted, context, first);
   return status;
 }

@@ -19,10 +19,10 @@ qmat_status qmat_count_lifted(qmat_context *context, const qmat_node *type, cons
 typedef qmat_status qmat_make_item_fn(void *user, qmat_context *context, qmat_run *one, pthread_mutex_t *lock,
                                       bool *hit);
 
-/* Runs step `index` for each item of its lists, several at a time, and sets `outputs` to sealed lists. `first` is the
- * list that gives the names. An item that the node cannot process (QMAT_ERROR_GEOMETRY) becomes a failure value in
- * every output; an item that is a failure already is left out. Fails when no item succeeds, with the first item's
- * error. */
+/* Runs step `index` for each item of its lists, several at a time, and once for items with equal inputs, and sets
+ * `outputs` to sealed lists. `first` is the list that gives the names. An item that the node cannot process
+ * (QMAT_ERROR_GEOMETRY) becomes a failure value in every output; an item that is a failure already is left out. Fails
+ * when no item succeeds, with the first item's error. */
 qmat_status qmat_run_lifted(qmat_context *context, qmat_run *run, size_t index, const qmat_value *const *inputs,
                             const qmat_list *first, qmat_make_item_fn *make, void *user, qmat_value **outputs);
 
