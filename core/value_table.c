@@ -24,6 +24,7 @@ static const qmat_value_row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
                                             ARRAY(qmat_scene, placed, U32, placement_count, 1),
                                             ARRAY(qmat_scene, placements, F64, placement_count, 16),
                                             ARRAY(qmat_scene, placement_paths, NAMES, placement_count, 1),
+                                            SCALAR(qmat_scene, has_instances, BOOL),
                                             END};
 
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {

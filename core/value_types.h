@@ -50,7 +50,7 @@ typedef struct qmat_file_part {
 } qmat_file_part;
 
 /* Where a model came from: its name, unit and up axis. A glTF scene keeps the whole asset, so that it can be written
- * again with the result; a USD scene keeps the places of its meshes. */
+ * again with the result; a USD scene keeps the places of its meshes, and its file, or a package of its files. */
 typedef struct qmat_scene {
   qmat_value base;
   char *name;             /* UTF-8: the file's base name without its extension */
@@ -66,6 +66,7 @@ typedef struct qmat_scene {
   uint32_t *placed;       /* placement_count: a mesh, from 0 to mesh_count - 1 */
   double *placements;     /* 16 * placement_count: from the mesh's space into the scene's, p' = (p, 1) * m by rows */
   char **placement_paths; /* placement_count: of the prim with the mesh */
+  bool has_instances;     /* prims are marked as instanceable: the prims below them take no opinions */
 } qmat_scene;
 
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. The first triangles bound solids; the last ones may

@@ -220,6 +220,17 @@ static json_t *describe_carrier(const json_t *root, size_t index, const json_t *
   return NULL;
 }
 
+/* Adds the prims with a medial mesh. */
+static qmat_status list_prims(qmat_context *context, const qmat_bytes *bytes, const char *path, json_t *carriers) {
+  json_t *names;
+  qmat_status status = qmat_usd_list_medials(context, bytes, path, &names);
+  for (size_t i = 0; status == QMAT_OK && i < json_array_size(names); i++)
+    if (json_array_append_new(carriers, json_pack("{s:O}", "node", json_array_get(names, i))) != 0)
+      status = qmat_fail_memory(context, "facts");
+  if (names) json_decref(names);
+  return status;
+}
+
 json_t *qmat_medial_carriers(qmat_context *context, const char *path) {
   qmat_bytes bytes = {0};
   qmat_gltf_asset asset = {0};
@@ -230,6 +241,7 @@ json_t *qmat_medial_carriers(qmat_context *context, const char *path) {
   if (status == QMAT_OK) status = qmat_format_choose(context, path, &bytes, &format);
   if (status == QMAT_OK && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF))
     status = qmat_gltf_asset_init(context, bytes.data, bytes.size, path, &asset);
+  if (status == QMAT_OK && format == QMAT_FORMAT_USD) status = list_prims(context, &bytes, path, carriers);
   const json_t *nodes = json_object_get(asset.root, "nodes");
   if (status == QMAT_OK && !(name_counts = count_names(nodes))) status = qmat_fail_memory(context, "facts");
   for (size_t i = 0; i < json_array_size(nodes) && status == QMAT_OK; i++) {

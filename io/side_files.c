@@ -106,8 +106,65 @@ static qmat_status rename_parts(namer *n, qmat_writer *out) {
   return status;
 }
 
+/* Appends `text`, with `name` for the side part's own name, which stands between quotes or at signs. */
+static void put_renamed(qmat_writer *out, const qmat_file_part *text, const char *own, const char *name) {
+  const size_t length = strlen(own);
+  const char *at = (const char *)text->bytes, *end = at + text->size, *kept = at;
+  const bool plain = !strpbrk(name, "@\"\\");
+  for (; (size_t)(end - at) > length + 1; at++) {
+    if ((at[0] != '@' && at[0] != '"') || at[length + 1] != at[0] || memcmp(at + 1, own, length) != 0) continue;
+    qmat_put_bytes(out, kept, (size_t)(at - kept));
+    const char *quote = at[0] == '@' ? plain ? "@" : "@@@" : "\"";
+    qmat_put_text(out, quote);
+    qmat_put_text(out, at[0] == '@' || plain ? name : own);
+    qmat_put_text(out, quote);
+    kept = at + length + 2;
+    if (at[0] == '@') break; /* the sublayer, which comes last */
+    at = kept - 1;
+  }
+  qmat_put_bytes(out, kept, (size_t)(end - kept));
+}
+
+/* Names the file that a layer of USD is over: for "x/out.usda" and "original.usdc", "out_original.usdc". */
+static qmat_status name_original(qmat_context *context, const qmat_file *file, const char *path, qmat_file **named) {
+  const char *base = base_of(path), *own = file->parts[1].name;
+  char **names = qmat_calloc(2, sizeof *names);
+  const namer n = {
+      .file = file, .stem = base, .stem_length = (size_t)(ending_of(base) - base), .names = names, .context = context};
+  char *name = names ? make_name(&n, own) : NULL;
+  qmat_writer out = {0};
+  qmat_file *made = qmat_file_new();
+  if (made) {
+    made->format = qmat_strdup(file->format);
+    made->parts = qmat_calloc(2, sizeof *made->parts);
+    if (made->parts) made->part_count = 2;
+  }
+  qmat_status status = QMAT_OK;
+  if (!name || !made || !made->format || !made->parts) status = qmat_fail_memory(context, "the output file");
+  if (status == QMAT_OK) put_renamed(&out, &file->parts[0], own, name);
+  if (status == QMAT_OK) status = qmat_writer_to_part(context, &out, made, 0, "");
+  if (status == QMAT_OK) {
+    made->parts[1] =
+        (qmat_file_part){.name = name, .size = file->parts[1].size, .bytes = qmat_alloc(file->parts[1].size, 1)};
+    name = NULL;
+    if (made->parts[1].bytes)
+      memcpy(made->parts[1].bytes, file->parts[1].bytes, file->parts[1].size);
+    else
+      status = qmat_fail_memory(context, "the output file");
+  }
+  qmat_free(name);
+  qmat_free(names);
+  qmat_writer_uninit(&out);
+  if (status == QMAT_OK)
+    *named = made;
+  else if (made)
+    qmat_value_release(&made->base);
+  return status;
+}
+
 qmat_status qmat_file_name_sides(qmat_context *context, const qmat_file *file, const char *path, qmat_file **named) {
   *named = NULL;
+  if (strcmp(file->format, "usda") == 0 && file->part_count == 2) return name_original(context, file, path, named);
   const bool is_gltf = strcmp(file->format, "gltf") == 0 || strcmp(file->format, "glb") == 0;
   if (!is_gltf || file->part_count < 2) {
     *named = (qmat_file *)qmat_value_retain(&file->base);
@@ -180,7 +237,8 @@ static qmat_status check_side(qmat_context *context, const qmat_file_part *part,
   struct stat about;
   char *side = qmat_gltf_beside(path, part->name), *uri = qmat_gltf_uri_of(part->name);
   qmat_status status = side && uri ? QMAT_OK : qmat_fail_memory(context, "the names of output files");
-  if (status == QMAT_OK && stat(side, &about) == 0 && !qmat_file_holds(side, part) && !mentions(path, uri)) {
+  if (status == QMAT_OK && stat(side, &about) == 0 && !qmat_file_holds(side, part) && !mentions(path, uri) &&
+      !mentions(path, part->name)) {
     qmat_fail(context, status = QMAT_ERROR_IO, "the side file exists with other content and does not belong to '%s'",
               path);
     qmat_fail_at(context, side, 0, 0);

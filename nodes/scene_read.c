@@ -42,10 +42,10 @@ static const qmat_param params[] = {
 enum { SCENE, MESH, REPORT };
 
 static const qmat_port outputs[] = {
-    [SCENE] =
-        {.name = "scene",
-         .type = QMAT_SCENE,
-         .doc = "The model's name, format and unit; for glTF also the whole asset, for USD the places of its meshes"},
+    [SCENE] = {.name = "scene",
+               .type = QMAT_SCENE,
+               .doc = "The model's name, format and unit; for glTF also the whole asset, for USD its files and the "
+                      "places of its meshes"},
     [MESH] = {.name = "mesh",
               .type = QMAT_MESH,
               .doc = "The surface as triangles; a list where the scene has several meshes",

@@ -139,12 +139,11 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   return status;
 }
 
-static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
-                             qmat_stated_errors *stated, qmat_file **file) {
-  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  const qmat_stated_errors errors =
-      errors_of((const qmat_medial *)inputs[IN_MEDIAL], (const qmat_report *)inputs[IN_REPORT]);
-  const qmat_usd_options options = {
+static qmat_usd_options usd_options_of(const scene_write_params *params, const qmat_scene *scene,
+                                       const qmat_medial *medial, const qmat_report *report,
+                                       qmat_stated_errors *stated) {
+  const qmat_stated_errors errors = errors_of(medial, report);
+  return (qmat_usd_options){
       .package = params->format == FORMAT_USDZ,
       .name = scene ? scene->name : NULL,
       .meters_per_unit = scene ? scene->meters_per_unit : 0,
@@ -153,6 +152,56 @@ static qmat_status write_usd(qmat_context *context, const scene_write_params *pa
       .errors = errors,
       .stated = stated,
   };
+}
+
+/* The first place of a mesh. */
+static const char *first_path(const qmat_scene *scene, size_t mesh) {
+  for (size_t i = 0; i < scene->placement_count; i++)
+    if (scene->placed[i] == mesh) return scene->placement_paths[i];
+  return NULL;
+}
+
+/* A layer over a USD scene that was kept. */
+static qmat_status write_layer(qmat_context *context, const scene_write_params *params,
+                               const qmat_value *const inputs[], qmat_stated_errors *stated, qmat_file **file) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
+  if (count != scene->mesh_count) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes for %zu meshes", count, scene->mesh_count);
+    return qmat_fail_field(context, "medial");
+  }
+  qmat_usd_addition *additions = qmat_calloc(count, sizeof *additions);
+  if (!additions) return qmat_fail_memory(context, "a USD file");
+  for (size_t i = 0; i < count; i++) {
+    const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
+    additions[i] = (qmat_usd_addition){
+        .medial = medial,
+        .skin = params->skin_beside ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
+        .options =
+            usd_options_of(params, scene, medial, (const qmat_report *)given_for(inputs[IN_REPORT], i), &stated[i]),
+    };
+    additions[i].options.prim = first_path(scene, i);
+  }
+  const qmat_status status = qmat_usd_write_layer(context, scene, additions, count, file);
+  qmat_free(additions);
+  return status;
+}
+
+static qmat_status fail_several(qmat_context *context, size_t count) {
+  qmat_fail(context, QMAT_ERROR_USAGE, "this format holds one medial mesh, not %zu", count);
+  qmat_fail_field(context, "medial");
+  return qmat_fail_hint(context, "set mesh of scene.read to a name, a number or merged, or write glb or gltf");
+}
+
+static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
+                             qmat_stated_errors *stated, qmat_file **file) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  if (scene && scene->placement_count > 0 && scene->part_count > 0)
+    return write_layer(context, params, inputs, stated, file);
+  const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
+  if (count > 1) return fail_several(context, count);
+  const qmat_usd_options options = usd_options_of(params, scene, (const qmat_medial *)inputs[IN_MEDIAL],
+                                                  (const qmat_report *)inputs[IN_REPORT], stated);
   return qmat_usd_write(context, (const qmat_medial *)inputs[IN_MEDIAL], (const qmat_mesh *)inputs[IN_SKIN], &options,
                         file);
 }
@@ -208,18 +257,14 @@ static qmat_status report_stated(qmat_context *context, const qmat_value *given,
   return done ? QMAT_OK : qmat_fail_memory(context, "the report");
 }
 
-/* The other lists have as many elements as that of medial meshes. Only glTF holds several. */
+/* The other lists have as many elements as that of medial meshes. Only scenes hold several. */
 static qmat_status check_counts(qmat_context *context, const void *data, const size_t counts[]) {
   static const int others[] = {IN_SKIN, IN_REPORT};
   static const char *const names[] = {"skin", "report"};
   const scene_write_params *params = data;
-  const bool is_gltf = params->format == FORMAT_GLB || params->format == FORMAT_GLTF;
+  const bool is_scene = params->format != FORMAT_MA && params->format != FORMAT_PLY;
   const size_t count = counts[IN_MEDIAL];
-  if (!is_gltf && count > 1) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "this format holds one medial mesh, not %zu", count);
-    qmat_fail_field(context, "medial");
-    return qmat_fail_hint(context, "set mesh of scene.read to a name, a number or merged, or write glb or gltf");
-  }
+  if (!is_scene && count > 1) return fail_several(context, count);
   for (size_t i = 0; i < 2; i++) {
     const size_t of_other = counts[others[i]];
     if (of_other == 0 || of_other == count) continue;
@@ -375,7 +420,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 7,
+    .version = 8,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
@@ -389,8 +434,9 @@ const qmat_node qmat_node_scene_write = {
         "errors of the report plus the distance by which storage moves the solid, at most 0.25 % of epsilon. "
         "qmat_certified says whether both are proved to be within qmat_epsilon. Far from zero, the node is translated "
         "to qmat_origin_x, _y and _z.\n\n"
-        "usda and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. ma and ply "
-        "hold the medial mesh alone.",
+        "usda and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. Of a USD "
+        "scene they are a layer over the original, which they keep beside or inside: each prim with a mesh gains a "
+        "child with its medial mesh. ma and ply hold the medial mesh alone.",
     .citation = "",
     .params_size = sizeof(scene_write_params),
     .params = params,

@@ -36,12 +36,13 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   return status;
 }
 
-/* Whether an output can hold a medial mesh for each mesh of a scene. */
+/* Whether an output can hold a medial mesh for each mesh of a scene: glTF, or for a scene of USD a layer over it. */
 static bool saves_scene(const qmat_invocation *invocation) {
   for (size_t i = 0; i < invocation->given_count; i++) {
     if (strcmp(invocation->given[i].name, "output") != 0) continue;
     const qmat_format format = qmat_format_of_name(invocation->given[i].value);
     if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
+    if (format == QMAT_FORMAT_USD && qmat_format_of_name(invocation->arguments[0]) == QMAT_FORMAT_USD) return true;
   }
   return false;
 }
@@ -77,9 +78,8 @@ const qmat_command qmat_command_mat = {
     .doc =
         "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to 0: "
         "no bound on the distance.\n"
-        "A glTF scene saved as glTF keeps its contents, and each of its meshes gets a medial mesh. For other formats "
-        "its "
-        "meshes are merged (model.mesh=merged).\n"
+        "A glTF scene saved as glTF keeps its contents, and each of its meshes gets a medial mesh. So does a USD scene "
+        "saved as USD, by a layer over it, and as glTF. For other formats the meshes are merged (model.mesh=merged).\n"
         "--set reaches every other parameter; 'qmat nodes' lists the nodes, 'qmat node NAME' their parameters.",
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,

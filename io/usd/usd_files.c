@@ -285,6 +285,19 @@ qmat_status qmat_usd_files_find(qmat_usd_files *files, const qmat_usd_prim *prim
   return status == QMAT_OK && layer ? find_stack(files, prim, &layer->layer, found) : status;
 }
 
+void qmat_usd_files_at(const qmat_usd_files *files, size_t number, const char **path, const qmat_usd_layer **layer,
+                       bool *is_member) {
+  const file *at = files->files[number];
+  const bool is_layer = !at->is_missing && !at->first;
+  *path = is_layer ? at->path : NULL;
+  *layer = is_layer ? &at->layer : NULL;
+  *is_member = at->package >= 0;
+}
+
+char *qmat_usd_beside(const char *from, const char *asset) {
+  return is_elsewhere(asset) ? NULL : resolve(from, asset);
+}
+
 void qmat_usd_files_uninit(qmat_usd_files *files) {
   for (size_t i = 0; i < files->file_count; i++) {
     qmat_usd_layer_uninit(&files->files[i]->layer);

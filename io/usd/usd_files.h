@@ -37,6 +37,15 @@ qmat_status qmat_usd_files_open(qmat_usd_files *files, const qmat_usd_prim *root
 qmat_status qmat_usd_files_find(qmat_usd_files *files, const qmat_usd_prim *prim, const qmat_usd_layer *from,
                                 const char *asset, const char *what, size_t *found);
 
+/* One of the files that were read, numbered from 0. `*path` and `*layer` are NULL for a file that is missing or is
+ * itself a package; `*is_member`: it is in a package. */
+void qmat_usd_files_at(const qmat_usd_files *files, size_t number, const char **path, const qmat_usd_layer **layer,
+                       bool *is_member);
+
+/* The path of `asset` relative to the folder of the file `from`, with "." and ".." resolved as far as possible; NULL
+ * when memory is short, or `asset` is absolute, an address or in a package. Free with qmat_free. */
+char *qmat_usd_beside(const char *from, const char *asset);
+
 void qmat_usd_files_uninit(qmat_usd_files *files);
 
 #endif

@@ -11,7 +11,9 @@ typedef struct reader {
   qmat_usd_stage *stage;
   json_t *facts;
   const char *name;    /* of the prim to read, or NULL */
-  size_t carriers;     /* prims with a medial mesh */
+  bool lists;          /* only lists the names */
+  json_t *names;       /* of prims with a medial mesh, as keys: prims of one name have the same one */
+  json_t *found;       /* the names in their order */
   qmat_medial *medial; /* NULL until it is found */
 } reader;
 
@@ -134,8 +136,11 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
 static qmat_status search(reader *r, qmat_usd_prim *prim) {
   const qmat_usd_value *data = prim->parent ? qmat_usd_prim_field(prim, "customData") : NULL;
   if (qmat_usd_text(qmat_usd_entry(data, "qmat_version"))) {
-    r->carriers++;
-    if (r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
+    const char *own = qmat_usd_shown(prim->name);
+    if (!json_object_get(r->names, own) && (json_object_set_new(r->names, own, json_true()) != 0 ||
+                                            json_array_append_new(r->found, json_string(own)) != 0))
+      return qmat_fail_memory(r->context, "a medial mesh");
+    if (r->lists || r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
     return read_carrier(r, prim, data);
   }
   const char *const *names;
@@ -150,22 +155,41 @@ static qmat_status search(reader *r, qmat_usd_prim *prim) {
   return status;
 }
 
+/* Searches all prims. The caller releases r->found. */
+static qmat_status search_all(reader *r, const qmat_bytes *bytes, const char *path) {
+  qmat_usd_prim root = {0};
+  r->names = json_object();
+  r->found = json_array();
+  qmat_status status = r->names && r->found ? qmat_usd_stage_open(r->context, bytes, path, &r->stage)
+                                            : qmat_fail_memory(r->context, "a medial mesh");
+  if (status == QMAT_OK) status = qmat_usd_stage_root(r->stage, &root);
+  if (status == QMAT_OK) status = search(r, &root);
+  qmat_usd_prim_uninit(&root);
+  qmat_usd_stage_close(r->stage);
+  json_decref(r->names);
+  return status;
+}
+
+qmat_status qmat_usd_list_medials(qmat_context *context, const qmat_bytes *bytes, const char *path, json_t **names) {
+  reader r = {.context = context, .lists = true};
+  const qmat_status status = search_all(&r, bytes, path);
+  if (status != QMAT_OK) json_decref(r.found);
+  *names = status == QMAT_OK ? r.found : NULL;
+  return status;
+}
+
 qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                                  qmat_medial **medial, json_t *facts) {
   reader r = {.context = context, .facts = facts, .name = name};
-  qmat_usd_prim root = {0};
   *medial = NULL;
-  qmat_status status = qmat_usd_stage_open(context, bytes, path, &r.stage);
-  if (status != QMAT_OK) return status;
-  status = qmat_usd_stage_root(r.stage, &root);
-  if (status == QMAT_OK) status = search(&r, &root);
-  qmat_usd_prim_uninit(&root);
-  qmat_usd_stage_close(r.stage);
+  qmat_status status = search_all(&r, bytes, path);
+  const size_t carriers = json_array_size(r.found);
+  json_decref(r.found);
   if (status == QMAT_OK && !r.medial) {
     qmat_fail(context, status = QMAT_ERROR_GEOMETRY,
-              r.carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
-  } else if (status == QMAT_OK && !name && r.carriers > 1) {
-    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: name one of them", r.carriers);
+              carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
+  } else if (status == QMAT_OK && !name && carriers > 1) {
+    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: name one of them", carriers);
   }
   if (status == QMAT_OK) {
     *medial = r.medial;

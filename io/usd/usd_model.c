@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/text.h"
+#include "io/usd/usd_keep.h"
 #include "io/usd/usd_scene.h"
 
 static qmat_status fail_shortage(qmat_context *context) {
@@ -134,6 +135,8 @@ qmat_status qmat_usd_read_meshes(qmat_context *context, const qmat_bytes *bytes,
     status = chosen && items ? choose(context, &from, path, choice, chosen) : fail_shortage(context);
     if (status == QMAT_OK) status = list_meshes(context, &from, chosen, items, meshes);
     if (status == QMAT_OK) status = list_places(context, &from, chosen, items, meshes, scene);
+    if (status == QMAT_OK) status = qmat_usd_keep(context, from.stage, bytes, scene);
+    scene->has_instances = from.instances > 0;
   }
   if (status == QMAT_OK) status = qmat_usd_scene_report(context, &from, report);
   qmat_free(items);

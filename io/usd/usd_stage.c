@@ -53,6 +53,10 @@ size_t qmat_usd_stage_bytes(const qmat_usd_stage *stage) {
   return stage->files.bytes_read;
 }
 
+const qmat_usd_files *qmat_usd_stage_files(const qmat_usd_stage *stage) {
+  return &stage->files;
+}
+
 json_t *qmat_usd_stage_warnings(const qmat_usd_stage *stage) {
   return stage->log.warnings;
 }

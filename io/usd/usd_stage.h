@@ -26,6 +26,8 @@ const qmat_usd_layer *qmat_usd_stage_root_layer(const qmat_usd_stage *stage);
 size_t qmat_usd_stage_layer_count(const qmat_usd_stage *stage);
 /* The bytes of all files that were read so far. */
 size_t qmat_usd_stage_bytes(const qmat_usd_stage *stage);
+/* The files that were read so far. */
+const struct qmat_usd_files *qmat_usd_stage_files(const qmat_usd_stage *stage);
 /* The warnings so far, an array of texts "PATH: ..." that the stage owns. */
 json_t *qmat_usd_stage_warnings(const qmat_usd_stage *stage);
 /* Removes all warnings. */

@@ -265,7 +265,8 @@ static void put_number_entry(qmat_writer *writer, const char *name, double numbe
   qmat_put_text(writer, "\n");
 }
 
-static void put_custom_data(qmat_writer *writer, const stored *s, const char *name, const qmat_stated_errors *stated) {
+static void put_custom_data(qmat_writer *writer, const stored *s, const char *name, const char *path,
+                            const qmat_stated_errors *stated) {
   const qmat_medial *medial = &s->medial;
   const struct {
     const char *name;
@@ -276,6 +277,7 @@ static void put_custom_data(qmat_writer *writer, const stored *s, const char *na
   qmat_put_text(writer, "    customData = {\n");
   put_text_entry(writer, "qmat_version", QMAT_VERSION);
   put_text_entry(writer, "qmat_name", name ? name : "");
+  if (path) put_text_entry(writer, "qmat_prim", path);
   put_count_entry(writer, "qmat_vertices", medial->sphere_count);
   put_count_entry(writer, "qmat_edges", medial->edge_count);
   put_count_entry(writer, "qmat_triangles", medial->triangle_count);
@@ -307,25 +309,53 @@ static void put_translation(qmat_writer *writer, const double origin[3]) {
   qmat_put_text(writer, ")\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n");
 }
 
-static void put_layer(qmat_writer *writer, const stored *s, const qmat_usd_options *options,
-                      const qmat_stated_errors *stated, const char *prim) {
+/* The prim with the medial mesh; `specifier` is "def" or "class". */
+static void put_prim(qmat_writer *writer, const stored *s, const qmat_usd_options *options,
+                     const qmat_stated_errors *stated, const char *specifier, const char *prim) {
   const qmat_medial *medial = &s->medial;
-  qmat_put_text(writer, "#usda 1.0\n(\n    defaultPrim = ");
-  put_quoted(writer, prim);
-  qmat_put_text(writer, "\n    doc = \"qmat " QMAT_VERSION "\"\n    metersPerUnit = ");
-  qmat_put_number(writer, options->meters_per_unit > 0 ? options->meters_per_unit : 1);
-  qmat_put_text(writer, options->is_z_up ? "\n    upAxis = \"Z\"\n)\n\n" : "\n    upAxis = \"Y\"\n)\n\n");
-  qmat_put_text(writer, "def Xform ");
+  qmat_put_text(writer, specifier);
+  qmat_put_text(writer, " Xform ");
   put_quoted(writer, prim);
   qmat_put_text(writer, " (\n");
-  put_custom_data(writer, s, options->name, stated);
-  qmat_put_text(writer, "    kind = \"component\"\n)\n{");
+  put_custom_data(writer, s, options->name, options->prim, stated);
+  if (!options->prim) qmat_put_text(writer, "    kind = \"component\"\n");
+  qmat_put_text(writer, ")\n{");
   if (has_origin(s)) put_translation(writer, s->origin);
   if (s->skin.triangle_count > 0) put_skin(writer, &s->skin);
   put_spheres(writer, medial);
   if (medial->edge_count > 0) put_cones(writer, medial);
   if (medial->triangle_count > 0) put_slabs(writer, medial);
   qmat_put_text(writer, "}\n");
+}
+
+static void put_layer(qmat_writer *writer, const stored *s, const qmat_usd_options *options,
+                      const qmat_stated_errors *stated, const char *prim) {
+  qmat_put_text(writer, "#usda 1.0\n(\n    defaultPrim = ");
+  put_quoted(writer, prim);
+  qmat_put_text(writer, "\n    doc = \"qmat " QMAT_VERSION "\"\n    metersPerUnit = ");
+  qmat_put_number(writer, options->meters_per_unit > 0 ? options->meters_per_unit : 1);
+  qmat_put_text(writer, options->is_z_up ? "\n    upAxis = \"Z\"\n)\n\n" : "\n    upAxis = \"Y\"\n)\n\n");
+  put_prim(writer, s, options, stated, "def", prim);
+}
+
+/* Stores the medial mesh, and states its errors. Free `s` also after a failure. */
+static qmat_status store(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
+                         const qmat_usd_options *options, stored *s, qmat_stated_errors *stated) {
+  const qmat_status status = stored_init(context, medial, skin, options->moved, s);
+  if (status != QMAT_OK) return status;
+  *stated = qmat_errors_after_move(&options->errors, s->loss);
+  if (options->stated) *options->stated = *stated;
+  return QMAT_OK;
+}
+
+qmat_status qmat_usd_put_class(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
+                               const qmat_usd_options *options, const char *prim, qmat_writer *writer) {
+  stored s;
+  qmat_stated_errors stated;
+  const qmat_status status = store(context, medial, skin, options, &s, &stated);
+  if (status == QMAT_OK) put_prim(writer, &s, options, &stated, "class", prim);
+  stored_uninit(&s);
+  return status;
 }
 
 qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
@@ -336,14 +366,12 @@ qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, con
     return qmat_fail_field(context, "medial");
   }
   stored s;
-  const qmat_status status = stored_init(context, medial, skin, options->moved, &s);
+  qmat_stated_errors stated;
+  const qmat_status status = store(context, medial, skin, options, &s, &stated);
   if (status != QMAT_OK) {
     stored_uninit(&s);
     return status;
   }
-  const qmat_stated_errors stated = qmat_errors_after_move(&options->errors, s.loss);
-  if (options->stated) *options->stated = stated;
-
   char prim[LONGEST_NAME + 2], member[LONGEST_NAME + 8];
   make_prim_name(options->name, prim);
   qmat_writer writer = {0}, package = {0};

@@ -2,12 +2,14 @@
 #ifndef QMAT_IO_USD_USD_WRITE_H
 #define QMAT_IO_USD_USD_WRITE_H
 
+#include "io/bytes.h"
 #include "io/stored_medial.h"
 
 /* The form of the file, and facts about the medial mesh. */
 typedef struct qmat_usd_options {
   bool package;               /* a .usdz with the layer; else a .usda */
   const char *name;           /* of the model, UTF-8; NULL or "": none */
+  const char *prim;           /* the path of the prim that is described, for qmat_usd_put_class; else NULL */
   double meters_per_unit;     /* 0: unknown, written as 1 */
   bool is_z_up;               /* else y is up */
   double moved;               /* how far single precision may move the solid, model units; above zero */
@@ -30,5 +32,30 @@ typedef struct qmat_usd_options {
  * thread; the same bytes for the same input. Cost: linear. */
 qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                            const qmat_usd_options *options, qmat_file **file);
+
+/* Appends the same prim as a class named `prim`, with options->prim in its customData as qmat_prim. The locale's
+ * decimal point must be that of C. Otherwise as above. */
+qmat_status qmat_usd_put_class(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
+                               const qmat_usd_options *options, const char *prim, qmat_writer *writer);
+
+/* A medial mesh of a scene. */
+typedef struct qmat_usd_addition {
+  const qmat_medial *medial; /* NULL: nothing is added for this mesh */
+  const qmat_mesh *skin;     /* NULL: none */
+  qmat_usd_options options;
+} qmat_usd_addition;
+
+/* Makes a layer over a USD scene that was kept (io/usd/usd_keep.h): its sublayer is the scene's own file, and prims
+ * with an "over" add a child to each prim that has a mesh. Prims whose names text cannot have get none. The child
+ * references the class of the mesh's medial mesh, which is described once, in the mesh's space: "medial_0" for mesh 0.
+ * `additions` has one element per mesh of the scene. With instances in the scene, the prims on the way are no longer
+ * instanceable, which would hide the additions. Layer metadata that only a root layer may have are copied: the default
+ * prim, units, axis and times.
+ *
+ * A text layer has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package contains everything:
+ * the layer first, and the scene's files in the folder "original". options->package and name are those of the first
+ * addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY. `*file` as above. */
+qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
+                                 size_t count, qmat_file **file);
 
 #endif

@@ -122,34 +122,50 @@ static void put_facts(qmat_writer *writer, uint32_t crc, uint32_t size, uint16_t
   qmat_put_u16(writer, extra);
 }
 
-void qmat_usdz_put(qmat_writer *writer, const char *name, const void *bytes, size_t size) {
-  const size_t name_length = strlen(name), header = LOCAL_SIZE + name_length;
+void qmat_usdz_add(qmat_usdz_writer *writer, const char *name, const void *bytes, size_t size) {
+  qmat_writer *out = writer->out, *directory = &writer->directory;
+  const size_t name_length = strlen(name), start = out->size, header = start + LOCAL_SIZE + name_length;
   /* The header of an extra field has 4 bytes. */
   const size_t extra = ALIGNMENT - (header + 4) % ALIGNMENT + 4;
-  if (size > UINT32_MAX - 4096 || name_length > 255) {
-    writer->failed = true;
+  if (size > UINT32_MAX - 4096 || start > UINT32_MAX - 4096 - size || name_length > 255 ||
+      writer->count == UINT16_MAX) {
+    out->failed = true;
     return;
   }
   const uint32_t crc = checksum(bytes, size);
-  qmat_put_u32(writer, LOCAL_SIGNATURE);
-  put_facts(writer, crc, (uint32_t)size, (uint16_t)name_length, (uint16_t)extra);
-  qmat_put_text(writer, name);
-  qmat_put_u16(writer, PADDING_ID);
-  qmat_put_u16(writer, (uint16_t)(extra - 4));
-  for (size_t i = 4; i < extra; i++) qmat_put_u8(writer, 0);
-  qmat_put_bytes(writer, bytes, size);
-  const size_t directory = writer->size;
-  qmat_put_u32(writer, CENTRAL_SIGNATURE);
-  qmat_put_u16(writer, 10); /* version made by */
-  put_facts(writer, crc, (uint32_t)size, (uint16_t)name_length, 0);
-  for (int i = 0; i < 14; i++) qmat_put_u8(writer, 0); /* comment, disk, attributes, offset */
-  qmat_put_text(writer, name);
-  const size_t directory_size = writer->size - directory;
-  qmat_put_u32(writer, END_SIGNATURE);
-  qmat_put_u32(writer, 0); /* disks */
-  qmat_put_u16(writer, 1);
-  qmat_put_u16(writer, 1);
-  qmat_put_u32(writer, (uint32_t)directory_size);
-  qmat_put_u32(writer, (uint32_t)directory);
-  qmat_put_u16(writer, 0);
+  qmat_put_u32(out, LOCAL_SIGNATURE);
+  put_facts(out, crc, (uint32_t)size, (uint16_t)name_length, (uint16_t)extra);
+  qmat_put_text(out, name);
+  qmat_put_u16(out, PADDING_ID);
+  qmat_put_u16(out, (uint16_t)(extra - 4));
+  for (size_t i = 4; i < extra; i++) qmat_put_u8(out, 0);
+  qmat_put_bytes(out, bytes, size);
+  qmat_put_u32(directory, CENTRAL_SIGNATURE);
+  qmat_put_u16(directory, 10); /* version made by */
+  put_facts(directory, crc, (uint32_t)size, (uint16_t)name_length, 0);
+  for (int i = 0; i < 10; i++) qmat_put_u8(directory, 0); /* comment, disk, attributes */
+  qmat_put_u32(directory, (uint32_t)start);
+  qmat_put_text(directory, name);
+  writer->count++;
+}
+
+void qmat_usdz_finish(qmat_usdz_writer *writer) {
+  qmat_writer *out = writer->out, *directory = &writer->directory;
+  const size_t start = out->size;
+  if (start > UINT32_MAX - 4096 || directory->failed) out->failed = true;
+  qmat_put_bytes(out, directory->bytes, directory->size);
+  qmat_put_u32(out, END_SIGNATURE);
+  qmat_put_u32(out, 0); /* disks */
+  qmat_put_u16(out, (uint16_t)writer->count);
+  qmat_put_u16(out, (uint16_t)writer->count);
+  qmat_put_u32(out, (uint32_t)directory->size);
+  qmat_put_u32(out, (uint32_t)start);
+  qmat_put_u16(out, 0);
+  qmat_writer_uninit(directory);
+}
+
+void qmat_usdz_put(qmat_writer *writer, const char *name, const void *bytes, size_t size) {
+  qmat_usdz_writer archive = {.out = writer};
+  qmat_usdz_add(&archive, name, bytes, size);
+  qmat_usdz_finish(&archive);
 }

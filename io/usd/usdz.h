@@ -29,6 +29,20 @@ void qmat_usdz_uninit(qmat_usdz *package);
 /* The member of that name, or NULL. */
 const qmat_usdz_member *qmat_usdz_find(const qmat_usdz *package, const char *name);
 
+/* An archive that is being written. `out` is empty before; the rest is zeroed. */
+typedef struct qmat_usdz_writer {
+  qmat_writer *out;
+  qmat_writer directory;
+  size_t count;
+} qmat_usdz_writer;
+
+/* Appends a member; the first one is the root layer. Sets out->failed for names of more than 255 bytes, for more than
+ * 4 GiB and 65,535 members, and when memory is short. */
+void qmat_usdz_add(qmat_usdz_writer *writer, const char *name, const void *bytes, size_t size);
+
+/* Appends the directory, and frees it. Call it also after a failure. */
+void qmat_usdz_finish(qmat_usdz_writer *writer);
+
 /* Appends an archive of one member to an empty writer. */
 void qmat_usdz_put(qmat_writer *writer, const char *name, const void *bytes, size_t size);
 

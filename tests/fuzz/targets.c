@@ -21,6 +21,7 @@
 #include "io/usd/usd_medial.h"
 #include "io/usd/usd_model.h"
 #include "io/usd/usd_scene.h"
+#include "io/usd/usd_write.h"
 #include "nodes/nodes.h"
 #include "tests/io/files.h" /* brings cmocka.h, which the headers below need */
 
@@ -304,6 +305,27 @@ static void read_base64(const uint8_t *content, size_t size) {
 }
 
 /* A text layer, a crate or a package, told apart by the first bytes. */
+/* A layer over any scene can be read. */
+static void write_usd_layer(const qmat_scene *scene) {
+  qmat_context context = {0};
+  qmat_file *file = NULL;
+  qmat_medial *medial = example_medial(3);
+  qmat_usd_addition *additions = calloc(scene->mesh_count, sizeof *additions);
+  require(additions);
+  for (size_t i = 0; i < scene->mesh_count; i++)
+    additions[i] = (qmat_usd_addition){.medial = medial, .options = {.moved = 1e-3, .prim = "/p"}};
+  require(qmat_usd_write_layer(&context, scene, additions, scene->mesh_count, &file) == QMAT_OK);
+  qmat_usd_layer layer = {0};
+  qmat_bytes text = memory_file(file->parts[0].bytes, file->parts[0].size);
+  require(read_layer(&context, &text, "layer", &layer) == QMAT_OK);
+  qmat_usd_layer_uninit(&layer);
+  free(text.data);
+  free(additions);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 /* The meshes of a scene one by one, and their places. */
 static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
   qmat_context context = {0};
@@ -317,6 +339,7 @@ static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
   if (status == QMAT_OK) {
     require(meshes.count > 0 && scene->mesh_count == meshes.count && scene->placement_count >= meshes.count);
     require(qmat_value_seal(&context, &scene->base) == QMAT_OK);
+    if (scene->part_count > 0) write_usd_layer(scene);
   }
   qmat_usd_meshes_uninit(&meshes);
   qmat_value_release(&scene->base);

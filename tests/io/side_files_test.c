@@ -101,6 +101,34 @@ static qmat_status save(qmat_context *context, const qmat_file *file, const char
   return status;
 }
 
+static void test_the_file_below_a_layer_of_usd_is_named_after_the_layer(void **state) {
+  (void)state;
+  static const struct {
+    const char *path, *text, *name;
+  } cases[] = {{"x/out.usda", "q = \"out_original.usdc\" s = @out_original.usdc@ original.usdc", "out_original.usdc"},
+               {"x/a@b.usda", "q = \"original.usdc\" s = @@@a@b_original.usdc@@@ original.usdc", "a@b_original.usdc"}};
+  for (size_t i = 0; i < 2; i++) {
+    static const char *const names[] = {"original.usdc"};
+    qmat_context context = {0};
+    qmat_file *file = make_file("{}", names, 1, "crate"), *named;
+    file->base.sealed = false;
+    qmat_free(file->format);
+    file->format = qmat_strdup("usda");
+    qmat_free(file->parts[0].bytes);
+    file->parts[0].bytes = (uint8_t *)qmat_strdup("q = \"original.usdc\" s = @original.usdc@ original.usdc");
+    file->parts[0].size = strlen((const char *)file->parts[0].bytes);
+    assert_int_equal(qmat_file_name_sides(&context, file, cases[i].path, &named), QMAT_OK);
+    assert_int_equal(named->part_count, 2);
+    assert_string_equal(named->parts[1].name, cases[i].name);
+    assert_int_equal(named->parts[1].size, 5);
+    assert_int_equal(named->parts[0].size, strlen(cases[i].text));
+    assert_memory_equal(named->parts[0].bytes, cases[i].text, strlen(cases[i].text));
+    qmat_value_release(&named->base);
+    qmat_value_release(&file->base);
+    qmat_context_uninit(&context);
+  }
+}
+
 static void test_a_file_of_something_else_is_never_replaced(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -136,6 +164,7 @@ int main(void) {
       cmocka_unit_test(test_side_files_are_named_after_the_output),
       cmocka_unit_test(test_names_stay_within_what_file_systems_take),
       cmocka_unit_test(test_other_formats_and_files_without_sides_stay_as_they_are),
+      cmocka_unit_test(test_the_file_below_a_layer_of_usd_is_named_after_the_layer),
       cmocka_unit_test(test_a_file_of_something_else_is_never_replaced),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

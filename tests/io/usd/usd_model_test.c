@@ -6,6 +6,8 @@
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_write.h"
 #include "io/placement.h"
+#include "io/usd/usd_medial.h"
+#include "io/usd/usd_write.h"
 #include "tests/io/files.h"
 #include "tests/io/medial_examples.h"
 #include "tests/shapes.h"
@@ -282,6 +284,114 @@ static void test_a_transform_is_split_into_a_rotation_and_a_plain_one(void **sta
   }
 }
 
+/* ---- layers over a scene ---- */
+
+/* Adds the same medial mesh to all meshes of a scene. The caller releases the file. */
+static qmat_file *write_layer(reading *r, const qmat_medial *medial, bool package) {
+  qmat_usd_addition additions[8] = {{0}};
+  for (size_t i = 0; i < r->meshes.count; i++)
+    additions[i] = (qmat_usd_addition){
+        .medial = i == 2 ? NULL : medial,
+        .options = {.package = package, .name = "thing", .prim = r->meshes.names[i], .moved = 1e-3}};
+  qmat_file *file;
+  if (qmat_usd_write_layer(&r->context, r->scene, additions, r->meshes.count, &file) != QMAT_OK)
+    fail_msg("%s", r->context.error.message);
+  return file;
+}
+
+#define LAYERED                                                                                                       \
+  "#usda 1.0\n( defaultPrim = \"a\" metersPerUnit = 0.5 upAxis = \"Z\" startTimeCode = 3 )\n"                         \
+  "def Xform \"a\" ( instanceable = true ) {\n" AT(1, 0, 0)                                                           \
+      CUBE("x", AT(0, 2, 0)) "def Xform \"ab\" {\n" CUBE("x", "") "}\n}\n" CUBE("b", "double size = 4\n" AT(7, 0, 0)) \
+          CUBE("c", "double size = 6")
+
+/* A layer has what the scene has at the same places, and the medial mesh below each prim with a mesh. */
+static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
+  (void)state;
+  char folder[64], path[256];
+  make_folder(folder);
+  reading before = read_all(LAYERED);
+  before.scene->is_z_up = true;
+  qmat_medial *medial = example_medial(5);
+  for (int package = 0; package < 2; package++) {
+    qmat_file *file = write_layer(&before, medial, package);
+    assert_int_equal(file->part_count, package ? 1 : 2);
+    assert_string_equal(file->format, package ? "usdz" : "usda");
+    if (!package) {
+      assert_string_equal(file->parts[1].name, "original.usda");
+      assert_int_equal(file->parts[1].size, strlen(LAYERED));
+      assert_memory_equal(file->parts[1].bytes, LAYERED, strlen(LAYERED));
+      snprintf(path, sizeof path, "%s/original.usda", folder);
+      FILE *original = fopen(path, "wb");
+      assert_non_null(original);
+      assert_int_equal(fwrite(LAYERED, 1, strlen(LAYERED), original), strlen(LAYERED));
+      fclose(original);
+    }
+    snprintf(path, sizeof path, "%s/layer", folder);
+    qmat_context context = {0};
+    qmat_bytes bytes = memory_file(file->parts[0].bytes, file->parts[0].size);
+    qmat_scene *scene = qmat_scene_new();
+    qmat_usd_meshes meshes;
+    json_t *report = json_object(), *names, *facts = json_object();
+    assert_int_equal(qmat_usd_read_meshes(&context, &bytes, path, "all", 16, scene, &meshes, report), QMAT_OK);
+    assert_int_equal(json_array_size(json_object_get(report, "warnings")), 0);
+    assert_true(json_real_value(json_object_get(report, "meters_per_unit")) == 0.5);
+    assert_string_equal(json_string_value(json_object_get(report, "up_axis")), "Z");
+    assert_int_equal(json_integer_value(json_object_get(report, "instances")), 0);
+    assert_int_equal(scene->placement_count, before.scene->placement_count);
+    for (size_t i = 0; i < scene->placement_count; i++) {
+      assert_string_equal(scene->placement_paths[i], before.scene->placement_paths[i]);
+      assert_memory_equal(scene->placements + 16 * i, before.scene->placements + 16 * i, 16 * sizeof(double));
+    }
+    assert_int_equal(qmat_usd_list_medials(&context, &bytes, path, &names), QMAT_OK);
+    assert_int_equal(json_array_size(names), 2); /* mesh 2 got none */
+    qmat_medial *read;
+    assert_int_equal(qmat_usd_read_medial(&context, &bytes, path, "medial_1", &read, facts), QMAT_OK);
+    assert_int_equal(read->sphere_count, medial->sphere_count);
+    assert_true(qmat_medial_move(medial, read) < 1e-6);
+    assert_string_equal(json_string_value(json_object_get(facts, "qmat_prim")), "/b");
+    qmat_value_release(&read->base);
+    json_decref(names);
+    json_decref(facts);
+    json_decref(report);
+    qmat_usd_meshes_uninit(&meshes);
+    qmat_value_release(&scene->base);
+    free(bytes.data);
+    qmat_value_release(&file->base);
+    qmat_context_uninit(&context);
+  }
+  snprintf(path, sizeof path, "%s/original.usda", folder);
+  unlink(path);
+  assert_int_equal(rmdir(folder), 0);
+  qmat_value_release(&medial->base);
+  release(&before);
+}
+
+/* The overs of a path that begins with another path are below its prim, and each prim is opened once. */
+static void test_the_prims_of_a_layer_are_opened_once(void **state) {
+  (void)state;
+  reading r =
+      read_all("#usda 1.0\n" CUBE("a", CUBE("x", "")) CUBE("a1", "") "def \"b\" { def \"a\" {" CUBE("x", "") "} }\n");
+  qmat_medial *medial = example_medial(1);
+  qmat_file *file = write_layer(&r, medial, false);
+  char *text = qmat_alloc(file->parts[0].size + 1, 1);
+  memcpy(text, file->parts[0].bytes, file->parts[0].size);
+  text[file->parts[0].size] = '\0';
+  const char *overs = strstr(text, "\n}\n\nover ");
+  assert_non_null(overs);
+#define CHILD(indent)                                                                                                  \
+  indent "def Xform \"medial_0\" (\n" indent "    prepend references = </medial_0>\n" indent ")\n" indent "{\n" indent \
+         "}\n"
+  assert_string_equal(overs + 4, "over \"a\"\n{\n" CHILD("    ") "    over \"x\"\n    {\n" CHILD("        ") "    }\n}\n"
+                                 "over \"a1\"\n{\n" CHILD("    ") "}\n"
+                                 "over \"b\"\n{\n    over \"a\"\n    {\n        over \"x\"\n        {\n"
+                                 CHILD("            ") "        }\n    }\n}\n");
+  qmat_free(text);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_equal_meshes_are_one_mesh_in_several_places),
@@ -290,6 +400,8 @@ int main(void) {
       cmocka_unit_test(test_prototypes_are_found_through_references_and_instancers_nest),
       cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
       cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),
+      cmocka_unit_test(test_a_layer_adds_medial_meshes_and_takes_nothing),
+      cmocka_unit_test(test_the_prims_of_a_layer_are_opened_once),
       cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

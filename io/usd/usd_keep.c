@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_keep.h"
+
+#include <string.h>
+
+#include "io/gltf/gltf_keep.h"
+#include "io/usd/usd_files.h"
+#include "io/usd/usdz.h"
+
+enum { MOST_KEPT = 4096 };
+
+/* Paths of the files to keep, the root layer first. */
+typedef struct keeper {
+  qmat_context *context;
+  size_t count, capacity;
+  char **paths;
+} keeper;
+
+static qmat_status fail_shortage(const keeper *k) {
+  return qmat_fail_memory(k->context, "the files of a USD scene");
+}
+
+/* Adds a path, which it takes over; NULL is none. */
+static qmat_status add_path(keeper *k, char *path) {
+  for (size_t i = 0; i < k->count && path; i++) {
+    if (strcmp(k->paths[i], path) != 0) continue;
+    qmat_free(path);
+    return QMAT_OK;
+  }
+  if (!path) return QMAT_OK;
+  if (k->count >= MOST_KEPT || qmat_grow((void **)&k->paths, &k->capacity, k->count + 1, sizeof *k->paths) != 0) {
+    qmat_free(path);
+    return fail_shortage(k);
+  }
+  k->paths[k->count++] = path;
+  return QMAT_OK;
+}
+
+/* Whether a file is an image. One that cannot be read is none. */
+static qmat_status is_image(const keeper *k, const char *path, bool *image) {
+  qmat_bytes bytes = {0};
+  const qmat_error before = k->context->error;
+  const qmat_status status = qmat_bytes_read_file(k->context, path, &bytes);
+  *image = status == QMAT_OK && (qmat_gltf_image_type(bytes.data, bytes.size) ||
+                                 (bytes.size > 4 && memcmp(bytes.data, "v/1\1", 4) == 0)); /* OpenEXR */
+  qmat_bytes_uninit(&bytes);
+  if (status != QMAT_ERROR_IO && status != QMAT_ERROR_FORMAT) return status;
+  k->context->error = before;
+  return QMAT_OK;
+}
+
+static qmat_status add_assets(keeper *k, const char *from, const qmat_usd_value *value) {
+  qmat_status status = QMAT_OK;
+  if (!value || value->type != QMAT_USD_ASSET) return QMAT_OK;
+  for (size_t i = 0; i < value->count && status == QMAT_OK; i++) {
+    char *path = value->texts[i][0] ? qmat_usd_beside(from, value->texts[i]) : NULL;
+    bool image = false;
+    if (path) status = is_image(k, path, &image);
+    if (image) {
+      const qmat_status added = add_path(k, path);
+      if (added != QMAT_OK) return added;
+    } else {
+      qmat_free(path);
+    }
+  }
+  return status;
+}
+
+/* Adds the images that the attributes below a spec name. */
+static qmat_status add_images(keeper *k, const char *from, const qmat_usd_spec *spec) {
+  qmat_status status = QMAT_OK;
+  if (spec->kind == QMAT_USD_ATTRIBUTE) status = add_assets(k, from, qmat_usd_field_value(spec, "default"));
+  for (const qmat_usd_spec *child = spec->first_child; child && status == QMAT_OK; child = child->next)
+    status = add_images(k, from, child);
+  return status;
+}
+
+/* The length of the folder that all paths are in. */
+static size_t common_folder(const keeper *k) {
+  const char *first = k->paths[0];
+  size_t length = 0;
+  for (size_t end = 1; first[end - 1]; end++) {
+    if (first[end - 1] != '/') continue;
+    for (size_t i = 1; i < k->count; i++)
+      if (strncmp(k->paths[i], first, end) != 0) return length;
+    length = end;
+  }
+  return length;
+}
+
+static qmat_status pack(const keeper *k, size_t folder, const qmat_bytes *root, qmat_writer *out) {
+  qmat_usdz_writer archive = {.out = out};
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < k->count && status == QMAT_OK; i++) {
+    qmat_bytes bytes = {0};
+    if (i > 0) status = qmat_bytes_read_file(k->context, k->paths[i], &bytes);
+    const qmat_bytes *from = i > 0 ? &bytes : root;
+    if (status == QMAT_OK) qmat_usdz_add(&archive, k->paths[i] + folder, from->data, from->size);
+    qmat_bytes_uninit(&bytes);
+  }
+  qmat_usdz_finish(&archive);
+  if (status == QMAT_OK && out->failed) status = fail_shortage(k);
+  return status;
+}
+
+static qmat_status warn_not_kept(const keeper *k, const qmat_usd_stage *stage, const char *why) {
+  json_t *text = json_sprintf("the scene is not kept for an output as USD: %s", why);
+  return json_array_append_new(qmat_usd_stage_warnings(stage), text) == 0 ? QMAT_OK : fail_shortage(k);
+}
+
+/* Lists the files to keep; `*why` says why that is impossible. */
+static qmat_status list_files(keeper *k, const qmat_usd_stage *stage, bool is_package, const char **why) {
+  const qmat_usd_files *files = qmat_usd_stage_files(stage);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < files->file_count && status == QMAT_OK && !*why && !is_package; i++) {
+    const char *path;
+    const qmat_usd_layer *layer;
+    bool is_member;
+    qmat_usd_files_at(files, i, &path, &layer, &is_member);
+    if (is_member) *why = "it refers to packages";
+    if (is_member || !path) continue;
+    char *copy = qmat_strdup(path);
+    status = copy ? add_path(k, copy) : fail_shortage(k);
+    if (status == QMAT_OK) status = add_images(k, path, layer->root);
+  }
+  return status;
+}
+
+qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, const qmat_bytes *bytes,
+                          qmat_scene *scene) {
+  keeper k = {.context = context};
+  const char *why = NULL;
+  const bool is_package = bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
+  qmat_writer out = {0};
+  qmat_status status = list_files(&k, stage, is_package, &why);
+  const size_t folder = k.count > 1 ? common_folder(&k) : 0;
+  for (size_t i = 0; i < k.count && k.count > 1; i++)
+    if (!qmat_is_part_name(k.paths[i] + folder) || !qmat_is_utf8(k.paths[i] + folder))
+      why = "a file is in a folder above that of the first one";
+  if (status == QMAT_OK && why) {
+    status = warn_not_kept(&k, stage, why);
+  } else if (status == QMAT_OK) {
+    if (k.count > 1)
+      status = pack(&k, folder, bytes, &out);
+    else
+      qmat_put_bytes(&out, bytes->data, bytes->size);
+    scene->parts = qmat_calloc(1, sizeof *scene->parts);
+    if (status == QMAT_OK && (!scene->parts || out.failed)) status = fail_shortage(&k);
+    if (status == QMAT_OK) {
+      scene->part_count = 1;
+      scene->parts[0].name = qmat_strdup("");
+      scene->parts[0].bytes = qmat_alloc(out.size, 1);
+      if (!scene->parts[0].name || !scene->parts[0].bytes) status = fail_shortage(&k);
+    }
+    if (status == QMAT_OK) {
+      memcpy(scene->parts[0].bytes, out.bytes, out.size);
+      scene->parts[0].size = out.size;
+    }
+  }
+  qmat_writer_uninit(&out);
+  for (size_t i = 0; i < k.count; i++) qmat_free(k.paths[i]);
+  qmat_free(k.paths);
+  return status;
+}

@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A layer over a USD scene that adds medial meshes to its prims. */
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/node.h"
+#include "io/usd/usd_stage.h"
+#include "io/usd/usd_write.h"
+#include "io/usd/usdz.h"
+
+/* A prim that carries a mesh. */
+typedef struct carrier {
+  const char *path;
+  uint32_t mesh;
+} carrier;
+
+static qmat_status fail_shortage(qmat_context *context) {
+  return qmat_fail_memory(context, "the output file");
+}
+
+/* Orders paths so that prims come right before those below them: the slash is the smallest character. */
+static int compare_carriers(const void *a, const void *b) {
+  const carrier *x = a, *y = b;
+  const unsigned char *p = (const unsigned char *)x->path, *q = (const unsigned char *)y->path;
+  while (*p && *p == *q) p++, q++;
+  const int first = *p == '/' ? 1 : *p, second = *q == '/' ? 1 : *q;
+  if (first != second) return first - second;
+  return (x->mesh > y->mesh) - (x->mesh < y->mesh);
+}
+
+static void put_indent(qmat_writer *writer, size_t depth) {
+  for (size_t i = 0; i < depth; i++) qmat_put_text(writer, "    ");
+}
+
+/* The number of names that two paths begin with. */
+static size_t common_names(const char *a, const char *b) {
+  size_t count = 0;
+  for (size_t i = 0;; i++) {
+    const bool a_ends = a[i] == '/' || a[i] == '\0', b_ends = b[i] == '/' || b[i] == '\0';
+    if (a_ends && b_ends && i > 0) count++;
+    if (a[i] != b[i] || a[i] == '\0') return count;
+  }
+}
+
+static size_t count_names(const char *path) {
+  size_t count = 0;
+  for (; *path; path++) count += *path == '/';
+  return count;
+}
+
+/* Opens the prims of a path behind its first `open` names. */
+static void open_prims(qmat_writer *writer, const char *path, size_t open, bool has_instances) {
+  size_t depth = 0;
+  while (*path) {
+    const size_t length = strcspn(++path, "/");
+    if (depth >= open) {
+      put_indent(writer, depth);
+      qmat_put_text(writer, "over \"");
+      qmat_put_bytes(writer, path, length);
+      qmat_put_text(writer, has_instances ? "\" (\n" : "\"\n");
+      if (has_instances) {
+        put_indent(writer, depth + 1);
+        qmat_put_text(writer, "instanceable = false\n");
+        put_indent(writer, depth);
+        qmat_put_text(writer, ")\n");
+      }
+      put_indent(writer, depth);
+      qmat_put_text(writer, "{\n");
+    }
+    path += length;
+    depth++;
+  }
+}
+
+static void put_reference(qmat_writer *writer, size_t depth, uint32_t mesh) {
+  char line[128];
+  put_indent(writer, depth);
+  snprintf(line, sizeof line, "def Xform \"medial_%u\" (\n", mesh);
+  qmat_put_text(writer, line);
+  put_indent(writer, depth + 1);
+  snprintf(line, sizeof line, "prepend references = </medial_%u>\n", mesh);
+  qmat_put_text(writer, line);
+  put_indent(writer, depth);
+  qmat_put_text(writer, ")\n");
+  put_indent(writer, depth);
+  qmat_put_text(writer, "{\n");
+  put_indent(writer, depth);
+  qmat_put_text(writer, "}\n");
+}
+
+/* Whether text can name the prims of a path. A crate may have any names. */
+static bool has_valid_names(const char *path) {
+  for (; *path == '/'; path += strcspn(path, "/")) {
+    const char *name = ++path;
+    if (*name == '\0' || *name == '/') return false;
+    for (; *name && *name != '/'; name++) {
+      const char c = *name;
+      const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+      if (!plain && !(c & 0x80)) return false;
+    }
+  }
+  return *path == '\0';
+}
+
+/* Writes the prims that carry a mesh with a medial mesh. */
+static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
+                             qmat_writer *writer) {
+  carrier *carriers = qmat_alloc(scene->placement_count, sizeof *carriers);
+  if (!carriers) return fail_shortage(context);
+  size_t count = 0, open = 0;
+  for (size_t i = 0; i < scene->placement_count; i++)
+    if (additions[scene->placed[i]].medial && has_valid_names(scene->placement_paths[i]))
+      carriers[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i]};
+  qsort(carriers, count, sizeof *carriers, compare_carriers);
+  for (size_t i = 0; i < count; i++) {
+    const char *path = carriers[i].path, *before = i > 0 ? carriers[i - 1].path : "";
+    if (i > 0 && strcmp(path, before) == 0) continue; /* a prototype of several instances */
+    const size_t shared = i > 0 ? common_names(path, before) : 0;
+    while (open > shared) {
+      put_indent(writer, --open);
+      qmat_put_text(writer, "}\n");
+    }
+    open_prims(writer, path, open, scene->has_instances);
+    open = count_names(path);
+    put_reference(writer, open, scene->meshes[carriers[i].mesh]);
+  }
+  while (open > 0) {
+    put_indent(writer, --open);
+    qmat_put_text(writer, "}\n");
+  }
+  qmat_free(carriers);
+  return QMAT_OK;
+}
+
+/* ---- the layer's metadata ---- */
+
+static void put_number_field(qmat_writer *writer, const qmat_usd_spec *root, const char *name) {
+  const double value = qmat_usd_number(qmat_usd_field_value(root, name), NAN);
+  if (!isfinite(value)) return;
+  qmat_put_text(writer, "    ");
+  qmat_put_text(writer, name);
+  qmat_put_text(writer, " = ");
+  qmat_put_number(writer, value);
+  qmat_put_text(writer, "\n");
+}
+
+/* Whether a text needs no escapes. */
+static bool is_plain(const char *text) {
+  for (; *text; text++)
+    if ((unsigned char)*text < ' ' || *text == '"' || *text == '\\' || *text == 127) return false;
+  return true;
+}
+
+static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, const qmat_usd_options *options,
+                         const char *sublayer) {
+  static const char *const numbers[] = {"endTimeCode", "framesPerSecond", "metersPerUnit", "startTimeCode",
+                                        "timeCodesPerSecond"};
+  const char *prim = qmat_usd_text(qmat_usd_field_value(root, "defaultPrim"));
+  qmat_put_text(writer, "#usda 1.0\n(\n");
+  if (is_plain(sublayer)) { /* by this a later run knows that the side file is this layer's */
+    qmat_put_text(writer, "    customLayerData = {\n        string qmat_original = \"");
+    qmat_put_text(writer, sublayer);
+    qmat_put_text(writer, "\"\n    }\n");
+  }
+  if (prim && is_plain(prim)) {
+    qmat_put_text(writer, "    defaultPrim = \"");
+    qmat_put_text(writer, prim);
+    qmat_put_text(writer, "\"\n");
+  }
+  qmat_put_text(writer, "    doc = \"qmat " QMAT_VERSION "\"\n");
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) put_number_field(writer, root, numbers[i]);
+  const char *quote = strchr(sublayer, '@') ? "@@@" : "@";
+  qmat_put_text(writer, "    subLayers = [\n        ");
+  qmat_put_text(writer, quote);
+  qmat_put_text(writer, sublayer);
+  qmat_put_text(writer, quote);
+  qmat_put_text(writer, options->is_z_up ? "\n    ]\n    upAxis = \"Z\"\n)\n\n" : "\n    ]\n    upAxis = \"Y\"\n)\n\n");
+}
+
+/* ---- the file ---- */
+
+static const char *ending_of(const qmat_file_part *part) {
+  if (part->size >= 4 && memcmp(part->bytes, "PK\3\4", 4) == 0) return "usdz";
+  return part->size >= 8 && memcmp(part->bytes, "PXR-USDC", 8) == 0 ? "usdc" : "usda";
+}
+
+static qmat_status put_text(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
+                            size_t count, const qmat_usd_spec *root, const char *sublayer, qmat_writer *text) {
+  qmat_status status = QMAT_OK;
+  const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+  if (plain == (locale_t)0) return fail_shortage(context);
+  const locale_t before = uselocale(plain);
+  put_metadata(text, root, &additions[0].options, sublayer);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    char prim[32];
+    if (!additions[i].medial) continue;
+    snprintf(prim, sizeof prim, "medial_%u", scene->meshes[i]);
+    status = qmat_usd_put_class(context, additions[i].medial, additions[i].skin, &additions[i].options, prim, text);
+    qmat_put_text(text, "\n");
+  }
+  if (status == QMAT_OK) status = put_overs(context, scene, additions, text);
+  uselocale(before);
+  freelocale(plain);
+  return status;
+}
+
+/* The name of the first member of the original, which is its root layer; "" for a file that is no package. */
+static qmat_status open_original(qmat_context *context, const qmat_file_part *part, const char *ending,
+                                 qmat_usdz *package) {
+  const qmat_bytes bytes = {.data = part->bytes, .size = part->size};
+  *package = (qmat_usdz){0};
+  return strcmp(ending, "usdz") == 0 ? qmat_usdz_open(context, &bytes, "the scene", package) : QMAT_OK;
+}
+
+static qmat_status make_package(qmat_context *context, const qmat_usdz *original, const qmat_file_part *part,
+                                const char *sublayer, const qmat_writer *text, qmat_file **file) {
+  qmat_writer out = {0};
+  qmat_usdz_writer archive = {.out = &out};
+  qmat_status status = QMAT_OK;
+  qmat_usdz_add(&archive, "medial.usda", text->bytes, text->size);
+  if (original->member_count == 0) qmat_usdz_add(&archive, sublayer, part->bytes, part->size);
+  for (size_t i = 0; i < original->member_count && status == QMAT_OK; i++) {
+    const qmat_usdz_member *member = &original->members[i];
+    const size_t size = strlen(member->name) + sizeof "original/";
+    char *name = qmat_alloc(size, 1);
+    if (!name) status = fail_shortage(context);
+    if (name) snprintf(name, size, "original/%s", member->name);
+    if (name) qmat_usdz_add(&archive, name, member->bytes, member->size);
+    qmat_free(name);
+  }
+  qmat_usdz_finish(&archive);
+  if (status == QMAT_OK) return qmat_writer_to_file(context, &out, "usdz", file);
+  qmat_writer_uninit(&out);
+  return status;
+}
+
+static qmat_status make_text(qmat_context *context, const qmat_file_part *part, const char *name, qmat_writer *text,
+                             qmat_file **file) {
+  qmat_file *made = qmat_file_new();
+  if (made) {
+    made->format = qmat_strdup("usda");
+    made->parts = qmat_calloc(2, sizeof *made->parts);
+    if (made->parts) made->part_count = 2;
+  }
+  qmat_status status = made && made->format && made->parts ? QMAT_OK : fail_shortage(context);
+  if (status == QMAT_OK) status = qmat_writer_to_part(context, text, made, 0, "");
+  if (status == QMAT_OK) {
+    made->parts[1] =
+        (qmat_file_part){.name = qmat_strdup(name), .size = part->size, .bytes = qmat_alloc(part->size, 1)};
+    if (made->parts[1].bytes) memcpy(made->parts[1].bytes, part->bytes, part->size);
+    status =
+        made->parts[1].name && made->parts[1].bytes ? qmat_value_seal(context, &made->base) : fail_shortage(context);
+  }
+  if (status == QMAT_OK)
+    *file = made;
+  else if (made)
+    qmat_value_release(&made->base);
+  return status;
+}
+
+qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
+                                 size_t count, qmat_file **file) {
+  const qmat_file_part *part = &scene->parts[0];
+  const char *ending = ending_of(part);
+  const bool in_package = additions[0].options.package;
+  const qmat_bytes bytes = {.data = part->bytes, .size = part->size};
+  char sublayer[512];
+  qmat_usd_stage *stage = NULL;
+  qmat_usdz original = {0};
+  qmat_writer text = {0};
+  *file = NULL;
+  qmat_status status = open_original(context, part, ending, &original);
+  if (status == QMAT_OK) status = qmat_usd_stage_open(context, &bytes, "", &stage);
+  if (status == QMAT_OK) {
+    if (in_package && original.member_count > 0)
+      snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
+    else
+      snprintf(sublayer, sizeof sublayer, in_package ? "original/scene.%s" : "original.%s", ending);
+    status = put_text(context, scene, additions, count, qmat_usd_stage_root_layer(stage)->root, sublayer, &text);
+  }
+  if (status == QMAT_OK && text.failed) status = fail_shortage(context);
+  if (status == QMAT_OK)
+    status = in_package ? make_package(context, &original, part, sublayer, &text, file)
+                        : make_text(context, part, sublayer, &text, file);
+  qmat_writer_uninit(&text);
+  qmat_usdz_uninit(&original);
+  qmat_usd_stage_close(stage);
+  return status;
+}
