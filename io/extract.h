@@ -20,8 +20,8 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
 
 /* Lists the nodes of a glTF asset with different medial meshes. The result is an array of objects with "node", the
  * `name` for qmat_medial_extract (the node's number if its name is missing or not unique), and "mesh", the number of
- * its mesh, if it has one that is not a skin. For USD "node" is the name of a prim. Empty for other formats. NULL on failure, with the error recorded. The
- * caller calls json_decref. Cost: linear. */
+ * its mesh, if it has one that is not a skin. For USD "node" is the name of a prim. Empty for other formats. NULL on
+ * failure, with the error recorded. The caller calls json_decref. Cost: linear. */
 json_t *qmat_medial_carriers(qmat_context *context, const char *path);
 
 #endif

@@ -154,8 +154,7 @@ static bool is_plain(const char *text) {
   return true;
 }
 
-static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, const qmat_usd_options *options,
-                         const char *sublayer) {
+static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, bool is_z_up, const char *sublayer) {
   static const char *const numbers[] = {"endTimeCode", "framesPerSecond", "metersPerUnit", "startTimeCode",
                                         "timeCodesPerSecond"};
   const char *prim = qmat_usd_text(qmat_usd_field_value(root, "defaultPrim"));
@@ -177,7 +176,7 @@ static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, const q
   qmat_put_text(writer, quote);
   qmat_put_text(writer, sublayer);
   qmat_put_text(writer, quote);
-  qmat_put_text(writer, options->is_z_up ? "\n    ]\n    upAxis = \"Z\"\n)\n\n" : "\n    ]\n    upAxis = \"Y\"\n)\n\n");
+  qmat_put_text(writer, is_z_up ? "\n    ]\n    upAxis = \"Z\"\n)\n\n" : "\n    ]\n    upAxis = \"Y\"\n)\n\n");
 }
 
 /* ---- the file ---- */
@@ -193,7 +192,7 @@ static qmat_status put_text(qmat_context *context, const qmat_scene *scene, cons
   const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   if (plain == (locale_t)0) return fail_shortage(context);
   const locale_t before = uselocale(plain);
-  put_metadata(text, root, &additions[0].options, sublayer);
+  put_metadata(text, root, scene->is_z_up, sublayer);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     char prim[32];
     if (!additions[i].medial) continue;
