@@ -110,7 +110,7 @@ static result unite_with(qmat_mesh *mesh, const char *params) {
   copy->triangle_count -= r.mesh->sheet_triangle_count;
   shape_seal(copy);
   if (strcmp(params, "solid=as_is") != 0)
-    assert_true(copy->closed && copy->oriented && (r.mesh->sheet_triangle_count > 0 || r.mesh->closed));
+    assert_true(copy->closed && copy->oriented && r.mesh->closed && r.mesh->oriented);
   if (!strstr(params, "wrap") && pipeline_count(r.report, "vertices_welded") == 0)
     assert_true(r.mesh->deviation == mesh->deviation);
   qmat_value_release(&copy->base);
