@@ -516,6 +516,20 @@ static void test_a_planted_medial_mesh_is_found_again(void **state) {
   }
 }
 
+/* Six spheres span the mid-planes of the bracket's two arms. Single spheres alone are fitted to eleven, and collapses
+ * alone to more. */
+static void test_joint_fits_find_what_single_fits_do_not(void **state) {
+  (void)state;
+  const pipeline *p = model(BRACKET);
+  result jointly = simplify(p, "epsilon=3%"), unfitted = simplify(p, "epsilon=3% refits=0");
+  assert_true(jointly.medial->sphere_count <= 8);
+  assert_true(unfitted.medial->sphere_count > 11);
+  check_errors(p, &jointly, 0.03, true);
+  check_errors(p, &unfitted, 0.03, true);
+  release(&jointly);
+  release(&unfitted);
+}
+
 /* How far spheres reach from the octopus's head. */
 static double reach(const qmat_medial *medial) {
   double most = 0;
@@ -864,6 +878,7 @@ int main(void) {
       cmocka_unit_test(test_stopping_at_epsilon_keeps_it_and_leaves_spheres_that_skipping_does_not),
       cmocka_unit_test(test_topology_is_free_guarded_or_preserved),
       cmocka_unit_test(test_a_planted_medial_mesh_is_found_again),
+      cmocka_unit_test(test_joint_fits_find_what_single_fits_do_not),
       cmocka_unit_test(test_protection_keeps_tubular_edges),
       cmocka_unit_test(test_protection_of_nothing_thin_changes_nothing),
       cmocka_unit_test(test_medial_mesh_without_regions_works),
