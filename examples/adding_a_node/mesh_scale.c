@@ -29,6 +29,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   scaled->closed = mesh->closed;
   scaled->oriented = mesh->oriented;
   scaled->deviation = params->factor * mesh->deviation;
+  scaled->meters_per_unit = mesh->meters_per_unit / params->factor;
   for (size_t i = 0; i < 3 * mesh->vertex_count; i++) scaled->positions[i] = params->factor * mesh->positions[i];
   memcpy(scaled->triangles, mesh->triangles, 3 * mesh->triangle_count * sizeof *scaled->triangles);
   status = qmat_value_seal(context, &scaled->base); /* a coordinate that overflows is found here */
