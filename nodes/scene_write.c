@@ -4,9 +4,11 @@
 
 #include "core/node.h"
 #include "core/text.h"
+#include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
 #include "io/mesh/ply_medial.h"
+#include "io/robot_write.h"
 #include "io/usd/usd_write.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
@@ -17,7 +19,17 @@
 /* Quantisation is never held to less than this share of the diagonal, which is near single precision. */
 #define LEAST_QUANTISATION 1e-7
 
-typedef enum file_format { FORMAT_GLB, FORMAT_GLTF, FORMAT_MA, FORMAT_PLY, FORMAT_USDA, FORMAT_USDZ } file_format;
+typedef enum file_format {
+  FORMAT_GLB,
+  FORMAT_GLTF,
+  FORMAT_MA,
+  FORMAT_PLY,
+  FORMAT_USDA,
+  FORMAT_USDZ,
+  FORMAT_URDF,
+  FORMAT_XML,
+  FORMAT_YAML
+} file_format;
 
 typedef enum requirement { REQUIRE_NOTHING, REQUIRE_CERTIFIED } requirement;
 
@@ -27,9 +39,10 @@ typedef struct scene_write_params {
   int64_t position_bits, radius_bits;
   int flat;    /* a qmat_flat_form */
   int require; /* a requirement */
+  bool khr_physics, omi_physics, unreal_hulls, godot_hulls, fixed;
 } scene_write_params;
 
-enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT };
+enum { IN_SCENE, IN_MEDIAL, IN_SKIN, IN_REPORT, IN_COLLIDERS };
 enum { OUT_FILE, OUT_REPORT };
 
 /* The diagonal of the box around all spheres, which is the model's up to the error of the medial mesh. */
@@ -111,6 +124,13 @@ static const char *name_of(const qmat_scene *scene, const qmat_value *medial, si
   return scene ? scene->name : NULL;
 }
 
+/* Without a choice, colliders are written as Khronos defines them. */
+static unsigned collider_forms(const scene_write_params *params) {
+  const unsigned forms = (params->khr_physics ? QMAT_GLTF_KHR : 0U) | (params->omi_physics ? QMAT_GLTF_OMI : 0U) |
+                         (params->unreal_hulls ? QMAT_GLTF_UNREAL : 0U) | (params->godot_hulls ? QMAT_GLTF_GODOT : 0U);
+  return forms ? forms : QMAT_GLTF_KHR;
+}
+
 /* All inputs of one mesh, or lists of one length. `stated` has one element a medial mesh. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               json_t *report, qmat_stated_errors *stated, qmat_file **file) {
@@ -130,11 +150,14 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
                                shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
                                (const qmat_report *)given_for(inputs[IN_REPORT], i),
                                name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);
+    additions[i].colliders = (const qmat_colliders *)given_for(inputs[IN_COLLIDERS], i);
+    additions[i].collider_forms = collider_forms(params);
+    additions[i].dynamic = !params->fixed;
   }
   const qmat_status status =
       kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
       : placed ? qmat_gltf_write_places(context, scene, additions, count, file)
-               : qmat_gltf_write(context, additions[0].medial, additions[0].skin, &additions[0].options, file);
+               : qmat_gltf_write_addition(context, &additions[0], file);
   qmat_free(additions);
   return status;
 }
@@ -200,10 +223,24 @@ static qmat_status write_usd(qmat_context *context, const scene_write_params *pa
     return write_layer(context, params, inputs, stated, file);
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   if (count > 1) return fail_several(context, count);
-  const qmat_usd_options options = usd_options_of(params, scene, (const qmat_medial *)inputs[IN_MEDIAL],
-                                                  (const qmat_report *)inputs[IN_REPORT], stated);
+  qmat_usd_options options = usd_options_of(params, scene, (const qmat_medial *)inputs[IN_MEDIAL],
+                                            (const qmat_report *)inputs[IN_REPORT], stated);
+  options.colliders = (const qmat_colliders *)inputs[IN_COLLIDERS];
   return qmat_usd_write(context, (const qmat_medial *)inputs[IN_MEDIAL], (const qmat_mesh *)inputs[IN_SKIN], &options,
                         file);
+}
+
+/* Colliders alone, as robot simulators read them. */
+static qmat_status write_robot(qmat_context *context, const scene_write_params *params,
+                               const qmat_value *const inputs[], qmat_file **file) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  if (inputs[IN_COLLIDERS])
+    return qmat_robot_write(context, (const qmat_colliders *)inputs[IN_COLLIDERS],
+                            (qmat_robot_format)(params->format - FORMAT_URDF + QMAT_ROBOT_URDF),
+                            scene ? scene->name : NULL, scene ? scene->meters_per_unit : 0, file);
+  qmat_fail(context, QMAT_ERROR_USAGE, "urdf, xml and yaml hold colliders, and there are none");
+  qmat_fail_field(context, "colliders");
+  return qmat_fail_hint(context, "connect medial.colliders, as in colliders.yaml");
 }
 
 /* Writes what the file states of one medial mesh into a report; nothing where no errors are known. */
@@ -259,13 +296,13 @@ static qmat_status report_stated(qmat_context *context, const qmat_value *given,
 
 /* The other lists have as many elements as that of medial meshes. Only scenes hold several. */
 static qmat_status check_counts(qmat_context *context, const void *data, const size_t counts[]) {
-  static const int others[] = {IN_SKIN, IN_REPORT};
-  static const char *const names[] = {"skin", "report"};
+  static const int others[] = {IN_SKIN, IN_REPORT, IN_COLLIDERS};
+  static const char *const names[] = {"skin", "report", "colliders"};
   const scene_write_params *params = data;
-  const bool is_scene = params->format != FORMAT_MA && params->format != FORMAT_PLY;
+  const bool is_scene = params->format < FORMAT_URDF && params->format != FORMAT_MA && params->format != FORMAT_PLY;
   const size_t count = counts[IN_MEDIAL];
   if (!is_scene && count > 1) return fail_several(context, count);
-  for (size_t i = 0; i < 2; i++) {
+  for (size_t i = 0; i < 3; i++) {
     const size_t of_other = counts[others[i]];
     if (of_other == 0 || of_other == count) continue;
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu values for %zu medial meshes", of_other, count);
@@ -329,6 +366,12 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
         status = params->format == FORMAT_MA ? qmat_ma_write(context, medial, &file)
                                              : qmat_ply_write_medial(context, medial, &stated[0], &file);
         break;
+      case FORMAT_URDF:
+      case FORMAT_XML:
+      case FORMAT_YAML:
+        stated[0] = errors_of(medial, (const qmat_report *)inputs[IN_REPORT]);
+        status = write_robot(context, params, inputs, &file);
+        break;
       case FORMAT_USDA:
       case FORMAT_USDZ:
         status = write_usd(context, params, inputs, stated, &file);
@@ -353,7 +396,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   return status;
 }
 
-static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", NULL};
+static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", "urdf", "xml", "yaml", NULL};
 
 static const char *const requirements[] = {[REQUIRE_NOTHING] = "none", [REQUIRE_CERTIFIED] = "certified", NULL};
 
@@ -386,6 +429,14 @@ static const qmat_param params[] = {
         "Numbers of the plain medial mesh (glb, gltf): 16 bits, single precision, or by epsilon; none: without it"),
     QMAT_ENUM(scene_write_params, require, requirements, REQUIRE_NOTHING,
               "certified: the run fails, and nothing is written, where a result is not certified"),
+    QMAT_BOOL(scene_write_params, khr_physics,
+              "Write colliders as KHR_implicit_shapes and KHR_physics_rigid_bodies (glb, gltf); so without a choice"),
+    QMAT_BOOL(scene_write_params, omi_physics,
+              "Write colliders as OMI_physics_shape and OMI_physics_body (glb, gltf), which Godot reads"),
+    QMAT_BOOL(scene_write_params, unreal_hulls, "Write hulls of colliders as meshes named UCX_name_01 (glb, gltf)"),
+    QMAT_BOOL(scene_write_params, godot_hulls,
+              "Write hulls of colliders as meshes named name_01-convcolonly (glb, gltf)"),
+    QMAT_BOOL(scene_write_params, fixed, "Bodies with colliders do not move: they get no mass (glb, gltf)"),
     {0},
 };
 
@@ -405,6 +456,11 @@ static const qmat_port inputs[] = {
      .optional = true,
      .doc = "Epsilon and the errors, from medial.evaluate or medial.simplify",
      .list = true},
+    {.name = "colliders",
+     .type = QMAT_COLLIDERS,
+     .optional = true,
+     .doc = "Shapes for collision detection, from medial.colliders; not in ma and ply",
+     .list = true},
     {0},
 };
 
@@ -420,7 +476,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 8,
+    .version = 9,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
@@ -436,7 +492,8 @@ const qmat_node qmat_node_scene_write = {
         "to qmat_origin_x, _y and _z.\n\n"
         "usda and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. Of a USD "
         "scene they are a layer over the original, which they keep beside or inside: each prim with a mesh gains a "
-        "child with its medial mesh. ma and ply hold the medial mesh alone.",
+        "child with its medial mesh. ma and ply hold the medial mesh alone; "
+        "urdf, xml (MJCF) and yaml (cuRobo) colliders alone.",
     .citation = "",
     .params_size = sizeof(scene_write_params),
     .params = params,

@@ -12,6 +12,7 @@
 #include "io/draco.h"
 #include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
 #include "io/gltf/gltf_skin.h"
@@ -417,6 +418,30 @@ static qmat_gltf_options options_after(const qmat_gltf_options *options, double 
   return after;
 }
 
+/* Adds colliders to every node that references the mesh; without one (-1), to the new nodes with a medial mesh. */
+static qmat_status add_colliders(qmat_context *context, const qmat_gltf_addition *addition, document *document,
+                                 const double origin[3], const char *name, json_int_t mesh, size_t nodes_before) {
+  static const double none[3] = {0, 0, 0};
+  const json_t *nodes = json_object_get(document->root, "nodes");
+  const size_t count = json_array_size(nodes);
+  qmat_gltf_colliders added = {.colliders = addition->colliders,
+                               .forms = addition->collider_forms,
+                               .name = name ? name : "model",
+                               .dynamic = addition->dynamic,
+                               .origin = {origin[0], origin[1], origin[2]}};
+  const qmat_status status = qmat_gltf_colliders_init(context, document->root, document->buffer, document->data_start,
+                                                      &document->data, &added);
+  bool done = status == QMAT_OK;
+  for (size_t i = mesh < 0 ? nodes_before : 0; i < count && done; i++) {
+    const json_t *node = json_array_get(nodes, i);
+    const bool is_new = json_object_get(json_object_get(node, "extras"), "qmat_version") != NULL;
+    if (mesh < 0 ? is_new : qmat_gltf_mesh_of(node) == mesh)
+      done = qmat_gltf_colliders_attach(document->root, (json_int_t)i, &added, mesh < 0 ? origin : none);
+  }
+  qmat_gltf_colliders_uninit(&added);
+  return status == QMAT_OK && !done ? qmat_fail_memory(context, "a glTF file") : status;
+}
+
 /* Adds one medial mesh and its skin. */
 static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, size_t index,
                               const qmat_gltf_addition *addition, document *document) {
@@ -430,6 +455,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   medial_text text = {0};
   qmat_gltf_skin data = {0};
   json_int_t skin = -1;
+  const size_t nodes_before = json_array_size(json_object_get(document->root, "nodes"));
   double origin[3];
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
   qmat_status status = make_medial_text(context, addition->medial, origin, &options, &text);
@@ -445,6 +471,9 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
     done = document->places ? add_places(document, index, extras, origin, skin, &options)
                             : add_node(document, extras, origin, skin, name, &options, !scene);
   }
+  if (done && addition->colliders)
+    status = add_colliders(context, addition, document, origin, name, of_mesh ? (json_int_t)scene->meshes[index] : -1,
+                           nodes_before);
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;
   json_decref(extras);
@@ -547,6 +576,10 @@ qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, co
 qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                    size_t count, qmat_file **file) {
   return write_document(context, NULL, scene, additions, count, false, NULL, file);
+}
+
+qmat_status qmat_gltf_write_addition(qmat_context *context, const qmat_gltf_addition *addition, qmat_file **file) {
+  return write_document(context, NULL, NULL, addition, 1, false, NULL, file);
 }
 
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,

@@ -63,11 +63,14 @@ typedef struct qmat_gltf_options {
 qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                             const qmat_gltf_options *options, qmat_file **file);
 
-/* A medial mesh to add to a scene. */
+/* A medial mesh to add to a scene, or to a new asset. */
 typedef struct qmat_gltf_addition {
   const qmat_medial *medial; /* NULL, in a scene: nothing is added for this mesh */
   const qmat_mesh *skin;     /* added as a mesh; NULL: none */
   qmat_gltf_options options;
+  const qmat_colliders *colliders; /* added to the nodes that get the medial mesh; NULL: none */
+  unsigned collider_forms;         /* of io/gltf/gltf_colliders.h */
+  bool dynamic;                    /* those nodes are bodies that move */
 } qmat_gltf_addition;
 
 /* Makes a glTF 2.0 file of the medial meshes of a USD scene, with the places that `scene` lists. `additions` has one
@@ -89,5 +92,8 @@ qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scen
  * draco_primitives and, if something is unchanged, warnings. Otherwise as qmat_gltf_write. */
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                              size_t count, bool draco_meshes, json_t *report, qmat_file **file);
+
+/* qmat_gltf_write with colliders. */
+qmat_status qmat_gltf_write_addition(qmat_context *context, const qmat_gltf_addition *addition, qmat_file **file);
 
 #endif

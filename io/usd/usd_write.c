@@ -9,6 +9,7 @@
 
 #include "core/node.h"
 #include "io/bytes.h"
+#include "io/usd/usd_colliders.h"
 #include "io/usd/usdz.h"
 
 #define LONGEST_NAME 200
@@ -317,14 +318,17 @@ static void put_prim(qmat_writer *writer, const stored *s, const qmat_usd_option
   qmat_put_text(writer, " Xform ");
   put_quoted(writer, prim);
   qmat_put_text(writer, " (\n");
+  if (options->colliders) qmat_usd_put_body_schemas(writer);
   put_custom_data(writer, s, options->name, options->prim, stated);
   if (!options->prim) qmat_put_text(writer, "    kind = \"component\"\n");
   qmat_put_text(writer, ")\n{");
   if (has_origin(s)) put_translation(writer, s->origin);
+  if (options->colliders) qmat_usd_put_body(writer, options->colliders, s->origin);
   if (s->skin.triangle_count > 0) put_skin(writer, &s->skin);
   put_spheres(writer, medial);
   if (medial->edge_count > 0) put_cones(writer, medial);
   if (medial->triangle_count > 0) put_slabs(writer, medial);
+  if (options->colliders) qmat_usd_put_colliders(writer, options->colliders, s->origin);
   qmat_put_text(writer, "}\n");
 }
 

@@ -7,14 +7,15 @@
 
 /* The form of the file, and facts about the medial mesh. */
 typedef struct qmat_usd_options {
-  bool package;               /* a .usdz with the layer; else a .usda */
-  const char *name;           /* of the model, UTF-8; NULL or "": none */
-  const char *prim;           /* the path of the prim that is described, for qmat_usd_put_class; else NULL */
-  double meters_per_unit;     /* 0: unknown, written as 1 */
-  bool is_z_up;               /* else y is up */
-  double moved;               /* how far single precision may move the solid, model units; above zero */
-  qmat_stated_errors errors;  /* of the medial mesh before it is stored */
-  qmat_stated_errors *stated; /* becomes the errors that the file states; may be NULL */
+  bool package;                    /* a .usdz with the layer; else a .usda */
+  const char *name;                /* of the model, UTF-8; NULL or "": none */
+  const char *prim;                /* the path of the prim that is described, for qmat_usd_put_class; else NULL */
+  double meters_per_unit;          /* 0: unknown, written as 1 */
+  bool is_z_up;                    /* else y is up */
+  double moved;                    /* how far single precision may move the solid, model units; above zero */
+  qmat_stated_errors errors;       /* of the medial mesh before it is stored */
+  const qmat_colliders *colliders; /* NULL: none; else the prim becomes a rigid body (io/usd/usd_colliders.h) */
+  qmat_stated_errors *stated;      /* becomes the errors that the file states; may be NULL */
 } qmat_usd_options;
 
 /* Makes a USD text layer of a medial mesh: one Xform, the default prim, with

@@ -220,7 +220,7 @@ static void make_solid(world to, const qmat_model *model) {
   qmat_value_release(values[QMAT_MEDIAL]);
   values[QMAT_MEDIAL] = simple;
   seal(values[QMAT_CHAIN] = chain_of((const qmat_medial *)simple));
-  values[QMAT_COLLIDERS] = make("medial.colliders", "colliders", to, "samples", "100");
+  values[QMAT_COLLIDERS] = make("medial.colliders", "colliders", to, "kind", "spheres");
   values[QMAT_FILE] = make("scene.write", "file", to, "format", "ma");
   seal(values[QMAT_FAILURE] = failure());
   seal(values[QMAT_LIST] = list_of(values[QMAT_REPORT]));

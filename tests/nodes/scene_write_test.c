@@ -68,7 +68,7 @@ typedef struct wiring {
 static qmat_file *must_write(const qmat_medial *medial, wiring with, const char *const settings[][2]) {
   const qmat_node *node = qmat_node_find("scene.write");
   assert_non_null(node);
-  const qmat_value *inputs[4] = {NULL};
+  const qmat_value *inputs[5] = {NULL};
   inputs[qmat_input_find(node, "medial")] = &medial->base;
   inputs[qmat_input_find(node, "scene")] = with.scene ? &with.scene->base : NULL;
   inputs[qmat_input_find(node, "skin")] = with.skin ? &with.skin->base : NULL;
@@ -284,7 +284,7 @@ static void test_a_medial_mesh_without_spheres_is_refused(void **state) {
   qmat_medial *none = qmat_medial_new();
   assert_non_null(none);
   assert_int_equal(qmat_value_seal(&context, &none->base), QMAT_OK);
-  const qmat_value *inputs[4] = {NULL};
+  const qmat_value *inputs[5] = {NULL};
   inputs[qmat_input_find(node, "medial")] = &none->base;
   qmat_value *outputs[2] = {NULL};
   void *params = make_params(node, NULL);
@@ -314,7 +314,7 @@ static void test_what_is_not_certified_fails_where_that_is_required(void **state
                              "envelope_to_surface", 0.01, "diagonal", 8.0);
     if (cases[i].certified >= 0) json_object_set_new(root, "certified", json_boolean(cases[i].certified));
     qmat_report *report = make_report(root);
-    const qmat_value *inputs[4] = {NULL};
+    const qmat_value *inputs[5] = {NULL};
     inputs[qmat_input_find(node, "medial")] = &medial->base;
     inputs[qmat_input_find(node, "report")] = &report->base;
     qmat_value *outputs[2] = {NULL};

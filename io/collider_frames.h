@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_IO_COLLIDER_FRAMES_H
+#define QMAT_IO_COLLIDER_FRAMES_H
+
+#include "core/value.h"
+
+/* What formats say of colliders. Quaternions are x y z w, of length 1. */
+
+/* The number of spheres of a shape (3 ids): 1, 2 or 3. */
+int qmat_collider_width(const uint32_t shape[3]);
+
+/* The frame of a capsule: the middle of its two centres, their distance, and the rotation that turns the y axis from
+ * the first centre to the second. */
+void qmat_capsule_frame(const double first[4], const double second[4], double middle[3], double *length,
+                        double rotation[4]);
+
+/* The principal moments of a body (the 10 numbers of qmat_colliders), and the rotation from their axes to those of the
+ * body; by Jacobi rotations. */
+void qmat_principal_inertia(const double body[10], double moments[3], double rotation[4]);
+
+#endif

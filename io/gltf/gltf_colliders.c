@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf/gltf_colliders.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+#include "io/collider_frames.h"
+#include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_skin.h"
+
+/* A node that an earlier run added has this in its extras. */
+#define MARK "qmat_collider"
+
+enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
+
+static const char *const shape_extensions[] = {"KHR_implicit_shapes", "OMI_physics_shape"};
+static const char *const body_extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+
+/* object[key], an object that is created where it is missing; NULL when out of memory. */
+static json_t *member(json_t *object, const char *key) {
+  json_t *value = json_object_get(object, key);
+  if (value) return value;
+  return qmat_gltf_set(object, key, json_object()) ? json_object_get(object, key) : NULL;
+}
+
+static bool use_extension(json_t *root, const char *name) {
+  const json_t *used = json_object_get(root, "extensionsUsed");
+  for (size_t i = 0; i < json_array_size(used); i++)
+    if (strcmp(json_string_value(json_array_get(used, i)), name) == 0) return true;
+  return qmat_gltf_add(root, "extensionsUsed", json_string(name), NULL);
+}
+
+/* Whether OMI takes the shape as a convex mesh. */
+static bool is_convex_for_omi(const qmat_colliders *c, const uint32_t *ids) {
+  const int width = qmat_collider_width(ids);
+  return width == 3 || (width == 2 && c->spheres[4 * (size_t)ids[0] + 3] != c->spheres[4 * (size_t)ids[1] + 3]);
+}
+
+/* ---- hulls ---- */
+
+/* Adds the mesh of a hull, relative to the origin. */
+static qmat_status add_hull(qmat_context *context, json_t *root, json_int_t buffer, size_t offset, qmat_writer *data,
+                            qmat_gltf_colliders *added, size_t shape) {
+  const qmat_colliders *c = added->colliders;
+  const size_t first = shape > 0 ? c->hull_ends[2 * shape - 2] : 0, points = c->hull_ends[2 * shape] - first;
+  const size_t row = shape > 0 ? c->hull_ends[2 * shape - 1] : 0, rows = c->hull_ends[2 * shape + 1] - row;
+  float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  const size_t positions_at = offset + data->size;
+  for (size_t i = 0; i < 3 * points; i++) {
+    const float x = (float)(c->points[3 * first + i] - added->origin[i % 3]);
+    if (!isfinite(x)) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "its hull does not fit into single precision");
+      qmat_fail_element(context, "shape", (int64_t)shape);
+      return qmat_fail_field(context, "colliders");
+    }
+    low[i % 3] = fminf(low[i % 3], x);
+    high[i % 3] = fmaxf(high[i % 3], x);
+    qmat_put_f32(data, x);
+  }
+  const size_t indices_at = offset + data->size;
+  for (size_t i = 0; i < 3 * rows; i++) qmat_put_u16(data, (uint16_t)(c->triangles[3 * row + i] - first));
+  qmat_gltf_pad(data, 0);
+  json_int_t view, view_of_indices, accessor, indices;
+  char name[32];
+  snprintf(name, sizeof name, "_%02zu", shape + 1);
+  bool done = qmat_gltf_add(root, "bufferViews",
+                            json_pack("{s:I, s:I, s:I, s:i}", "buffer", buffer, "byteOffset", (json_int_t)positions_at,
+                                      "byteLength", (json_int_t)(12 * points), "target", ARRAY_BUFFER),
+                            &view);
+  done = done && qmat_gltf_add(root, "bufferViews",
+                               json_pack("{s:I, s:I, s:I, s:i}", "buffer", buffer, "byteOffset", (json_int_t)indices_at,
+                                         "byteLength", (json_int_t)(6 * rows), "target", ELEMENT_ARRAY_BUFFER),
+                               &view_of_indices);
+  done = done && qmat_gltf_add(
+                     root, "accessors",
+                     json_pack("{s:I, s:i, s:I, s:s, s:[f, f, f], s:[f, f, f]}", "bufferView", view, "componentType",
+                               5126, "count", (json_int_t)points, "type", "VEC3", "min", (double)low[0], (double)low[1],
+                               (double)low[2], "max", (double)high[0], (double)high[1], (double)high[2]),
+                     &accessor);
+  done = done && qmat_gltf_add(root, "accessors",
+                               json_pack("{s:I, s:i, s:I, s:s}", "bufferView", view_of_indices, "componentType", 5123,
+                                         "count", (json_int_t)(3 * rows), "type", "SCALAR"),
+                               &indices);
+  done = done && qmat_gltf_add(root, "meshes",
+                               json_pack("{s:s+++, s:[{s:{s:I}, s:I}], s:{s:b}}", "name",
+                                         added->forms & QMAT_GLTF_UNREAL ? "UCX_" : "", added->name, name, "",
+                                         "primitives", "attributes", "POSITION", accessor, "indices", indices, "extras",
+                                         QMAT_GLTF_SKIN_MARK, 1),
+                               &added->hulls[shape]);
+  return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+}
+
+/* ---- shapes ---- */
+
+/* Appends to root.extensions[extension].shapes. */
+static bool add_shape(json_t *root, const char *extension, json_t *shape, json_int_t *number) {
+  json_t *extensions = member(root, "extensions"), *owner = extensions ? member(extensions, extension) : NULL;
+  if (owner) return qmat_gltf_add(owner, "shapes", shape, number);
+  json_decref(shape);
+  return false;
+}
+
+static bool add_shapes(json_t *root, qmat_gltf_colliders *added, size_t shape) {
+  const qmat_colliders *c = added->colliders;
+  const uint32_t *ids = &c->shapes[3 * shape];
+  const double *a = &c->spheres[4 * (size_t)ids[0]], *b = &c->spheres[4 * (size_t)ids[1]];
+  const int width = qmat_collider_width(ids);
+  bool done = true;
+  for (int form = 0; form < 2 && done; form++) {
+    if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
+    json_t *made = NULL;
+    if (form == 1 && is_convex_for_omi(c, ids)) {
+      made = json_pack("{s:s, s:{s:I}}", "type", "convex", "convex", "mesh", added->hulls[shape]);
+    } else if (width == 1) {
+      made = json_pack("{s:s, s:{s:f}}", "type", "sphere", "sphere", "radius", a[3]);
+    } else if (width == 2) {
+      made = json_pack("{s:s, s:{s:f, s:f, s:f}}", "type", "capsule", "capsule", "height", qmat_point_distance(a, b),
+                       "radiusBottom", a[3], "radiusTop", b[3]);
+    } else { /* KHR: the hull of a node's mesh */
+      done = qmat_gltf_add(root, "nodes", json_pack("{s:I, s:{s:b}}", "mesh", added->hulls[shape], "extras", MARK, 1),
+                           &added->nodes[shape]);
+      continue;
+    }
+    done = add_shape(root, shape_extensions[form], made, &added->shapes[2 * shape + (size_t)form]);
+  }
+  return done;
+}
+
+qmat_status qmat_gltf_colliders_init(qmat_context *context, json_t *root, json_int_t buffer, size_t offset,
+                                     qmat_writer *data, qmat_gltf_colliders *added) {
+  const qmat_colliders *c = added->colliders;
+  const size_t count = c->shape_count;
+  added->shapes = qmat_alloc(2 * count, sizeof *added->shapes);
+  added->hulls = qmat_alloc(count, sizeof *added->hulls);
+  added->nodes = qmat_alloc(count, sizeof *added->nodes);
+  if (!added->shapes || !added->hulls || !added->nodes) return qmat_fail_memory(context, "a glTF file");
+  bool done = true;
+  for (size_t i = 0; i < count && done; i++) {
+    const uint32_t *ids = &c->shapes[3 * i];
+    added->shapes[2 * i] = added->shapes[2 * i + 1] = added->hulls[i] = added->nodes[i] = -1;
+    const bool needs_hull = added->forms & (QMAT_GLTF_UNREAL | QMAT_GLTF_GODOT) ||
+                            (added->forms & QMAT_GLTF_KHR && qmat_collider_width(ids) == 3) ||
+                            (added->forms & QMAT_GLTF_OMI && is_convex_for_omi(c, ids));
+    if (needs_hull) {
+      const qmat_status status = add_hull(context, root, buffer, offset, data, added, i);
+      if (status != QMAT_OK) return status;
+    }
+    done = add_shapes(root, added, i);
+  }
+  for (int form = 0; form < 2 && done; form++) {
+    if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
+    const json_t *shapes = json_object_get(json_object_get(root, "extensions"), shape_extensions[form]);
+    done = use_extension(root, body_extensions[form]) && (!shapes || use_extension(root, shape_extensions[form]));
+  }
+  return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+}
+
+void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added) {
+  qmat_free(added->shapes);
+  qmat_free(added->hulls);
+  qmat_free(added->nodes);
+}
+
+/* ---- nodes ---- */
+
+/* Adds a child with an extension object (may be NULL: none) in its `extensions`. */
+static bool add_child(json_t *root, json_t *body, json_t *child) {
+  json_int_t number;
+  return child && qmat_gltf_set(child, "extras", json_pack("{s:b}", MARK, 1)) &&
+         qmat_gltf_add(root, "nodes", json_incref(child), &number) &&
+         qmat_gltf_add(body, "children", json_integer(number), NULL);
+}
+
+static bool place(json_t *node, const double at[3], const double *rotation) {
+  bool done = at[0] == 0 && at[1] == 0 && at[2] == 0;
+  done = done || qmat_gltf_set(node, "translation", json_pack("[f, f, f]", at[0], at[1], at[2]));
+  if (!rotation || rotation[3] == 1) return done;
+  return done &&
+         qmat_gltf_set(node, "rotation", json_pack("[f, f, f, f]", rotation[0], rotation[1], rotation[2], rotation[3]));
+}
+
+static bool set_extension(json_t *node, const char *name, json_t *value) {
+  json_t *extensions = member(node, "extensions");
+  if (extensions) return qmat_gltf_set(extensions, name, value);
+  json_decref(value);
+  return false;
+}
+
+/* The collider of one form. Shapes of several forms share a node where they have the same frame. */
+static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders *added, size_t shape,
+                          const double shift[3]) {
+  const qmat_colliders *c = added->colliders;
+  const uint32_t *ids = &c->shapes[3 * shape];
+  double middle[3], rotation[4], length, at_origin[3];
+  qmat_capsule_frame(&c->spheres[4 * (size_t)ids[0]], &c->spheres[4 * (size_t)ids[1]], middle, &length, rotation);
+  for (int k = 0; k < 3; k++) {
+    middle[k] -= shift[k];
+    at_origin[k] = added->origin[k] - shift[k];
+  }
+  json_t *own = NULL, *of_hull = NULL; /* in the shape's own frame, and in that of hulls */
+  bool done = true;
+  for (int form = 0; form < 2 && done; form++) {
+    const json_int_t number = added->shapes[2 * shape + (size_t)form];
+    json_t *collider = NULL;
+    const bool takes_hull = form == 1 ? is_convex_for_omi(c, ids) : added->nodes[shape] >= 0;
+    if (form == 0 && added->nodes[shape] >= 0)
+      collider = json_pack("{s:{s:{s:I, s:b}}}", "collider", "geometry", "node", added->nodes[shape], "convexHull", 1);
+    else if (number < 0)
+      continue;
+    else if (form == 0)
+      collider = json_pack("{s:{s:{s:I}}}", "collider", "geometry", "shape", number);
+    else
+      collider = json_pack("{s:{s:I}}", "collider", "shape", number);
+    json_t **node = takes_hull ? &of_hull : &own;
+    if (!*node) {
+      *node = json_object();
+      done = *node && place(*node, takes_hull ? at_origin : middle, takes_hull ? NULL : rotation) &&
+             add_child(root, body, *node);
+    }
+    if (done) {
+      done = set_extension(*node, body_extensions[form], collider);
+    } else {
+      json_decref(collider);
+    }
+  }
+  json_decref(own);
+  json_decref(of_hull);
+  for (int form = 0; form < 2 && done; form++) {
+    if (!(added->forms & (form == 0 ? QMAT_GLTF_UNREAL : QMAT_GLTF_GODOT))) continue;
+    json_t *node = json_pack("{s:I}", "mesh", added->hulls[shape]);
+    done = node && place(node, at_origin, NULL) &&
+           qmat_gltf_set(node, "name",
+                         form == 0 ? json_sprintf("UCX_%s_%02zu", added->name, shape + 1)
+                                   : json_sprintf("%s_%02zu-convcolonly", added->name, shape + 1)) &&
+           add_child(root, body, node);
+    json_decref(node);
+  }
+  return done;
+}
+
+/* Takes the colliders of an earlier run off the node. They stay in the asset without a parent. */
+static void detach(json_t *root, json_t *body) {
+  json_t *children = json_object_get(body, "children"), *nodes = json_object_get(root, "nodes");
+  for (size_t i = json_array_size(children); i-- > 0;) {
+    const json_t *child = json_array_get(nodes, (size_t)json_number_value(json_array_get(children, i)));
+    if (json_object_get(json_object_get(child, "extras"), MARK)) json_array_remove(children, i);
+  }
+  if (children && json_array_size(children) == 0) json_object_del(body, "children");
+}
+
+/* What a body that moves has, in both forms. */
+static json_t *motion_of(const qmat_gltf_colliders *added, const double shift[3]) {
+  const qmat_colliders *c = added->colliders;
+  json_t *motion = json_object();
+  if (c->body_count == 0 || !motion) return motion;
+  double moments[3], q[4];
+  qmat_principal_inertia(c->body, moments, q);
+  const bool done =
+      qmat_gltf_set(motion, "mass", json_real(c->body[0])) &&
+      qmat_gltf_set(motion, "centerOfMass",
+                    json_pack("[f, f, f]", c->body[1] - shift[0], c->body[2] - shift[1], c->body[3] - shift[2])) &&
+      qmat_gltf_set(motion, "inertiaDiagonal", json_pack("[f, f, f]", moments[0], moments[1], moments[2])) &&
+      qmat_gltf_set(motion, "inertiaOrientation", json_pack("[f, f, f, f]", q[0], q[1], q[2], q[3]));
+  if (done) return motion;
+  json_decref(motion);
+  return NULL;
+}
+
+bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
+                                const double shift[3]) {
+  json_t *body = json_array_get(json_object_get(root, "nodes"), (size_t)node);
+  bool done = body != NULL;
+  if (done) detach(root, body);
+  for (int form = 0; form < 2 && done && added->dynamic; form++) {
+    if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
+    json_t *motion = motion_of(added, shift);
+    done = motion && (form == 0 || qmat_gltf_set(motion, "type", json_string("dynamic")));
+    if (done) {
+      done = set_extension(body, body_extensions[form], json_pack("{s:o}", "motion", motion));
+    } else {
+      json_decref(motion);
+    }
+  }
+  for (size_t i = 0; i < added->colliders->shape_count && done; i++) done = add_colliders(root, body, added, i, shift);
+  return done;
+}

@@ -1,0 +1,271 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Colliders as glTF, USD and robot simulators have them. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "io/collider_frames.h"
+#include "io/gltf/gltf_colliders.h"
+#include "io/robot_write.h"
+#include "io/usd/usd_colliders.h"
+#include "tests/shapes.h"
+
+/* A sphere, a capsule of two radii, one of one radius that points down, and a slab; each with a tetrahedron for a hull.
+ */
+static qmat_colliders *example(void) {
+  static const double spheres[] = {1, 2, 3, 0.5, 4, 2, 3, 0.25, 1, 0, 3, 0.5, 1, 2, 6, 0.5};
+  static const uint32_t shapes[] = {0, 2, 3, 0, 1, 1, 0, 2, 2, 0, 0, 0};
+  static const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  static const double body[] = {2, 1, 2, 3, 5, 6, 7, 0.5, -0.25, 0.125};
+  qmat_colliders *c = qmat_colliders_new();
+  assert_non_null(c);
+  c->sphere_count = c->shape_count = 4;
+  c->point_count = c->triangle_count = 16;
+  c->body_count = 1;
+  c->spheres = qmat_alloc(16, sizeof(double));
+  c->shapes = qmat_alloc(12, sizeof(uint32_t));
+  c->points = qmat_alloc(48, sizeof(double));
+  c->triangles = qmat_alloc(48, sizeof(uint32_t));
+  c->hull_ends = qmat_alloc(8, sizeof(uint32_t));
+  c->body = qmat_alloc(10, sizeof(double));
+  memcpy(c->spheres, spheres, sizeof spheres);
+  memcpy(c->shapes, shapes, sizeof shapes);
+  memcpy(c->body, body, sizeof body);
+  for (uint32_t i = 0; i < 4; i++) {
+    for (uint32_t k = 0; k < 12; k++) {
+      c->points[12 * i + k] = tetrahedron[k] + 10 * i;
+      c->triangles[12 * i + k] = faces[k] + 4 * i;
+    }
+    c->hull_ends[2 * i] = c->hull_ends[2 * i + 1] = 4 * (i + 1);
+  }
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return c;
+}
+
+/* v turned by the quaternion q. */
+static void turn(const double q[4], const double v[3], double out[3]) {
+  const double x = q[0], y = q[1], z = q[2], w = q[3];
+  const double m[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                          {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                          {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
+  for (int i = 0; i < 3; i++) out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
+}
+
+static void test_a_capsules_frame_turns_y_to_its_axis(void **state) {
+  (void)state;
+  static const double ends[][3] = {{1, 0, 0}, {0, 3, 0}, {0, -2, 0}, {1, 2, -3}, {1e-9, -1, 1e-9}};
+  for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+    const double first[4] = {4, 5, 6, 1}, second[4] = {4 + ends[i][0], 5 + ends[i][1], 6 + ends[i][2], 1};
+    double middle[3], length, q[4], axis[3];
+    qmat_capsule_frame(first, second, middle, &length, q);
+    turn(q, (const double[]){0, 1, 0}, axis);
+    assert_near(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1, 1e-12);
+    for (int k = 0; k < 3; k++) {
+      assert_near(middle[k] - 0.5 * length * axis[k], first[k], 1e-6);
+      assert_near(middle[k] + 0.5 * length * axis[k], second[k], 1e-6);
+    }
+  }
+}
+
+static void test_principal_moments_and_axes_make_the_tensor(void **state) {
+  (void)state;
+  static const double bodies[][10] = {{1, 0, 0, 0, 5, 6, 7, 0.5, -0.25, 0.125},
+                                      {1, 0, 0, 0, 5, 5, 5, 0, 0, 0},
+                                      {1, 0, 0, 0, 1, 2, 3, 0.9, 0.3, -0.2},
+                                      {1, 0, 0, 0, 3, 2, 1, -0.5, 0.5, 0.5}};
+  for (size_t b = 0; b < sizeof bodies / sizeof *bodies; b++) {
+    double moments[3], q[4], tensor[3][3] = {{0}};
+    qmat_principal_inertia(bodies[b], moments, q);
+    for (int k = 0; k < 3; k++) {
+      double axis[3];
+      turn(q, (const double[]){k == 0, k == 1, k == 2}, axis);
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) tensor[i][j] += moments[k] * axis[i] * axis[j];
+    }
+    const double *in = &bodies[b][4];
+    const double expected[3][3] = {{in[0], in[3], in[4]}, {in[3], in[1], in[5]}, {in[4], in[5], in[2]}};
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) assert_near(tensor[i][j], expected[i][j], 1e-12);
+  }
+}
+
+static double at(const json_t *value, const char *key) {
+  assert_true(json_is_number(json_object_get(value, key)));
+  return json_number_value(json_object_get(value, key));
+}
+
+/* An asset of one node that carries the colliders. */
+static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *data) {
+  qmat_context context = {0};
+  qmat_colliders *c = example();
+  static const double none[3] = {0, 0, 0};
+  qmat_gltf_colliders added = {.colliders = c, .forms = forms, .name = "Mesh", .dynamic = dynamic};
+  if (!root) root = json_pack("{s:[{}]}", "nodes");
+  assert_int_equal(qmat_gltf_colliders_init(&context, root, 0, 0, data, &added), QMAT_OK);
+  assert_true(qmat_gltf_colliders_attach(root, 0, &added, none));
+  qmat_gltf_colliders_uninit(&added);
+  qmat_value_release(&c->base);
+  qmat_context_uninit(&context);
+  return root;
+}
+
+/* The children of node 0 that have the extension, or of which the name contains `name`. */
+static size_t children_with(const json_t *root, const char *extension, const char *name) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  const json_t *children = json_object_get(json_array_get(nodes, 0), "children");
+  size_t count = 0;
+  for (size_t i = 0; i < json_array_size(children); i++) {
+    const json_t *node = json_array_get(nodes, (size_t)json_integer_value(json_array_get(children, i)));
+    const char *own = json_string_value(json_object_get(node, "name"));
+    count += extension ? json_object_get(json_object_get(node, "extensions"), extension) != NULL
+                       : own && strstr(own, name) != NULL;
+  }
+  return count;
+}
+
+static void test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_nodes(void **state) {
+  (void)state;
+  qmat_writer data = {0};
+  json_t *root = write(QMAT_GLTF_KHR, true, NULL, &data);
+  const json_t *shapes =
+      json_object_get(json_object_get(json_object_get(root, "extensions"), "KHR_implicit_shapes"), "shapes");
+  assert_int_equal(json_array_size(shapes), 3);
+  const json_t *tapered = json_object_get(json_array_get(shapes, 0), "capsule");
+  assert_near(at(tapered, "height"), 3, 0);
+  assert_near(at(tapered, "radiusBottom"), 0.5, 0);
+  assert_near(at(tapered, "radiusTop"), 0.25, 0);
+  assert_near(at(json_object_get(json_array_get(shapes, 2), "sphere"), "radius"), 0.5, 0);
+  assert_int_equal(children_with(root, "KHR_physics_rigid_bodies", NULL), 4);
+  const json_t *nodes = json_object_get(root, "nodes"), *hull = NULL;
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *geometry = json_object_get(
+        json_object_get(
+            json_object_get(json_object_get(json_array_get(nodes, i), "extensions"), "KHR_physics_rigid_bodies"),
+            "collider"),
+        "geometry");
+    if (json_object_get(geometry, "node")) hull = geometry;
+  }
+  assert_true(json_is_true(json_object_get(hull, "convexHull")));
+  const json_t *hidden = json_array_get(nodes, (size_t)at(hull, "node"));
+  assert_near(at(hidden, "mesh"), 0, 0);
+  assert_int_equal(json_array_size(json_object_get(root, "meshes")), 1);
+  assert_int_equal(data.size, 4 * 12 + 12 * 2);
+  const json_t *motion = json_object_get(
+      json_object_get(json_object_get(json_array_get(nodes, 0), "extensions"), "KHR_physics_rigid_bodies"), "motion");
+  assert_near(at(motion, "mass"), 2, 0);
+  assert_int_equal(json_array_size(json_object_get(motion, "inertiaOrientation")), 4);
+  assert_int_equal(json_array_size(json_object_get(root, "extensionsUsed")), 2);
+  assert_null(json_object_get(root, "extensionsRequired"));
+  json_decref(root);
+  qmat_writer_uninit(&data);
+}
+
+static void test_omi_has_convex_meshes_where_radii_differ(void **state) {
+  (void)state;
+  qmat_writer data = {0};
+  json_t *root = write(QMAT_GLTF_OMI, true, NULL, &data);
+  const json_t *shapes =
+      json_object_get(json_object_get(json_object_get(root, "extensions"), "OMI_physics_shape"), "shapes");
+  static const char *const types[] = {"convex", "convex", "capsule", "sphere"};
+  assert_int_equal(json_array_size(shapes), 4);
+  for (size_t i = 0; i < 4; i++)
+    assert_string_equal(json_string_value(json_object_get(json_array_get(shapes, i), "type")), types[i]);
+  const json_t *body = json_object_get(json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions"),
+                                       "OMI_physics_body");
+  assert_string_equal(json_string_value(json_object_get(json_object_get(body, "motion"), "type")), "dynamic");
+  json_decref(root);
+  qmat_writer_uninit(&data);
+}
+
+static void test_names_of_hulls_and_a_second_run_replaces_the_first(void **state) {
+  (void)state;
+  qmat_writer data = {0};
+  const unsigned all = QMAT_GLTF_KHR | QMAT_GLTF_OMI | QMAT_GLTF_UNREAL | QMAT_GLTF_GODOT;
+  json_t *root = write(all, false, NULL, &data);
+  assert_int_equal(children_with(root, NULL, "UCX_Mesh_0"), 4);
+  assert_int_equal(children_with(root, NULL, "-convcolonly"), 4);
+  assert_null(json_object_get(json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions"),
+                              "KHR_physics_rigid_bodies"));
+  write(all, false, root, &data);
+  assert_int_equal(children_with(root, NULL, "UCX_Mesh_0"), 4);
+  assert_int_equal(children_with(root, "OMI_physics_body", NULL), 4);
+  assert_int_equal(json_array_size(json_object_get(root, "extensionsUsed")), 4);
+  json_decref(root);
+  qmat_writer_uninit(&data);
+}
+
+static bool says(const qmat_file *file, const char *text) {
+  return memmem(file->parts[0].bytes, file->parts[0].size, text, strlen(text)) != NULL;
+}
+
+static void test_robot_files_have_shapes_in_metres_and_mass(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_colliders *c = example();
+  qmat_file *file;
+  assert_int_equal(qmat_robot_write(&context, c, QMAT_ROBOT_URDF, "my arm", 0.5, &file), QMAT_OK);
+  assert_string_equal(file->format, "urdf");
+  assert_int_equal(file->part_count, 4); /* three hulls */
+  assert_int_equal(file->parts[1].size, 84 + 4 * 50);
+  assert_string_equal(file->parts[1].name, "my_arm_hull_01.stl");
+  assert_true(says(file, "<sphere radius=\"0.25\"/>") && says(file, "<mass value=\"2\"/>"));
+  assert_true(says(file, "ixx=\"1.25\" iyy=\"1.5\" izz=\"1.75\" ixy=\"0.125\" ixz=\"-0.0625\" iyz=\"0.03125\""));
+  qmat_value_release(&file->base);
+  assert_int_equal(qmat_robot_write(&context, c, QMAT_ROBOT_MJCF, NULL, 0, &file), QMAT_OK);
+  assert_true(says(file, "type=\"capsule\" size=\"0.5\" fromto=\"1 2 3 1 0 3\"") && says(file, "type=\"sphere\""));
+  assert_true(says(file, "<mesh name=\"model_hull_02\" vertex=\"10 10 10 11 10 10"));
+  assert_true(says(file, "fullinertia=\"5 6 7 0.5 -0.25 0.125\""));
+  qmat_value_release(&file->base);
+  assert_int_equal(qmat_robot_write(&context, c, QMAT_ROBOT_YAML, NULL, 0, &file), QMAT_ERROR_USAGE);
+  assert_null(file);
+  qmat_colliders *sphere = qmat_colliders_new();
+  sphere->sphere_count = sphere->shape_count = 1;
+  sphere->spheres = qmat_alloc(4, sizeof(double));
+  sphere->shapes = qmat_calloc(3, sizeof(uint32_t));
+  sphere->hull_ends = qmat_calloc(2, sizeof(uint32_t));
+  memcpy(sphere->spheres, (double[]){1, 2, 3, 0.5}, 4 * sizeof(double));
+  assert_int_equal(qmat_value_seal(&context, &sphere->base), QMAT_OK);
+  assert_int_equal(qmat_robot_write(&context, sphere, QMAT_ROBOT_YAML, "link", 0, &file), QMAT_OK);
+  assert_true(says(file, "collision_spheres:\n  \"link\":\n    - \"center\": [1, 2, 3]\n      \"radius\": 0.5\n"));
+  qmat_value_release(&file->base);
+  qmat_value_release(&sphere->base);
+  qmat_value_release(&c->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_usd_has_a_capsule_of_two_radii_and_convex_hulls(void **state) {
+  (void)state;
+  qmat_colliders *c = example();
+  qmat_writer writer = {0};
+  qmat_usd_put_body(&writer, c, (const double[]){1, 0, 0});
+  qmat_usd_put_colliders(&writer, c, (const double[]){1, 0, 0});
+  qmat_put_u8(&writer, 0);
+  const char *text = (const char *)writer.bytes;
+  assert_non_null(strstr(text, "physics:centerOfMass = (0, 2, 3)"));
+  assert_non_null(strstr(text, "double radiusBottom = 0.5\n            double radiusTop = 0.25"));
+  assert_non_null(strstr(text, "double3 xformOp:translate = (1.5, 2, 3)"));
+  assert_non_null(strstr(text, "physics:approximation = \"convexHull\""));
+  assert_non_null(strstr(text, "def Sphere \"shape_04\""));
+  qmat_writer_uninit(&writer);
+  qmat_value_release(&c->base);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_a_capsules_frame_turns_y_to_its_axis),
+      cmocka_unit_test(test_principal_moments_and_axes_make_the_tensor),
+      cmocka_unit_test(test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_nodes),
+      cmocka_unit_test(test_omi_has_convex_meshes_where_radii_differ),
+      cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),
+      cmocka_unit_test(test_robot_files_have_shapes_in_metres_and_mass),
+      cmocka_unit_test(test_usd_has_a_capsule_of_two_radii_and_convex_hulls),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
