@@ -9,6 +9,7 @@
 #include "nodes/simplify/decimation_resume.h"
 #include "nodes/simplify/ordered_collapse.h"
 #include "nodes/simplify/simplification.h"
+#include "nodes/simplify/sphere_budget.h"
 
 typedef qmat_simplify_params medial_simplify_params;
 
@@ -59,6 +60,12 @@ static qmat_status make_outputs(qmat_context *context, const qmat_simplify_figur
   return QMAT_OK;
 }
 
+/* Whether only the number of spheres is given, for the cost that bounds both errors. The others end at the number, as
+ * in their papers. */
+static bool searches_epsilon(const medial_simplify_params *params) {
+  return params->vertices > 0 && params->epsilon == 0 && params->cost == QMAT_COST_SLAB;
+}
+
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   medial_simplify_params own = *(const medial_simplify_params *)params;
@@ -80,10 +87,16 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     return status;
   }
   qmat_simplification s = {.context = context, .params = own};
-  qmat_simplified best;
-  status = qmat_simplification_run(&s, inputs, &best);
+  qmat_simplified best = {.fault = INFINITY};
+  double kept = own.epsilon;
+  status = qmat_simplification_prepare(&s, inputs);
   if (status == QMAT_OK)
-    status = make_outputs(context, &best.figures, s.surface, epsilon, deviation, &best.medial, outputs);
+    status = searches_epsilon(&own) ? qmat_simplification_run_to_count(&s, &best, &kept)
+                                    : qmat_simplification_run(&s, &best);
+  best.figures.wanted_spheres = searches_epsilon(&own) ? (size_t)own.vertices : 0;
+  if (status == QMAT_OK)
+    status = make_outputs(context, &best.figures, s.surface, kept > 0 ? kept + deviation : 0, deviation, &best.medial,
+                          outputs);
   qmat_simplified_uninit(&best);
   qmat_simplification_uninit(&s);
   return status;
@@ -93,8 +106,10 @@ static const char *const exceed_rules[] = {"skip", "stop", "raise", NULL};
 static const qmat_param params[] = {
     QMAT_LENGTH(qmat_simplify_params, epsilon, 0.01, 0, 1,
                 "The largest distance between the surface and the envelope, either way; 0: no bound"),
-    QMAT_INT(qmat_simplify_params, vertices, "spheres", 0, 0, 4294967294.0,
-             "Stop at this number of medial spheres; 0: no such stop"),
+    QMAT_INT(
+        qmat_simplify_params, vertices, "spheres", 0, 0, 4294967294.0,
+        "Stop at this number of medial spheres; 0: no such stop. With epsilon=0 and cost=slab the least error that "
+        "allows the number is searched"),
     QMAT_ERROR_PARAM,
     QMAT_ENUM(
         qmat_simplify_params, on_exceed, exceed_rules, QMAT_EXCEED_SKIP,
@@ -128,6 +143,9 @@ const qmat_node qmat_node_medial_simplify = {
         "places beyond epsilon between the constraint points, and the collapses are repeated with these. Uncovered "
         "interior is filled with extra spheres. Spheres of radius zero are sharp features and stay on their creases. "
         "The deviation of a subdivision surface (mesh.subdivide) is subtracted from epsilon.\n\n"
+        "With vertices and epsilon=0 it is run at several epsilons, until the least one that leaves at most that "
+        "number "
+        "is known to 4 %; it is at least finest.\n\n"
         "With on_exceed=stop or raise the threshold of both errors starts at finest and rises to epsilon; collapses do "
         "not depend on epsilon, no sphere is fitted, and medial.chain records them. cost=hausdorff keeps the end of "
         "the edge that leaves the surface nearest to the envelope; cost=pmat keeps the larger end. compat=qmat follows "

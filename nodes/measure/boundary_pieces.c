@@ -156,7 +156,7 @@ bool qmat_boundary_piece_ball(const qmat_boundary_features *f, const qmat_bounda
 
 /* ---- the hull of a piece ---- */
 
-/* A unit normal n of the patch is h / |h| for a point h of the triangle of the corners, and |h| >= h.m >= the least a.m
+/* A unit normal n of the piece is h / |h| for a point h of the triangle of the corners, and |h| >= h.m >= the least a.m
  * over the corners a = 1 - |a - m|^2 / 2, for every unit vector m. */
 static int sphere_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
                        double *bulge) {

@@ -250,12 +250,15 @@ static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *
   return status == QMAT_OK ? qmat_simplification_close_loops(s, best) : status;
 }
 
-qmat_status qmat_simplification_run(qmat_simplification *s, const qmat_value *const inputs[], qmat_simplified *best) {
+qmat_status qmat_simplification_prepare(qmat_simplification *s, const qmat_value *const inputs[]) {
   s->samples = (const qmat_samples *)inputs[2];
   s->initial = (const qmat_medial *)inputs[3];
+  const qmat_status status = qmat_simplify_prepare(s->context, &s->params, inputs, &s->surface, &s->state);
+  return status == QMAT_OK ? qmat_topology_of_solid(s->context, s->surface, &s->solid) : status;
+}
+
+qmat_status qmat_simplification_run(qmat_simplification *s, qmat_simplified *best) {
   *best = (qmat_simplified){.fault = INFINITY};
-  qmat_status status = qmat_simplify_prepare(s->context, &s->params, inputs, &s->surface, &s->state);
-  if (status == QMAT_OK) status = qmat_topology_of_solid(s->context, s->surface, &s->solid);
-  if (status == QMAT_OK) status = run_rounds(s, best);
+  const qmat_status status = run_rounds(s, best);
   return status == QMAT_OK ? mend_topology(s, best) : status;
 }

@@ -4,10 +4,12 @@
 
 #include "nodes/simplify/simplification_state.h"
 
-/* Runs all passes for parameters with on_exceed=skip. Inputs and statuses are those of qmat_simplify_prepare. `best`
- * gets the result; the caller has given `simplification` its context and parameters, and frees both with
- * qmat_simplification_uninit and qmat_simplified_uninit, also after a failure. All threads. */
-qmat_status qmat_simplification_run(qmat_simplification *simplification, const qmat_value *const inputs[],
-                                    qmat_simplified *best);
+/* Reads the inputs. They and the statuses are those of qmat_simplify_prepare. The caller has given `simplification` its
+ * context and parameters, and frees it with qmat_simplification_uninit, also after a failure. All threads. */
+qmat_status qmat_simplification_prepare(qmat_simplification *simplification, const qmat_value *const inputs[]);
+
+/* Runs all passes of a prepared simplification with on_exceed=skip. `best` gets the result; free it with
+ * qmat_simplified_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+qmat_status qmat_simplification_run(qmat_simplification *simplification, qmat_simplified *best);
 
 #endif

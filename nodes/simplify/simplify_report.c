@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/simplify/simplify_report.h"
 
+#include <stdio.h>
+
 #include "core/json_text.h"
 #include "nodes/measure/topology_report.h"
 
@@ -10,6 +12,13 @@ void qmat_simplify_figures_of(const qmat_decimation *run, qmat_simplify_figures 
   figures->features = run->creases.left;
   figures->crease_error = qmat_crease_guard_error(&run->creases);
   figures->moves = run->moves;
+}
+
+static int add_warning(json_t *root, const qmat_simplify_figures *f, const qmat_medial *unit, double epsilon) {
+  char text[160];
+  snprintf(text, sizeof text, "%zu spheres are left instead of %zu: fewer are farther than %.3g %% from the surface",
+           unit->sphere_count, f->wanted_spheres, 100 * epsilon);
+  return json_object_set_new(root, "warnings", json_pack("[s]", text));
 }
 
 qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figures *f, const qmat_medial *unit,
@@ -50,5 +59,6 @@ qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figu
     if (counts[i].shown) bad |= qmat_json_set_count(root, counts[i].key, counts[i].count);
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     if (numbers[i].shown) bad |= json_object_set_new(root, numbers[i].key, json_real(numbers[i].value));
+  if (f->wanted_spheres > 0 && unit->sphere_count > f->wanted_spheres) bad |= add_warning(root, f, unit, epsilon);
   return bad ? qmat_fail_memory(context, "the report") : qmat_topology_report(context, unit, surface, root);
 }

@@ -8,7 +8,8 @@
 typedef struct qmat_simplify_figures {
   qmat_collapse_counts counts;
   size_t initial_spheres, constraint_points;
-  size_t features; /* sharp ones that are left */
+  size_t features;       /* sharp ones that are left */
+  size_t wanted_spheres; /* 0: no such number */
   double crease_error, surface_to_envelope, envelope_to_surface;
   bool in_order;    /* then only the next member applies, else only those after it */
   double threshold; /* of the last collapse */

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/sphere_budget.h"
+
+#include <math.h>
+
+#include "nodes/descriptor/epsilon.h"
+
+/* The search ends when it knows the epsilon to this factor, or after so many runs. */
+static const double precision = 1.04;
+enum { MOST_RUNS = 14 };
+
+/* Without an error that is too small, or one that is enough, the next one differs by this factor. */
+static const double step = 2;
+
+/* The largest error there is, in diagonals. */
+static const double most_error = 1;
+
+/* The number of spheres falls about as fast as epsilon rises. The next epsilon keeps away from both ends of the known
+ * interval by this share of its logarithm, since the number is not that regular. */
+static const double least_share = 0.2;
+
+/* One run, in scratch memory of its own, down to `vertices` spheres (0: as few as possible). */
+static qmat_status run_at(const qmat_simplification *prepared, double epsilon, int64_t vertices,
+                          qmat_simplified *result) {
+  qmat_context *context = prepared->context;
+  qmat_context own = *context;
+  own.arena = (qmat_arena){0};
+  qmat_simplification s = *prepared;
+  s.context = &own;
+  s.params.epsilon = epsilon;
+  s.params.vertices = vertices;
+  const qmat_status status = qmat_simplification_run(&s, result);
+  s.surface = NULL; /* the caller's */
+  qmat_simplification_uninit(&s);
+  qmat_context_uninit(&own);
+  context->error = own.error;
+  context->progress_time = own.progress_time;
+  return status;
+}
+
+/* The epsilon to try between one that is too small, which leaves `spheres`, and one that is enough. */
+static double next_between(double low, double high, double spheres, double wanted) {
+  const double share = log(spheres / wanted) / log(high / low);
+  return low * pow(high / low, fmin(fmax(share, least_share), 1 - least_share));
+}
+
+qmat_status qmat_simplification_run_to_count(const qmat_simplification *s, qmat_simplified *best, double *epsilon) {
+  const size_t wanted = (size_t)s->params.vertices;
+  const double least = s->params.finest;
+  double low = 0, high = INFINITY, tried = fmax(QMAT_DEFAULT_EPSILON, least);
+  size_t at_low = 0;
+  *best = (qmat_simplified){.fault = INFINITY};
+  for (int i = 0; i < MOST_RUNS && high > least && low < most_error && !(high <= precision * low); i++) {
+    qmat_simplified result;
+    const qmat_status status = run_at(s, tried, 0, &result);
+    const bool enough = status == QMAT_OK && result.within_epsilon && result.medial->sphere_count <= wanted;
+    if (status == QMAT_OK && !enough) at_low = result.medial->sphere_count;
+    *(enough ? &high : &low) = tried;
+    if (status == QMAT_OK && (enough || high == INFINITY)) {
+      qmat_simplified_uninit(best);
+      *best = result;
+      *epsilon = tried;
+    } else {
+      qmat_simplified_uninit(&result);
+    }
+    if (status != QMAT_OK) return status;
+    tried = high == INFINITY ? fmin(step * low, most_error)
+            : low == 0       ? fmax(high / step, least)
+                             : next_between(low, high, (double)at_low, (double)wanted);
+  }
+  if (high == INFINITY || best->medial->sphere_count == wanted) return QMAT_OK;
+  /* Fewer are left. As many as wanted are nearer still. */
+  qmat_simplified result;
+  const qmat_status status = run_at(s, high, s->params.vertices, &result);
+  if (status == QMAT_OK && result.within_epsilon) {
+    qmat_simplified_uninit(best);
+    *best = result;
+  } else {
+    qmat_simplified_uninit(&result);
+  }
+  return status;
+}
