@@ -6,6 +6,7 @@
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/thickness.h"
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
@@ -25,6 +26,10 @@ typedef struct {
 /* The spacing of the test points on the surface, as a share of epsilon. */
 static const double spacing_share = 0.5;
 
+/* A round brings a far place nearer if its distance falls below this share. Other places are given up: around a sheet
+ * of an open surface there is no solid that a sphere could fill. */
+static const double nearer_share = 0.9;
+
 enum { MOST_ROUNDS = 8 };
 
 /* Samples, and the initial medial mesh made of them. */
@@ -33,8 +38,9 @@ typedef struct {
   double *reaches; /* per sample, unit frame: bounds the distance to its representative; NULL: unbounded */
   qmat_medial *medial;
   size_t far_count;
-  double *far_points; /* 3 each, unit frame: test points farther from the envelope than the limit */
-  double farthest;    /* an upper bound for all test points; exact where it exceeds the limit */
+  double farthest;   /* an upper bound for all test points; exact where it exceeds the limit */
+  double *distances; /* per place: an upper bound, exact where it exceeds the limit */
+  double excess;     /* the sum over all places of what exceeds the limit */
 } refinement;
 
 typedef struct {
@@ -46,19 +52,43 @@ typedef struct {
   qmat_frame frame;
   double *positions; /* 3 per vertex, unit frame */
   double spacing;    /* of the test points */
-  double around;     /* samples are added up to this distance from a far point */
+  double around;     /* samples are added up to this distance from a far place */
+  /* The test points of all rounds: the samples of the input, then the grid. */
+  size_t known, place_count;
+  double *places;    /* 3 each, unit frame */
+  uint8_t *given_up; /* per place */
 } refiner;
 
 static void refinement_uninit(refinement *r) {
   if (r->samples) qmat_value_release(&r->samples->base);
   if (r->medial) qmat_value_release(&r->medial->base);
   qmat_free(r->reaches);
-  qmat_free(r->far_points);
+  qmat_free(r->distances);
   *r = (refinement){.samples = NULL};
 }
 
+/* Keeps the distances of the places of all rounds; the samples that rounds added lie between them. */
+static qmat_status note_places(refiner *r, const qmat_constraint_points *measured, double limit, refinement *found) {
+  const size_t grid = measured->count - measured->sample_count, added = measured->sample_count - r->known;
+  if (!r->places) {
+    r->place_count = r->known + grid;
+    r->places = qmat_arena_alloc(&r->context->arena, r->place_count, 3 * sizeof *r->places);
+    r->given_up = qmat_arena_calloc(&r->context->arena, r->place_count, sizeof *r->given_up);
+    if (!r->places || !r->given_up) return qmat_fail_memory(r->context, "places");
+    memcpy(r->places, measured->points, 3 * r->place_count * sizeof *r->places);
+  }
+  if (!found->distances) found->distances = qmat_alloc(r->place_count, sizeof *found->distances);
+  if (!found->distances) return qmat_fail_memory(r->context, "places");
+  found->excess = 0;
+  for (size_t i = 0; i < r->place_count; i++) {
+    found->distances[i] = measured->distances[i < r->known ? i : i + added];
+    found->excess += fmax(found->distances[i] - limit, 0);
+  }
+  return QMAT_OK;
+}
+
 /* Measures the distance to the envelope at the samples and at a grid of points between them. */
-static qmat_status find_far_points(const refiner *r, double limit, refinement *found) {
+static qmat_status find_far_places(refiner *r, double limit, refinement *found) {
   qmat_context *context = r->context;
   const qmat_medial *medial = found->medial;
   double *points = qmat_arena_alloc(&context->arena, found->samples->count, 3 * sizeof *points);
@@ -80,32 +110,85 @@ static qmat_status find_far_points(const refiner *r, double limit, refinement *f
     found->farthest = qmat_larger(found->farthest, places.distances[i]);
     found->far_count += places.distances[i] > limit;
   }
-  qmat_free(found->far_points);
-  found->far_points = qmat_alloc(found->far_count, 3 * sizeof *found->far_points);
-  if (!found->far_points) return qmat_fail_memory(context, "far points");
-  size_t next = 0;
-  for (size_t i = 0; i < places.count; i++)
-    if (places.distances[i] > limit)
-      memcpy(&found->far_points[3 * next++], &places.points[3 * i], 3 * sizeof *found->far_points);
+  return note_places(r, &places, limit, found);
+}
+
+/* The far places that are not given up; 3 doubles each in the arena. */
+static qmat_status choose_targets(const refiner *r, const refinement *from, double limit, double **targets,
+                                  size_t *count) {
+  *count = 0;
+  *targets = qmat_arena_alloc(&r->context->arena, from->far_count, 3 * sizeof **targets);
+  if (!*targets) return qmat_fail_memory(r->context, "far places");
+  for (size_t i = 0; i < r->place_count; i++)
+    if (from->distances[i] > limit && !r->given_up[i])
+      memcpy(&(*targets)[3 * (*count)++], &r->places[3 * i], 3 * sizeof **targets);
   return QMAT_OK;
 }
 
-/* One round: samples are added around the far points of `from`, and the medial mesh is made again. `to->medial` stays
- * NULL if nothing changes. */
-static qmat_status refine(const refiner *r, const qmat_surface *surface, const refinement *from, double spacing,
-                          double limit, refinement *to) {
+/* The depths below a place at which it is asked for solid, in limits. */
+static const double solid_depths[] = {0.02, 0.25, 1};
+
+static bool has_solid_below(const qmat_surface *surface, const double place[3], double limit) {
+  uint32_t triangle = 0;
+  (void)qmat_surface_distance(surface, place, INFINITY, NULL, &triangle);
+  const uint32_t *ids = &qmat_surface_mesh(surface)->triangles[3 * (size_t)triangle];
+  const double *p = qmat_surface_positions(surface);
+  double normal[3], below[3];
+  (void)qmat_triangle_area(&p[3 * (size_t)ids[0]], &p[3 * (size_t)ids[1]], &p[3 * (size_t)ids[2]], normal);
+  for (size_t i = 0; i < sizeof solid_depths / sizeof *solid_depths; i++) {
+    for (size_t k = 0; k < 3; k++) below[k] = place[k] - solid_depths[i] * limit * normal[k];
+    if (qmat_surface_inside(surface, below)) return true;
+  }
+  return false;
+}
+
+enum { PLACES_PER_REPORT = 256 };
+
+/* On an open surface, gives up the far places without solid below: no sphere can come nearer. */
+static qmat_status give_up_without_solid(refiner *r, const qmat_surface *surface, const refinement *from,
+                                         double limit) {
+  if (r->solids.closed) return QMAT_OK;
+  const int threads = qmat_threads(r->context);
+  for (size_t first = 0, last; first < r->place_count; first = last) {
+    const qmat_status status = qmat_progress(r->context, first, r->place_count, "places");
+    if (status != QMAT_OK) return status;
+    size_t asked = 0;
+    for (last = first; last < r->place_count && asked < PLACES_PER_REPORT; last++)
+      asked += from->distances[last] > limit;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+    for (size_t i = first; i < last; i++)
+      if (from->distances[i] > limit) r->given_up[i] = !has_solid_below(surface, &r->places[3 * i], limit);
+  }
+  return QMAT_OK;
+}
+
+/* Gives up the far places that a round did not bring nearer. */
+static void give_up(refiner *r, const refinement *from, const refinement *to, double limit) {
+  for (size_t i = 0; i < r->place_count; i++)
+    r->given_up[i] |= from->distances[i] > limit && to->distances[i] > nearer_share * from->distances[i];
+}
+
+/* One round: samples are added around the far places of `from`, and the medial mesh is made again. `to->medial` stays
+ * NULL if there is none, or nothing changes. */
+static qmat_status refine(refiner *r, const qmat_surface *surface, const refinement *from, double spacing, double limit,
+                          refinement *to) {
   qmat_context *context = r->context;
   const qmat_arena kept = context->arena; /* a round's scratch memory is released before the next round */
   context->arena = (qmat_arena){NULL};
   qmat_point_grid far;
   const qmat_resampling where = {&r->solids, &r->frame, r->positions, &far, r->around, spacing};
-  qmat_status status = qmat_point_grid_init(context, from->far_points, from->far_count, &far);
-  if (status == QMAT_OK)
-    status = qmat_samples_densify(context, &where, from->samples, from->reaches, &to->samples, &to->reaches);
-  if (status == QMAT_OK && to->samples)
-    status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples, to->reaches,
-                                    &to->medial, NULL);
-  if (status == QMAT_OK && to->samples) status = find_far_points(r, limit, to);
+  double *targets;
+  size_t count;
+  qmat_status status = choose_targets(r, from, limit, &targets, &count);
+  if (status == QMAT_OK && count > 0) {
+    status = qmat_point_grid_init(context, targets, count, &far);
+    if (status == QMAT_OK)
+      status = qmat_samples_densify(context, &where, from->samples, from->reaches, &to->samples, &to->reaches);
+    if (status == QMAT_OK && to->samples)
+      status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples,
+                                      to->reaches, &to->medial, NULL);
+    if (status == QMAT_OK && to->samples) status = find_far_places(r, limit, to);
+  }
   qmat_arena_uninit(&context->arena);
   context->arena = kept;
   return status;
@@ -114,17 +197,18 @@ static qmat_status refine(const refiner *r, const qmat_surface *surface, const r
 /* --- the node ---------------------------------------------------------------------------------------------------- */
 
 static bool is_better(const refinement *a, const refinement *b) {
-  return a->farthest < b->farthest || (a->farthest == b->farthest && a->far_count < b->far_count);
+  return a->excess < b->excess;
 }
 
-/* Repeats with half the spacing until no point is farther than the limit or a round does not improve. The first spacing
- * is the limit. `*best` is the last round that improved. */
-static qmat_status refine_in_rounds(const refiner *r, double limit, refinement *rounds, size_t *best) {
+/* Repeats with half the spacing until no place is farther than the limit, all that are have been given up, or a round
+ * does not improve. The first spacing is the limit. `*best` is the last round that improved. */
+static qmat_status refine_in_rounds(refiner *r, double limit, refinement *rounds, size_t *best) {
   qmat_surface *surface;
   qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
+  if (status == QMAT_OK) status = give_up_without_solid(r, surface, &rounds[0], limit);
   size_t newest = 0;
   double spacing = limit;
-  for (int64_t i = 0; i < r->params->rounds && rounds[newest].far_count > 0 && status == QMAT_OK; i++) {
+  for (int64_t i = 0; i < r->params->rounds && rounds[newest].excess > 0 && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
     spacing *= 0.5;
@@ -135,6 +219,7 @@ static qmat_status refine_in_rounds(const refiner *r, double limit, refinement *
     }
     newest++;
     if (!is_better(next, &rounds[newest - 1])) break;
+    give_up(r, &rounds[newest - 1], next, limit);
     *best = newest;
   }
   qmat_surface_free(surface);
@@ -151,11 +236,12 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   if (!r->positions) return qmat_fail_memory(r->context, "the vertices");
   qmat_frame_to_unit(&r->frame, r->mesh->positions, r->mesh->vertex_count, r->positions);
   r->spacing = spacing_share * epsilon;
-  qmat_status status = find_far_points(r, params->trigger * epsilon, &rounds[0]);
+  r->known = rounds[0].samples->count;
+  qmat_status status = find_far_places(r, params->trigger * epsilon, &rounds[0]);
   if (status != QMAT_OK || rounds[0].far_count == 0) return status;
   const double limit = fmin(params->target, params->trigger) * epsilon;
   r->around = limit;
-  status = find_far_points(r, limit, &rounds[0]);
+  status = find_far_places(r, limit, &rounds[0]);
   return status == QMAT_OK ? refine_in_rounds(r, limit, rounds, best) : status;
 }
 
@@ -210,7 +296,7 @@ static const qmat_param params[] = {
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 1, 0.1, 1,
                "Refinement starts only if some point of the surface is farther from the envelope than this"),
-    QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
+    QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.75, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),
     QMAT_INT(medial_refine_params, rounds, "rounds", 4, 0, MOST_ROUNDS,
              "The most rounds; each halves the spacing of the added samples; 0: nothing is refined"),
@@ -235,13 +321,14 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 3,
+    .version = 4,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
         "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly spaced "
         "samples are added around all points farther than the target, and the medial mesh is made again. Each further "
-        "round halves the spacing. The result is the round that comes closest.\n\n"
+        "round halves the spacing. Places that a round brings no nearer are given up, as are those of an open surface "
+        "without solid below. The result is the round that leaves the least excess over the target.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "
         "before medial.simplify.\n\n"
         "The parameters after rounds are those of medial.delaunay. Set both nodes to the same values.",

@@ -40,4 +40,20 @@ static inline uint32_t qmat_dual_surface_component(const qmat_dual_complex *dual
                                   : 0;
 }
 
+/* A step around the Delaunay edge (a, b) of a tetrahedron: the neighbour across the facet opposite the corner
+ * `*leaving`, QMAT_NO_TETRAHEDRON outside of all. `*leaving` becomes the corner for the next step. */
+static inline uint32_t qmat_dual_step_around(const qmat_dual_complex *dual, uint32_t cell, uint32_t a, uint32_t b,
+                                             uint32_t *leaving) {
+  const uint32_t *corners = &dual->cells.corners[4 * (size_t)cell];
+  uint32_t entering = QMAT_NO_ID, next = QMAT_NO_TETRAHEDRON;
+  for (size_t k = 0; k < 4; k++) {
+    if (corners[k] == *leaving)
+      next = dual->cells.neighbours[4 * (size_t)cell + k];
+    else if (corners[k] != a && corners[k] != b)
+      entering = corners[k];
+  }
+  *leaving = entering;
+  return next;
+}
+
 #endif

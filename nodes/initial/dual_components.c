@@ -243,6 +243,8 @@ static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, uin
       medial_link best = {0, INFINITY, NONE, NONE};
       for (size_t i = first; i < last; i++) {
         if (qmat_set_leader(joined, index[contacts[i].sphere]) == home) continue;
+        const qmat_status status = qmat_progress(d->context, 0, 0, "components");
+        if (status != QMAT_OK) return status;
         for (size_t j = first; j < last; j++) {
           if (qmat_set_leader(joined, index[contacts[j].sphere]) != home) continue;
           const medial_link link = link_of(spheres, contacts[i].sphere, contacts[j].sphere);

@@ -70,12 +70,12 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   size_t *row_starts = qmat_arena_calloc(arena, spheres + 1, sizeof *row_starts);
   if (!middle_spheres || !middles || !row_starts) return qmat_fail_memory(context, "medial edges");
   const int threads = qmat_threads(context);
-  const size_t slice = 1 << 12;
+  const size_t slice = 1 << 10; /* inside tests of an open surface are slow */
   for (size_t first = 0; first < edges; first += slice) {
     const qmat_status status = qmat_progress(context, first, edges, "refinement");
     if (status != QMAT_OK) return status;
     const size_t last = first + slice < edges ? first + slice : edges;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 512)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t e = first; e < last; e++)
       middles[e] =
           find_middle(surface, &medial->spheres[4 * (size_t)medial->edges[2 * e]],

@@ -118,7 +118,7 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
 
 qmat_status qmat_medial_vertices_select(qmat_dual_complex *d) {
   qmat_context *context = d->context;
-  const size_t count = d->cells.count, slice = 1 << 11;
+  const size_t count = d->cells.count, slice = 512; /* inside tests of an open surface are slow */
   d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);
   d->spheres = qmat_arena_alloc(&context->arena, count, 4 * sizeof *d->spheres);
   if (!d->kinds || !d->spheres) return qmat_fail_memory(context, "medial vertices");
@@ -127,7 +127,7 @@ qmat_status qmat_medial_vertices_select(qmat_dual_complex *d) {
   for (size_t first = 0; first < count && status == QMAT_OK; first += slice) {
     if ((status = qmat_progress(context, first, count, "tetrahedra")) != QMAT_OK) break;
     const size_t last = first + slice < count ? first + slice : count;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 32)
     for (size_t cell = first; cell < last; cell++)
       d->kinds[cell] = (uint8_t)select_medial_vertex(d, cell, &d->spheres[4 * cell]);
   }

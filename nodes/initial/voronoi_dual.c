@@ -20,12 +20,6 @@
 /* The corner pairs of a tetrahedron's edges. */
 static const uint8_t edge_corners[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-static int corner_index(const uint32_t *corners, uint32_t id) {
-  for (int k = 0; k < 3; k++)
-    if (corners[k] == id) return k;
-  return 3;
-}
-
 /* Walks around the Delaunay edge (a, b) from the tetrahedron `start`. Returns the length of the ring, or 0 unless it is
  * closed, all its tetrahedra are kept and `start` is the smallest, so that each ring is found once. */
 static size_t walk_ring(const qmat_dual_complex *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring,
@@ -39,14 +33,8 @@ static size_t walk_ring(const qmat_dual_complex *d, uint32_t start, uint32_t a, 
   do {
     if (cell < start || count == capacity) return 0;
     ring[count++] = cell;
-    corners = &d->cells.corners[4 * (size_t)cell];
-    uint32_t entering = QMAT_NO_ID;
-    for (int k = 0; k < 4; k++)
-      if (corners[k] != a && corners[k] != b && corners[k] != leaving) entering = corners[k];
-    const uint32_t next = d->cells.neighbours[4 * (size_t)cell + (size_t)corner_index(corners, leaving)];
-    if (next == QMAT_NO_TETRAHEDRON || !d->kinds[next]) return 0;
-    cell = next;
-    leaving = entering;
+    cell = qmat_dual_step_around(d, cell, a, b, &leaving);
+    if (cell == QMAT_NO_TETRAHEDRON || !d->kinds[cell]) return 0;
   } while (cell != start);
   return count;
 }

@@ -132,7 +132,7 @@ static void test_more_samples_bring_a_coarse_solid_nearer(void **state) {
     pipeline p;
     pipeline_make(&p, solids[i], "spacing=8%", "");
     qmat_value *outputs[PIPELINE_MOST_PORTS];
-    must_refine(&p, 0, "epsilon=2%", outputs);
+    must_refine(&p, 0, "epsilon=2% target=0.5", outputs);
     const qmat_samples *samples = (const qmat_samples *)outputs[REFINED_SAMPLES];
     const qmat_medial *medial = (const qmat_medial *)outputs[REFINED_MEDIAL];
     const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
@@ -213,6 +213,63 @@ static void test_a_coarse_solid_is_certified(void **state) {
   pipeline_free(&p);
 }
 
+/* A box with a square sheet beside it: the winding number of the sheet is too small for a solid anywhere. */
+static void test_places_without_solid_get_no_samples(void **state) {
+  (void)state;
+  pipeline p;
+  qmat_mesh *mesh = shape_box(4, 3, 3);
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  const size_t closed = mesh->triangle_count;
+  const double corners[] = {10, 0, 0, 12, 0, 0, 12, 2, 0, 10, 2, 0};
+  const uint32_t sides[] = {first, first + 1, first + 2, first, first + 2, first + 3};
+  size_t room = 3 * first, corner_room = 3 * closed;
+  assert_false(qmat_grow((void **)&mesh->positions, &room, 3 * (first + 4), sizeof *mesh->positions));
+  assert_false(qmat_grow((void **)&mesh->triangles, &corner_room, 3 * (closed + 2), sizeof *mesh->triangles));
+  memcpy(&mesh->positions[3 * first], corners, sizeof corners);
+  memcpy(&mesh->triangles[3 * closed], sides, sizeof sides);
+  mesh->vertex_count += 4;
+  mesh->triangle_count += 2;
+  pipeline_make(&p, mesh, "spacing=8%", "");
+  assert_false(p.mesh->closed);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  must_refine(&p, 0, "epsilon=1.5%", outputs);
+  const qmat_samples *samples = (const qmat_samples *)outputs[REFINED_SAMPLES];
+  const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
+  assert_true(samples->count > p.samples->count); /* on the box, whose far places come nearer */
+  for (size_t s = p.samples->count; s < samples->count; s++) assert_true(samples->facets[s] < closed);
+  assert_true(pipeline_count(report, "far_places_left") < pipeline_count(report, "far_places"));
+  assert_true(pipeline_number(report, "farthest_place_left") > 0.3);
+  release(outputs);
+  pipeline_free(&p);
+}
+
+typedef struct {
+  int calls_left;
+} patience;
+
+static bool lose_patience(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                          const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return ((patience *)user)->calls_left-- > 0;
+}
+
+static void test_a_cancelled_run_leaves_nothing(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_box(2, 1.3, 0.4), "spacing=8%", "");
+  for (int calls = 0; calls < 64; calls = 2 * calls + 1) {
+    patience left = {calls};
+    qmat_context context = {.progress = lose_patience, .progress_user = &left};
+    qmat_value *outputs[PIPELINE_MOST_PORTS] = {NULL};
+    const qmat_status status = refine(&p, "epsilon=2%", &context, outputs);
+    assert_true(status == QMAT_OK || status == QMAT_CANCELLED);
+    if (calls == 0) assert_int_equal(status, QMAT_CANCELLED);
+    if (status == QMAT_OK) release(outputs);
+    qmat_context_uninit(&context);
+  }
+  pipeline_free(&p);
+}
+
 static void test_threads_do_not_change_a_byte(void **state) {
   (void)state;
   pipeline p;
@@ -275,6 +332,8 @@ int main(void) {
       cmocka_unit_test(test_more_samples_bring_a_coarse_solid_nearer),
       cmocka_unit_test(test_places_that_are_near_stay_as_they_were),
       cmocka_unit_test(test_a_coarse_solid_is_certified),
+      cmocka_unit_test(test_places_without_solid_get_no_samples),
+      cmocka_unit_test(test_a_cancelled_run_leaves_nothing),
       cmocka_unit_test(test_threads_do_not_change_a_byte),
       cmocka_unit_test(test_nothing_is_refined_where_the_mesh_itself_is_farther_than_epsilon),
       cmocka_unit_test(test_what_does_not_belong_together_is_named),
