@@ -49,12 +49,21 @@ qmat_status qmat_simplification_run_to_count(const qmat_simplification *s, qmat_
   const double least = s->params.finest;
   double low = 0, high = INFINITY, tried = fmax(QMAT_DEFAULT_EPSILON, least);
   size_t at_low = 0;
+  bool again = false;
   *best = (qmat_simplified){.fault = INFINITY};
   for (int i = 0; i < MOST_RUNS && high > least && low < most_error && !(high <= precision * low); i++) {
     qmat_simplified result;
     const qmat_status status = run_at(s, tried, 0, &result);
-    const bool enough = status == QMAT_OK && result.within_epsilon && result.medial->sphere_count <= wanted;
+    const bool few = status == QMAT_OK && result.medial->sphere_count <= wanted;
+    const bool enough = few && result.within_epsilon;
     if (status == QMAT_OK && !enough) at_low = result.medial->sphere_count;
+    if (few && !enough && !again) { /* few spheres just beyond epsilon: not yet too small */
+      qmat_simplified_uninit(&result);
+      tried *= precision;
+      again = true;
+      continue;
+    }
+    again = false;
     *(enough ? &high : &low) = tried;
     if (status == QMAT_OK && (enough || high == INFINITY)) {
       qmat_simplified_uninit(best);
