@@ -797,6 +797,12 @@ static void compare_threads(subject *run, const char *what) {
   }
 }
 
+/* Whether a choice refuses the subjects: their medial meshes have no report that certifies them.
+ * tests/nodes/scene_write tests it. */
+static bool refuses_subjects(const qmat_node *node, const qmat_param *param) {
+  return strcmp(node->name, "scene.write") == 0 && strcmp(param->name, "require") == 0;
+}
+
 /* Calls `visit` with the node's defaults, and with every other choice of each enum, which can select another algorithm.
  */
 static void for_each_choice(const qmat_node *node, void (*visit)(subject *run, const char *what)) {
@@ -806,7 +812,7 @@ static void for_each_choice(const qmat_node *node, void (*visit)(subject *run, c
   for (size_t row = 0; row < qmat_param_count(node); row++) {
     const qmat_param *param = &node->params[row];
     for (int choice = 0; param->type == QMAT_PARAM_ENUM && param->choices[choice]; choice++) {
-      if (choice == (int)param->default_number) continue;
+      if (choice == (int)param->default_number || refuses_subjects(node, param)) continue;
       run = subject_of(node);
       memcpy((char *)run.params + param->offset, &choice, sizeof choice);
       char what[64];
