@@ -207,7 +207,8 @@ refused "zeros" zeros.glb
 head -c 65536 "$build/qmat" >program.ply
 refused "a program" program.ply
 printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n2 0 0\n3 0 0\n3 0 1 2\n3 0 2 3\n3 1 2 3\n3 0 1 3\n' >flat.off
-refused "all vertices on a line" flat.off
+holds "all vertices on a line: mat" qmat mat flat.off -o flat.ma
+holds "all vertices on a line: two spheres of radius zero" grep -qx 'v 3 0 0 0' flat.ma
 printf 'OFF\n4 4 0\n5 5 5\n5 5 5\n5 5 5\n5 5 5\n3 0 1 2\n3 0 2 3\n3 1 2 3\n3 0 1 3\n' >point.off
 refused "all vertices in one point" point.off
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n' >range.obj
@@ -303,18 +304,22 @@ else
   holds "a scene: the run fails before it computes anything" test "$(grep -c '"start"' events.txt)" -eq 1
 fi
 
-# A mesh that encloses nothing is left as it is, with a warning. The run fails where no other mesh exists.
+# A mesh that encloses nothing is a sheet. With solid=as_is it is left as it is, with a warning; the run fails where no
+# other mesh exists.
 sed -e 's/"POSITION":2},"indices":1/"POSITION":2},"indices":3/' \
   -e 's/"max":\[3,1,1\]}/&,{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}/' scene/in.gltf >scene/flat.gltf
-qmat mat scene/flat.gltf -o scene/out/flat.gltf --epsilon 10% >flat.txt 2>flat_warnings.txt
-holds "a flat mesh in a scene: the run succeeds" test $? -eq 0
-holds "a flat mesh in a scene: one warning names it" \
+holds "a flat mesh in a scene: mat" qmat mat scene/flat.gltf -o scene/out/sheet.gltf --epsilon 10%
+holds "a flat mesh in a scene: a medial mesh on each node" test "$(grep -c '"qmat_data"' scene/out/sheet.gltf)" -eq 3
+holds "a flat mesh in a scene: certified" qmat info scene/out/sheet.gltf --against scene/flat.gltf
+qmat mat scene/flat.gltf -o scene/out/flat.gltf --epsilon 10% --set solid.solid=as_is >flat.txt 2>flat_warnings.txt
+holds "a flat mesh as it is: the run succeeds" test $? -eq 0
+holds "a flat mesh as it is: one warning names it" \
   test "$(grep -c "mesh 'bar' cannot be described: " flat_warnings.txt)$(grep -c . flat_warnings.txt)" = 11
-holds "a flat mesh in a scene: it is counted" grep -q 'describe 1 of the 2 meshes' flat.txt
-holds "a flat mesh in a scene: the other has a medial mesh on each node" \
+holds "a flat mesh as it is: it is counted" grep -q 'describe 1 of the 2 meshes' flat.txt
+holds "a flat mesh as it is: the other has a medial mesh on each node" \
   test "$(grep -c '"qmat_data"' scene/out/flat.gltf)" -eq 2
 sed -e 's/"indices":1/"indices":3/' scene/flat.gltf >scene/flat2.gltf
-qmat mat scene/flat2.gltf -o scene/out/flat2.gltf --epsilon 10% >flat.txt 2>flat_warnings.txt
+qmat mat scene/flat2.gltf -o scene/out/flat2.gltf --epsilon 10% --set solid.solid=as_is >flat.txt 2>flat_warnings.txt
 holds "a scene of flat meshes: exit code 1" test $? -eq 1
 holds "a scene of flat meshes: one error names the first" \
   test "$(grep -c 'cube: ' flat_warnings.txt)$(grep -c . flat_warnings.txt)" = 11
