@@ -184,22 +184,23 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   result_free(&r);
 }
 
+/* The first output of a node; the others are released. */
+static qmat_value *first_output(const char *name, const char *text, const qmat_value *const inputs[]) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS] = {NULL};
+  pipeline_must_run(0, name, text, inputs, outputs);
+  for (int i = 1; i < PIPELINE_MOST_PORTS; i++) qmat_value_release(outputs[i]);
+  return outputs[0];
+}
+
 /* A model at 3 % and its medial mesh. */
 static void describe(const char *name, qmat_mesh **mesh, qmat_medial **medial) {
-  qmat_value *outputs[PIPELINE_MOST_PORTS] = {NULL};
   *mesh = shape_seal(pipeline_model(name, 12));
-  qmat_value *field, *samples;
-  pipeline_must_run(0, "mesh.sdf", "", (const qmat_value *[]){&(*mesh)->base}, outputs);
-  field = outputs[0];
-  pipeline_must_run(0, "mesh.sample", "", (const qmat_value *[]){&(*mesh)->base, field}, outputs);
-  samples = outputs[0];
-  pipeline_must_run(0, "medial.delaunay", "", (const qmat_value *[]){&(*mesh)->base, field, samples}, outputs);
-  qmat_value *initial = outputs[0];
-  outputs[1] = NULL;
-  pipeline_must_run(0, "medial.simplify", "epsilon=3%", (const qmat_value *[]){&(*mesh)->base, field, samples, initial},
-                    outputs);
-  *medial = (qmat_medial *)outputs[0];
-  for (int i = 1; i < PIPELINE_MOST_PORTS; i++) qmat_value_release(outputs[i]);
+  const qmat_value *solid = &(*mesh)->base;
+  qmat_value *field = first_output("mesh.sdf", "", (const qmat_value *[]){solid});
+  qmat_value *samples = first_output("mesh.sample", "", (const qmat_value *[]){solid, field});
+  qmat_value *initial = first_output("medial.delaunay", "", (const qmat_value *[]){solid, field, samples});
+  *medial = (qmat_medial *)first_output("medial.simplify", "epsilon=3%",
+                                        (const qmat_value *[]){solid, field, samples, initial});
   qmat_value_release(field);
   qmat_value_release(samples);
   qmat_value_release(initial);
