@@ -46,19 +46,12 @@ static qmat_status sum_areas(qmat_context *context, triangles *t) {
 static size_t sample_point(const measuring *m, size_t i, uint64_t stream, double point[3]) {
   const triangles *t = &m->area;
   const double at = t->areas[t->count - 1] * ((double)i + 0.5) / (double)m->samples;
-  size_t low = 0, high = t->count - 1;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    if (t->areas[middle] > at)
-      high = middle;
-    else
-      low = middle + 1;
-  }
-  const uint32_t *row = &t->rows[3 * low];
+  const size_t triangle = qmat_area_element_at(t->areas, t->count, at);
+  const uint32_t *row = &t->rows[3 * triangle];
   qmat_triangle_point(&t->positions[3 * (size_t)row[0]], &t->positions[3 * (size_t)row[1]],
                       &t->positions[3 * (size_t)row[2]], qmat_hash_unit(qmat_hash3(stream, i, 0)),
                       qmat_hash_unit(qmat_hash3(stream, i, 1)), point);
-  return low;
+  return triangle;
 }
 
 static double gap_at(const measuring *m, size_t i) {

@@ -9,12 +9,11 @@
 /* Sums are taken over blocks of samples and then in the order of the blocks, so that they do not depend on threads. */
 enum { BLOCK_SAMPLES = 512, SLICE_BLOCKS = 256 };
 
-/* The first element up to which the area exceeds `area`. */
-static size_t element_at(const qmat_area_samples *s, double area) {
-  size_t low = 0, high = s->element_count - 1;
+size_t qmat_area_element_at(const double *areas, size_t count, double area) {
+  size_t low = 0, high = count - 1;
   while (low < high) {
     const size_t middle = low + (high - low) / 2;
-    if (s->areas[middle] > area)
+    if (areas[middle] > area)
       high = middle;
     else
       low = middle + 1;
@@ -26,7 +25,8 @@ static qmat_area_sums sum_block(const qmat_area_samples *s, size_t block) {
   const double area = s->areas[s->element_count - 1];
   qmat_area_sums sums = {.count = 0};
   for (size_t i = block * BLOCK_SAMPLES; i < s->sample_count && i < (block + 1) * BLOCK_SAMPLES; i++) {
-    const size_t element = element_at(s, area * (((double)i + 0.5) / (double)s->sample_count));
+    const size_t element =
+        qmat_area_element_at(s->areas, s->element_count, area * (((double)i + 0.5) / (double)s->sample_count));
     s->add(s->data, element, qmat_hash_unit(qmat_hash3(s->stream, i, 0)), qmat_hash_unit(qmat_hash3(s->stream, i, 1)),
            &sums);
   }

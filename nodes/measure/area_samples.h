@@ -27,6 +27,10 @@ typedef struct qmat_area_samples {
  * not depend on their number. Cost: linear in the samples. */
 qmat_status qmat_area_samples_sum(qmat_context *context, const qmat_area_samples *samples, qmat_area_sums *sums);
 
+/* The first of `count` (> 0) elements whose running area, `areas` as above, exceeds `area`; the last where none does.
+ */
+size_t qmat_area_element_at(const double *areas, size_t count, double area);
+
 /* The point of the triangle abc (3 doubles each) for two even random numbers: even in its area. */
 void qmat_triangle_point(const double a[3], const double b[3], const double c[3], double x, double y, double point[3]);
 

@@ -115,16 +115,27 @@ typedef struct finding {
   bool maybe_exposed; /* `place` is farther than epsilon, and may or may not be on the boundary */
 } finding;
 
+/* Points whose hull comes within `bulge` of a piece; none of a cell. */
+typedef struct hull {
+  double points[4][3], bulge;
+  int count;
+} hull;
+
+static hull hull_of(const search *s, const qmat_boundary_piece *p) {
+  hull h;
+  h.count = qmat_boundary_piece_hull(s->features, p, h.points, &h.bulge);
+  return h;
+}
+
 /* Whether no point of the piece lies on the boundary. The middle of a piece of a feature is never outside of the
  * envelope. */
-static bool is_off_boundary(const search *s, const qmat_boundary_piece *p, const double middle[3], double reach) {
-  if (p->feature == QMAT_CELL)
+static bool is_off_boundary(const search *s, const hull *h, const double middle[3], double reach) {
+  if (h->count == 0)
     return qmat_envelope_holds(s->envelope, middle, reach + QMAT_BOUNDARY_SKIN) ||
            qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
-  double points[4][3], bulge, bound;
-  const int count = qmat_boundary_piece_hull(s->features, p, points, &bulge);
-  const double f = qmat_envelope_bound(s->envelope, middle, (const double(*)[3])points, count, &bound);
-  return qmat_smaller(f + reach, bound + bulge) < -QMAT_BOUNDARY_SKIN;
+  double bound;
+  const double f = qmat_envelope_bound(s->envelope, middle, (const double(*)[3])h->points, h->count, &bound);
+  return qmat_smaller(f + reach, bound + h->bulge) < -QMAT_BOUNDARY_SKIN;
 }
 
 /* Moves a cell's middle to the surface of its nearest medial sphere. */
@@ -146,18 +157,16 @@ static void raise_lower_bound(const search *s, bool is_cell, double middle[3], u
 }
 
 /* An upper bound over a piece: the distance to one triangle is convex, so over a hull its maximum is at a corner. */
-static double hull_bound(const search *s, const qmat_boundary_piece *p, uint32_t triangle) {
-  double points[4][3], bulge, bound = 0;
-  const int count = qmat_boundary_piece_hull(s->features, p, points, &bulge);
-  if (count == 0) return INFINITY;
-  for (int i = 0; i < count; i++)
-    bound = qmat_larger(bound, qmat_surface_distance_to_triangle(s->surface, points[i], triangle));
-  return bound + bulge;
+static double hull_bound(const search *s, const hull *h, uint32_t triangle) {
+  double bound = h->count > 0 ? 0 : INFINITY;
+  for (int i = 0; i < h->count; i++)
+    bound = qmat_larger(bound, qmat_surface_distance_to_triangle(s->surface, h->points[i], triangle));
+  return bound + h->bulge;
 }
 
 /* Finishes what the piece is wanted for and `bound` proves. */
 static void finish_with(const search *s, double bound, uint8_t *wanted, finding *result) {
-  result->undecided =
+  result->undecided |=
       bound > s->epsilon && bound <= s->target[0] && s->lo[0] <= s->epsilon && (*wanted & WANT_EITHER_SIDE);
   for (int i = 0; i < BOUND_COUNT; i++)
     if ((*wanted >> i & 1) && bound <= s->target[i]) {
@@ -179,12 +188,13 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   double d = limit > 0 ? qmat_surface_distance(s->surface, middle, limit, NULL, &triangle) : INFINITY;
   finish_with(s, d + reach, wanted, &result);
   if (!*wanted && !result.undecided) return result;
-  if (is_off_boundary(s, p, middle, reach)) {
+  const hull h = hull_of(s, p);
+  if (is_off_boundary(s, &h, middle, reach)) {
     *wanted = 0;
     return (finding){.children = 0};
   }
   if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, &triangle);
-  if (*wanted) finish_with(s, hull_bound(s, p, triangle), wanted, &result);
+  if (*wanted) finish_with(s, hull_bound(s, &h, triangle), wanted, &result);
   if (result.undecided) memcpy(result.place, middle, sizeof result.place);
   if (!*wanted) return result;
   const bool inside = (*wanted & WANT_OUTSIDE) && qmat_surface_inside(s->surface, middle);
@@ -203,12 +213,11 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
 static finding evaluate(const search *s, const qmat_boundary_piece *p) {
   finding result = {.children = 0};
   double middle[3], reach;
-  const bool is_cell = p->feature == QMAT_CELL;
   uint8_t wanted = p->wanted;
   if (!qmat_boundary_piece_ball(s->features, p, middle, &reach)) return result;
-  if (s->last || reach < s->target[0] || !is_cell)
+  if (s->last || reach < s->target[0] || p->feature != QMAT_CELL)
     result = evaluate_ball(s, p, middle, reach, &wanted);
-  else if (is_off_boundary(s, p, middle, reach))
+  else if (is_off_boundary(s, &(hull){.count = 0}, middle, reach))
     return result;
   result.wanted = wanted;
   if (wanted) result.children = qmat_boundary_piece_child_count(s->features, p);

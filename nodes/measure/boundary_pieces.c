@@ -67,13 +67,20 @@ static double depth_in_hull(double excess, double radius, double square) {
   return t * excess - t * t * square / (2 * radius);
 }
 
-static bool sphere_ball(const qmat_boundary_features *f, const qmat_boundary_piece *p, double middle[3],
-                        double *reach) {
-  const double *sphere = &f->spheres[4 * (size_t)p->feature];
-  double normal[3], spread = 0;
+/* The mean normal of a piece of a sphere, and the largest distance of a corner's normal from it. */
+static double sphere_spread(const qmat_boundary_piece *p, double normal[3]) {
+  double spread = 0;
   for (int k = 0; k < 3; k++) normal[k] = p->at[k] + p->at[3 + k] + p->at[6 + k];
   qmat_normalize(normal);
   for (int i = 0; i < 3; i++) spread = qmat_larger(spread, qmat_point_distance(normal, &p->at[3 * i]));
+  return spread;
+}
+
+static bool sphere_ball(const qmat_boundary_features *f, const qmat_boundary_piece *p, double middle[3],
+                        double *reach) {
+  const double *sphere = &f->spheres[4 * (size_t)p->feature];
+  double normal[3];
+  const double spread = sphere_spread(p, normal);
   for (int k = 0; k < 3; k++) middle[k] = sphere[k] + sphere[3] * normal[k];
   *reach = sphere[3] * spread;
   for (size_t i = f->neighbour_offsets[p->feature]; i < f->neighbour_offsets[p->feature + 1]; i++) {
@@ -161,13 +168,10 @@ bool qmat_boundary_piece_ball(const qmat_boundary_features *f, const qmat_bounda
 static int sphere_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
                        double *bulge) {
   const double *sphere = &f->spheres[4 * (size_t)p->feature];
-  double normal[3], spread = 0;
-  for (int k = 0; k < 3; k++) normal[k] = p->at[k] + p->at[3 + k] + p->at[6 + k];
-  qmat_normalize(normal);
-  for (int i = 0; i < 3; i++) {
-    spread = qmat_larger(spread, qmat_point_distance(normal, &p->at[3 * i]));
+  double normal[3];
+  const double spread = sphere_spread(p, normal);
+  for (int i = 0; i < 3; i++)
     for (int k = 0; k < 3; k++) points[i][k] = sphere[k] + sphere[3] * p->at[3 * i + k];
-  }
   *bulge = 0.5 * sphere[3] * spread * spread;
   return 3;
 }

@@ -7,28 +7,13 @@
 #include <cmocka.h>
 
 #include "core/geometry/envelope.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/surface.h"
 #include "core/hash.h"
 #include "nodes/colliders/shape_set.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
 static const double pi = 3.14159265358979323846;
-
-static qmat_medial *medial_of(const double *spheres, size_t sphere_count, const uint32_t *edges, size_t edge_count,
-                              const uint32_t *triangles, size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = sphere_count;
-  medial->spheres = qmat_alloc(4 * sphere_count, sizeof *medial->spheres);
-  assert_non_null(medial->spheres);
-  memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 typedef struct result {
   qmat_mesh *mesh;
@@ -86,7 +71,7 @@ static void test_two_joined_spheres_are_one_capsule(void **state) {
   (void)state;
   static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.25};
   static const uint32_t edge[] = {0, 1};
-  result r = make(box_around(2, 1, 1), medial_of(spheres, 2, edge, 1, NULL, 0), "hull_points=1024", 0);
+  result r = make(box_around(2, 1, 1), sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0), "hull_points=1024", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
   assert_memory_equal(r.colliders->shapes, ((uint32_t[]){0, 1, 1}), 3 * sizeof(uint32_t));
@@ -115,7 +100,7 @@ static void test_two_joined_spheres_are_one_capsule(void **state) {
 static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1.2};
-  result r = make(box_around(1, 1, 1), medial_of(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
+  result r = make(box_around(1, 1, 1), sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
   /* Six caps of height 0.2, each of area 2 pi 1.2 0.2, of which no point is farther out than 0.2. */
   assert_near(pipeline_number(r.report, "protrusion"), 6 * 0.2 / (2 * 1.2), 0.01);
   assert_near(pipeline_number(r.report, "protrusion_mean"), 0.5 * 0.1 / sqrt(12), 0.001);
@@ -132,7 +117,7 @@ static void test_mass_properties_of_a_box_by_hand(void **state) {
   static const double ball[] = {10, 20, 30, 0.5};
   qmat_mesh *box = box_around(1, 2, 3);
   shape_map(box, 1, 10, 20, 30);
-  result r = make(box, medial_of(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
+  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
   const double mass = 2.5 * 48, *body = r.colliders->body;
   const double expected[10] = {mass, 10, 20, 30, mass / 12 * (16 + 36), mass / 12 * (4 + 36), mass / 12 * (4 + 16)};
   assert_int_equal(r.colliders->body_count, 1);
@@ -146,7 +131,7 @@ static void test_inertia_turns_with_the_solid(void **state) {
   static const double ball[] = {0, 0, 0, 0.5};
   qmat_mesh *box = box_around(1, 2, 3);
   shape_rotate(box);
-  result r = make(box, medial_of(ball, 1, NULL, 0, NULL, 0), "", 0);
+  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "", 0);
   const double *i = &r.colliders->body[4], m = 48 / 12.0;
   /* Invariants of the tensor: trace, sum of principal minors, determinant. */
   const double a = m * 52, b = m * 40, c = m * 20;
@@ -165,7 +150,7 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   /* Sphere 1 is inside sphere 0, with which it is joined; sphere 2 has no radius; sphere 3 is inside the capsule. */
   static const double nested[] = {0, 0, 0, 1, 0.3, 0, 0, 0.2, 4, 0, 0, 0, 2, 0, 0, 0.1};
   static const uint32_t edges[] = {0, 1, 0, 2};
-  result r = make(box_around(5, 1, 1), medial_of(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
+  result r = make(box_around(5, 1, 1), sealed_medial_mesh(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
   assert_near(r.colliders->spheres[7], 0.001 * sqrt(108), 1e-12);
@@ -173,13 +158,13 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   /* A slab whose large sphere reaches beyond the line of the others is two capsules and no hull. */
   static const double steep[] = {0, 0, 0, 1, 1.2, 0.1, 0, 0.1, 1.2, -0.1, 0, 0.1};
   static const uint32_t slab[] = {0, 1, 2};
-  r = make(box_around(3, 3, 3), medial_of(steep, 3, NULL, 0, slab, 1), "", 0);
+  r = make(box_around(3, 3, 3), sealed_medial_mesh(steep, 3, NULL, 0, slab, 1), "", 0);
   assert_int_equal(pipeline_count(r.report, "hulls_of_three") + pipeline_count(r.report, "capsules"),
                    r.colliders->shape_count);
   result_free(&r);
   /* Two equal spheres are one. */
   static const double equal[] = {0, 0, 0, 1, 0, 0, 0, 1};
-  r = make(box_around(1, 1, 1), medial_of(equal, 2, NULL, 0, NULL, 0), "", 0);
+  r = make(box_around(1, 1, 1), sealed_medial_mesh(equal, 2, NULL, 0, NULL, 0), "", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   result_free(&r);
 }

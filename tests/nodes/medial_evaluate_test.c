@@ -7,8 +7,8 @@
 #include <cmocka.h>
 
 #include "core/geometry/envelope.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/surface.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
@@ -16,21 +16,6 @@
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
 /* ---- a medial mesh, a surface, and the report on both ---- */
-
-/* An unsealed medial mesh; the sides of triangles are added. */
-static qmat_medial *medial_of(const double *spheres, size_t sphere_count, const uint32_t *edges, size_t edge_count,
-                              const uint32_t *triangles, size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = sphere_count;
-  medial->spheres = qmat_alloc(4 * sphere_count, sizeof *medial->spheres);
-  assert_non_null(medial->spheres);
-  if (sphere_count > 0) memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 static void seal(qmat_medial *medial) {
   qmat_context context = {0};
@@ -94,7 +79,7 @@ static qmat_mesh *box_around(double x, double y, double z) {
 static void test_a_ball_in_a_cube_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  subject s = subject_of(box_around(1, 1, 1), medial_of(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1, 0.05);
   /* Under a corner of the cube the ball is the farthest from all sides. */
@@ -126,7 +111,7 @@ static void test_a_ball_in_a_cube_by_hand(void **state) {
 static void test_a_ball_that_leaves_a_cube_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1.2};
-  subject s = subject_of(box_around(1, 1, 1), medial_of(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "tolerance=0.01 epsilon=5%", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1.2, 0.01);
   check_bounds(&s, report, "envelope_to_surface", 1 - 1.2 / sqrt(3), 0.01);
@@ -141,7 +126,7 @@ static void test_cones_and_slabs_by_hand(void **state) {
   static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.5, 0, 1.5, 0, 0.5};
   static const uint32_t edge[] = {0, 1}, slab[] = {0, 1, 2};
   /* A capsule as long as the box and half as wide: farthest from the surface on the middle lines of its mantle... */
-  subject s = subject_of(box_around(1.5, 1, 1), medial_of(spheres, 2, edge, 1, NULL, 0));
+  subject s = subject_of(box_around(1.5, 1, 1), medial_mesh(spheres, 2, edge, 1, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(0.25 + 2) - 0.5, 0.05);
   check_bounds(&s, report, "envelope_to_surface", 1 - 0.5 / sqrt(2), 0.05);
@@ -149,7 +134,7 @@ static void test_cones_and_slabs_by_hand(void **state) {
   subject_free(&s);
   /* ... and a slab in a wide plate, whose sheets are 0.5 from its sides and whose mantles are 1 where they are level.
    */
-  s = subject_of(box_around(9, 9, 1), medial_of(spheres, 3, NULL, 0, slab, 1));
+  s = subject_of(box_around(9, 9, 1), medial_mesh(spheres, 3, NULL, 0, slab, 1));
   report = evaluate(&s, "", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(64 + 81 + 1) - 0.5, 0.05);
   check_bounds(&s, report, "envelope_to_surface", 1, 0.05);
@@ -162,7 +147,7 @@ static void test_a_sheet_alone_makes_the_boundary_where_it_is_wide(void **state)
   /* A slab of three balls that swells out of a thin plate: its sheets are parallel to the plate, out by 0.3. */
   static const double spheres[] = {-3, -2, 0, 0.8, 3, -2, 0, 0.8, 0, 3, 0, 0.8};
   static const uint32_t slab[] = {0, 1, 2};
-  subject s = subject_of(box_around(9, 9, 0.5), medial_of(spheres, 3, NULL, 0, slab, 1));
+  subject s = subject_of(box_around(9, 9, 0.5), medial_mesh(spheres, 3, NULL, 0, slab, 1));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_out_of_solid", 0.3, 0.05);
   qmat_value_release(&report->base);
@@ -173,7 +158,7 @@ static void test_the_groove_between_two_balls_is_the_farthest(void **state) {
   (void)state;
   /* Their common circle has the radius 0.6; it is farthest where y = z. The rest of both balls is no part of it. */
   static const double balls[] = {-0.8, 0, 0, 1, 0.8, 0, 0, 1};
-  subject s = subject_of(box_around(1.8, 1, 1), medial_of(balls, 2, NULL, 0, NULL, 0));
+  subject s = subject_of(box_around(1.8, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_to_surface", 1 - 0.6 / sqrt(2), 0.05);
   assert_int_equal(pipeline_count(report, "components"), 2);
@@ -187,7 +172,7 @@ static void test_a_cavity_in_the_envelope_counts(void **state) {
   double balls[24];
   for (int i = 0; i < 6; i++)
     for (int k = 0; k < 4; k++) balls[4 * i + k] = k == 3 ? 0.8 : k == i / 2 ? (i % 2 ? -1.3 : 1.3) : 0;
-  subject s = subject_of(box_around(2.1, 2.1, 2.1), medial_of(balls, 6, NULL, 0, NULL, 0));
+  subject s = subject_of(box_around(2.1, 2.1, 2.1), medial_mesh(balls, 6, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_to_surface", 2.1 - 0.5, 0.05);
   qmat_value_release(&report->base);
@@ -197,7 +182,7 @@ static void test_a_cavity_in_the_envelope_counts(void **state) {
 static void test_certified_exactly_where_epsilon_holds(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  subject s = subject_of(box_around(1, 1, 1), medial_of(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   const double truth = (sqrt(3) - 1) / s.diagonal;
   char params[64];
   for (int i = 0; i < 2; i++) { /* within the tolerance of 5 %: what is undecided is searched on */
@@ -218,7 +203,7 @@ static void test_the_deviation_of_the_mesh_is_part_of_both_errors(void **state) 
   static const double ball[] = {0, 0, 0, 1};
   qmat_mesh *cube = box_around(1, 1, 1);
   cube->deviation = 0.01;
-  subject s = subject_of(cube, medial_of(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(cube, medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "tolerance=0.01", 0);
   const struct {
     const char *key, *at_least;
@@ -244,7 +229,7 @@ static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
   for (int i = 0; i < 40; i++) {
     double balls[4 * 12];
     for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
-    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_of(balls, 12, NULL, 0, NULL, 0));
+    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
     qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001", 1);
     const double truth = pipeline_number(close, "surface_to_envelope");
     qmat_value_release(&close->base);
@@ -266,7 +251,7 @@ static void test_an_open_surface_is_never_certified(void **state) {
   static const double ball[] = {0, 0, 0, 1};
   qmat_mesh *mesh = box_around(1, 1, 1);
   mesh->triangle_count--;
-  subject s = subject_of(mesh, medial_of(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(mesh, medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "epsilon=50%", 0);
   assert_true(pipeline_number(report, "surface_to_envelope") < 0.5);
   assert_true(pipeline_number(report, "envelope_to_surface") < 0.5);
@@ -286,7 +271,7 @@ static void test_odd_spheres_cones_and_slabs_are_counted(void **state) {
                                    -1,   0, 0, 0,               /* on the surface */
                                    -0.5, 0, 0, 0.3};
   static const uint32_t edges[] = {0, 1, 0, 2, 0, 5}, slabs[] = {0, 3, 5}; /* collinear, and holds its third corner */
-  subject s = subject_of(box_around(1, 1, 1), medial_of(spheres, 6, edges, 3, slabs, 1));
+  subject s = subject_of(box_around(1, 1, 1), medial_mesh(spheres, 6, edges, 3, slabs, 1));
   qmat_report *report = evaluate(&s, "", 0);
   assert_int_equal(pipeline_count(report, "duplicate_spheres"), 1);
   assert_int_equal(pipeline_count(report, "spheres_outside"), 1);
@@ -386,7 +371,7 @@ static void test_random_medial_meshes_against_dense_samples(void **state) {
       spheres[i] = i % 4 == 3 ? random_between(&random, 0, 0.5) : random_between(&random, 0, i % 4 == 2 ? 1 : 2);
     for (size_t i = 0; i < COUNT(edges); i++) edges[i] = (uint32_t)random_index(&random, 7);
     for (size_t i = 0; i < COUNT(triangles); i++) triangles[i] = (uint32_t)random_index(&random, 7);
-    subject s = subject_of(shape_l(), medial_of(spheres, 7, edges, 3, triangles, 3));
+    subject s = subject_of(shape_l(), medial_mesh(spheres, 7, edges, 3, triangles, 3));
     check_against_samples(&s, 10000, 0.02, true);
     subject_free(&s);
   }
@@ -421,7 +406,7 @@ static void test_a_crowd_of_balls_against_dense_samples(void **state) {
   assert_non_null(spheres);
   for (size_t i = 0; i < 4 * BALLS; i++)
     spheres[i] = random_between(&random, 0, i % 4 == 3 ? 0.05 : i % 4 == 2 ? 1 : 2);
-  subject s = subject_of(shape_l(), medial_of(spheres, BALLS, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_l(), medial_mesh(spheres, BALLS, NULL, 0, NULL, 0));
   check_against_samples(&s, 10000, 0.02, false);
   qmat_report *report = evaluate(&s, "epsilon=10%", 0);
   assert_true(pipeline_number(report, "envelope_to_surface") - pipeline_number(report, "envelope_to_surface_at_least") <
@@ -436,7 +421,7 @@ static void test_a_crowd_of_balls_against_dense_samples(void **state) {
 static qmat_medial *some_medial(void) {
   static const double spheres[] = {0.4, 0.5, 0.5, 0.4, 1.5, 0.5, 0.5, 0.45, 0.5, 1.6, 0.5, 0.3, 0.6, 0.6, 0.7, 0.2};
   static const uint32_t edges[] = {0, 1, 0, 2}, slab[] = {0, 2, 3};
-  return medial_of(spheres, 4, edges, 2, slab, 1);
+  return medial_mesh(spheres, 4, edges, 2, slab, 1);
 }
 
 static void test_scale_and_place_change_nothing_but_rounding(void **state) {
@@ -532,8 +517,8 @@ static void check_refused(qmat_medial *medial, const char *message, int64_t elem
 static void test_no_sphere_and_far_spheres_are_refused(void **state) {
   (void)state;
   static const double far_away[] = {0, 0, 0, 1, 1e9, 0, 0, 1};
-  check_refused(medial_of(NULL, 0, NULL, 0, NULL, 0), "no sphere", -1);
-  check_refused(medial_of(far_away, 2, NULL, 0, NULL, 0), "far away", 1);
+  check_refused(medial_mesh(NULL, 0, NULL, 0, NULL, 0), "no sphere", -1);
+  check_refused(medial_mesh(far_away, 2, NULL, 0, NULL, 0), "far away", 1);
 }
 
 int main(void) {

@@ -9,28 +9,14 @@
 #include <cmocka.h>
 
 #include "core/geometry/envelope.h"
-#include "core/geometry/medial_build.h"
 #include "core/hash.h"
 #include "core/node.h"
+#include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
 extern const qmat_node qmat_node_medial_skin;
 
 static const double PI = 3.14159265358979323846;
-
-static qmat_medial *medial_of(const double *spheres, size_t sphere_count, const uint32_t *edges, size_t edge_count,
-                              const uint32_t *triangles, size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = sphere_count;
-  medial->spheres = qmat_alloc(4 * sphere_count, sizeof *spheres);
-  if (sphere_count > 0) memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 typedef struct skin_result {
   qmat_mesh *mesh;
@@ -197,12 +183,12 @@ static void check_shape(skin_result result, int euler, int components, double ar
 }
 
 static qmat_medial *ball(void) {
-  return medial_of((double[]){3, -2, 5, 2}, 1, NULL, 0, NULL, 0);
+  return sealed_medial_mesh((double[]){3, -2, 5, 2}, 1, NULL, 0, NULL, 0);
 }
 
 static qmat_medial *capsule(double growth) {
   const double spheres[] = {0, 0, 0, 1, 3, 4, 0, 1 + growth};
-  return medial_of(spheres, 2, (uint32_t[]){0, 1}, 1, NULL, 0);
+  return sealed_medial_mesh(spheres, 2, (uint32_t[]){0, 1}, 1, NULL, 0);
 }
 
 static qmat_medial *ring(void) {
@@ -215,7 +201,7 @@ static qmat_medial *ring(void) {
     edges[2 * i] = i;
     edges[2 * i + 1] = (i + 1) % COUNT;
   }
-  return medial_of(spheres, COUNT, edges, COUNT, NULL, 0);
+  return sealed_medial_mesh(spheres, COUNT, edges, COUNT, NULL, 0);
 }
 
 static qmat_medial *soup(uint64_t seed) {
@@ -236,7 +222,7 @@ static qmat_medial *soup(uint64_t seed) {
     triangles[3 * i + 1] = 20 + (uint32_t)(qmat_hash3(seed + 60, i, 1) % 20);
     triangles[3 * i + 2] = 40 + (uint32_t)(qmat_hash3(seed + 60, i, 2) % 20);
   }
-  return medial_of(spheres, COUNT, edges, 40, triangles, 25);
+  return sealed_medial_mesh(spheres, COUNT, edges, 40, triangles, 25);
 }
 
 static void test_a_sphere_has_its_area_and_volume(void **unused) {
@@ -297,7 +283,7 @@ static void test_a_cone_has_its_area_and_volume(void **unused) {
 static void test_a_slab_has_its_area_and_volume(void **unused) {
   (void)unused;
   const double spheres[] = {0, 0, 0, 0.2, 3, 0, 0, 0.2, 0, 4, 0, 0.2};
-  skin_result result = skin(medial_of(spheres, 3, NULL, 0, (uint32_t[]){0, 1, 2}, 1), "resolution=200");
+  skin_result result = skin(sealed_medial_mesh(spheres, 3, NULL, 0, (uint32_t[]){0, 1, 2}, 1), "resolution=200");
   const double r = 0.2, flat = 6, rim = 12;
   check_shape(result, 2, 1, 2 * flat + PI * r * rim + 4 * PI * r * r,
               2 * r * flat + PI / 2 * r * r * rim + 4.0 / 3 * PI * r * r * r, 2e-3);
@@ -316,7 +302,7 @@ static void test_a_ring_of_cones_is_a_torus(void **unused) {
 static void test_separate_spheres_are_separate_components(void **unused) {
   (void)unused;
   const double spheres[] = {0, 0, 0, 1, 3, 0, 0, 1.5, 0, 9, 0, 0.5};
-  skin_result result = skin(medial_of(spheres, 3, NULL, 0, NULL, 0), "");
+  skin_result result = skin(sealed_medial_mesh(spheres, 3, NULL, 0, NULL, 0), "");
   const double cubes = 1 + 1.5 * 1.5 * 1.5 + 0.125, squares = 1 + 2.25 + 0.25;
   check_shape(result, 6, 3, 4 * PI * squares, 4.0 / 3 * PI * cubes, 5e-3);
   release(result);
@@ -359,7 +345,7 @@ static void test_thin_parts_stay_connected(void **unused) {
                                          "resolution=32 detail=6"};
   double last = INFINITY;
   for (int i = 0; i < 4; i++) {
-    skin_result result = skin(medial_of(spheres, 5, edges, 2, triangles, 1), settings[i]);
+    skin_result result = skin(sealed_medial_mesh(spheres, 5, edges, 2, triangles, 1), settings[i]);
     assert_manifold(result.mesh);
     assert_near(number_of(result, "components"), 1, 0);
     assert_near(number_of(result, "euler_characteristic"), 2, 0);
@@ -378,8 +364,8 @@ static void test_cells_are_finer_where_radii_are_small(void **unused) {
   (void)unused;
   const double spheres[] = {0, 0, 0, 1, 4, 0, 0, 0.02};
   const uint32_t edge[] = {0, 1};
-  skin_result coarse = skin(medial_of(spheres, 2, edge, 1, NULL, 0), "resolution=32 detail=0");
-  skin_result fine = skin(medial_of(spheres, 2, edge, 1, NULL, 0), "resolution=32 detail=3");
+  skin_result coarse = skin(sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0), "resolution=32 detail=0");
+  skin_result fine = skin(sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0), "resolution=32 detail=3");
   assert_near(number_of(coarse, "refined_cells"), 0, 0);
   assert_true(number_of(fine, "refined_cells") > 0);
   assert_true(number_of(fine, "cells") < 3 * number_of(coarse, "cells"));
@@ -393,7 +379,7 @@ static void test_spheres_inside_others_change_nothing(void **unused) {
   const double spheres[] = {3, -2, 5, 2, 3.5, -2, 5, 1, 3, -2, 5, 0.5, 3, -2, 5, 2};
   const uint32_t triangles[] = {0, 1, 2};
   skin_result alone = skin(ball(), "resolution=48");
-  skin_result full = skin(medial_of(spheres, 4, NULL, 0, triangles, 1), "resolution=48");
+  skin_result full = skin(sealed_medial_mesh(spheres, 4, NULL, 0, triangles, 1), "resolution=48");
   assert_int_equal(alone.mesh->vertex_count, full.mesh->vertex_count);
   for (size_t i = 0; i < 3 * alone.mesh->vertex_count; i++) {
     assert_near(alone.mesh->positions[i], full.mesh->positions[i], 1e-9);
@@ -406,7 +392,7 @@ static void test_isolated_spheres_without_radius_are_left_out(void **unused) {
   (void)unused;
   const double spheres[] = {3, -2, 5, 2, 100, 0, 0, 0};
   skin_result alone = skin(ball(), "resolution=32");
-  skin_result both = skin(medial_of(spheres, 2, NULL, 0, NULL, 0), "resolution=32");
+  skin_result both = skin(sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0), "resolution=32");
   assert_memory_equal(&alone.mesh->base.digest, &both.mesh->base.digest, sizeof alone.mesh->base.digest);
   release(alone);
   release(both);
@@ -419,7 +405,7 @@ static void test_size_and_place_do_not_matter(void **unused) {
   for (int i = 0; i < 3; i++) {
     const double k = scales[i];
     const double spheres[] = {5 * k, 0, 0, k, 9 * k, k, 0, 0.5 * k};
-    skin_result result = skin(medial_of(spheres, 2, (uint32_t[]){0, 1}, 1, NULL, 0), "resolution=64");
+    skin_result result = skin(sealed_medial_mesh(spheres, 2, (uint32_t[]){0, 1}, 1, NULL, 0), "resolution=64");
     assert_manifold(result.mesh);
     assert_near(number_of(result, "euler_characteristic"), 2, 0);
     if (i > 0) assert_near((double)result.mesh->vertex_count / (double)vertices, 1, 0.01);
@@ -464,7 +450,8 @@ static void test_a_skin_surface_fills_cones_and_slabs_with_balls(void **unused) 
   assert_true(number_of(result, "error_at_vertices") * number_of(result, "diagonal") < 0.5 * 0.09 / 8 + 1e-5);
   release(result);
   const double spheres[] = {0, 0, 0, 0.5, 3, 0, 0, 0.5, 0, 3, 0, 0.5};
-  result = skin(medial_of(spheres, 3, NULL, 0, (uint32_t[]){0, 1, 2}, 1), "method=skin_surface subdivisions=0");
+  result =
+      skin(sealed_medial_mesh(spheres, 3, NULL, 0, (uint32_t[]){0, 1, 2}, 1), "method=skin_surface subdivisions=0");
   assert_manifold(result.mesh);
   assert_near(number_of(result, "euler_characteristic"), 2, 0);
   assert_true(number_of(result, "balls") > 50);
@@ -475,7 +462,7 @@ static void test_a_skin_surface_does_without_hidden_balls(void **unused) {
   (void)unused;
   const double spheres[] = {0, 0, 0, 1, 0, 0, 0, 1, 0.2, 0, 0, 0.5, 0, 0, 0, 0.3, 0.5, 0, 0, 0, 3, 0, 0, 0};
   const uint32_t edges[] = {0, 1, 0, 2, 0, 4, 2, 3};
-  skin_result result = skin(medial_of(spheres, 6, edges, 4, NULL, 0), "method=skin_surface");
+  skin_result result = skin(sealed_medial_mesh(spheres, 6, edges, 4, NULL, 0), "method=skin_surface");
   assert_near(number_of(result, "balls"), 1, 0);
   assert_manifold(result.mesh);
   release(result);
@@ -494,17 +481,18 @@ static void test_errors_name_the_input_or_the_parameter(void **unused) {
   (void)unused;
   static const char *const methods[] = {"method=envelope", "method=skin_surface"};
   for (int i = 0; i < 2; i++) {
-    expect_error(medial_of(NULL, 0, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
+    expect_error(sealed_medial_mesh(NULL, 0, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
     const double zero[] = {0, 0, 0, 0, 1, 0, 0, 0};
-    expect_error(medial_of(zero, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
+    expect_error(sealed_medial_mesh(zero, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
     const double huge[] = {-1e308, 0, 0, 1e308, 1e308, 0, 0, 1e308};
-    expect_error(medial_of(huge, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
+    expect_error(sealed_medial_mesh(huge, 2, NULL, 0, NULL, 0), methods[i], QMAT_ERROR_GEOMETRY, "medial");
   }
   /* A large thin sheet. */
   const double sheet[] = {0, 0, 0, 1e-3, 10, 0, 0, 1e-3, 0, 10, 0, 1e-3};
   const uint32_t triangle[] = {0, 1, 2};
-  expect_error(medial_of(sheet, 3, NULL, 0, triangle, 1), "method=skin_surface", QMAT_ERROR_GEOMETRY, "spacing");
-  expect_error(medial_of(sheet, 3, NULL, 0, triangle, 1), "resolution=2048 detail=6", QMAT_ERROR_GEOMETRY,
+  expect_error(sealed_medial_mesh(sheet, 3, NULL, 0, triangle, 1), "method=skin_surface", QMAT_ERROR_GEOMETRY,
+               "spacing");
+  expect_error(sealed_medial_mesh(sheet, 3, NULL, 0, triangle, 1), "resolution=2048 detail=6", QMAT_ERROR_GEOMETRY,
                "resolution");
 }
 
@@ -514,7 +502,7 @@ static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unus
   qmat_context context = {0};
   skin_result result;
   const uint32_t cone[] = {2, 3}, slab[] = {0, 1, 2};
-  assert_int_equal(try_skin(&context, medial_of(spheres, 4, cone, 1, slab, 1), "", &result), QMAT_OK);
+  assert_int_equal(try_skin(&context, sealed_medial_mesh(spheres, 4, cone, 1, slab, 1), "", &result), QMAT_OK);
   assert_int_equal(result.mesh->triangle_count, 2 + 8);
   assert_near(number_of(result, "flat_slabs"), 1, 0);
   assert_near(number_of(result, "flat_cones"), 1, 0);
@@ -524,7 +512,8 @@ static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unus
   const double side = sqrt(3) * number_of(result, "diagonal") / 1024, prism = sqrt(3) / 4 * side * side * 5;
   assert_near(volume_of(result.mesh), prism, 1e-9 * prism);
   release(result);
-  assert_int_equal(try_skin(&context, medial_of(spheres, 5, cone, 1, slab, 1), "resolution=32", &result), QMAT_OK);
+  assert_int_equal(try_skin(&context, sealed_medial_mesh(spheres, 5, cone, 1, slab, 1), "resolution=32", &result),
+                   QMAT_OK);
   assert_int_equal(result.mesh->triangle_count, 10 + (size_t)number_of(result, "triangles"));
   assert_near(number_of(result, "components"), 1, 0);
   release(result);
