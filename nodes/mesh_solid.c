@@ -136,14 +136,17 @@ static qmat_status split_pairs(solidifier *s) {
   return status;
 }
 
+static double epsilon_of(const solidifier *s) {
+  return s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
+}
+
 /* The triangles that may bound solids, with the seams of open meshes welded. */
 static qmat_status weld_seams(solidifier *s) {
   s->triangles = s->mesh->triangles;
   s->triangle_count = s->mesh->triangle_count - s->mesh->sheet_triangle_count;
   if (s->mesh->closed) return QMAT_OK;
-  const double epsilon = s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
   const qmat_status status = qmat_weld_borders(s->context, s->mesh->vertex_count, s->unit, s->triangle_count,
-                                               s->triangles, fmin(weld_tolerance, 0.01 * epsilon), &s->weld);
+                                               s->triangles, fmin(weld_tolerance, 0.01 * epsilon_of(s)), &s->weld);
   if (status != QMAT_OK || s->weld.merged == 0) return status;
   s->triangles = s->weld.triangles;
   s->triangle_count = s->weld.triangle_count;
@@ -256,10 +259,14 @@ static void choose_kinds(solidifier *s) {
   }
 }
 
+/* How far a wrap is from what it wraps, in model units. */
+static double wrap_distance(const solidifier *s) {
+  return wrap_offset * fmax(epsilon_of(s), least_wrap_epsilon) * s->frame.diagonal;
+}
+
 /* Replaces everything by a wrap. */
 static qmat_status wrap_all(solidifier *s) {
-  const double epsilon = fmax(s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON, least_wrap_epsilon),
-               offset = wrap_offset * epsilon * s->frame.diagonal;
+  const double offset = wrap_distance(s);
   return qmat_wrap_triangles(s->context, s->mesh->positions, s->mesh->vertex_count, s->mesh->triangles,
                              s->mesh->triangle_count, wrap_alpha * offset, offset, &s->wrap);
 }
@@ -335,22 +342,20 @@ static qmat_status fill_skin(const solidifier *s, qmat_mesh *mesh) {
   return QMAT_OK;
 }
 
+/* The result, without joints and weights, and unsealed. */
+static qmat_status place_triangles(const solidifier *s, qmat_mesh *mesh) {
+  if (s->wrap.triangles)
+    return fill_mesh(s, s->wrap.positions, s->wrap.vertex_count, s->wrap.triangles, s->wrap.triangle_count, mesh);
+  if (s->united.changed)
+    return fill_mesh(s, s->united.positions, s->united.vertex_count, s->united.triangles, s->united.triangle_count,
+                     mesh);
+  return fill_mesh(s, s->mesh->positions, s->mesh->vertex_count, s->solids.corners, s->solids.count, mesh);
+}
+
 static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
   qmat_mesh *mesh = qmat_mesh_new();
-  qmat_status status = mesh ? QMAT_OK : fail_shortage(s);
-  if (status == QMAT_OK) {
-    if (s->wrap.triangles)
-      status = fill_mesh(s, s->wrap.positions, s->wrap.vertex_count, s->wrap.triangles, s->wrap.triangle_count, mesh);
-    else if (s->united.changed)
-      status = fill_mesh(s, s->united.positions, s->united.vertex_count, s->united.triangles, s->united.triangle_count,
-                         mesh);
-    else
-      status = fill_mesh(s, s->mesh->positions, s->mesh->vertex_count, s->solids.corners, s->solids.count, mesh);
-  }
-  if (status == QMAT_OK && s->wrap.triangles) {
-    const double epsilon = fmax(s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON, least_wrap_epsilon);
-    mesh->deviation += wrap_offset * epsilon * s->frame.diagonal;
-  }
+  qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
+  if (status == QMAT_OK && s->wrap.triangles) mesh->deviation += wrap_distance(s);
   if (status == QMAT_OK) status = fill_skin(s, mesh);
   if (status == QMAT_OK) status = qmat_value_seal(s->context, &mesh->base);
   if (status == QMAT_OK)
@@ -385,29 +390,17 @@ static bool is_inside(const qmat_surface *solid, const double *positions, const 
 /* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
  * nothing. */
 static qmat_status drop_inner_sheets(solidifier *s) {
-  if (s->sheets.count == 0 || (s->solids.count == 0 && !s->wrap.triangles)) return QMAT_OK;
+  if (s->sheets.count == 0 || s->solids.count == 0) return QMAT_OK;
   const size_t sheet_count = s->sheets.count;
-  qmat_mesh *mesh = NULL, *solids = qmat_mesh_new();
+  qmat_mesh *mesh = qmat_mesh_new();
   qmat_surface *surface = NULL;
-  qmat_status status = make_mesh(s, &mesh);
-  if (status == QMAT_OK && !solids) status = fail_shortage(s);
-  if (status == QMAT_OK) {
-    solids->vertex_count = mesh->vertex_count;
-    solids->triangle_count = mesh->triangle_count - sheet_count;
-    solids->positions = qmat_alloc(3 * mesh->vertex_count, sizeof *mesh->positions);
-    solids->triangles = qmat_alloc(3 * solids->triangle_count, sizeof *mesh->triangles);
-    solids->closed = solids->oriented = true;
-    if (!solids->positions || !solids->triangles) status = fail_shortage(s);
-  }
-  if (status == QMAT_OK) {
-    memcpy(solids->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *mesh->positions);
-    memcpy(solids->triangles, mesh->triangles, 3 * solids->triangle_count * sizeof *mesh->triangles);
-    status = qmat_surface_new(s->context, solids, &surface);
-  }
+  qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
+  if (status == QMAT_OK) status = qmat_surface_new_of_solids(s->context, mesh, &surface);
   s->sheets.count = 0;
   for (size_t t = 0; status == QMAT_OK && t < sheet_count; t++) {
     const uint32_t *c = s->sheets.corners + 3 * t;
-    if (is_inside(surface, qmat_surface_positions(surface), mesh->triangles + 3 * (solids->triangle_count + t)))
+    if (is_inside(surface, qmat_surface_positions(surface),
+                  mesh->triangles + 3 * (mesh->triangle_count - sheet_count + t)))
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
@@ -415,7 +408,6 @@ static qmat_status drop_inner_sheets(solidifier *s) {
   }
   qmat_surface_free(surface);
   qmat_value_release(mesh ? &mesh->base : NULL);
-  qmat_value_release(solids ? &solids->base : NULL);
   return status;
 }
 
