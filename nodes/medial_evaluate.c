@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "core/geometry/medial_distance.h"
-#include "core/geometry/triangle.h"
 #include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/descriptor/epsilon.h"
@@ -77,14 +76,9 @@ static void add_sample(const void *data, size_t facet, double x, double y, qmat_
 
 static qmat_status sample_surface(evaluation *e) {
   const qmat_mesh *mesh = qmat_surface_mesh(e->surface);
-  const double *positions = qmat_surface_positions(e->surface);
-  double *areas = qmat_arena_alloc(&e->context->arena, mesh->triangle_count, sizeof *areas), area = 0, normal[3];
+  double *areas = qmat_arena_alloc(&e->context->arena, mesh->triangle_count, sizeof *areas);
   if (!areas) return qmat_fail_memory(e->context, "samples of the surface");
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    const uint32_t *row = &mesh->triangles[3 * t];
-    areas[t] = area += qmat_triangle_area(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]],
-                                          &positions[3 * (size_t)row[2]], normal);
-  }
+  qmat_running_areas(qmat_surface_positions(e->surface), mesh->triangles, mesh->triangle_count, areas);
   const qmat_area_samples samples = {.areas = areas,
                                      .element_count = mesh->triangle_count,
                                      .sample_count = (size_t)e->params->samples,

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/colliders/cover_bound.h"
 #include "nodes/measure/area_samples.h"
@@ -49,16 +49,12 @@ static qmat_status take_samples(fit *t) {
   const size_t room = even + vertices + MOST_PARTS;
   t->samples = qmat_arena_alloc(&context->arena, room, 3 * sizeof *t->samples);
   t->rows = qmat_arena_alloc(&context->arena, room, sizeof *t->rows);
-  double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas), area = 0, normal[3];
+  double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
   if (!t->samples || !t->rows || !areas) return qmat_fail_memory(context, "samples of the surface");
-  for (size_t i = 0; i < mesh->triangle_count; i++) {
-    const uint32_t *ids = &mesh->triangles[3 * i];
-    areas[i] = area += qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
-                                          &positions[3 * (size_t)ids[2]], normal);
-  }
-  for (size_t i = 0, facet = 0; i < even; i++) {
-    const double at = area * ((double)i + 0.5) / (double)even;
-    while (facet + 1 < mesh->triangle_count && areas[facet] <= at) facet++;
+  qmat_running_areas(positions, mesh->triangles, mesh->triangle_count, areas);
+  for (size_t i = 0; i < even; i++) {
+    const double at = areas[mesh->triangle_count - 1] * ((double)i + 0.5) / (double)even;
+    const size_t facet = qmat_area_element_at(areas, mesh->triangle_count, at);
     const uint32_t *ids = &mesh->triangles[3 * facet];
     qmat_triangle_point(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]], &positions[3 * (size_t)ids[2]],
                         qmat_hash_unit(qmat_hash3(3, i, 0)), qmat_hash_unit(qmat_hash3(3, i, 1)), &t->samples[3 * i]);

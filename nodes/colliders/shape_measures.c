@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/measure/area_samples.h"
 
@@ -31,14 +31,9 @@ typedef struct measuring {
 } measuring;
 
 static qmat_status sum_areas(qmat_context *context, triangles *t) {
-  double area = 0, normal[3];
   t->areas = qmat_arena_alloc(&context->arena, t->count, sizeof *t->areas);
   if (!t->areas) return qmat_fail_memory(context, "samples of colliders");
-  for (size_t i = 0; i < t->count; i++) {
-    const uint32_t *row = &t->rows[3 * i];
-    t->areas[i] = area += qmat_triangle_area(&t->positions[3 * (size_t)row[0]], &t->positions[3 * (size_t)row[1]],
-                                             &t->positions[3 * (size_t)row[2]], normal);
-  }
+  qmat_running_areas(t->positions, t->rows, t->count, t->areas);
   return QMAT_OK;
 }
 

@@ -3,11 +3,20 @@
 
 #include <math.h>
 
-#include "core/geometry/vector.h"
+#include "core/geometry/triangle.h"
 #include "core/hash.h"
 
 /* Sums are taken over blocks of samples and then in the order of the blocks, so that they do not depend on threads. */
 enum { BLOCK_SAMPLES = 512, SLICE_BLOCKS = 256 };
+
+void qmat_running_areas(const double *positions, const uint32_t *triangles, size_t count, double *areas) {
+  double area = 0, normal[3];
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *row = &triangles[3 * i];
+    areas[i] = area += qmat_triangle_area(&positions[3 * (size_t)row[0]], &positions[3 * (size_t)row[1]],
+                                          &positions[3 * (size_t)row[2]], normal);
+  }
+}
 
 size_t qmat_area_element_at(const double *areas, size_t count, double area) {
   size_t low = 0, high = count - 1;

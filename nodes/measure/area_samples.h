@@ -27,6 +27,9 @@ typedef struct qmat_area_samples {
  * not depend on their number. Cost: linear in the samples. */
 qmat_status qmat_area_samples_sum(qmat_context *context, const qmat_area_samples *samples, qmat_area_sums *sums);
 
+/* Fills `areas`, as above, for `count` triangles: 3 vertex ids each, 3 coordinates a vertex. */
+void qmat_running_areas(const double *positions, const uint32_t *triangles, size_t count, double *areas);
+
 /* The first of `count` (> 0) elements whose running area, `areas` as above, exceeds `area`; the last where none does.
  */
 size_t qmat_area_element_at(const double *areas, size_t count, double area);
