@@ -1,44 +1,45 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/colliders/convex_hull_cgal.h"
 
+#include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/convex_hull_3.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
 
 #include <algorithm>
 #include <array>
 #include <exception>
-#include <map>
 #include <new>
+#include <utility>
 #include <vector>
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<uint32_t, Kernel>;
+using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase>>;
 
+/* The hull is the border of the Delaunay triangulation: CGAL's perturbation makes that unique where four points are in
+ * one plane. CGAL's convex_hull_3 goes by addresses of memory there, so its triangles differ between runs. */
 qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count) {
   try {
-    std::vector<Kernel::Point_3> given;
-    std::map<std::array<double, 3>, uint32_t> ids;
+    std::vector<std::pair<Kernel::Point_3, uint32_t>> given;
     given.reserve(count);
     for (size_t i = 0; i < count; i++) {
       const double *p = points + 3 * i;
-      given.emplace_back(p[0], p[1], p[2]);
-      ids.try_emplace({p[0], p[1], p[2]}, static_cast<uint32_t>(i));
+      given.emplace_back(Kernel::Point_3(p[0], p[1], p[2]), static_cast<uint32_t>(i));
     }
-    CGAL::Surface_mesh<Kernel::Point_3> hull;
-    CGAL::convex_hull_3(given.begin(), given.end(), hull);
+    const Delaunay delaunay(given.begin(), given.end());
+    if (delaunay.dimension() < 3) return QMAT_ERROR_GEOMETRY;
+    std::vector<Delaunay::Cell_handle> outside;
+    delaunay.incident_cells(delaunay.infinite_vertex(), std::back_inserter(outside));
     std::vector<std::array<uint32_t, 3>> faces;
-    for (const auto face : hull.faces()) {
+    for (const auto cell : outside) {
+      const auto inside = cell->neighbor(cell->index(delaunay.infinite_vertex()));
+      const int opposite = inside->index(cell);
       std::array<uint32_t, 3> row{};
-      size_t k = 0;
-      for (const auto vertex : hull.vertices_around_face(hull.halfedge(face))) {
-        const Kernel::Point_3 &p = hull.point(vertex);
-        if (k == 3) return QMAT_ERROR_GEOMETRY;
-        row[k++] = ids.at({p.x(), p.y(), p.z()});
-      }
+      for (int k = 0; k < 3; k++) row[k] = inside->vertex(Delaunay::vertex_triple_index(opposite, 2 - k))->info();
       std::rotate(row.begin(), std::min_element(row.begin(), row.end()), row.end());
       faces.push_back(row);
     }
-    if (faces.size() < 4 || faces.size() > 2 * count) return QMAT_ERROR_GEOMETRY;
+    if (faces.size() > 2 * count) return QMAT_ERROR_GEOMETRY;
     std::sort(faces.begin(), faces.end());
     for (const auto &row : faces) triangles = std::copy(row.begin(), row.end(), triangles);
     *triangle_count = faces.size();
