@@ -7,26 +7,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/vector.h"
-
-/* The circumsphere of a tetrahedron; false if it is degenerate or its centre is outside the unit frame. */
-static bool circumsphere(const double *const p[4], double sphere[4]) {
-  double e[3][3], square[3], normal[3][3];
-  for (int k = 0; k < 3; k++) {
-    qmat_subtract(p[k + 1], p[0], e[k]);
-    square[k] = qmat_dot(e[k], e[k]);
-  }
-  for (int k = 0; k < 3; k++) qmat_cross(e[(k + 1) % 3], e[(k + 2) % 3], normal[k]);
-  const double determinant = qmat_dot(e[0], normal[0]);
-  if (determinant == 0) return false;
-  double offset[3];
-  for (int i = 0; i < 3; i++) {
-    offset[i] = (square[0] * normal[0][i] + square[1] * normal[1][i] + square[2] * normal[2][i]) / (2 * determinant);
-    sphere[i] = p[0][i] + offset[i];
-    if (!(fabs(sphere[i]) <= 0.5)) return false; /* outside the bounding box, or not finite */
-  }
-  sphere[3] = sqrt(qmat_dot(offset, offset));
-  return true;
-}
+#include "nodes/initial/circumsphere.h"
 
 /* The centre of the inscribed sphere: the corners weighted by the areas of the facets opposite them. */
 static void incentre(const double *const p[4], double centre[3]) {
@@ -103,7 +84,7 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
   const bool all = d->params->incentres == QMAT_INCENTRES_ALL;
   const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
   if (all && (!in_solid || spans_gap(d, corner))) return QMAT_CELL_DROPPED;
-  if (circumsphere(p, sphere) && qmat_surface_inside(d->surface, sphere)) {
+  if (qmat_circumsphere(p, 0.5, sphere) && qmat_surface_inside(d->surface, sphere)) {
     const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
     if (nearest > least_depth) {
       if (d->params->radius == QMAT_RADIUS_DISTANCE) sphere[3] = nearest;

@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/initial/regular_cgal.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Regular_triangulation_3.h>
+#include <CGAL/Regular_triangulation_cell_base_3.h>
+#include <CGAL/Regular_triangulation_vertex_base_3.h>
+#include <CGAL/Spatial_sort_traits_adapter_3.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <numeric>
+#include <vector>
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Sphere = Kernel::Weighted_point_3;
+constexpr uint32_t kNoId = UINT32_MAX;
+struct SphereId {
+  uint32_t value = kNoId;
+};
+using VertexBase =
+    CGAL::Triangulation_vertex_base_with_info_3<SphereId, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>;
+using CellBase = CGAL::Regular_triangulation_cell_base_3<Kernel>;
+using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+
+constexpr size_t kSpheresPerReport = 1024;
+
+/* As in delaunay_cgal.cpp: a shortage of memory must not occur while CGAL records new cells in its thread-local map. */
+void reserve_cells(Triangulation &triangulation) {
+  constexpr size_t kMostCells = Triangulation::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
+  auto &cells = triangulation.tds().cells();
+  if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
+}
+
+qmat_status triangulate(qmat_context *context, const std::vector<Sphere> &spheres, Triangulation &triangulation) {
+  std::vector<Kernel::Point_3> centres;
+  centres.reserve(spheres.size());
+  for (const Sphere &sphere : spheres) centres.push_back(sphere.point());
+  using PointMap = CGAL::Pointer_property_map<Kernel::Point_3>::const_type;
+  std::vector<size_t> order(spheres.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  CGAL::spatial_sort(order.begin(), order.end(),
+                     CGAL::Spatial_sort_traits_adapter_3<Kernel, PointMap>(PointMap(centres.data())));
+  Triangulation::Cell_handle hint;
+  for (size_t i = 0; i < order.size(); i++) {
+    if (i % kSpheresPerReport == 0) {
+      const qmat_status status = qmat_progress(context, i, order.size(), "spheres");
+      if (status != QMAT_OK) return status;
+    }
+    reserve_cells(triangulation);
+    const auto vertex = triangulation.insert(spheres[order[i]], hint);
+    if (vertex == Triangulation::Vertex_handle()) continue; /* hidden */
+    const auto id = static_cast<uint32_t>(order[i]);
+    uint32_t &known = vertex->info().value;
+    if (known == kNoId || id < known || spheres[known].weight() != spheres[id].weight()) known = id;
+    hint = vertex->cell();
+  }
+  return QMAT_OK;
+}
+
+template <size_t N>
+using Simplices = std::vector<std::array<uint32_t, N>>;
+
+template <size_t N>
+uint32_t *copy_sorted(qmat_context *context, Simplices<N> &simplices) {
+  for (auto &ids : simplices) std::sort(ids.begin(), ids.end());
+  std::sort(simplices.begin(), simplices.end());
+  auto *copy = static_cast<uint32_t *>(qmat_arena_alloc(&context->arena, simplices.size(), N * sizeof(uint32_t)));
+  if (copy && !simplices.empty()) std::memcpy(copy, simplices.data(), simplices.size() * N * sizeof(uint32_t));
+  return copy;
+}
+
+qmat_status collect(qmat_context *context, const Triangulation &triangulation, size_t count,
+                    qmat_regular_simplices *found) {
+  Simplices<2> edges;
+  Simplices<3> triangles;
+  for (auto edge = triangulation.finite_edges_begin(); edge != triangulation.finite_edges_end(); edge++)
+    edges.push_back({edge->first->vertex(edge->second)->info().value, edge->first->vertex(edge->third)->info().value});
+  for (auto facet = triangulation.finite_facets_begin(); facet != triangulation.finite_facets_end(); facet++) {
+    std::array<uint32_t, 3> ids;
+    for (int k = 0, n = 0; k < 4; k++)
+      if (k != facet->second) ids[static_cast<size_t>(n++)] = facet->first->vertex(k)->info().value;
+    triangles.push_back(ids);
+  }
+  found->edges = copy_sorted(context, edges);
+  found->triangles = copy_sorted(context, triangles);
+  found->hidden = static_cast<uint8_t *>(qmat_arena_alloc(&context->arena, count, 1));
+  if (!found->edges || !found->triangles || !found->hidden) return qmat_fail_memory(context, "the power diagram");
+  found->edge_count = edges.size();
+  found->triangle_count = triangles.size();
+  std::memset(found->hidden, 1, count);
+  for (auto vertex = triangulation.finite_vertices_begin(); vertex != triangulation.finite_vertices_end(); vertex++)
+    found->hidden[vertex->info().value] = 0;
+  return QMAT_OK;
+}
+
+}  // namespace
+
+qmat_status qmat_regular_simplices_find(qmat_context *context, const double *spheres, size_t count,
+                                        qmat_regular_simplices *simplices) {
+  *simplices = {};
+  if (count >= UINT32_MAX)
+    return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu spheres are too many for a triangulation", count);
+  try {
+    std::vector<Sphere> sites;
+    sites.reserve(count);
+    for (size_t i = 0; i < count; i++) {
+      const double *s = spheres + 4 * i;
+      sites.emplace_back(Kernel::Point_3(s[0], s[1], s[2]), s[3] * s[3]);
+    }
+    Triangulation triangulation;
+    const qmat_status status = triangulate(context, sites, triangulation);
+    return status == QMAT_OK ? collect(context, triangulation, count, simplices) : status;
+  } catch (const std::bad_alloc &) {
+    return qmat_fail_memory(context, "the power diagram");
+  } catch (const std::exception &failure) {
+    return qmat_fail(context, QMAT_ERROR_DEPENDENCY, "CGAL: %s", failure.what());
+  } catch (...) {
+    return qmat_fail(context, QMAT_ERROR_INTERNAL, "the power diagram failed in an unknown way");
+  }
+}
