@@ -96,8 +96,9 @@ typedef struct qmat_summary_entry {
 typedef struct qmat_report_summary {
   const qmat_summary_entry *entries; /* ended by an entry without a key. A report without all sums and bounds has no
                                         summary. */
-  /* Writes one sentence about `name`. `summary` has the merged entries; of a list of meshes also the counts "meshes",
-   * those that have a report, and "failures". `text` holds `size` bytes; always terminated. */
+  /* Writes what was made of `name` and, on a second line, how good it is. `summary` has the merged entries; of a list
+   * of meshes also the counts "meshes", those that have a report, and "failures". `text` holds `size` bytes; always
+   * terminated. */
   void (*sentence)(const char *name, const json_t *summary, char *text, size_t size);
 } qmat_report_summary;
 
@@ -121,6 +122,8 @@ typedef struct qmat_node {
   const qmat_port *outputs;                  /* ended by a row without a name */
   const qmat_library *const *libraries;      /* ended by NULL; NULL: none */
   const qmat_report_summary *report_summary; /* of its first report output; NULL: not part of a run's summary */
+  unsigned
+      effort; /* its usual share of the time of a run with other nodes, in per cent; 0: little. For progress only */
   /* Checks rules between parameters; NULL: none. Fails with qmat_fail and qmat_fail_field. Lengths with a unit are
    * shares by then, so that the check waits for the node's inputs. */
   qmat_status (*check)(qmat_context *context, const void *params);

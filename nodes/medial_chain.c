@@ -124,5 +124,6 @@ const qmat_node qmat_node_medial_chain = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 60,
     .run = run,
 };

@@ -203,5 +203,6 @@ const qmat_node qmat_node_medial_colliders = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 40,
     .run = run,
 };

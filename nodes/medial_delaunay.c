@@ -69,5 +69,6 @@ const qmat_node qmat_node_medial_delaunay = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 15,
     .run = run,
 };

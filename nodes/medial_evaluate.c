@@ -285,5 +285,6 @@ const qmat_node qmat_node_medial_evaluate = {
     .inputs = inputs,
     .outputs = outputs,
     .report_summary = &qmat_medial_summary,
+    .effort = 8,
     .run = run,
 };

@@ -338,5 +338,6 @@ const qmat_node qmat_node_medial_refine = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 15,
     .run = run,
 };

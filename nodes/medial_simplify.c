@@ -157,5 +157,6 @@ const qmat_node qmat_node_medial_simplify = {
     .outputs = outputs,
     .report_summary = &qmat_medial_summary,
     .libraries = libraries,
+    .effort = 45,
     .run = run,
 };

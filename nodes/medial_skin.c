@@ -396,5 +396,6 @@ const qmat_node qmat_node_medial_skin = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 6,
     .run = run,
 };

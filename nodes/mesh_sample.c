@@ -413,5 +413,6 @@ const qmat_node qmat_node_mesh_sample = {
     .inputs = inputs,
     .outputs = outputs,
     .check = check,
+    .effort = 2,
     .run = run,
 };

@@ -377,5 +377,6 @@ const qmat_node qmat_node_mesh_sdf = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 8,
     .run = run,
 };

@@ -594,5 +594,6 @@ const qmat_node qmat_node_mesh_solid = {
     .inputs = inputs,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 3,
     .run = run,
 };

@@ -95,5 +95,6 @@ const qmat_node qmat_node_scene_read = {
     .params = params,
     .outputs = outputs,
     .libraries = libraries,
+    .effort = 1,
     .run = run,
 };

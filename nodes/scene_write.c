@@ -502,5 +502,6 @@ const qmat_node qmat_node_scene_write = {
     .libraries = libraries,
     .report_summary = &qmat_medial_summary,
     .check_counts = check_counts,
+    .effort = 2,
     .run = run,
 };

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/json_text.h"
+#include "graphs/cli/terminal.h"
 #include "graphs/graph_names.h"
 
 const qmat_command *const qmat_commands[] = {
@@ -148,6 +149,14 @@ const char *qmat_invocation_value(const qmat_invocation *invocation, const char 
   return NULL;
 }
 
+bool qmat_invocation_chooses(const qmat_invocation *invocation, const char *option, const char *other) {
+  for (size_t i = invocation->given_count; i-- > 0;) {
+    if (strcmp(invocation->given[i].name, option) == 0) return true;
+    if (strcmp(invocation->given[i].name, other) == 0) return false;
+  }
+  return false;
+}
+
 qmat_status qmat_invocation_number(qmat_context *context, const qmat_invocation *invocation, const char *option,
                                    int least, int most, int *number) {
   const char *text = qmat_invocation_value(invocation, option);
@@ -167,32 +176,13 @@ qmat_status qmat_invocation_number(qmat_context *context, const qmat_invocation 
 
 /* ---- help ---- */
 
+static int help_width(void) {
+  const int width = qmat_terminal_width(stdout);
+  return width < 80 ? width : 80;
+}
+
 void qmat_print_wrapped(const char *text, int column, int indent) {
-  const int width = 80;
-  bool first = true;
-  while (*text) {
-    if (*text == '\n') {
-      printf("\n%*s", indent, "");
-      column = indent;
-      first = true;
-      text++;
-      continue;
-    }
-    int length = (int)strcspn(text, " \n");
-    if (length > 0 && !first && column + 1 + length > width) {
-      printf("\n%*s", indent, "");
-      column = indent;
-      first = true;
-    }
-    if (length > 0) {
-      printf("%s%.*s", first ? "" : " ", length, text);
-      column += length + !first;
-      first = false;
-    }
-    text += length;
-    while (*text == ' ') text++;
-  }
-  putchar('\n');
+  qmat_put_wrapped(stdout, text, column, indent, help_width(), false);
 }
 
 qmat_status qmat_print_json(qmat_context *context, json_t *json) {
@@ -205,7 +195,7 @@ qmat_status qmat_print_json(qmat_context *context, json_t *json) {
 }
 
 static void print_row(const char *left, const char *text) {
-  const int indent = 26;
+  const int indent = help_width() < 70 ? 8 : 26;
   int length = printf("  %s", left);
   if (length > indent - 2) {
     printf("\n%*s", indent, "");
@@ -236,7 +226,7 @@ void qmat_command_print_help(const qmat_invocation *invocation) {
 void qmat_commands_print(void) {
   printf("qmat COMMAND [ARGUMENTS] [OPTIONS]\n\nThe medial axis transform of 3D models, for asset pipelines.\n\n");
   for (size_t i = 0; i < qmat_command_count; i++) print_row(qmat_commands[i]->name, qmat_commands[i]->summary);
-  printf(
-      "\n'qmat help COMMAND' explains a command.\nExit codes: 0 done, 1 a run failed, 2 bad usage or a bad graph, 3 "
-      "cancelled.\n");
+  putchar('\n');
+  qmat_print_wrapped("'qmat help COMMAND' explains a command.", 0, 0);
+  qmat_print_wrapped("Exit codes: 0 done, 1 a run failed, 2 bad usage or a bad graph, 3 cancelled.", 0, 0);
 }

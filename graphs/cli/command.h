@@ -76,6 +76,9 @@ qmat_status qmat_invocation_parse(qmat_context *context, qmat_invocation *invoca
 /* The last value given for an option; "" for an option without a value; NULL: the option was not given. */
 const char *qmat_invocation_value(const qmat_invocation *invocation, const char *option);
 
+/* Whether an option was given, and not its opposite after it. */
+bool qmat_invocation_chooses(const qmat_invocation *invocation, const char *option, const char *other);
+
 /* Prints the help of a command, or the list of commands. */
 void qmat_command_print_help(const qmat_invocation *invocation);
 void qmat_commands_print(void);
@@ -84,8 +87,8 @@ void qmat_commands_print(void);
 qmat_status qmat_invocation_number(qmat_context *context, const qmat_invocation *invocation, const char *option,
                                    int least, int most, int *number);
 
-/* Prints `text` wrapped at 80 columns. The first line starts at column `column`; the others are indented by `indent`.
- */
+/* Prints `text` wrapped at 80 columns, or at the terminal's where it is narrower. The first line starts at column
+ * `column`; the others are indented by `indent`. */
 void qmat_print_wrapped(const char *text, int column, int indent);
 
 /* Prints JSON, indented, and releases it. NULL: QMAT_ERROR_MEMORY. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,9 +10,11 @@
 #include "core/json_text.h"
 #include "graphs/cli/batch.h"
 #include "graphs/cli/command.h"
+#include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
+#include "graphs/cli/terminal.h"
 #include "graphs/graph_params.h"
-#include "graphs/run/run_report.h"
+#include "graphs/run/run_summary.h"
 
 /* One call of `qmat batch`. */
 typedef struct batch_call {
@@ -20,8 +23,10 @@ typedef struct batch_call {
   const char *folder, *format, *input; /* --out, --format, and the graph's input that takes the model */
   char program[4096], reports[4096];
   int jobs, threads;
-  bool json, quiet, slurm;
+  bool json, quiet, verbose, slurm;
+  bool redraws; /* stderr is a terminal: its last line says how far the batch is */
   size_t ended;
+  double started; /* seconds, monotonic */
 } batch_call;
 
 static bool is_input_file(const qmat_graph *graph, const qmat_graph_input *input) {
@@ -129,79 +134,155 @@ static void print_json_line(const qmat_asset *asset) {
   json_decref(json);
 }
 
+/* What the graph's last node with a summary makes of its report; NULL: no node has one. */
+static const qmat_report_summary *summary_type(const qmat_graph *graph) {
+  for (size_t i = graph->node_count; i-- > 0;)
+    if (graph->nodes[i].type->report_summary) return graph->nodes[i].type->report_summary;
+  return NULL;
+}
+
+/* The entries that have a column. */
+static const qmat_summary_entry *summary_entries(const qmat_graph *graph) {
+  static const qmat_summary_entry none[] = {{0}};
+  return summary_type(graph) ? summary_type(graph)->entries : none;
+}
+
+static void format_entry(const json_t *value, char *text) {
+  text[0] = 0;
+  if (json_is_integer(value))
+    qmat_format_count((uint64_t)json_integer_value(value), text);
+  else if (value)
+    qmat_format_bound(json_real_value(value), text);
+}
+
+static bool is_from_cache(const qmat_asset *asset) {
+  const json_int_t hits = json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits"));
+  return hits > 0 && (size_t)hits == json_array_size(json_object_get(asset->result, "nodes"));
+}
+
+static const char *result_of(const qmat_asset *asset) {
+  static const char *const results[] = {"not run", "running", "ok", "failed"};
+  return asset->state == QMAT_ASSET_DONE && is_from_cache(asset) ? "from cache" : results[asset->state];
+}
+
+/* A line as an asset ends: "[2/9] spot.off: ok, 2.1 s, 31 spheres, 0.93 % to envelope". What has no room is left out.
+ */
+static void print_asset_line(const batch_call *call, const qmat_batch *batch, const qmat_asset *asset) {
+  char line[1024], text[48], part[96];
+  const int width = qmat_terminal_width(stderr);
+  const json_t *summary = json_object_get(asset->result, "summary");
+  const qmat_summary_entry *entries = summary_entries(&call->invocation->graph);
+  int used = snprintf(line, sizeof line, "[%zu/%zu] %.600s: %s, %.1f s", call->ended, batch->count, asset->input,
+                      result_of(asset), asset->seconds);
+  for (size_t i = 0; asset->state == QMAT_ASSET_DONE && entries[i].key; i++) {
+    format_entry(entries[i].title ? json_object_get(summary, entries[i].key) : NULL, text);
+    if (!*text) continue;
+    const bool one = strcmp(text, "1") == 0; /* "1 sphere" */
+    const int length =
+        snprintf(part, sizeof part, ", %s %.*s", text, (int)strlen(entries[i].title) - one, entries[i].title);
+    if (qmat_columns_of(line) + qmat_columns_of(part) > width || used + length >= (int)sizeof line) break;
+    used += snprintf(line + used, sizeof line - (size_t)used, "%s", part);
+  }
+  qmat_put_wrapped(stderr, line, 0, 2, width, true);
+}
+
 static void on_asset(void *user, const qmat_batch *batch, const qmat_asset *asset) {
   batch_call *call = user;
   call->ended++;
   if (call->json) print_json_line(asset);
-  if (!call->json && !call->quiet)
-    fprintf(stderr, "[%zu/%zu] %s: %s, %.1f s\n", call->ended, batch->count, asset->input,
-            asset->state == QMAT_ASSET_DONE ? "ok" : "failed", asset->seconds);
-}
-
-/* The width of a name, one column a character. */
-static int columns_of(const char *name) {
-  int columns = 0;
-  for (; *name; name++) columns += ((unsigned char)*name & 0xc0) != 0x80;
-  return columns;
-}
-
-/* The entries that the assets' summaries are expected to have: those of the graph's last node with a summary. */
-static const qmat_summary_entry *summary_entries(const qmat_graph *graph) {
-  static const qmat_summary_entry none[] = {{0}};
-  for (size_t i = graph->node_count; i-- > 0;)
-    if (graph->nodes[i].type->report_summary) return graph->nodes[i].type->report_summary->entries;
-  return none;
+  if (call->json || call->quiet) return;
+  if (call->redraws) fputs("\r\x1b[K", stderr);
+  print_asset_line(call, batch, asset);
+  if (!call->redraws || call->ended == batch->count) return;
+  char left[32];
+  const double share = (double)call->ended / (double)batch->count;
+  qmat_progress_left(share, qmat_clock_seconds() - call->started, left);
+  fprintf(stderr, "%zu of %zu  %3d %%  %s", call->ended, batch->count, (int)(100 * share), left);
+  fflush(stderr);
 }
 
 /* The width of an entry's column. */
 static int column_width(const qmat_summary_entry *entry) {
-  return columns_of(entry->title) > 7 ? columns_of(entry->title) : 7;
-}
-
-static void print_summary(const qmat_summary_entry *entries, const json_t *summary) {
-  for (size_t i = 0; entries[i].key; i++) {
-    const json_t *value = json_object_get(summary, entries[i].key);
-    char text[48];
-    if (!entries[i].title) continue;
-    if (json_is_integer(value))
-      qmat_format_count((uint64_t)json_integer_value(value), text);
-    else
-      qmat_format_bound(json_real_value(value), text);
-    printf("  %*s", column_width(&entries[i]), text);
-  }
+  return qmat_columns_of(entry->title) > 7 ? qmat_columns_of(entry->title) : 7;
 }
 
 static void print_table(const qmat_batch *batch, const qmat_graph *graph) {
   const qmat_summary_entry *entries = summary_entries(graph);
-  int width = 5;
-  size_t counts[4] = {0};
+  int width = 5, rest = 22;
+  for (size_t i = 0; entries[i].key; i++) rest += entries[i].title ? 2 + column_width(&entries[i]) : 0;
   for (size_t i = 0; i < batch->count; i++)
-    if (columns_of(batch->assets[i].stem) > width) width = columns_of(batch->assets[i].stem);
-  printf("%-*s  result   seconds  hits ", width, "asset");
+    if (qmat_columns_of(batch->assets[i].stem) > width) width = qmat_columns_of(batch->assets[i].stem);
+  /* A longer name has a line of its own. */
+  if (width > qmat_terminal_width(stdout) - rest) width = qmat_terminal_width(stdout) - rest;
+  if (width < 5) width = 5;
+  printf("%-*s  result      seconds", width, "asset");
   for (size_t i = 0; entries[i].key; i++)
     if (entries[i].title) printf("  %*s", column_width(&entries[i]), entries[i].title);
   putchar('\n');
   for (size_t i = 0; i < batch->count; i++) {
     const qmat_asset *asset = &batch->assets[i];
-    const json_t *summary = json_object_get(asset->result, "summary"), *nodes = json_object_get(asset->result, "nodes");
-    static const char *const results[] = {"not run", "running", "ok", "failed"};
-    counts[asset->state]++;
-    printf("%s%*s  %-7s %8.2f s", asset->stem, width - columns_of(asset->stem), "", results[asset->state],
-           asset->seconds);
-    if (asset->state == QMAT_ASSET_DONE)
-      printf("  %2lld/%-2zu", json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits")),
-             json_array_size(nodes));
-    if (json_is_object(summary)) print_summary(entries, summary);
+    const json_t *summary = json_object_get(asset->result, "summary");
+    const int columns = qmat_columns_of(asset->stem);
+    if (columns > width) qmat_put_wrapped(stdout, asset->stem, 0, 0, qmat_terminal_width(stdout), false);
+    printf("%s%*s  %-10s %8.2f", columns > width ? "" : asset->stem, columns > width ? width : width - columns, "",
+           result_of(asset), asset->seconds);
+    for (size_t k = 0; json_is_object(summary) && entries[k].key; k++) {
+      char text[48];
+      format_entry(json_object_get(summary, entries[k].key), text);
+      if (entries[k].title) printf("  %*s", column_width(&entries[k]), text);
+    }
     putchar('\n');
   }
-  printf("%zu done, %zu failed, %zu not run\n", counts[QMAT_ASSET_DONE], counts[QMAT_ASSET_FAILED],
-         counts[QMAT_ASSET_WAITING]);
+}
+
+/* Names what failed. On a terminal a long line is wrapped. */
+static void print_failures(const qmat_batch *batch, FILE *out) {
   for (size_t i = 0; i < batch->count; i++) {
-    char error[2048];
+    char error[2048], line[2600];
     if (batch->assets[i].state != QMAT_ASSET_FAILED) continue;
     qmat_asset_error(&batch->assets[i], error, sizeof error);
-    printf("%s: %s\n", batch->assets[i].input, error);
+    const char *input = batch->assets[i].input;
+    const bool named = strncmp(error, input, strlen(input)) == 0;
+    snprintf(line, sizeof line, "%.500s%s%s", named ? "" : input, named ? "" : ": ", error);
+    qmat_put_wrapped(out, line, 0, 2, isatty(fileno(out)) ? qmat_terminal_width(out) : INT_MAX, true);
   }
+}
+
+/* Three lines: what was made, how good it is, where it is. */
+static void print_totals(const batch_call *call, const qmat_batch *batch) {
+  const qmat_report_summary *type = summary_type(&call->invocation->graph);
+  json_t *total = json_object();
+  size_t counts[4] = {0}, files = 0;
+  json_int_t bytes = 0;
+  for (size_t i = 0; i < batch->count; i++) {
+    const json_t *result = batch->assets[i].result, *outputs = json_object_get(result, "outputs"), *file, *part;
+    const json_t *summary = json_object_get(result, "summary");
+    size_t at, side;
+    counts[batch->assets[i].state]++;
+    if (type && json_is_object(summary)) qmat_summary_add(type, summary, total);
+    json_array_foreach(outputs, at, file) {
+      files++;
+      bytes += json_integer_value(json_object_get(file, "bytes"));
+      json_array_foreach(json_object_get(file, "parts"), side, part) {
+        files++;
+        bytes += json_integer_value(json_object_get(part, "bytes"));
+      }
+    }
+  }
+  char name[128], text[640], size[32];
+  snprintf(name, sizeof name, "%zu done, %zu failed, %zu not run", counts[QMAT_ASSET_DONE], counts[QMAT_ASSET_FAILED],
+           counts[QMAT_ASSET_WAITING]);
+  if (json_object_size(total) > 0)
+    type->sentence(name, total, text, sizeof text);
+  else
+    snprintf(text, sizeof text, "%s", name);
+  json_decref(total);
+  qmat_print_summary(text, stdout);
+  qmat_format_bytes((uint64_t)bytes, size);
+  snprintf(text, sizeof text, "%zu file%s in %.500s (%s) in %.1f s", files, files == 1 ? "" : "s", call->folder, size,
+           qmat_clock_seconds() - call->started);
+  fputs("  ", stdout);
+  qmat_put_wrapped(stdout, text, 2, 2, qmat_terminal_width(stdout), true);
 }
 
 /* ---- the call ---- */
@@ -271,7 +352,10 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   batch_call call = {.context = context,
                      .invocation = invocation,
                      .json = qmat_invocation_value(invocation, "json") != NULL,
-                     .quiet = qmat_invocation_value(invocation, "quiet") != NULL};
+                     .quiet = qmat_invocation_chooses(invocation, "quiet", "verbose"),
+                     .verbose = qmat_invocation_chooses(invocation, "verbose", "quiet"),
+                     .redraws = qmat_can_redraw(),
+                     .started = qmat_clock_seconds()};
   qmat_batch batch = {0};
   qmat_status status = qmat_read_graph_argument(context, invocation);
   for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
@@ -291,7 +375,11 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     failed += batch.assets[i].state == QMAT_ASSET_FAILED;
     if (batch.assets[i].report) unlink(batch.assets[i].report);
   }
-  if (started && !call.json && !call.quiet) print_table(&batch, &call.invocation->graph);
+  const bool prints = started && !call.json && !call.quiet;
+  if (prints && call.redraws && call.ended < batch.count) fputs("\r\x1b[K", stderr);
+  if (prints && call.verbose) print_table(&batch, &call.invocation->graph);
+  if (prints) print_totals(&call, &batch);
+  if (started && !call.json) print_failures(&batch, call.quiet ? stderr : stdout);
   if (status == QMAT_OK && failed > 0)
     status = qmat_fail(context, QMAT_ERROR_IO, "%zu of %zu assets failed", failed, batch.count);
   if (*call.reports) rmdir(call.reports);
@@ -309,8 +397,9 @@ static const qmat_option options[] = {
     {"engine", 0, "local|slurm", "Run here, or as a job array on a Slurm cluster that shares folders and cache"},
     {"set", 0, "NAME=VALUE", "Set a parameter for all models; may be repeated"},
     {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},
-    {"json", 0, NULL, "Print a line of JSON as each model ends, instead of the table"},
-    {"quiet", 'q', NULL, "Print nothing but errors"},
+    {"json", 0, NULL, "Print a line of JSON as each model ends, instead of the summary"},
+    {"quiet", 'q', NULL, "Print nothing but what failed"},
+    {"verbose", 'v', NULL, "Also print a table of the models"},
     {0},
 };
 

@@ -60,7 +60,7 @@ static void print_node(const qmat_graph *graph, const qmat_run *run, size_t inde
     printf("</table></td></tr>");
   }
   printf("<tr><td><b>%s</b><br/><font point-size=\"10\" color=\"#555555\">%s%s%s</font></td></tr>", node->id,
-         node->type->name, step ? ": " : "", step ? qmat_step_state_name(step->state) : "");
+         node->type->name, step ? ": " : "", step ? qmat_step_state_words(step->state, false) : "");
   for (size_t row = 0; row < qmat_param_count(node->type); row++) {
     if (!node->texts[row]) continue;
     printf("<tr><td><font point-size=\"9\">%s = ", node->type->params[row].name);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "graphs/cli/command.h"
+#include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
 #include "graphs/graph_file.h"
 #include "graphs/graph_names.h"
@@ -21,7 +22,8 @@ const qmat_option qmat_common_options[] = {
     {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},
     {"dry-run", 0, NULL, "Print which nodes would run and which results are cached; run nothing"},
     {"depfile", 0, "FILE", "Write the dependencies of the saved files as a rule for Make and Ninja"},
-    {"quiet", 'q', NULL, "Print nothing but errors"},
+    {"quiet", 'q', NULL, "Print nothing but what failed"},
+    {"verbose", 'v', NULL, "Also print a table of the nodes: state, time and results"},
     {0},
 };
 
@@ -137,12 +139,13 @@ static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *
   return false;
 }
 
-/* Prints the warnings in the steps' reports, such as what a reader left out, and the meshes that failed. */
-static void print_warnings(const qmat_run *run) {
+/* Prints the meshes that failed and, unless `quiet`, the warnings in the steps' reports, such as what a reader left
+ * out. */
+static void print_warnings(const qmat_run *run, bool quiet) {
   for (size_t i = 0; i < run->step_count; i++) {
     const char *id = run->graph->nodes[run->steps[i].node].id;
     const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
-    for (size_t k = 0; k < json_array_size(warnings); k++) {
+    for (size_t k = 0; k < json_array_size(warnings) && !quiet; k++) {
       const char *text = json_string_value(json_array_get(warnings, k));
       if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", id, text);
     }
@@ -161,7 +164,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                          void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
   const char *report_path = qmat_invocation_value(invocation, "report");
-  bool quiet = qmat_invocation_value(invocation, "quiet") != NULL;
+  bool quiet = qmat_invocation_chooses(invocation, "quiet", "verbose");
+  bool verbose = qmat_invocation_chooses(invocation, "verbose", "quiet");
   bool dry = qmat_invocation_value(invocation, "dry-run") != NULL;
   const char *mode = qmat_invocation_value(invocation, "progress");
   qmat_progress_view view = {0};
@@ -177,7 +181,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   bool ready = status == QMAT_OK, reported = false;
   if (ready && dry) {
     qmat_run_foresee(run);
-    qmat_run_print_plan(run, stdout);
+    qmat_print_plan(run, verbose, stdout);
   }
   if (ready && !dry) {
     qmat_progress_view_connect(&view, context, &observer);
@@ -194,7 +198,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     reported = true;
   }
-  if (status == QMAT_OK && !quiet && !dry) qmat_run_print(run, stdout);
+  if (status == QMAT_OK && !quiet && !dry) qmat_print_run(run, verbose, stdout);
   if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
     /* A failure to write the report must not replace this error. */
     const qmat_error error = context->error;
@@ -203,7 +207,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     context->error = error;
   }
-  if (ready && !quiet && !dry) print_warnings(run);
+  if (ready && !dry) print_warnings(run, quiet);
   const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
   if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
   if (finished) finished(user, &invocation->graph, run);

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <limits.h>
 #include <locale.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
+#include "graphs/cli/terminal.h"
 #include "nodes/nodes.h"
 
 static qmat_status call(qmat_context *context, const char *name, char *const *words, size_t count) {
@@ -45,7 +48,8 @@ int main(int argc, char **argv) {
   if (status != QMAT_OK) {
     char line[2048];
     qmat_error_format(&context.error, line, sizeof line);
-    fprintf(stderr, "qmat: %s\n", line);
+    fputs("qmat: ", stderr);
+    qmat_put_wrapped(stderr, line, 6, 2, isatty(STDERR_FILENO) ? qmat_terminal_width(stderr) : INT_MAX, true);
   }
   qmat_context_uninit(&context);
   return qmat_status_exit_code(status);

@@ -2,16 +2,18 @@
 #include "graphs/cli/progress.h"
 
 #include <langinfo.h>
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/cache/cache_key.h"
+#include "graphs/cli/terminal.h"
 #include "graphs/graph_names.h"
-#include "graphs/run/run_report.h"
+#include "io/model.h"
 
 /* The program's one global variable: a signal handler has no other place. */
 static volatile sig_atomic_t interrupted;
@@ -32,17 +34,16 @@ bool qmat_interrupted(void) {
   return interrupted != 0;
 }
 
-static int terminal_width(void) {
-  struct winsize size;
-  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
-  return 80;
+bool qmat_can_redraw(void) {
+  const char *term = getenv("TERM");
+  return isatty(STDERR_FILENO) && term && *term && strcmp(term, "dumb") != 0;
 }
 
 qmat_status qmat_progress_view_init(qmat_context *context, const char *mode, qmat_progress_view *view) {
   static const char *const modes[] = {"off", "tty", "json"};
   *view = (qmat_progress_view){0};
-  const char *term = getenv("TERM"), *no_colour = getenv("NO_COLOR");
-  bool can_redraw = isatty(STDERR_FILENO) && term && *term && strcmp(term, "dumb") != 0;
+  const char *no_colour = getenv("NO_COLOR");
+  const bool can_redraw = qmat_can_redraw();
   view->mode = can_redraw ? QMAT_PROGRESS_TTY : QMAT_PROGRESS_OFF;
   view->unicode = strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
   view->colour = can_redraw && !(no_colour && *no_colour);
@@ -116,32 +117,66 @@ static void put_bar(line_writer *line, const qmat_progress_view *view, double fr
   line->column += cells;
 }
 
-static void draw(qmat_progress_view *view, uint64_t done, uint64_t total, const char *unit, bool finished) {
-  line_writer line = {.width = terminal_width() - 1};
-  char text[160], count[32];
+/* One line: model, step, bar, share, time left. A narrow terminal has a shorter bar, then none. */
+static void draw(qmat_progress_view *view, double share) {
+  line_writer line = {.width = qmat_terminal_width(stderr) - 1};
+  const double seconds = qmat_clock_seconds() - view->run_started;
+  char text[160], left[32];
+  qmat_progress_left(share, seconds, left);
   put_code(&line, "\r");
-  snprintf(text, sizeof text, "[%zu/%zu] %-10s %-16s ", view->step + 1, view->step_count, view->id, view->type);
+  snprintf(text, sizeof text, "%.24s [%zu/%zu] %-10s ", view->name, view->step + 1, view->step_count, view->id);
   put_text(&line, text);
-  double fraction = finished ? 1 : total > 0 && done <= total ? (double)done / (double)total : 0;
-  int cells = line.width - line.column - 34;
-  if (cells > 30) cells = 30;
-  if (cells >= 6) put_bar(&line, view, fraction, cells);
-  if (finished || total > 0) {
-    snprintf(text, sizeof text, " %3d %%", (int)(fraction * 100));
-    put_text(&line, text);
-  }
-  snprintf(text, sizeof text, " %7.1f s", qmat_clock_seconds() - view->started);
+  const int cells = line.width - line.column - 24;
+  if (cells >= 6) put_bar(&line, view, share, cells > 30 ? 30 : cells);
+  snprintf(text, sizeof text, " %3d %%  %s", (int)(share * 100), left);
   put_text(&line, text);
-  if (!finished && done > 0) {
-    qmat_format_count(done, count);
-    snprintf(text, sizeof text, "  %s %s", count, unit);
-    put_text(&line, text);
-  }
   put_code(&line, "\x1b[K");
-  if (finished) put_code(&line, "\n");
-  view->line_open = !finished;
+  view->line_open = true;
   fwrite(line.bytes, 1, line.size, stderr);
   fflush(stderr);
+}
+
+/* ---- how far it is ---- */
+
+static double work_of(const qmat_run *run, size_t step) {
+  return 0.2 + run->graph->nodes[run->steps[step].node].type->effort;
+}
+
+void qmat_progress_share_start(qmat_progress_share *share, const qmat_run *run, size_t step) {
+  if (step > 0 && run->steps[step - 1].done && run->steps[step - 1].state != QMAT_STEP_HIT)
+    share->done += work_of(run, step - 1);
+  share->step_work = work_of(run, step);
+  share->phases = 0;
+  share->unit[0] = 0;
+  share->units = 0;
+}
+
+double qmat_progress_share_at(qmat_progress_share *share, const qmat_run *run, uint64_t done, uint64_t total,
+                              const char *unit) {
+  double work = 0;
+  for (size_t i = 0; i < run->step_count; i++)
+    if (!run->steps[i].done || run->steps[i].state != QMAT_STEP_HIT) work += work_of(run, i);
+  const bool same = strncmp(unit, share->unit, sizeof share->unit - 1) == 0;
+  if (share->unit[0] && (!same || done < share->units)) share->phases += (1 - share->phases) / (same ? 8 : 3);
+  snprintf(share->unit, sizeof share->unit, "%s", unit);
+  share->units = done;
+  const double of_phase = total > 0 && done <= total ? (double)done / (double)total : 0;
+  const double of_step = share->phases + (1 - share->phases) / 3 * of_phase;
+  const double now = work > 0 ? (share->done + share->step_work * of_step) / work : 0;
+  share->shown = fmin(1, fmax(share->shown, now));
+  return share->shown;
+}
+
+void qmat_progress_left(double share, double seconds, char *text) {
+  text[0] = 0;
+  if (seconds < 1 || share < 0.05 || share >= 1) return;
+  const double left = seconds * (1 - share) / share;
+  if (left >= 5400)
+    snprintf(text, 32, "about %.0f h left", left / 3600);
+  else if (left >= 90)
+    snprintf(text, 32, "about %.0f min left", left / 60);
+  else
+    snprintf(text, 32, "about %.0f s left", ceil(left / 5) * 5);
 }
 
 /* ---- callbacks ---- */
@@ -153,12 +188,26 @@ static bool on_progress(void *user, const char *node_id, const char *node_type, 
   qmat_progress_view *view = user;
   /* Some calls only ask whether to cancel. */
   bool has_news = done > 0 || total > 0;
-  if (view->mode == QMAT_PROGRESS_TTY && has_news) draw(view, done, total, unit, false);
+  if (view->mode == QMAT_PROGRESS_TTY && has_news)
+    draw(view, qmat_progress_share_at(&view->share, view->run, done, total, unit));
   if (view->mode == QMAT_PROGRESS_JSON && has_news)
     print_event(view, "progress",
                 json_pack("{s:I, s:I, s:s, s:f}", "done", (json_int_t)done, "total", (json_int_t)total, "unit", unit,
                           "seconds", qmat_clock_seconds() - view->started));
   return !interrupted;
+}
+
+/* Names the first model that the run reads. */
+static void name_model(qmat_progress_view *view, const qmat_run *run) {
+  for (size_t i = 0; i < run->step_count && !view->name[0]; i++) {
+    const qmat_node *type = run->graph->nodes[run->steps[i].node].type;
+    for (size_t row = 0; row < qmat_param_count(type) && !view->name[0]; row++) {
+      const char *path = qmat_param_input_file(type, row, run->steps[i].params);
+      char *name = path ? qmat_model_name(path) : NULL;
+      if (name) snprintf(view->name, sizeof view->name, "%s", qmat_show(name).text);
+      qmat_free(name);
+    }
+  }
 }
 
 static void on_started(void *user, const qmat_run *run, size_t step) {
@@ -168,14 +217,17 @@ static void on_started(void *user, const qmat_run *run, size_t step) {
   view->step_count = run->step_count;
   view->id = node->id;
   view->type = node->type->name;
+  view->run = run;
   view->started = qmat_clock_seconds();
-  if (view->mode == QMAT_PROGRESS_TTY) draw(view, 0, 0, "", false);
+  if (view->run_started <= 0) view->run_started = view->started;
+  name_model(view, run);
+  qmat_progress_share_start(&view->share, run, step);
+  if (view->mode == QMAT_PROGRESS_TTY) draw(view, qmat_progress_share_at(&view->share, run, 0, 0, ""));
   if (view->mode == QMAT_PROGRESS_JSON) print_event(view, "start", NULL);
 }
 
 static void on_done(void *user, const qmat_run *run, size_t step) {
   qmat_progress_view *view = user;
-  if (view->mode == QMAT_PROGRESS_TTY) draw(view, 0, 0, "", true);
   if (view->mode == QMAT_PROGRESS_JSON)
     print_event(view, "done", json_pack("{s:f}", "seconds", run->steps[step].seconds));
 }
@@ -187,6 +239,6 @@ void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context,
 }
 
 void qmat_progress_view_end(qmat_progress_view *view) {
-  if (view->line_open) fputc('\n', stderr);
+  if (view->line_open) fputs("\r\x1b[K", stderr);
   view->line_open = false;
 }

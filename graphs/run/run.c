@@ -16,6 +16,11 @@ const char *qmat_step_state_name(qmat_step_state state) {
   return names[state];
 }
 
+const char *qmat_step_state_words(qmat_step_state state, bool ran) {
+  static const char *const words[] = {"ran", "from cache", "unchanged", "depends"};
+  return state == QMAT_STEP_RUN && !ran ? "to run" : words[state];
+}
+
 void qmat_step_describe_missing(const qmat_graph *graph, const qmat_run_step *step, char *text, size_t size) {
   text[0] = 0;
   if (!step->missing) return;

@@ -22,8 +22,11 @@ typedef enum qmat_step_state {
   QMAT_STEP_DEPENDS /* not known before earlier nodes run */
 } qmat_step_state;
 
-/* "run", "hit", "same", "depends". */
+/* For programs: "run", "hit", "same", "depends". */
 const char *qmat_step_state_name(qmat_step_state state);
+
+/* For people: "ran" ("to run" before the run), "from cache", "unchanged", "depends". */
+const char *qmat_step_state_words(qmat_step_state state, bool ran);
 
 /* Facts about a value that a node made. They outlive the value. */
 typedef struct qmat_run_made {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_report.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "core/json_text.h"
@@ -109,9 +110,11 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   json_t *nodes = json_array(), *outputs = json_array();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
   for (size_t i = 0; i < run->file_count; i++) json_array_append_new(outputs, file_json(run, &run->files[i]));
-  char text[512];
+  char text[512], line[520];
   json_t *summary = qmat_run_summarise(run, text, sizeof text);
-  if (summary) json_object_set_new(summary, "text", qmat_json_string(text));
+  const char *second = summary ? strchr(text, '\n') : NULL;
+  if (second) snprintf(line, sizeof line, "%.*s; %s", (int)(second - text), text, second + 1);
+  if (summary) json_object_set_new(summary, "text", qmat_json_string(second ? line : text));
   const bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
   json_t *report = json_pack("{s:s, s:o, s:o, s:f, s:i, s:o, s:o, s:o, s:o}", "qmat", QMAT_VERSION, "graph",
                              qmat_json_string(run->graph->file), "input", input_json(run), "seconds", run->seconds,
@@ -181,108 +184,4 @@ qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, c
   if (status == QMAT_OK) status = qmat_file_save(context, file, path);
   if (file) qmat_value_release(&file->base);
   return status;
-}
-
-/* ---- text ---- */
-
-/* "26,021 samples", "3 vertices 2 edges", "1.2 MB"; "" for a type without counts. */
-static void describe_made(const qmat_port *port, const qmat_run_made *made, char *text, size_t size) {
-  text[0] = 0;
-  char number[32];
-  if (port->type == QMAT_FILE) {
-    qmat_format_bytes(made->bytes, number);
-    snprintf(text, size, "%s", number);
-    return;
-  }
-  const qmat_value_count_row *rows = qmat_value_count_rows(port->type);
-  size_t used = 0;
-  for (size_t i = 0; rows[i].name && used < size; i++) {
-    if (rows[i].detail) continue;
-    qmat_format_count(made->counts[i], number);
-    int letters = (int)strlen(rows[i].name) - (made->counts[i] == 1 ? 1 : 0);
-    used += (size_t)snprintf(text + used, size - used, "%s%s %.*s", used ? " " : "", number, letters, rows[i].name);
-  }
-}
-
-static int widest(int width, const char *text) {
-  int length = (int)strlen(text);
-  return length > width ? length : width;
-}
-
-/* The columns that identify a step. */
-static void print_step(const qmat_run *run, const qmat_run_step *step, FILE *out) {
-  int id_width = 0, type_width = 0;
-  for (size_t i = 0; i < run->step_count; i++) {
-    id_width = widest(id_width, run->graph->nodes[run->steps[i].node].id);
-    type_width = widest(type_width, run->graph->nodes[run->steps[i].node].type->name);
-  }
-  const qmat_graph_node *node = &run->graph->nodes[step->node];
-  fprintf(out, "%-*s  %-*s", id_width, node->id, type_width, node->type->name);
-  if (!run->cache) return;
-  char key[65] = "";
-  if (step->keyed) qmat_digest_hex(&step->key, key);
-  fprintf(out, "  %-7s  %-12.12s", qmat_step_state_name(step->state), key);
-}
-
-void qmat_run_print_plan(const qmat_run *run, FILE *out) {
-  for (size_t i = 0; i < run->step_count; i++) {
-    const qmat_run_step *step = &run->steps[i];
-    char missing[256];
-    qmat_step_describe_missing(run->graph, step, missing, sizeof missing);
-    print_step(run, step, out);
-    fprintf(out, "%s%s\n", *missing ? "  " : "", missing);
-  }
-  if (!run->cache) fprintf(out, "There is no cache: every node would run.\n");
-}
-
-void qmat_run_print(const qmat_run *run, FILE *out) {
-  const qmat_graph *graph = run->graph;
-  for (size_t i = 0; i < run->step_count; i++) {
-    const qmat_run_step *step = &run->steps[i];
-    const qmat_graph_node *node = &graph->nodes[step->node];
-    print_step(run, step, out);
-    fprintf(out, "  %8.2f s", step->seconds);
-    if (run->cache) {
-      char size[32];
-      size_t bytes = 0;
-      for (size_t port = 0; port < qmat_output_count(node->type); port++) bytes += step->made[port].bytes;
-      qmat_format_bytes(bytes, size);
-      fprintf(out, "  %9s", size);
-    }
-    const char *joint = "  ";
-    for (size_t port = 0; port < qmat_output_count(node->type); port++) {
-      char made[128];
-      describe_made(&node->type->outputs[port], &step->made[port], made, sizeof made);
-      /* The size of a file is already in the line. */
-      if (!*made || (run->cache && node->type->outputs[port].type == QMAT_FILE)) continue;
-      fprintf(out, "%s%s", joint, made);
-      joint = ", ";
-    }
-    const qmat_param *format = qmat_output_format_param(node->type);
-    if (format) fprintf(out, "%s%s", joint, format->choices[step->format]);
-    if (step->lifted_hits > 0) fprintf(out, "%s%zu of %zu from the cache", joint, step->lifted_hits, step->lifted);
-    fputc('\n', out);
-  }
-  for (size_t i = 0; i < run->file_count; i++) {
-    char size[32];
-    qmat_format_bytes(run->files[i].bytes, size);
-    const char *name = graph->outputs[run->files[i].output].name, *path = run->files[i].path;
-    const qmat_file *written = run->files[i].written;
-    fprintf(out, "%s -> %s (%s)\n", name, path, size);
-    for (size_t part = 1; written && part < written->part_count; part++) {
-      qmat_format_bytes(written->parts[part].size, size);
-      fprintf(out, "%s -> %.*s%s (%s)\n", name, (int)qmat_folder_length(path), path, written->parts[part].name, size);
-    }
-  }
-  for (size_t i = 0; i < graph->output_count; i++) {
-    const qmat_graph_output *output = &graph->outputs[i];
-    bool saved = graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE, made = false;
-    for (size_t k = 0; k < run->file_count; k++) saved = saved || run->files[k].output == i;
-    for (size_t k = 0; k < run->step_count; k++) made = made || run->steps[k].node == output->node;
-    if (made && !saved) fprintf(out, "%s was not saved (-o %s=PATH)\n", output->name, output->name);
-  }
-  char text[512];
-  json_t *summary = qmat_run_summarise(run, text, sizeof text);
-  if (summary) fprintf(out, "%s\n", text);
-  json_decref(summary);
 }

@@ -2,12 +2,10 @@
 #ifndef QMAT_GRAPHS_RUN_RUN_REPORT_H
 #define QMAT_GRAPHS_RUN_RUN_REPORT_H
 
-#include <stdio.h>
-
 #include "graphs/run/run.h"
 #include "graphs/run/run_summary.h"
 
-/* The results of a run: JSON for programs, a table for people. */
+/* The results of a run, as JSON for programs. */
 
 /* A run that was executed and written, as a JSON object: qmat, graph, input, seconds, threads, cache, nodes, outputs,
  * summary. NULL when memory is short; the caller calls json_decref. */
@@ -22,12 +20,5 @@ json_t *qmat_error_report(const qmat_error *error);
 
 /* Writes JSON as a file, through a temporary. */
 qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char *path);
-
-/* Prints a line per step (node, type, with a cache also state and start of the key, then seconds and results), a line
- * per file, and the summary if there is one. */
-void qmat_run_print(const qmat_run *run, FILE *out);
-
-/* Prints a line per step of a foreseen run: node, type, state, start of the key if known, missing parameter if any. */
-void qmat_run_print_plan(const qmat_run *run, FILE *out);
 
 #endif

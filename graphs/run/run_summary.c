@@ -64,6 +64,18 @@ static bool merge_report(const qmat_report_summary *type, const json_t *report, 
   return whole;
 }
 
+void qmat_summary_add(const qmat_report_summary *type, const json_t *summary, json_t *total) {
+  const bool first = json_object_size(total) == 0;
+  for (const qmat_summary_entry *entry = type->entries; entry->key; entry++) {
+    const json_int_t sum = json_integer_value(json_object_get(total, entry->key)) +
+                           json_integer_value(json_object_get(summary, entry->key));
+    if (entry->kind == QMAT_SUMMARY_INPUT)
+      json_object_set_new(total, entry->key, json_integer(sum));
+    else
+      merge_entry(entry, summary, first, total);
+  }
+}
+
 /* The summary of one step, or NULL. */
 static json_t *summarise_step(const qmat_run *run, const qmat_run_step *step) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];

@@ -9,8 +9,8 @@ static const qmat_summary_entry entries[] = {
     {"spheres", "spheres", QMAT_SUMMARY_SUM},
     {"triangles", NULL, QMAT_SUMMARY_INPUT},
     {"epsilon", NULL, QMAT_SUMMARY_BOUND},
-    {"surface_to_envelope", "surface to envelope", QMAT_SUMMARY_BOUND},
-    {"envelope_to_surface", "envelope to surface", QMAT_SUMMARY_BOUND},
+    {"surface_to_envelope", "to envelope", QMAT_SUMMARY_BOUND},
+    {"envelope_to_surface", "to surface", QMAT_SUMMARY_BOUND},
     {"surface_to_envelope_meters", NULL, QMAT_SUMMARY_SIZE},
     {"envelope_to_surface_meters", NULL, QMAT_SUMMARY_SIZE},
     {"certified", NULL, QMAT_SUMMARY_ALL},
@@ -64,12 +64,13 @@ static void write_sentence(const char *name, const json_t *summary, char *text, 
     proof = " (an estimate: the surface is not closed)";
   else if (certified && json_real_value(json_object_get(summary, "epsilon")) > 0)
     proof = " (not certified)";
-  snprintf(text, size,
-           "%s: %s sphere%s %s; no surface point is farther than %s of the %s%s from the envelope, and %s %s%s%s%s.",
-           name, spheres, sphere_count == 1 ? " describes" : "s describe", model, out,
-           count_of(summary, "meshes") > 1 ? "mesh's diagonal" : "diagonal", out_size,
-           certified ? "no point of its boundary is farther than" : "the envelope leaves the solid by at most", in,
-           in_size, certified ? " from the surface" : "", proof);
+  /* With lengths beside them, percentages need no other unit. */
+  const char *unit = *out_size && *in_size             ? ""
+                     : count_of(summary, "meshes") > 1 ? " of the mesh's diagonal"
+                                                       : " of the diagonal";
+  snprintf(text, size, "%s: %s sphere%s %s%s\nsurface to envelope %s%s, %s %s%s%s", name, spheres,
+           sphere_count == 1 ? " describes" : "s describe", model, proof, out, out_size,
+           certified ? "envelope to surface" : "envelope outside of the solid", in, in_size, unit);
 }
 
 const qmat_report_summary qmat_medial_summary = {.entries = entries, .sentence = write_sentence};

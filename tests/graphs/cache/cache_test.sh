@@ -16,9 +16,9 @@ write_box box.off
 # run OPTION...: the graph on $model; the states of its nodes, in one line, in $states.
 model=box.off
 run() {
-  "$qmat" run "$graph" --set model="$model" "$@" >out.txt 2>err.txt
+  "$qmat" run "$graph" --set model="$model" --verbose "$@" >out.txt 2>err.txt
   code=$?
-  states=$(awk '$2 ~ /^[a-z]+\.[a-z]+$/ { printf "%s%s:%s", n++ ? " " : "", $1, $3 }' out.txt)
+  states=$(sed 's/from cache/hit/; s/to run/run/; s/ ran / run /; s/unchanged/same/' out.txt | awk '$2 ~ /^[a-z]+\.[a-z]+$/ { printf "%s%s:%s", n++ ? " " : "", $1, $3 }')
 }
 
 # all STATE WHAT: the last run went well, and every node was in that state.
@@ -43,14 +43,14 @@ run $(echo $formats | sed 's/cold/warm/g')
 all hit "a second run"
 for ending in glb gltf ma ply; do holds "cold and warm are the same, .$ending" cmp cold.$ending warm.$ending; done
 run -o off.glb --no-cache
-holds "no state without a cache" test -z "$(grep -c ' hit ' out.txt | grep -v 0)"
+holds "no state without a cache" test -z "$(grep -c 'from cache' out.txt | grep -v 0)"
 holds "with and without a cache is the same" cmp off.glb cold.glb
 run -o off.glb --cache "$work/other"
 all run "another cache"
 QMAT_CACHE=$work/other run -o off.glb
 all hit "the cache that the environment names"
 QMAT_CACHE=off run -o off.glb
-holds "no cache where the environment says so" sh -c '! grep -q " hit " out.txt'
+holds "no cache where the environment says so" sh -c '! grep -q "from cache" out.txt'
 holds "the default folder" test -s "$XDG_CACHE_HOME/qmat/CACHEDIR.TAG"
 
 # What a result depends on, and what it does not.
@@ -123,8 +123,8 @@ holds "why tells of the node that was asked for" sh -c '! grep -q "^model" out.t
 "$qmat" why "$graph" --set model=changed.off --json >out.txt 2>err.txt
 holds "why as JSON" grep -q '"tag": "name"' out.txt
 "$qmat" dot "$graph" --status --set model=box.off --set initial.merge=0.2% >out.txt 2>err.txt
-holds "dot shows hits" grep -q 'mesh.sdf: hit' out.txt
-holds "dot shows what would run" grep -q 'medial.delaunay: run' out.txt
+holds "dot shows hits" grep -q 'mesh.sdf: from cache' out.txt
+holds "dot shows what would run" grep -q 'medial.delaunay: to run' out.txt
 "$qmat" run "$graph" --set model=box.off -o a.glb --report report.json >out.txt 2>err.txt
 holds "hits in the report" grep -q '"cache": "hit"' report.json
 
@@ -185,7 +185,7 @@ all hit "a scene of two meshes again"
 put_scene "$two"
 run --to initial
 is initial run "a mesh of two that has changed"
-holds "the other mesh comes from the cache" test "$(grep -c '1 of 2 from the cache' out.txt)" -eq 3
+holds "the other mesh comes from the cache" test "$(grep -c '1 of 2 from cache' out.txt)" -eq 3
 "$qmat" cache verify >out.txt 2>err.txt
 holds "lists are whole in the cache" grep -q ' 0 broken, 0 incomplete' out.txt
 model=box.off
@@ -264,7 +264,7 @@ holds "exit code 3 after a signal, not $code" test $code -eq 3
 "$qmat" cache verify >out.txt 2>err.txt
 holds "nothing is broken after a signal" test $? -eq 0
 "$qmat" run "$graph" --set model=torus.off --set samples.spacing=2% --dry-run >out.txt 2>err.txt
-holds "what was done before the signal is kept" grep -q '^model .*hit' out.txt
+holds "what was done before the signal is kept" grep -q '^model .*from cache' out.txt
 
 # Looking after it.
 "$qmat" cache stats >out.txt 2>err.txt

@@ -80,9 +80,9 @@ right=right.glb
 run() {
   folder=$1
   shift
-  timeout 60 "$qmat" run graph.yaml --cache "$folder" --remote-cache "$url" -o out.glb "$@" >out.txt 2>err.txt
+  timeout 60 "$qmat" run graph.yaml --cache "$folder" --remote-cache "$url" -o out.glb --verbose "$@" >out.txt 2>err.txt
   code=$?
-  states=$(awk '$2 ~ /^[a-z]+\.[a-z]+$/ { print $3 }' out.txt | sort -u | tr '\n' ' ')
+  states=$(sed 's/from cache/hit/; s/ ran / run /' out.txt | awk '$2 ~ /^[a-z]+\.[a-z]+$/ { print $3 }' | sort -u | tr '\n' ' ')
   holds "the result is right" cmp -s out.glb "$right"
   holds "exit code 0, not $code" test $code -eq 0
 }

@@ -36,11 +36,16 @@ batch --inputs 'models/*.off' --out results --jobs 3
 holds "a failing asset makes exit code 1, not $code" test $code -eq 1
 holds "the others are made" test "$(ls results/*.glb | wc -l)" -eq 9
 holds "they are counted" grep -q '^9 done, 1 failed, 0 not run' out.txt
-holds "the failure is told with its place" grep -q '^models/bad one.off: .*line\|^models/bad one.off: models/bad one.off:1' out.txt
+holds "the failure is told with its place" grep -q '^models/bad one.off:1' out.txt
 for width in 1 5 9; do
   "$qmat" run graph.yaml --set model=models/box$width.off -o alone.glb --no-cache --quiet
   holds "the same bytes as alone" cmp alone.glb results/box$width.glb
 done
+batch --inputs 'models/b*.off' --out results --quiet
+holds "--quiet names what failed, and nothing else" sh -c '
+  [ ! -s out.txt ] && [ "$(wc -l <err.txt)" -eq 2 ] && grep -q "^models/bad one.off:1" err.txt'
+batch --inputs 'models/b*.off' --out results --verbose
+holds "--verbose has a table" grep -q '^box1  *from cache  *[0-9.]*$' out.txt
 rm -r results "models/bad one.off"
 batch --inputs 'models/*.off' --out results --format ma --json
 holds "exit code 0, not $code" test $code -eq 0

@@ -106,12 +106,12 @@ cp "$source/examples/game/models/"roof.* .
 expect 0 "certified" "$qmat" mat roof.gltf -o listed.gltf --epsilon 10% $coarse --report report_of_files.json
 holds "a side file" test -s listed.bin
 for file in listed.*; do
-  holds "$file is listed" grep -qF -e "-> $file (" out.txt
+  holds "$file is listed" grep -qF -e "$file (" out.txt
   holds "$file is in the report" grep -qF "\"$file\"" report_of_files.json
 done
 holds "the report names all" test "$(grep -c '"sha256"' report.json)" -eq 3
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
-expect 0 "surface point is farther" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
+expect 0 "surface to envelope" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \
   --set epsilon=5% $coarse -o again.glb --threads 2
 expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --set epsilon=0.05 $coarse \
   -o asset=again.ma
@@ -131,7 +131,8 @@ def Mesh "cage" {
 END
 expect 0 "(certified)" "$qmat" mat cage.usda -o cage.ma --epsilon 4% --report cage.json
 holds "the cage is taken to its limit" grep -q '"deviation": 0.00' cage.json
-expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness
+expect 0 "" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model=box.off --to thickness -v
+holds "--to gets there" grep -q mesh.sdf out.txt
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
 # A number of spheres alone means no bound on the distance.
 expect 0 "" "$qmat" mat box.off -o few.ma --vertices 5 --report few.json

@@ -45,7 +45,7 @@ if cmp -s a/buf.bin b/buf.bin; then die "the two buffers differ"; fi
 # Two runs into one folder: each output has its own files, all of them listed.
 mkdir out
 for name in a b; do
-  expect 0 "asset -> out/$name.bin" save $name/scene.gltf out/$name.gltf --report $name.json
+  expect 0 "out/$name.bin (" save $name/scene.gltf out/$name.gltf --report $name.json
   holds "$name: the image is listed" grep -q "out/${name}_own t.png" out.txt
   holds "$name: the report has the buffer" grep -q "\"name\": \"$name.bin\"" $name.json
 done

@@ -21,16 +21,16 @@ static void test_the_sentence_states_what_is_certified(void **state) {
     int certified, estimate;
     double epsilon;
     const char *end;
-  } cases[] = {{1, 0, 0.01, "(certified)."},
-               {0, 0, 0.01, "(not certified)."},
-               {0, 1, 0.01, "(an estimate: the surface is not closed)."},
-               {0, 0, 0, "from the surface."}};
+  } cases[] = {{1, 0, 0.01, " (certified)"},
+               {0, 0, 0.01, " (not certified)"},
+               {0, 1, 0.01, " (an estimate: the surface is not closed)"},
+               {0, 0, 0, ""}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     char expected[512];
     snprintf(expected, sizeof expected,
-             "x: 2 spheres describe 1,234 triangles; no surface point is farther than 0.4 %% of the diagonal from the "
-             "envelope, and no point of its boundary is farther than 0.5 %% from the surface%s%s",
-             i == 3 ? "" : " ", i == 3 ? "." : cases[i].end);
+             "x: 2 spheres describe 1,234 triangles%s\n"
+             "surface to envelope 0.4 %%, envelope to surface 0.5 %% of the diagonal",
+             cases[i].end);
     assert_sentence(json_pack("{s:i, s:i, s:f, s:f, s:f, s:b, s:b}", "spheres", 2, "triangles", 1234, "epsilon",
                               cases[i].epsilon, "surface_to_envelope", 0.004, "envelope_to_surface", 0.005, "certified",
                               cases[i].certified, "estimate", cases[i].estimate),
@@ -42,15 +42,22 @@ static void test_without_a_certificate_only_the_outside_of_the_solid_is_bounded(
   (void)state;
   assert_sentence(json_pack("{s:i, s:f, s:f, s:f}", "spheres", 1, "epsilon", 0.01, "surface_to_envelope", 0.00977,
                             "envelope_to_surface", 0.0),
-                  "x: 1 sphere describes the model; no surface point is farther than 0.98 % of the diagonal from the "
-                  "envelope, and the envelope leaves the solid by at most 0 %.");
+                  "x: 1 sphere describes the model\n"
+                  "surface to envelope 0.98 %, envelope outside of the solid 0 % of the diagonal");
+}
+
+static void test_lengths_stand_beside_percentages(void **state) {
+  (void)state;
+  assert_sentence(json_pack("{s:i, s:f, s:f, s:f, s:f, s:f, s:b}", "spheres", 3, "epsilon", 0.01, "surface_to_envelope",
+                            0.005, "envelope_to_surface", 0.006, "surface_to_envelope_meters", 0.0048,
+                            "envelope_to_surface_meters", 0.012, "certified", 1),
+                  "x: 3 spheres describe the model (certified)\n"
+                  "surface to envelope 0.5 % (4.8 mm), envelope to surface 0.6 % (12 mm)");
 }
 
 static void test_several_meshes_are_counted(void **state) {
   (void)state;
-  static const char *const ends =
-      "; no surface point is farther than 1 % of the mesh's diagonal from the envelope, and "
-      "the envelope leaves the solid by at most 2 %.";
+  static const char *const ends = "\nsurface to envelope 1 %, envelope outside of the solid 2 % of the mesh's diagonal";
   char expected[512];
   snprintf(expected, sizeof expected, "x: 7 spheres describe 90 triangles of 3 meshes%s", ends);
   json_t *summary = json_pack("{s:i, s:i, s:i, s:f, s:f}", "spheres", 7, "triangles", 90, "meshes", 3,
@@ -65,6 +72,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_sentence_states_what_is_certified),
       cmocka_unit_test(test_without_a_certificate_only_the_outside_of_the_solid_is_bounded),
+      cmocka_unit_test(test_lengths_stand_beside_percentages),
       cmocka_unit_test(test_several_meshes_are_counted),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
