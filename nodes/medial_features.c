@@ -12,7 +12,7 @@
 #include "core/json_text.h"
 #include "nodes/initial/creases.h"
 
-typedef enum { FEATURES_NONE, FEATURES_SHARP } feature_kind;
+typedef enum { FEATURES_NONE, FEATURES_SHARP, FEATURES_AUTO } feature_kind;
 
 typedef struct {
   int features;
@@ -405,7 +405,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   qmat_medial *medial = NULL;
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
-  if (status == QMAT_OK && b.params->features == FEATURES_SHARP && (status = check_inputs(&b)) == QMAT_OK)
+  if (status == QMAT_OK && b.params->features != FEATURES_NONE && (status = check_inputs(&b)) == QMAT_OK)
     status = build(&b);
   if (status == QMAT_OK && b.feature_count > 0) {
     medial = qmat_medial_new();
@@ -426,11 +426,13 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   return status;
 }
 
-static const char *const feature_kinds[] = {"none", "sharp", NULL};
+static const char *const feature_kinds[] = {"none", "sharp", "auto", NULL};
 
 static const qmat_param params[] = {
     QMAT_ENUM(medial_features_params, features, feature_kinds, FEATURES_SHARP,
-              "Leave the medial mesh as it is, or add spheres of radius zero on sharp convex edges and corners"),
+              "Leave the medial mesh as it is, or add spheres of radius zero on sharp convex edges and corners. auto: "
+              "as sharp; "
+              "medial.simplify with features=auto then keeps them or not"),
     QMAT_FLOAT(medial_features_params, angle, "degrees", 40, 1, 179,
                "An edge is sharp if the normals of its facets differ by more than this"),
     QMAT_LENGTH(medial_features_params, shortest, 0.02, 0, 1,
@@ -454,7 +456,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_features = {
     .name = "medial.features",
-    .version = 2,
+    .version = 3,
     .summary = "Extends an initial medial mesh to the sharp convex edges and corners of the surface",
     .doc =
         "The medial axis of a solid touches its convex creases with radius zero, but spheres through samples never do. "

@@ -10,6 +10,7 @@
 #include "nodes/simplify/ordered_collapse.h"
 #include "nodes/simplify/simplification.h"
 #include "nodes/simplify/sphere_budget.h"
+#include "nodes/simplify/starts.h"
 
 typedef qmat_simplify_params medial_simplify_params;
 
@@ -92,7 +93,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   status = qmat_simplification_prepare(&s, inputs);
   if (status == QMAT_OK)
     status = searches_epsilon(&own) ? qmat_simplification_run_to_count(&s, &best, &kept)
-                                    : qmat_simplification_run(&s, &best);
+                                    : qmat_simplification_run_starts(&s, &own, &best);
   best.figures.wanted_spheres = searches_epsilon(&own) ? (size_t)own.vertices : 0;
   if (status == QMAT_OK)
     status = make_outputs(context, &best.figures, s.surface, kept > 0 ? kept + deviation : 0, deviation, &best.medial,
@@ -117,6 +118,8 @@ static const qmat_param params[] = {
     QMAT_COLLAPSE_PARAMS,
     QMAT_INT(qmat_simplify_params, refits, "passes", 8, 0, 1000,
              "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses"),
+    QMAT_INT(qmat_simplify_params, effort, "starts", 1, 1, 1000,
+             "Runs from so many starts, side by side on all threads, of which the best result counts"),
     {0},
 };
 
@@ -132,7 +135,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 15,
+    .version = 16,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "core/hash.h"
 #include "nodes/simplify/collapse_test.h"
 #include "nodes/simplify/cost_rows.h"
 #include "nodes/simplify/fitted_collapse.h"
@@ -38,6 +39,8 @@ static qmat_status set_cost(qmat_decimation *s, uint32_t edge) {
   const double *a = &s->complex.spheres[4 * (size_t)ends[0]], *b = &s->complex.spheres[4 * (size_t)ends[1]];
   s->heap.errors[edge] = row->by_quadrics ? c.errors[0] : qmat_point_distance(a, b);
   s->heap.costs[edge] = row->cost(s, &c, a, b);
+  if (s->rules.seed > 0)
+    s->heap.costs[edge] *= pow(qmat_most_cost_factor, qmat_hash_unit(qmat_hash3(s->rules.seed, edge, 0)));
   s->stale[edge] = 0;
   return QMAT_OK;
 }

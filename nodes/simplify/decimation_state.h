@@ -17,7 +17,7 @@
 typedef enum { QMAT_ERROR_TWO_SIDED, QMAT_ERROR_ONE_SIDED } qmat_error_kind;
 typedef enum { QMAT_EXCEED_SKIP, QMAT_EXCEED_STOP, QMAT_EXCEED_RAISE } qmat_exceed_rule;
 typedef enum { QMAT_PROTECT_OFF, QMAT_PROTECT_LATE, QMAT_PROTECT_ALWAYS } qmat_protection;
-typedef enum { QMAT_FEATURES_NONE, QMAT_FEATURES_SHARP } qmat_feature_rule;
+typedef enum { QMAT_FEATURES_NONE, QMAT_FEATURES_SHARP, QMAT_FEATURES_AUTO } qmat_feature_rule;
 typedef enum { QMAT_TOPOLOGY_FREE, QMAT_TOPOLOGY_GUARD, QMAT_TOPOLOGY_PRESERVE } qmat_topology_policy;
 
 /* Collapses done, and refused by each test. */
@@ -40,8 +40,9 @@ typedef struct qmat_decimation_rules {
   qmat_exceed_rule on_exceed;
   qmat_topology_policy topology;
   qmat_protection protect;
-  qmat_feature_rule features; /* whether spheres of radius zero stay on their creases */
+  qmat_feature_rule features; /* whether spheres of radius zero stay on their creases; never auto */
   double crease_share; /* of the threshold: the largest distance of a crease from its remaining points; above 0 */
+  uint64_t seed;       /* of the factors of the costs; 0: none */
   int refits;          /* passes that fit spheres to the surface after the last collapse, to make room for more */
   bool neighbourhoods; /* edges are tried with the spheres around them fitted jointly, from the end of an earlier run */
   bool final_refit;    /* spheres are fitted at the end to lower the error itself */

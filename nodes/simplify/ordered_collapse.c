@@ -28,7 +28,7 @@ qmat_status qmat_ordered_collapses_run(qmat_context *context, const qmat_simplif
   run->context = context;
   run->surface = o->surface;
   run->sheet_vertices = medial->sheet_sphere_count;
-  run->rules = qmat_simplify_rules(&o->params, &o->initial);
+  run->rules = qmat_simplify_rules(&o->params, &o->initial, 0);
   status = qmat_complex_init(context, &run->complex, medial, o->initial.spheres);
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(context, o->surface, samples, medial, &run->complex,

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_build.h"
+#include "nodes/simplify/side_by_side.h"
 
 static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex, size_t first) {
   for (size_t v = first; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)
@@ -49,7 +50,6 @@ typedef struct partition {
   piece_rows vertices, edges, triangles, points;
   piece_result *results;
   _Atomic size_t done; /* vertices of finished pieces */
-  _Atomic bool ended;  /* the run was cancelled, or a piece has failed */
 } partition;
 
 /* ---- the pieces ---- */
@@ -272,72 +272,15 @@ static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *
   return QMAT_OK;
 }
 
-static qmat_status collapse_piece(qmat_context *context, partition *d, size_t piece) {
+static qmat_status collapse_piece(qmat_context *context, void *user, size_t piece) {
+  partition *d = user;
   qmat_decimation own;
   qmat_constraint_points constraints;
   qmat_status status = start_piece(context, d, piece, &constraints, &own);
   if (status == QMAT_OK) status = qmat_decimation_run(&own);
   if (status == QMAT_OK) status = end_piece(d, piece, &own);
   qmat_decimation_uninit(&own);
-  qmat_arena_uninit(&context->arena);
   return status;
-}
-
-/* Only the thread that runs the node may call the progress function of the run. */
-typedef struct progress_caller {
-  partition *partition;
-  bool is_main_thread;
-} progress_caller;
-
-static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                             const char *unit) {
-  (void)node_id;
-  (void)node_type;
-  (void)total;
-  const progress_caller *here = user;
-  partition *d = here->partition;
-  if (here->is_main_thread &&
-      qmat_progress(d->context, atomic_load(&d->done) + done, d->whole->complex.vertex_count, unit) != QMAT_OK)
-    atomic_store(&d->ended, true);
-  return !atomic_load(&d->ended);
-}
-
-static qmat_status collapse_pieces(partition *d) {
-  qmat_context *context = d->context;
-  const int threads = qmat_threads(context);
-  qmat_status status = qmat_progress(context, 0, 0, "collapses");
-  if (status != QMAT_OK) return status;
-  size_t failed = SIZE_MAX;
-  qmat_error error = {.status = QMAT_OK};
-#pragma omp parallel num_threads(threads)
-  {
-    progress_caller here = {.partition = d, .is_main_thread = false};
-    qmat_context own = {.progress = forward_progress,
-                        .progress_user = &here,
-                        .threads = 1,
-                        .node_id = context->node_id,
-                        .node_type = context->node_type};
-#pragma omp master
-    here.is_main_thread = true;
-#pragma omp for schedule(dynamic, 1)
-    for (size_t piece = 0; piece < d->piece_count; piece++) {
-      if (atomic_load(&d->ended)) continue;
-      const qmat_status result = collapse_piece(&own, d, piece);
-      if (result == QMAT_OK || result == QMAT_CANCELLED) continue;
-      atomic_store(&d->ended, true);
-#pragma omp critical(qmat_collapse_partitioned)
-      if (piece < failed) {
-        failed = piece;
-        error = own.error;
-      }
-    }
-    qmat_context_uninit(&own);
-  }
-  if (failed < SIZE_MAX) {
-    context->error = error;
-    return error.status;
-  }
-  return atomic_load(&d->ended) ? QMAT_CANCELLED : QMAT_OK;
 }
 
 /* ---- the joined result ---- */
@@ -459,7 +402,8 @@ qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constrai
   memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
   qmat_medial_quadrics_add(c, decimation->quadrics);
   qmat_status status = divide(&d);
-  if (status == QMAT_OK) status = collapse_pieces(&d);
+  if (status == QMAT_OK)
+    status = qmat_run_side_by_side(context, d.piece_count, collapse_piece, &d, &d.done, c->vertex_count, "collapses");
   if (status == QMAT_OK) status = join_pieces(&d);
   free_results(&d);
   return status;

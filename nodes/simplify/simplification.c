@@ -52,10 +52,6 @@ static bool starts_within(const qmat_simplification *s) {
 
 /* ---- a result, and its judgement ---- */
 
-static bool is_better(const qmat_simplified *a, const qmat_simplified *best) {
-  return a->fault < best->fault || (a->fault == best->fault && a->medial->sphere_count < best->medial->sphere_count);
-}
-
 /* Replaces `best` by `a`, which is empty afterwards. */
 static void replace(qmat_simplified *a, qmat_simplified *best) {
   qmat_simplified_uninit(best);
@@ -133,7 +129,7 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   qmat_decimation_uninit(dense);
   *dense = (qmat_decimation){
-      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state)};
+      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
   dense->sheet_vertices = s->initial->sheet_sphere_count;
   qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
@@ -165,7 +161,7 @@ static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from
   qmat_decimation *round = &s->rounds[s->newest];
   qmat_decimation_uninit(round);
   *round = (qmat_decimation){
-      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state)};
+      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
   a->medial = qmat_medial_new();
   if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
   round->rules.neighbourhoods = neighbourhoods;
@@ -207,7 +203,7 @@ static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_error
     ended = a.within_epsilon;
     if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
-    if (status == QMAT_OK && !is_better(best, &a)) {
+    if (status == QMAT_OK && !qmat_simplified_is_better(best, &a)) {
       replace(&a, best);
       return QMAT_OK;
     }
@@ -233,7 +229,7 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
     if (status == QMAT_OK && is_done && (a.within_epsilon || a.figures.filled > 0 || is_within))
       status = refit_jointly(s, &errors, &a);
-    if (status == QMAT_OK && is_better(&a, best)) replace(&a, best);
+    if (status == QMAT_OK && qmat_simplified_is_better(&a, best)) replace(&a, best);
     qmat_simplified_uninit(&a);
     if (status == QMAT_OK && !is_done) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);

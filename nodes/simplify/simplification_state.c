@@ -31,6 +31,10 @@ void qmat_simplification_uninit(qmat_simplification *s) {
   qmat_surface_free(s->surface);
 }
 
+bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b) {
+  return a->fault < b->fault || (a->fault == b->fault && a->medial->sphere_count < b->medial->sphere_count);
+}
+
 void qmat_simplified_uninit(qmat_simplified *a) {
   qmat_value_release(a->medial ? &a->medial->base : NULL);
   *a = (qmat_simplified){.fault = INFINITY};

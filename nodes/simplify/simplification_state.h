@@ -15,6 +15,7 @@ typedef struct qmat_simplification {
   const qmat_samples *samples;
   const qmat_medial *initial;
   qmat_initial_medial state;
+  uint64_t seed; /* of the start; 0: costs as they are */
   qmat_surface *surface;
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
@@ -39,6 +40,9 @@ typedef struct qmat_simplified {
  * failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
                                         qmat_medial_errors *errors);
+
+/* Whether `a` has the smaller fault, or the same with fewer spheres. */
+bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b);
 
 /* Frees what a simplification has made; the caller keeps the inputs. */
 void qmat_simplification_uninit(qmat_simplification *simplification);

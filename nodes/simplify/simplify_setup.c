@@ -12,7 +12,7 @@ const char *const qmat_cost_choices[] = {"slab", "hausdorff", "pmat", NULL};
 const char *const qmat_compat_choices[] = {"off", "qmat", NULL};
 const char *const qmat_topology_choices[] = {"free", "guard", "preserve", NULL};
 const char *const qmat_protect_choices[] = {"off", "late", "always", NULL};
-const char *const qmat_feature_choices[] = {"none", "sharp", NULL};
+const char *const qmat_feature_choices[] = {"none", "sharp", "auto", NULL};
 
 /* The exact depth at the centre of a medial sphere. Most spheres are inscribed: a query within the radius finds it. */
 static double depth_of(const qmat_surface *surface, const double *sphere) {
@@ -87,23 +87,26 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
 }
 
-qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const qmat_initial_medial *initial) {
-  return (qmat_decimation_rules){.limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
-                                 .share = 1,
-                                 .finest = p->finest,
-                                 .vertices = (size_t)p->vertices,
-                                 .most_cost = p->most_cost,
-                                 .k = p->k,
-                                 .cost = (qmat_cost_kind)p->cost,
-                                 .published = p->compat == QMAT_COMPAT_QMAT,
-                                 .error = (qmat_error_kind)p->error,
-                                 .on_exceed = (qmat_exceed_rule)p->on_exceed,
-                                 .topology = (qmat_topology_policy)p->topology,
-                                 .protect = (qmat_protection)p->protect,
-                                 .features = (qmat_feature_rule)p->features,
-                                 .crease_share = p->crease,
-                                 .refits = (int)p->refits,
-                                 .thin = initial->thin};
+qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const qmat_initial_medial *initial,
+                                          uint64_t seed) {
+  return (qmat_decimation_rules){
+      .limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
+      .share = 1,
+      .finest = p->finest,
+      .vertices = (size_t)p->vertices,
+      .most_cost = p->most_cost,
+      .k = p->k,
+      .cost = (qmat_cost_kind)p->cost,
+      .published = p->compat == QMAT_COMPAT_QMAT,
+      .error = (qmat_error_kind)p->error,
+      .on_exceed = (qmat_exceed_rule)p->on_exceed,
+      .topology = (qmat_topology_policy)p->topology,
+      .protect = (qmat_protection)p->protect,
+      .features = p->features == QMAT_FEATURES_NONE ? QMAT_FEATURES_NONE : QMAT_FEATURES_SHARP,
+      .crease_share = p->crease,
+      .seed = seed,
+      .refits = (int)p->refits,
+      .thin = initial->thin};
 }
 
 bool qmat_simplify_in_order(const qmat_simplify_params *params) {

@@ -20,7 +20,7 @@ typedef struct qmat_simplify_params {
   double crease;
   double theta;
   double k;
-  int64_t refits;
+  int64_t refits, effort;
 } qmat_simplify_params;
 
 extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *const qmat_compat_choices[],
@@ -52,7 +52,8 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
                 "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
       QMAT_ENUM(                                                                                                      \
           qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                  \
-          "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases"),   \
+          "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases. "   \
+          "auto: both are tried, and the better result counts (on_exceed=skip only, else as sharp)"),                 \
       QMAT_FLOAT(qmat_simplify_params, crease, "epsilon", 0.25, 0.01, 1,                                              \
                  "The largest distance of a crease from its remaining points, as a share of the threshold"),          \
       QMAT_FLOAT(qmat_simplify_params, theta, "mean thickness", 0.5, 0, 10,                                           \
@@ -72,20 +73,21 @@ typedef struct qmat_initial_medial {
   uint8_t *thin;   /* per sample: whether it lies on a thin feature */
 } qmat_initial_medial;
 
-/* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY if epsilon is
- * not larger. */
+/* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY if
+ * epsilon is not larger. */
 qmat_status qmat_simplify_leave_deviation(qmat_context *context, const qmat_mesh *mesh, qmat_simplify_params *params,
                                           double *deviation);
 
-/* Reads the inputs of both nodes (QMAT_SIMPLIFY_INPUTS, in that order). `*surface` is new, also after some failures;
- * the caller frees it. QMAT_ERROR_GEOMETRY names inputs that do not belong together; QMAT_ERROR_MEMORY, QMAT_CANCELLED.
- * All threads. */
+/* Reads the inputs of both nodes (QMAT_SIMPLIFY_INPUTS, in that order). `*surface` is new, also after some
+ * failures; the caller frees it. QMAT_ERROR_GEOMETRY names inputs that do not belong together;
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_params *params,
                                   const qmat_value *const inputs[], qmat_surface **surface,
                                   qmat_initial_medial *initial);
 
-/* The rules for the parameters. */
-qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *params, const qmat_initial_medial *initial);
+/* The rules for the parameters, and for a start with `seed` (0: costs as they are). */
+qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *params, const qmat_initial_medial *initial,
+                                          uint64_t seed);
 
 /* Sets what `compat` sets. */
 void qmat_simplify_apply_compatibility(qmat_simplify_params *params);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "nodes/descriptor/epsilon.h"
+#include "nodes/simplify/starts.h"
 
 /* The search ends when it knows the epsilon to this factor, or after so many runs. */
 static const double precision = 1.04;
@@ -19,23 +20,13 @@ static const double most_error = 1;
  * interval by this share of its logarithm, since the number is not that regular. */
 static const double least_share = 0.2;
 
-/* One run, in scratch memory of its own, down to `vertices` spheres (0: as few as possible). */
+/* One run, down to `vertices` spheres (0: as few as possible). */
 static qmat_status run_at(const qmat_simplification *prepared, double epsilon, int64_t vertices,
                           qmat_simplified *result) {
-  qmat_context *context = prepared->context;
-  qmat_context own = *context;
-  own.arena = (qmat_arena){0};
-  qmat_simplification s = *prepared;
-  s.context = &own;
-  s.params.epsilon = epsilon;
-  s.params.vertices = vertices;
-  const qmat_status status = qmat_simplification_run(&s, result);
-  s.surface = NULL; /* the caller's */
-  qmat_simplification_uninit(&s);
-  qmat_context_uninit(&own);
-  context->error = own.error;
-  context->progress_time = own.progress_time;
-  return status;
+  qmat_simplify_params params = prepared->params;
+  params.epsilon = epsilon;
+  params.vertices = vertices;
+  return qmat_simplification_run_starts(prepared, &params, result);
 }
 
 /* The epsilon to try between one that is too small, which leaves `spheres`, and one that is enough. */

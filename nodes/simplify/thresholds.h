@@ -54,6 +54,9 @@ static const double qmat_early_exit_share = 0.6;
 /* The margin of a refused point that becomes a target; derived from qmat_placement_ratio. */
 static const double qmat_target_margin = 0.02;
 
+/* Starts after the first multiply each cost by a factor between 1 and this one. */
+static const double qmat_most_cost_factor = 1.65;
+
 /* A move of a sphere has to lower its error by at least this share of the error. */
 static const double qmat_least_gain = 0.02;
 

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_SIDE_BY_SIDE_H
+#define QMAT_NODES_SIMPLIFY_SIDE_BY_SIDE_H
+
+#include <stdatomic.h>
+
+#include "core/context.h"
+
+/* One of several items. `own` is a context with one thread; its scratch memory is freed after the item. */
+typedef qmat_status qmat_item_fn(qmat_context *own, void *user, size_t item);
+
+/* Runs items 0 to count - 1 on all threads of `context`, each on one. Progress is `*done` of `total` in `unit`; the
+ * items raise `*done`. Ends with QMAT_CANCELLED, or with the error of the first item that failed; items that have not
+ * started are then left out. */
+qmat_status qmat_run_side_by_side(qmat_context *context, size_t count, qmat_item_fn *run, void *user,
+                                  const _Atomic size_t *done, size_t total, const char *unit);
+
+#endif

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/simplify/starts.h"
+
+#include <math.h>
+
+#include "nodes/simplify/side_by_side.h"
+
+typedef struct all_starts {
+  const qmat_simplification *prepared;
+  const qmat_simplify_params *params;
+  size_t rule_count; /* 2 where creases are kept and not kept */
+  qmat_simplified *results;
+  _Atomic size_t done;
+} all_starts;
+
+/* Whether a choice is left to make: the spheres of sheets have radius 0 too, and are no features. */
+static bool chooses_features(const qmat_simplification *s, const qmat_simplify_params *params) {
+  if (params->features != QMAT_FEATURES_AUTO) return false;
+  for (size_t v = s->initial->sheet_sphere_count; v < s->initial->sphere_count; v++)
+    if (s->state.spheres[4 * v + 3] == 0) return true;
+  return false;
+}
+
+/* Starts with the same seed follow each other, creases kept first. */
+static qmat_status run_start(qmat_context *own, void *user, size_t start) {
+  all_starts *all = user;
+  qmat_simplification s = *all->prepared;
+  s.context = own;
+  s.params = *all->params;
+  s.seed = start / all->rule_count;
+  if (all->rule_count == 2) s.params.features = start % 2 == 0 ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
+  const qmat_status status = qmat_simplification_run(&s, &all->results[start]);
+  s.surface = NULL; /* the caller's */
+  qmat_simplification_uninit(&s);
+  atomic_fetch_add(&all->done, 1);
+  return status;
+}
+
+/* A single start uses all threads by itself. */
+static qmat_status run_alone(qmat_context *context, all_starts *all) {
+  qmat_context own = *context;
+  own.arena = (qmat_arena){0};
+  const qmat_status status = run_start(&own, all, 0);
+  qmat_context_uninit(&own);
+  context->error = own.error;
+  context->progress_time = own.progress_time;
+  return status;
+}
+
+qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, const qmat_simplify_params *params,
+                                           qmat_simplified *best) {
+  qmat_context *context = prepared->context;
+  all_starts all = {.prepared = prepared, .params = params, .rule_count = chooses_features(prepared, params) ? 2 : 1};
+  const size_t count = (size_t)params->effort * all.rule_count;
+  *best = (qmat_simplified){.fault = INFINITY};
+  all.results = qmat_arena_alloc(&context->arena, count, sizeof *all.results);
+  if (!all.results) return qmat_fail_memory(context, "starts");
+  for (size_t i = 0; i < count; i++) all.results[i] = *best;
+  const qmat_status status = count == 1
+                                 ? run_alone(context, &all)
+                                 : qmat_run_side_by_side(context, count, run_start, &all, &all.done, count, "starts");
+  for (size_t i = 0; i < count; i++) {
+    if (status == QMAT_OK && (i == 0 || qmat_simplified_is_better(&all.results[i], best))) {
+      qmat_simplified_uninit(best);
+      *best = all.results[i];
+    } else {
+      qmat_simplified_uninit(&all.results[i]);
+    }
+  }
+  return status;
+}

@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "nodes/simplify/side_by_side.h"
+#include "tests/nodes/pipeline.h"
+
+/* --- several starts ------------------------------------------------------------------------------------------------
+ */
+
+typedef struct {
+  pipeline made;
+  qmat_value *features[PIPELINE_MOST_PORTS]; /* the initial medial mesh with spheres on the creases, and its report */
+} creased;
+
+static void make_creased(creased *c, const char *name, int resolution, const char *features) {
+  *c = (creased){.features = {NULL}};
+  pipeline_make(&c->made, pipeline_model(name, resolution), "spacing=4% n_f=0", "");
+  const qmat_value *inputs[] = {&c->made.mesh->base, &c->made.medial->base};
+  pipeline_must_run(0, "medial.features", features, inputs, c->features);
+}
+
+static void free_creased(creased *c) {
+  qmat_value_release(c->features[0]);
+  qmat_value_release(c->features[1]);
+  pipeline_free(&c->made);
+}
+
+static void simplify(const creased *c, int threads, const char *text, qmat_value *outputs[]) {
+  const pipeline *p = &c->made;
+  const qmat_value *inputs[] = {&p->mesh->base, &p->thickness->base, &p->samples->base, c->features[0]};
+  pipeline_must_run(threads, "medial.simplify", text, inputs, outputs);
+}
+
+static size_t simplified_count(const creased *c, int threads, const char *text, qmat_digest *digest) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  simplify(c, threads, text, outputs);
+  const size_t count = ((qmat_medial *)outputs[0])->sphere_count;
+  *digest = outputs[0]->digest;
+  qmat_value_release(outputs[0]);
+  qmat_value_release(outputs[1]);
+  return count;
+}
+
+/* The creases of a bracket are straight: keeping them takes fewer spheres. Those of a curved sheet are not. */
+static void test_features_auto_takes_the_better_choice(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    int resolution;
+    bool keeps;
+  } cases[] = {{"l-bracket", 8, true}, {"curved-sheet", 16, false}};
+  for (size_t i = 0; i < 2; i++) {
+    creased c;
+    qmat_digest sharp, none, chosen;
+    make_creased(&c, cases[i].name, cases[i].resolution, "features=auto");
+    const size_t kept = simplified_count(&c, 0, "epsilon=1.5% features=sharp", &sharp);
+    const size_t free = simplified_count(&c, 0, "epsilon=1.5% features=none", &none);
+    print_message("%zu %zu\n", kept, free);
+    assert_true(cases[i].keeps ? kept < free : free < kept);
+    assert_int_equal(simplified_count(&c, 0, "epsilon=1.5% features=auto", &chosen), cases[i].keeps ? kept : free);
+    assert_memory_equal(&chosen, cases[i].keeps ? &sharp : &none, sizeof chosen);
+    free_creased(&c);
+  }
+}
+
+static void test_more_starts_are_never_worse_and_the_same_on_any_thread(void **state) {
+  (void)state;
+  creased c;
+  qmat_digest first, one, several, again;
+  size_t fewer = 0;
+  make_creased(&c, "octopus", 6, "features=none");
+  for (int i = 0; i < 3; i++) {
+    static const char *const texts[][2] = {{"epsilon=8%", "epsilon=8% effort=6"},
+                                           {"epsilon=6%", "epsilon=6% effort=6"},
+                                           {"epsilon=5%", "epsilon=5% effort=6"}};
+    const size_t alone = simplified_count(&c, 0, texts[i][0], &first);
+    const size_t best = simplified_count(&c, 1, texts[i][1], &one);
+    assert_true(best <= alone);
+    fewer += best < alone;
+    assert_int_equal(simplified_count(&c, 2, texts[i][1], &several), best);
+    assert_int_equal(simplified_count(&c, 8, texts[i][1], &again), best);
+    assert_memory_equal(&one, &several, sizeof one);
+    assert_memory_equal(&one, &again, sizeof one);
+  }
+  assert_true(fewer > 0);
+  free_creased(&c);
+}
+
+/* --- items side by side --------------------------------------------------------------------------------------------
+ */
+
+typedef struct {
+  _Atomic size_t done;
+  size_t first_failure, last_failure;
+  uint8_t ran[64];
+} items;
+
+static qmat_status run_item(qmat_context *own, void *user, size_t item) {
+  items *all = user;
+  assert_int_equal(qmat_threads(own), 1);
+  all->ran[item]++;
+  if (item == all->first_failure || item == all->last_failure)
+    return qmat_fail(own, QMAT_ERROR_GEOMETRY, "item %zu", item);
+  atomic_fetch_add(&all->done, 1);
+  return qmat_progress(own, 0, 0, "ignored");
+}
+
+static void test_every_item_runs_once(void **state) {
+  (void)state;
+  for (int threads = 1; threads <= 8; threads *= 2) {
+    qmat_context context = {.threads = threads};
+    items all = {.first_failure = 64, .last_failure = 64};
+    assert_int_equal(qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items"), QMAT_OK);
+    for (size_t i = 0; i < 64; i++) assert_int_equal(all.ran[i], 1);
+    assert_int_equal(atomic_load(&all.done), 64);
+    qmat_context_uninit(&context);
+  }
+}
+
+static void test_a_failure_ends_it_with_its_error(void **state) {
+  (void)state;
+  qmat_context context = {.threads = 1};
+  items all = {.first_failure = 5, .last_failure = 9};
+  assert_int_equal(qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items"), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "item 5");
+  assert_int_equal(all.ran[6], 0);
+  qmat_context_uninit(&context);
+}
+
+static bool refuse_later(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                         const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return --*(int *)user > 0;
+}
+
+static void test_it_can_be_cancelled(void **state) {
+  (void)state;
+  for (int calls = 1; calls <= 2; calls++) {
+    int left = calls;
+    qmat_context context = {.threads = 2, .progress = refuse_later, .progress_user = &left};
+    items all = {.first_failure = 64, .last_failure = 64};
+    const qmat_status status = qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items");
+    if (calls == 1) assert_int_equal(status, QMAT_CANCELLED);
+    if (status != QMAT_OK) assert_int_equal(context.error.status, QMAT_CANCELLED);
+    qmat_context_uninit(&context);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_features_auto_takes_the_better_choice),
+      cmocka_unit_test(test_more_starts_are_never_worse_and_the_same_on_any_thread),
+      cmocka_unit_test(test_every_item_runs_once),
+      cmocka_unit_test(test_a_failure_ends_it_with_its_error),
+      cmocka_unit_test(test_it_can_be_cancelled),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
