@@ -60,7 +60,6 @@ static void test_features_auto_takes_the_better_choice(void **state) {
     make_creased(&c, cases[i].name, cases[i].resolution, "features=auto");
     const size_t kept = simplified_count(&c, 0, "epsilon=1.5% features=sharp", &sharp);
     const size_t free = simplified_count(&c, 0, "epsilon=1.5% features=none", &none);
-    print_message("%zu %zu\n", kept, free);
     assert_true(cases[i].keeps ? kept < free : free < kept);
     assert_int_equal(simplified_count(&c, 0, "epsilon=1.5% features=auto", &chosen), cases[i].keeps ? kept : free);
     assert_memory_equal(&chosen, cases[i].keeps ? &sharp : &none, sizeof chosen);
