@@ -131,6 +131,9 @@ typedef struct qmat_node {
    * input, 0 for an unconnected one. Fails like `check`. Called by qmat_node_run, and by the runner as soon as the
    * counts are known. */
   qmat_status (*check_counts)(qmat_context *context, const void *params, const size_t counts[]);
+  /* Whether an input is read with these parameters; NULL: each is. One that is not is as if unconnected, and what only
+   * it needs does not run. */
+  bool (*reads)(const void *params, size_t input);
   /* Makes every output: sealed, with one reference, which the caller releases. On failure no output is set. Scratch
    * memory comes from context->arena. */
   qmat_status (*run)(qmat_context *context, const void *params, const qmat_value *const inputs[],

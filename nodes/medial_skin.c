@@ -10,6 +10,7 @@
 #include "nodes/descriptor/libraries.h"
 #include "nodes/skin/envelope_surface.h"
 #include "nodes/skin/flat_primitives.h"
+#include "nodes/skin/skin_decimate.h"
 #include "nodes/skin/skin_surface_cgal.h"
 
 /* The limit of balls for CGAL: so many may take 45 seconds. */
@@ -22,8 +23,8 @@ enum { METHOD_ENVELOPE, METHOD_SKIN_SURFACE };
 
 typedef struct medial_skin_params {
   int method;
-  int64_t resolution, detail, subdivisions;
-  double shrink, spacing;
+  int64_t resolution, detail, subdivisions, triangles;
+  double shrink, spacing, error;
 } medial_skin_params;
 
 typedef struct skin {
@@ -36,6 +37,8 @@ typedef struct skin {
   qmat_envelope *envelope; /* of `solid` */
   qmat_skin_triangles surface;
   qmat_envelope_grid grid;
+  size_t contour_triangle_count; /* before decimation */
+  qmat_skin_errors errors;
   size_t ball_count;
 } skin;
 
@@ -227,6 +230,17 @@ static qmat_status count_components(skin *s, size_t *components) {
   return QMAT_OK;
 }
 
+static qmat_status make_envelope_surface(skin *s) {
+  const medial_skin_params *p = s->params;
+  qmat_status status = qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
+                                             1 / (double)p->resolution, (int)p->detail, &s->surface, &s->grid);
+  s->contour_triangle_count = s->surface.triangle_count;
+  if (status == QMAT_OK && p->error > 0) {
+    status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
+  }
+  return status;
+}
+
 /* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
 static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
   const qmat_skin_triangles *surface = &s->surface;
@@ -277,6 +291,13 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
                                     (json_int_t)s->grid.refined_cell_count, "smallest_radius", s->grid.smallest_radius,
                                     "raised_radii", (json_int_t)s->grid.raised_sphere_count)
                         : json_pack("{s:I}", "balls", (json_int_t)s->ball_count);
+  if (details && envelope && s->params->error > 0) {
+    json_t *decimated =
+        json_pack("{s:I, s:f, s:f}", "contour_triangles", (json_int_t)s->contour_triangle_count, "error_at_samples",
+                  s->errors.to_envelope, "error_from_contour", s->errors.from_original);
+    if (!decimated || json_object_update(details, decimated)) status = qmat_fail_memory(s->context, "the report");
+    json_decref(decimated);
+  }
   if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details))
     status = qmat_fail_memory(s->context, "the report");
   json_decref(root);
@@ -299,8 +320,7 @@ static qmat_status make_closed_surface(skin *s) {
                         solid->triangle_count, &s->envelope);
   if (status != QMAT_OK) return status;
   if (params->method != METHOD_ENVELOPE) return make_skin_surface(s);
-  return qmat_envelope_surface(s->context, s->envelope, s->spheres, solid->sphere_count, 1 / (double)params->resolution,
-                               (int)params->detail, &s->surface, &s->grid);
+  return make_envelope_surface(s);
 }
 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
@@ -351,6 +371,10 @@ static const qmat_param params[] = {
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
     QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small"),
+    QMAT_LENGTH(medial_skin_params, error, 2e-3, 0, 0.1,
+                "envelope: the distance from the envelope that decimation may make; 0: no decimation"),
+    QMAT_INT(medial_skin_params, triangles, "triangles", 0, 0, 100000000,
+             "envelope: at most so many, though the distance then exceeds error; 0: as many as error needs"),
     QMAT_FLOAT(medial_skin_params, shrink, "1", 0.5, 0.05, 0.95,
                "skin_surface: near 1 the union of the balls, near 0 smoother and fuller between them"),
     QMAT_FLOAT(medial_skin_params, spacing, "radius", 0.75, 0.02, 10,
@@ -375,19 +399,22 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 2,
+    .version = 3,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
         "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
-        "the report counts them. The mesh is a closed 2-manifold.\n\n"
+        "the report counts them. The mesh is a closed 2-manifold. Narrow crevices may fill, up to half a cell. Edges "
+        "are "
+        "then collapsed (CGAL) as far as `error` and the topology allow.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
         "as prisms of three sides. The counts and distances of the report are without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
         "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
-        "The report has the largest distance from the envelope at vertices and at triangle centroids, as a fraction of "
-        "the diagonal of the envelope's bounding box.",
+        "The report has the largest distance from the envelope at vertices, at triangle centroids and at 15 points of "
+        "each triangle (error_at_samples), and that from the vertices before decimation to the mesh "
+        "(error_from_contour), as fractions of the diagonal of the envelope's bounding box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",

@@ -311,6 +311,15 @@ static qmat_status check_counts(qmat_context *context, const void *data, const s
   return QMAT_OK;
 }
 
+/* A medial mesh alone needs no skin, and colliders alone need neither that nor errors. */
+static bool reads(const void *data, size_t input) {
+  const scene_write_params *params = data;
+  const bool is_robot = params->format >= FORMAT_URDF,
+             is_plain = params->format == FORMAT_MA || params->format == FORMAT_PLY;
+  if (input == IN_SKIN) return !is_robot && !is_plain;
+  return input != IN_COLLIDERS || !is_plain;
+}
+
 static qmat_status check_spheres(qmat_context *context, const qmat_value *const inputs[]) {
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   for (size_t i = 0; i < count; i++) {
@@ -503,5 +512,6 @@ const qmat_node qmat_node_scene_write = {
     .report_summary = &qmat_medial_summary,
     .check_counts = check_counts,
     .effort = 2,
+    .reads = reads,
     .run = run,
 };

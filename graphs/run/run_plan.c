@@ -99,7 +99,18 @@ static bool needs_own_step(const run_planner *planner, size_t index) {
   return true;
 }
 
-static void plan_needs(run_planner *planner) {
+/* Marks the nodes that a node needs when it runs in a format. `params` is room for its parameters. */
+static void mark_inputs(run_planner *planner, size_t index, int format, void *params) {
+  const qmat_graph_node *node = &planner->graph->nodes[index];
+  const qmat_param *param = qmat_output_format_param(node->type);
+  if (node->type->params_size > 0) memcpy(params, node->params, node->type->params_size);
+  if (param) memcpy((char *)params + param->offset, &format, sizeof format);
+  for (size_t port = 0; port < qmat_input_count(node->type); port++)
+    if (node->links[port].node != SIZE_MAX && (!node->type->reads || node->type->reads(params, port)))
+      planner->needed[node->links[port].node] = true;
+}
+
+static qmat_status plan_needs(run_planner *planner) {
   const qmat_graph *graph = planner->graph;
   const qmat_run_options *options = planner->options;
   for (size_t i = 0; i < options->want_count; i++) planner->needed[options->wants[i].node] = true;
@@ -114,16 +125,22 @@ static void plan_needs(run_planner *planner) {
     for (size_t i = 0; i < graph->node_count; i++)
       if (qmat_output_count(graph->nodes[i].type) == 0) planner->needed[i] = true;
   }
+  size_t largest = 1;
+  for (size_t i = 0; i < graph->node_count; i++)
+    if (graph->nodes[i].type->params_size > largest) largest = graph->nodes[i].type->params_size;
+  void *params = qmat_alloc(largest, 1);
+  if (!params) return qmat_fail_memory(planner->context, "plan");
   for (size_t k = graph->node_count; k-- > 0;) {
     size_t index = graph->order[k];
-    bool runs = planner->needed[index];
-    for (size_t i = 0; i < planner->run->file_count; i++)
-      if (graph->outputs[planner->run->files[i].output].node == index) runs = true;
-    if (!runs || planner->replaced[index]) continue;
+    if (planner->replaced[index]) continue;
     const qmat_graph_node *node = &graph->nodes[index];
-    for (size_t port = 0; port < qmat_input_count(node->type); port++)
-      if (node->links[port].node != SIZE_MAX) planner->needed[node->links[port].node] = true;
+    if (planner->needed[index]) mark_inputs(planner, index, choice_of(node->type, node->params), params);
+    for (size_t i = 0; i < planner->run->file_count; i++)
+      if (graph->outputs[planner->run->files[i].output].node == index)
+        mark_inputs(planner, index, planner->formats[i], params);
   }
+  qmat_free(params);
+  return QMAT_OK;
 }
 
 static bool is_forced(const qmat_run_options *options, size_t node) {
@@ -212,7 +229,7 @@ static qmat_status plan_slots(run_planner *planner) {
     for (size_t port = 0; port < qmat_input_count(node->type); port++) {
       const qmat_graph_link *link = &node->links[port];
       step->inputs[port] = SIZE_MAX;
-      if (link->node == SIZE_MAX) continue;
+      if (link->node == SIZE_MAX || (node->type->reads && !node->type->reads(step->params, port))) continue;
       status = find_slot(planner, link->node, link->port, &step->inputs[port]);
       if (status != QMAT_OK) return status;
     }
@@ -276,8 +293,8 @@ qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const 
   for (size_t i = 0; i < options->given_count; i++) planner.replaced[options->given[i].node] = true;
   status = plan_files(&planner);
   if (status != QMAT_OK) goto cleanup;
-  plan_needs(&planner);
-  status = plan_steps(&planner);
+  status = plan_needs(&planner);
+  if (status == QMAT_OK) status = plan_steps(&planner);
   if (status == QMAT_OK) status = plan_slots(&planner);
   if (status != QMAT_OK) goto cleanup;
   name_run(run);

@@ -9,7 +9,6 @@
 #include <array>
 #include <exception>
 #include <new>
-#include <utility>
 #include <vector>
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -20,13 +19,15 @@ using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data
  * one plane. CGAL's convex_hull_3 goes by addresses of memory there, so its triangles differ between runs. */
 qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count) {
   try {
-    std::vector<std::pair<Kernel::Point_3, uint32_t>> given;
-    given.reserve(count);
+    /* A shortage of memory must come before CGAL notes the new cells, as in initial/delaunay_cgal.cpp. */
+    constexpr size_t kMostCells = Delaunay::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
+    Delaunay delaunay;
+    auto &cells = delaunay.tds().cells();
     for (size_t i = 0; i < count; i++) {
+      if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
       const double *p = points + 3 * i;
-      given.emplace_back(Kernel::Point_3(p[0], p[1], p[2]), static_cast<uint32_t>(i));
+      delaunay.insert(Kernel::Point_3(p[0], p[1], p[2]))->info() = static_cast<uint32_t>(i);
     }
-    const Delaunay delaunay(given.begin(), given.end());
     if (delaunay.dimension() < 3) return QMAT_ERROR_GEOMETRY;
     std::vector<Delaunay::Cell_handle> outside;
     delaunay.incident_cells(delaunay.infinite_vertex(), std::back_inserter(outside));

@@ -23,14 +23,15 @@ typedef struct skin_result {
   qmat_report *report;
 } skin_result;
 
-/* Runs the node with the parameters of `settings`: "name=value name=value". Releases the medial mesh. */
+/* Runs the node with the parameters of `settings`: "name=value name=value", without decimation where it does not set
+ * the error. Releases the medial mesh. */
 static qmat_status try_skin(qmat_context *context, qmat_medial *medial, const char *settings, skin_result *result) {
   const qmat_node *node = &qmat_node_medial_skin;
   double params[16];
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
   char text[256];
-  snprintf(text, sizeof text, "%s", settings);
+  snprintf(text, sizeof text, "%s%s", strstr(settings, "error=") ? "" : "error=0 ", settings);
   char *rest = text;
   for (char *word; (word = strtok_r(rest, " ", &rest)) != NULL;) {
     char *value = strchr(word, '=');
@@ -243,6 +244,101 @@ static void test_a_sphere_has_its_area_and_volume(void **unused) {
   assert_near(number_of(result, "error_at_vertices"), off / diagonal, 1e-12);
   assert_true(number_of(result, "error_at_centroids") < 1e-4);
   assert_near(number_of(result, "raised_radii"), 0, 0);
+  release(result);
+}
+
+/* The largest |F| at points spread over each triangle, more of them than the node takes. */
+static double farthest_from(const qmat_envelope *envelope, const qmat_mesh *mesh) {
+  enum { PARTS = 7 };
+  double most = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    for (int i = 0; i <= PARTS; i++) {
+      for (int j = 0; i + j <= PARTS; j++) {
+        const double weights[3] = {(double)i / PARTS, (double)j / PARTS, (double)(PARTS - i - j) / PARTS};
+        double point[3] = {0, 0, 0};
+        for (size_t k = 0; k < 9; k++)
+          point[k % 3] += weights[k / 3] * mesh->positions[3 * (size_t)mesh->triangles[3 * t + k / 3] + k % 3];
+        most = fmax(most, fabs(qmat_envelope_distance(envelope, point, NULL)));
+      }
+    }
+  }
+  return most;
+}
+
+static void test_decimation_leaves_few_triangles_within_its_error(void **unused) {
+  (void)unused;
+  static const char *const settings[] = {"error=0.1%", "error=0.2%", "error=1%"};
+  qmat_context context = {0};
+  size_t last = SIZE_MAX / 2;
+  for (int i = 0; i < 3; i++) {
+    qmat_medial *medial = ball();
+    qmat_envelope *envelope;
+    assert_int_equal(qmat_envelope_of_medial(&context, medial, &envelope), QMAT_OK);
+    skin_result result = skin(medial, settings[i]);
+    const double error = (double[]){1e-3, 2e-3, 1e-2}[i], diagonal = number_of(result, "diagonal");
+    check_shape(result, 2, 1, 4 * PI * 4, 4.0 / 3 * PI * 8, 12 * error);
+    assert_true(number_of(result, "contour_triangles") > 50000);
+    assert_true(3 * result.mesh->triangle_count < 2 * last);
+    last = result.mesh->triangle_count;
+    if (i == 1) assert_true(last < 2000);
+    /* The cells' own error is the share beyond what decimation may add. */
+    const double farthest = farthest_from(envelope, result.mesh) / diagonal;
+    assert_true(farthest <= error + 1.2e-4);
+    assert_near(number_of(result, "error_at_samples"), farthest, 0.15 * error);
+    assert_true(number_of(result, "error_from_contour") <= error &&
+                number_of(result, "error_from_contour") > error / 4);
+    qmat_envelope_free(envelope);
+    release(result);
+  }
+  qmat_context_uninit(&context);
+}
+
+static void test_a_number_of_triangles_comes_before_the_error(void **unused) {
+  (void)unused;
+  skin_result free_of_it = skin(ring(), "error=0.2%"), enough = skin(ring(), "error=0.2% triangles=1000000");
+  assert_memory_equal(&free_of_it.mesh->base.digest, &enough.mesh->base.digest, sizeof enough.mesh->base.digest);
+  char settings[64];
+  snprintf(settings, sizeof settings, "error=0.2%% triangles=%zu", free_of_it.mesh->triangle_count / 2);
+  skin_result few = skin(ring(), settings);
+  assert_manifold(few.mesh);
+  assert_true(few.mesh->triangle_count <= free_of_it.mesh->triangle_count / 2);
+  assert_near(number_of(few, "euler_characteristic"), 0, 0);
+  assert_true(number_of(few, "error_at_samples") > 2e-3);
+  release(few);
+  release(enough);
+  release(free_of_it);
+}
+
+static void test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology(void **unused) {
+  (void)unused;
+  static const char *const plain[] = {"resolution=8 detail=0", "resolution=16 detail=2", "resolution=40 detail=1"};
+  static const char *const lean[] = {"resolution=8 detail=0 error=2%", "resolution=16 detail=2 error=1%",
+                                     "resolution=40 detail=1 error=0.2%"};
+  size_t fewer = 0;
+  for (uint64_t seed = 0; seed < 12; seed++) {
+    skin_result before = skin(soup(seed), plain[seed % 3]), after = skin(soup(seed), lean[seed % 3]);
+    assert_manifold(after.mesh);
+    assert_no_triangle_is_degenerate(after.mesh);
+    assert_near(number_of(after, "components"), number_of(before, "components"), 0);
+    assert_near(number_of(after, "euler_characteristic"), number_of(before, "euler_characteristic"), 0);
+    assert_near(number_of(after, "contour_triangles"), number_of(before, "triangles"), 0);
+    assert_true(after.mesh->triangle_count <= before.mesh->triangle_count);
+    fewer += 5 * after.mesh->triangle_count < 4 * before.mesh->triangle_count;
+    release(before);
+    release(after);
+  }
+  assert_true(fewer >= 10);
+}
+
+static void test_decimation_does_not_shorten_a_hair(void **unused) {
+  (void)unused;
+  /* A hair that is thinner than the error: all of it is near the envelope, its tip is not near the rest. */
+  const double spheres[] = {0, 0, 0, 1, 6, 0, 0, 0.03};
+  skin_result result = skin(medial_mesh(spheres, 2, (uint32_t[]){0, 1}, 1, NULL, 0), "error=1%");
+  double furthest = -INFINITY;
+  for (size_t v = 0; v < result.mesh->vertex_count; v++) furthest = fmax(furthest, result.mesh->positions[3 * v]);
+  assert_near(furthest, 6.03, 0.01 * number_of(result, "diagonal") * 1.05);
+  assert_true((double)result.mesh->triangle_count < 0.2 * number_of(result, "contour_triangles"));
   release(result);
 }
 
@@ -539,6 +635,10 @@ static void test_a_run_can_be_cancelled(void **unused) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_sphere_has_its_area_and_volume),
+      cmocka_unit_test(test_decimation_leaves_few_triangles_within_its_error),
+      cmocka_unit_test(test_a_number_of_triangles_comes_before_the_error),
+      cmocka_unit_test(test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology),
+      cmocka_unit_test(test_decimation_does_not_shorten_a_hair),
       cmocka_unit_test(test_finer_cells_come_closer),
       cmocka_unit_test(test_a_capsule_has_its_area_and_volume),
       cmocka_unit_test(test_a_cone_has_its_area_and_volume),

@@ -120,7 +120,7 @@ holds "the same bytes from mat and run, .ma" cmp box.ma again.ma
 expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 5% $coarse
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
 expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 5% $coarse
-holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 12
+holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 11
 cat >cage.usda <<'END'
 #usda 1.0
 def Mesh "cage" {
