@@ -64,6 +64,22 @@ qmat_status qmat_soup_add_facet(qmat_context *context, qmat_soup *soup, const ui
   return report_progress(context, soup->facet_count - 1, 1, "facets read");
 }
 
+qmat_status qmat_soup_add_skin(qmat_context *context, qmat_soup *soup, const uint32_t *joints, const double *weights,
+                               size_t count) {
+  const size_t all = 4 * soup->vertex_count, first = 4 * (soup->vertex_count - count);
+  if (qmat_grow((void **)&soup->joints, &soup->joint_capacity, all, sizeof *soup->joints) != 0 ||
+      qmat_grow((void **)&soup->weights, &soup->weight_capacity, all, sizeof *soup->weights) != 0)
+    return qmat_fail_memory(context, "the skin of a mesh");
+  for (size_t i = 4 * soup->skinned_count; i < first; i++) {
+    soup->joints[i] = 0;
+    soup->weights[i] = i % 4 == 0;
+  }
+  memcpy(soup->joints + first, joints, 4 * count * sizeof *joints);
+  memcpy(soup->weights + first, weights, 4 * count * sizeof *weights);
+  soup->skinned_count = soup->vertex_count;
+  return QMAT_OK;
+}
+
 /* The arrays of a cage: the offsets of array and count, and the bytes per item. */
 static const struct {
   size_t array, count, bytes;
@@ -150,6 +166,8 @@ void qmat_soup_uninit(qmat_soup *soup) {
   qmat_free(soup->facet_ordinals);
   qmat_free(soup->facet_lines);
   qmat_free(soup->corners);
+  qmat_free(soup->joints);
+  qmat_free(soup->weights);
   *soup = (qmat_soup){0};
 }
 
@@ -422,6 +440,27 @@ static qmat_status drop_repeats(conversion *c) {
   return QMAT_OK;
 }
 
+/* Of vertices that were welded the first lends its joints: seams repeat them. */
+static qmat_status fill_skin(conversion *c, const uint32_t *numbers, qmat_mesh *mesh) {
+  const qmat_soup *soup = c->soup;
+  if (soup->skinned_count == 0) return QMAT_OK;
+  mesh->joints = qmat_calloc(4 * mesh->vertex_count, sizeof *mesh->joints);
+  mesh->weights = qmat_calloc(4 * mesh->vertex_count, sizeof *mesh->weights);
+  if (!mesh->joints || !mesh->weights) return fail_shortage(c);
+  mesh->skinned_count = mesh->vertex_count;
+  for (size_t v = 0; v < soup->vertex_count; v++) {
+    if (numbers[v] == NONE) continue;
+    const size_t to = 4 * (size_t)numbers[v];
+    if (v < soup->skinned_count) {
+      memcpy(mesh->joints + to, soup->joints + 4 * v, 4 * sizeof *mesh->joints);
+      memcpy(mesh->weights + to, soup->weights + 4 * v, 4 * sizeof *mesh->weights);
+    } else {
+      mesh->weights[to] = 1;
+    }
+  }
+  return QMAT_OK;
+}
+
 /* Renumbers the used vertices in file order, and passes the arrays to the mesh. */
 static qmat_status fill_mesh(conversion *c, qmat_mesh *mesh) {
   const qmat_soup *soup = c->soup;
@@ -453,7 +492,7 @@ static qmat_status fill_mesh(conversion *c, qmat_mesh *mesh) {
   mesh->triangles = c->triangles;
   mesh->triangle_count = c->triangle_count;
   c->triangles = NULL;
-  return QMAT_OK;
+  return fill_skin(c, numbers, mesh);
 }
 
 static qmat_status fill_report(conversion *c, const qmat_mesh *mesh, const qmat_connectivity *facts, json_t *report) {

@@ -21,7 +21,11 @@ typedef struct qmat_soup {
   size_t corner_count, corner_capacity;
   uint32_t *corners;      /* corner_count vertex indices */
   double meters_per_unit; /* of the mesh; 0: unknown */
-  qmat_cage cage;         /* subdivision surfaces, copied into the mesh unchanged */
+  /* The skin, as in qmat_mesh: of the first vertices; a vertex without one follows joint 0. 0: no skin. */
+  size_t skinned_count, joint_capacity, weight_capacity;
+  uint32_t *joints; /* 4 * skinned_count */
+  double *weights;  /* 4 * skinned_count */
+  qmat_cage cage;   /* subdivision surfaces, copied into the mesh unchanged */
   size_t cage_capacities[QMAT_CAGE_ARRAYS];
   double deviation; /* of the facets from the surface that they stand for, copied into the mesh; 0: exact */
 } qmat_soup;
@@ -42,6 +46,10 @@ qmat_status qmat_soup_reserve(qmat_context *context, qmat_soup *soup, size_t ver
 /* Adds `count` vertices, 3 doubles each. qmat_soup_to_mesh checks that they are finite.
  * QMAT_ERROR_MEMORY, also beyond 2^32 - 1 vertices; QMAT_CANCELLED. */
 qmat_status qmat_soup_add_vertices(qmat_context *context, qmat_soup *soup, const double *positions, size_t count);
+
+/* Gives the newest `count` vertices joints and weights, 4 each, as in qmat_mesh. QMAT_ERROR_MEMORY. */
+qmat_status qmat_soup_add_skin(qmat_context *context, qmat_soup *soup, const uint32_t *joints, const double *weights,
+                               size_t count);
 
 /* Adds a facet of `count` corners. qmat_soup_to_mesh checks that the indices are in range. `ordinal` is the
  * facet's number in the file, from 0; `line` is 0 where the format has no lines. QMAT_ERROR_MEMORY, QMAT_CANCELLED. */

@@ -2,6 +2,7 @@
 /* medial.simplify: edge collapses by slab quadratic error and stability ratio, with both errors bounded. */
 #include <math.h>
 
+#include "core/geometry/joint_weights.h"
 #include "core/node.h"
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
@@ -40,16 +41,18 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
 }
 
 /* Makes the outputs of a result in the unit frame; `*medial` moves into them. */
-static qmat_status make_outputs(qmat_context *context, const qmat_simplify_figures *figures, qmat_surface *surface,
-                                double epsilon, double deviation, qmat_medial **medial, qmat_value *outputs[]) {
+static qmat_status make_outputs(qmat_context *context, const qmat_simplify_figures *figures, const qmat_mesh *mesh,
+                                qmat_surface *surface, double epsilon, double deviation, qmat_medial **medial,
+                                qmat_value *outputs[]) {
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
   if (status == QMAT_OK) status = qmat_simplify_report(context, figures, *medial, surface, epsilon, deviation, report);
   if (status == QMAT_OK) {
     double *spheres = (*medial)->spheres;
     qmat_frame_spheres_to_model(qmat_surface_frame(surface), spheres, (*medial)->sphere_count, spheres);
-    status = qmat_value_seal(context, &(*medial)->base);
+    status = qmat_skin_spheres(context, mesh, *medial);
   }
+  if (status == QMAT_OK) status = qmat_value_seal(context, &(*medial)->base);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   if (status != QMAT_OK) {
     qmat_value_release(report ? &report->base : NULL);
@@ -72,7 +75,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   medial_simplify_params own = *(const medial_simplify_params *)params;
   const double epsilon = own.epsilon;
   double deviation;
-  qmat_status status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &own, &deviation);
+  const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
+  qmat_status status = qmat_simplify_leave_deviation(context, mesh, &own, &deviation);
   if (status != QMAT_OK) return status;
   if (qmat_simplify_in_order(&own)) {
     qmat_ordered_collapses o = {.surface = NULL};
@@ -81,8 +85,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     status = medial ? run_in_order(context, &own, inputs, &o, medial, &figures)
                     : qmat_fail_memory(context, "the medial mesh");
     if (status == QMAT_OK)
-      status =
-          make_outputs(context, &figures, o.surface, o.params.epsilon > 0 ? epsilon : 0, deviation, &medial, outputs);
+      status = make_outputs(context, &figures, mesh, o.surface, o.params.epsilon > 0 ? epsilon : 0, deviation, &medial,
+                            outputs);
     qmat_value_release(medial ? &medial->base : NULL);
     qmat_ordered_collapses_uninit(&o);
     return status;
@@ -96,8 +100,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
                                     : qmat_simplification_run_starts(&s, &own, &best);
   best.figures.wanted_spheres = searches_epsilon(&own) ? (size_t)own.vertices : 0;
   if (status == QMAT_OK)
-    status = make_outputs(context, &best.figures, s.surface, kept > 0 ? kept + deviation : 0, deviation, &best.medial,
-                          outputs);
+    status = make_outputs(context, &best.figures, mesh, s.surface, kept > 0 ? kept + deviation : 0, deviation,
+                          &best.medial, outputs);
   qmat_simplified_uninit(&best);
   qmat_simplification_uninit(&s);
   return status;
@@ -135,7 +139,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 16,
+    .version = 17,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
@@ -145,7 +149,8 @@ const qmat_node qmat_node_medial_simplify = {
         "When no edge is left, spheres are fitted to the surface and edges tried again. Branch and bound then finds "
         "places beyond epsilon between the constraint points, and the collapses are repeated with these. Uncovered "
         "interior is filled with extra spheres. Spheres of radius zero are sharp features and stay on their creases. "
-        "The deviation of a subdivision surface (mesh.subdivide) is subtracted from epsilon.\n\n"
+        "The deviation of a subdivision surface (mesh.subdivide) is subtracted from epsilon. Of a skinned mesh each "
+        "sphere gets the mean joints and weights of the surface that it answers for.\n\n"
         "With vertices and epsilon=0 it is run at several epsilons, until the least one that leaves at most that "
         "number "
         "is known to 4 %; it is at least finest.\n\n"

@@ -10,6 +10,7 @@
 #include "core/node.h"
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/measure/point_grid.h"
 #include "nodes/mesh/border_weld.h"
 #include "nodes/mesh/half_edges.h"
 #include "nodes/mesh/hole_cgal.h"
@@ -311,7 +312,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   return QMAT_OK;
 }
 
-/* The nearest given vertex lends its joints; those that stay are found by their position. */
+/* The nearest given vertex lends its joints. */
 static qmat_status fill_skin(const solidifier *s, qmat_mesh *mesh) {
   const qmat_mesh *given = s->mesh;
   if (given->skinned_count == 0) return QMAT_OK;
@@ -319,27 +320,15 @@ static qmat_status fill_skin(const solidifier *s, qmat_mesh *mesh) {
   mesh->weights = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->weights);
   if (!mesh->joints || !mesh->weights) return fail_shortage(s);
   mesh->skinned_count = mesh->vertex_count;
-  size_t next = 0;
-  for (size_t v = 0; v < mesh->vertex_count; v++) {
-    const double *p = mesh->positions + 3 * v;
-    size_t nearest = next;
-    while (nearest < given->vertex_count && memcmp(given->positions + 3 * nearest, p, 3 * sizeof *p) != 0) nearest++;
-    if (nearest < given->vertex_count) {
-      next = nearest + 1; /* vertices that stay keep their order */
-    } else {
-      double least = INFINITY;
-      for (size_t i = 0; i < given->vertex_count; i++) {
-        const double distance = qmat_point_distance(given->positions + 3 * i, p);
-        if (distance < least) nearest = i;
-        least = fmin(least, distance);
-      }
-    }
+  qmat_point_grid grid;
+  qmat_status status = qmat_point_grid_init(s->context, given->positions, given->vertex_count, &grid);
+  for (size_t v = 0; v < mesh->vertex_count && status == QMAT_OK; v++) {
+    const size_t nearest = qmat_point_grid_nearest(&grid, mesh->positions + 3 * v);
     memcpy(mesh->joints + 4 * v, given->joints + 4 * nearest, 4 * sizeof *mesh->joints);
     memcpy(mesh->weights + 4 * v, given->weights + 4 * nearest, 4 * sizeof *mesh->weights);
-    const qmat_status status = qmat_progress(s->context, v, mesh->vertex_count, "vertices");
-    if (status != QMAT_OK) return status;
+    if (v % 1024 == 0) status = qmat_progress(s->context, v, mesh->vertex_count, "vertices");
   }
-  return QMAT_OK;
+  return status;
 }
 
 /* The result, without joints and weights, and unsealed. */

@@ -15,13 +15,15 @@ typedef struct target {
 } target;
 
 static qmat_status add_to_soup(void *user, size_t which, const double *positions, size_t vertex_count,
-                               const uint32_t *corners, size_t triangle_count) {
+                               const uint32_t *corners, size_t triangle_count, const uint32_t *joints,
+                               const double *weights) {
   target *to = user;
   qmat_soup *soup = &to->soups[which];
   size_t first = soup->vertex_count;
   if (vertex_count > UINT32_MAX - first) return qmat_fail_memory(to->context, "more than 2^32 - 1 vertices");
   qmat_status status = qmat_soup_reserve(to->context, soup, vertex_count, triangle_count, 3 * triangle_count);
   if (status == QMAT_OK) status = qmat_soup_add_vertices(to->context, soup, positions, vertex_count);
+  if (status == QMAT_OK && joints) status = qmat_soup_add_skin(to->context, soup, joints, weights, vertex_count);
   for (size_t t = 0; t < triangle_count && status == QMAT_OK; t++) {
     uint32_t triangle[3];
     for (size_t k = 0; k < 3; k++) triangle[k] = (uint32_t)first + corners[3 * t + k];

@@ -36,6 +36,7 @@
 #pragma GCC diagnostic pop
 #endif
 
+#include "core/geometry/joint_weights.h"
 #include "io/draco_draco.h"
 #include "io/gltf/gltf_tinygltf.h"
 #include "io/stretch.h"
@@ -203,6 +204,7 @@ class Reader {
         check_room(shape->positions.size() / 3, shape->corners.size() / 3);
         world_ = shape->positions;
         add_targets(primitive, mesh.weights, world_);
+        find_joints(*shape, joint_count_of(meshes[which_]));
         emit(*shape);
       }
     }
@@ -438,6 +440,38 @@ class Reader {
     return scale > 0 && std::isfinite(scale) ? scale : 1;
   }
 
+  /* The number of joints that every skin of the mesh has; 0: it has none. */
+  size_t joint_count_of(size_t mesh) const {
+    size_t least = 0;
+    for (const qmat_tinygltf::Node &node : model_.nodes) {
+      if (node.mesh != static_cast<int>(mesh) || node.skin < 0) continue;
+      const size_t count = model_.skins[static_cast<size_t>(node.skin)].joints.size();
+      least = least == 0 ? count : std::min(least, count);
+    }
+    return least;
+  }
+
+  /* The strongest joints of each vertex of all sets. Those that the skin does not have are left out, as in engines. */
+  void find_joints(const Shape &shape, size_t joint_count) {
+    joints_.clear();
+    weights_.clear();
+    if (shape.sets == 0 || joint_count == 0) return;
+    const size_t vertices = shape.positions.size() / 3;
+    joints_.resize(4 * vertices);
+    weights_.resize(4 * vertices);
+    std::vector<uint32_t> joints(4 * shape.sets);
+    std::vector<double> weights(4 * shape.sets);
+    for (size_t v = 0; v < vertices; v++) {
+      for (size_t i = 0; i < joints.size(); i++) {
+        const size_t from = 4 * (i / 4 * vertices + v) + i % 4;
+        const bool exists = shape.joints[from] < static_cast<double>(joint_count);
+        joints[i] = exists ? static_cast<uint32_t>(shape.joints[from]) : 0;
+        weights[i] = exists ? shape.weights[from] : 0;
+      }
+      qmat_strongest_joints(joints.data(), weights.data(), joints.size(), &joints_[4 * v], &weights_[4 * v]);
+    }
+  }
+
   void apply_skin(const Shape &shape, size_t skin_id, const std::vector<double> &local) {
     const std::vector<Matrix> matrices = joint_matrices(model_.skins[skin_id]);
     const size_t vertices = local.size() / 3;
@@ -503,7 +537,8 @@ class Reader {
       for (size_t i = 0; i + 2 < reversed_.size(); i += 3) std::swap(reversed_[i + 1], reversed_[i + 2]);
       corners = &reversed_;
     }
-    must(sink_(user_, which_, world_.data(), world_.size() / 3, corners->data(), corners->size() / 3));
+    must(sink_(user_, which_, world_.data(), world_.size() / 3, corners->data(), corners->size() / 3,
+               joints_.empty() ? nullptr : joints_.data(), joints_.empty() ? nullptr : weights_.data()));
     vertices_ += world_.size() / 3;
     triangles_ += corners->size() / 3;
   }
@@ -519,7 +554,8 @@ class Reader {
   std::vector<std::vector<std::unique_ptr<Shape>>> shapes_; /* by mesh and primitive, read when first placed */
   size_t which_ = 0;                                        /* index among the requested meshes */
   std::vector<double> world_;
-  std::vector<uint32_t> reversed_;
+  std::vector<uint32_t> reversed_, joints_; /* joints and weights: 4 a vertex, or empty */
+  std::vector<double> weights_;
   bool mirrored_ = false; /* whether the transform mirrors: triangles are reversed */
   size_t vertices_ = 0, triangles_ = 0;
 };

@@ -17,10 +17,12 @@ typedef struct qmat_gltf_bytes {
   size_t size;
 } qmat_gltf_bytes;
 
-/* Receives the triangles of one primitive: 3 * vertex_count doubles, and 3 * triangle_count ids below vertex_count.
- * `which` is the mesh's index among the requested meshes, 0 for a scene. Any status but QMAT_OK stops the reader. */
+/* Receives the triangles of one primitive: 3 * vertex_count doubles, and 3 * triangle_count ids below vertex_count;
+ * `joints` and `weights` have 4 a vertex as in qmat_mesh, or are NULL in world space and without a skin. `which` is the
+ * mesh's index among the requested meshes, 0 for a scene. Any status but QMAT_OK stops the reader. */
 typedef qmat_status qmat_gltf_sink(void *user, size_t which, const double *positions, size_t vertex_count,
-                                   const uint32_t *corners, size_t triangle_count);
+                                   const uint32_t *corners, size_t triangle_count, const uint32_t *joints,
+                                   const double *weights);
 
 typedef struct qmat_gltf_counts {
   size_t primitives_read, primitives_skipped, meshes_placed, meshes_skinned;
@@ -28,11 +30,11 @@ typedef struct qmat_gltf_counts {
 
 /* Passes triangles to `sink`. If `meshes` is NULL: the first scene in world space, node by node, parents first. Else:
  * the meshes with those mesh_count valid ids, each in its own space, with the mesh's morph weights and without
- * skinning. `text` is the JSON of qmat_gltf_document_read; its buffer views refer to `buffers`. Indices, joint ids and
- * Draco data are checked here because they depend on the data. `scales` (mesh_count numbers, NULL with `meshes`) gets
- * for each mesh the largest length that its nodes, or the joints of its skin, make of a unit; 1 where that is no
- * length. No exception escapes. QMAT_ERROR_FORMAT with the element, QMAT_ERROR_GEOMETRY beyond `most` vertices or
- * triangles, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. */
+ * skinning, but with joints and weights where a node has a skin. `text` is the JSON of qmat_gltf_document_read; its
+ * buffer views refer to `buffers`. Indices, joint ids and Draco data are checked here because they depend on the data.
+ * `scales` (mesh_count numbers, NULL with `meshes`) gets for each mesh the largest length that its nodes, or the joints
+ * of its skin, make of a unit; 1 where that is no length. No exception escapes. QMAT_ERROR_FORMAT with the element,
+ * QMAT_ERROR_GEOMETRY beyond `most` vertices or triangles, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. */
 qmat_status qmat_gltf_triangles(qmat_context *context, const char *text, size_t text_length,
                                 const qmat_gltf_bytes *buffers, size_t most, const uint32_t *meshes, size_t mesh_count,
                                 double *scales, qmat_gltf_sink *sink, void *user, qmat_gltf_counts *counts);

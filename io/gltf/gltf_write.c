@@ -30,6 +30,7 @@ typedef struct medial_text {
   char *flat;           /* base64 of the plain form; NULL: none */
   bool flat_floats;
   double flat_loss; /* as `loss` */
+  bool has_joints;  /* the plain form has the joints of the spheres */
 } medial_text;
 
 /* Encodes the medial mesh, decodes it again, and measures the loss. */
@@ -55,7 +56,11 @@ static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial,
   uint8_t *bytes = NULL;
   size_t size = 0;
   qmat_medial *decoded = NULL;
-  qmat_status status = qmat_flat_encode(context, medial, NULL, text->origin, text->flat_floats, &bytes, &size);
+  uint16_t *joints = text->has_joints ? qmat_alloc(4 * medial->sphere_count, sizeof *joints) : NULL;
+  if (text->has_joints && !joints) return qmat_fail_memory(context, "the medial mesh as text");
+  for (size_t i = 0; joints && i < 4 * medial->sphere_count; i++) joints[i] = (uint16_t)medial->joints[i];
+  const qmat_sphere_data data = {.joints = joints, .weights = medial->weights};
+  qmat_status status = qmat_flat_encode(context, medial, &data, text->origin, text->flat_floats, &bytes, &size);
   if (status == QMAT_OK) status = qmat_flat_decode(context, bytes, size, text->origin, &decoded);
   if (status == QMAT_OK) {
     qmat_free(text->flat);
@@ -65,6 +70,7 @@ static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial,
   }
   if (decoded) qmat_value_release(&decoded->base);
   qmat_free(bytes);
+  qmat_free(joints);
   return status;
 }
 
@@ -80,12 +86,16 @@ static qmat_status make_flat_text(qmat_context *context, const qmat_medial *medi
   return status;
 }
 
+/* `has_skin`: a node with the mesh has one, which joints refer to. */
 static qmat_status make_medial_text(qmat_context *context, const qmat_medial *medial, const double *origin,
-                                    const qmat_gltf_options *options, medial_text *text) {
+                                    bool has_skin, const qmat_gltf_options *options, medial_text *text) {
   double position_range, radius_range, allowed = options->quantisation;
   bool choose_position = options->position_bits == 0, choose_radius = options->radius_bits == 0;
   qmat_draco_medial_ranges(medial, &position_range, &radius_range);
-  *text = (medial_text){.position_bits = options->position_bits, .radius_bits = options->radius_bits, .origin = origin};
+  *text = (medial_text){.position_bits = options->position_bits,
+                        .radius_bits = options->radius_bits,
+                        .origin = origin,
+                        .has_joints = has_skin && medial->skinned_count > 0};
   if (choose_position) text->position_bits = qmat_draco_bits_for(3, position_range, allowed / 2);
   if (choose_radius) text->radius_bits = qmat_draco_bits_for(1, radius_range, allowed / 2);
 
@@ -151,6 +161,7 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
     done = done && qmat_gltf_set(extras, "qmat_flat", json_string(text->flat)) &&
            qmat_gltf_set(extras, "qmat_flat_format", json_string(text->flat_floats ? "f32" : "u16")) &&
            qmat_gltf_set(extras, "qmat_flat_quantisation", json_real(text->flat_loss));
+    if (text->has_joints) done = done && qmat_gltf_set(extras, "qmat_skinned", json_true());
   }
   static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
   for (int k = 0; k < 3 && done && !is_zero(text->origin); k++)
@@ -458,7 +469,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   const size_t nodes_before = json_array_size(json_object_get(document->root, "nodes"));
   double origin[3];
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
-  qmat_status status = make_medial_text(context, addition->medial, origin, &options, &text);
+  qmat_status status = make_medial_text(context, addition->medial, origin, of_mesh, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
   const double skin_moved = options.compress_skin ? fmax(options.quantisation, DBL_MIN) : 0;
   if (status == QMAT_OK && mesh) status = qmat_gltf_skin_put(context, mesh, origin, skin_moved, &data, &document->data);

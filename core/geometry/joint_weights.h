@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_CORE_GEOMETRY_JOINT_WEIGHTS_H
+#define QMAT_CORE_GEOMETRY_JOINT_WEIGHTS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct qmat_mesh;
+struct qmat_medial;
+
+/* Joints and weights of skinned meshes and of the spheres that describe them. */
+
+/* The four strongest of `count` influences as a mesh or a medial mesh stores them: weights descend and sum to 1, and a
+ * joint is there once. Weights that are not above zero or not finite do not count; joints beyond 16 bits neither. Where
+ * none is left, joint 0 has the whole weight. `joints` and `weights` have `count` items, the results 4. Quadratic. */
+void qmat_strongest_joints(const uint32_t *joints, const double *weights, size_t count, uint32_t strongest[4],
+                           double strengths[4]);
+
+/* Gives each sphere of an unsealed medial mesh, in the units of `mesh`, the mean joints and weights of the surface that
+ * it answers for: the points that are nearer to it than to the other spheres of the primitive nearest to them. A sphere
+ * that answers for no point takes those of the vertex nearest to it. Nothing is done for a mesh without a skin.
+ * Triangles are divided, so that points are a fiftieth of the diagonal apart, up to a few million. QMAT_ERROR_MEMORY,
+ * QMAT_ERROR_GEOMETRY for a medial mesh with ids out of range, QMAT_CANCELLED. Threads are the context's; the result
+ * does not depend on them. Cost: a query of the envelope for each point. */
+qmat_status qmat_skin_spheres(qmat_context *context, const struct qmat_mesh *mesh, struct qmat_medial *medial);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* A skinned model through the shipped nodes: joints of a glTF file to the joints of its spheres. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "examples/readers/qmat_reader.h"
+#include "tests/io/files.h"
+#include "tests/io/gltf/gltf_assets.h"
+#include "tests/nodes/pipeline.h"
+
+static const double pi = 3.14159265358979323846;
+enum { RINGS = 41, AROUND = 20 };
+
+/* An arm of two tubes with a ball at the elbow: along x from -2 to 2, of radius 0.3, at the elbow 0.6. */
+static double radius_at(double x) {
+  const double ball = 0.36 - x * x, tip = 2 - fabs(x);
+  const double tube = tip < 0.3 ? sqrt(fmax(0.09 - (0.3 - tip) * (0.3 - tip), 0)) : 0.3;
+  return ball > 0.09 ? sqrt(ball) : tube;
+}
+
+/* Positions as floats, corners as u16, joints as u8, weights as floats, two inverse bind matrices. `sizes` are theirs.
+ */
+static qmat_writer arm_data(size_t sizes[5], uint32_t *triangle_count) {
+  qmat_writer data = {0};
+  size_t start = 0;
+  const uint32_t vertices = RINGS * AROUND + 2;
+  const uint32_t ends[] = {RINGS * AROUND, RINGS * AROUND + 1};
+  float x_of[RINGS * AROUND + 2];
+  for (uint32_t v = 0; v < vertices; v++) {
+    const uint32_t ring = v / AROUND;
+    /* Rings are denser at the tips. */
+    const double x = v == ends[0] ? -2 : v == ends[1] ? 2 : -2 * cos(pi * (ring + 1) / (RINGS + 1));
+    const double r = v >= ends[0] ? 0 : radius_at(x), a = 2 * pi * (v % AROUND) / AROUND;
+    x_of[v] = (float)x;
+    qmat_put_f32(&data, x_of[v]);
+    qmat_put_f32(&data, (float)(r * cos(a)));
+    qmat_put_f32(&data, (float)(r * sin(a)));
+  }
+  sizes[0] = data.size, start = data.size;
+  for (uint32_t i = 0; i + 1 < RINGS; i++)
+    for (uint32_t k = 0; k < AROUND; k++) {
+      const uint32_t a = i * AROUND + k, b = i * AROUND + (k + 1) % AROUND, c = a + AROUND, d = b + AROUND;
+      const uint32_t corners[] = {a, c, b, b, c, d};
+      for (int n = 0; n < 6; n++) qmat_put_u16(&data, (uint16_t)corners[n]);
+    }
+  for (uint32_t k = 0; k < AROUND; k++) {
+    const uint32_t next = (k + 1) % AROUND, last = (RINGS - 1) * AROUND;
+    const uint32_t corners[] = {ends[0], k, next, ends[1], last + next, last + k};
+    for (int n = 0; n < 6; n++) qmat_put_u16(&data, (uint16_t)corners[n]);
+  }
+  sizes[1] = data.size - start, start = data.size;
+  *triangle_count = (uint32_t)(sizes[1] / 6);
+  assert_true(data.size % 4 == 0);
+  for (uint32_t v = 0; v < vertices; v++)
+    for (int k = 0; k < 4; k++) qmat_put_u8(&data, k == 0 ? x_of[v] > 0 : k == 1 ? x_of[v] <= 0 : 0);
+  sizes[2] = data.size - start, start = data.size;
+  for (uint32_t v = 0; v < vertices; v++) {
+    const float own = fabsf(x_of[v]) < 0.1f ? 0.5f : 1.0f;
+    const float weights[] = {own, 1 - own, 0, 0};
+    for (int k = 0; k < 4; k++) qmat_put_f32(&data, weights[k]);
+  }
+  sizes[3] = data.size - start, start = data.size;
+  for (int i = 0; i < 32; i++) qmat_put_f32(&data, i % 16 % 5 == 0);
+  sizes[4] = data.size - start;
+  return data;
+}
+
+static void write_arm(const char *path) {
+  size_t sizes[5], offsets[6] = {0};
+  uint32_t triangles;
+  qmat_writer data = arm_data(sizes, &triangles);
+  for (int i = 0; i < 5; i++) offsets[i + 1] = offsets[i] + sizes[i];
+  const uint32_t vertices = RINGS * AROUND + 2;
+  char json[2048];
+  const int length = snprintf(
+      json, sizeof json,
+      "{'asset':{'version':'2.0'},'buffers':[{'byteLength':%zu}],'bufferViews':[{'buffer':0,'byteLength':%zu},{'buffer'"
+      ":0,'byteOffset':%zu,'byteLength':%zu},{'buffer':0,'byteOffset':%zu,'byteLength':%zu},{'buffer':0,'byteOffset':"
+      "%zu,'byteLength':%zu},{'buffer':0,'byteOffset':%zu,'byteLength':%zu}],'accessors':[{'bufferView':0,"
+      "'componentType':5126,'count':%u,'type':'VEC3','min':[-2,-1,-1],'max':[2,1,1]},{'bufferView':1,'componentType':"
+      "5123,'count':%u,'type':'SCALAR'},{'bufferView':2,'componentType':5121,'count':%u,'type':'VEC4'},{'bufferView':3,"
+      "'componentType':5126,'count':%u,'type':'VEC4'},{'bufferView':4,'componentType':5126,'count':2,'type':'MAT4'}],"
+      "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'JOINTS_0':2,'WEIGHTS_0':3},'indices':1}]}],'skins':[{"
+      "'joints':[1,2],'inverseBindMatrices':4}],'nodes':[{'mesh':0,'skin':0},{'children':[2]},{}],'scene':0,'scenes':"
+      "[{'nodes':[0,1]}]}",
+      data.size, sizes[0], offsets[1], sizes[1], offsets[2], sizes[2], offsets[3], sizes[3], offsets[4], sizes[4],
+      vertices, 3 * triangles, vertices, vertices);
+  assert_true(length > 0 && (size_t)length < sizeof json);
+  qmat_writer glb = asset_glb(json, data.bytes, data.size);
+  write_file(path, (const char *)glb.bytes, glb.size);
+  qmat_writer_uninit(&glb);
+  qmat_writer_uninit(&data);
+}
+
+/* Describes the arm at 2 % and reads what the written file says of its spheres. */
+static void describe_arm(qmr_medial *medial) {
+  char folder[64], path[96], setting[128];
+  make_folder(folder);
+  snprintf(path, sizeof path, "%s/arm.glb", folder);
+  write_arm(path);
+  snprintf(setting, sizeof setting, "path=%s", path);
+  qmat_value *read[PIPELINE_MOST_PORTS], *solid[PIPELINE_MOST_PORTS], *simple[PIPELINE_MOST_PORTS],
+      *written[PIPELINE_MOST_PORTS];
+  pipeline_must_run(1, "scene.read", setting, NULL, read);
+  unlink(path);
+  rmdir(folder);
+  assert_int_equal(((const qmat_mesh *)read[1])->skinned_count, RINGS * AROUND + 2);
+  pipeline_must_run(1, "mesh.solid", "", (const qmat_value *[]){read[1]}, solid);
+  pipeline p;
+  pipeline_make(&p, (qmat_mesh *)qmat_value_retain(solid[0]), "", "");
+  pipeline_must_run(1, "medial.simplify", "epsilon=0.02",
+                    (const qmat_value *[]){solid[0], &p.thickness->base, &p.samples->base, &p.medial->base}, simple);
+  const qmat_node *write = qmat_node_find("scene.write");
+  const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
+  inputs[qmat_input_find(write, "medial")] = simple[0];
+  inputs[qmat_input_find(write, "scene")] = read[0];
+  pipeline_must_run(1, "scene.write", "format=glb", inputs, written);
+  const qmat_file *file = (const qmat_file *)written[0];
+  size_t length = 0;
+  const char *text = qmr_find(file->parts[0].bytes, file->parts[0].size, NULL, &length);
+  assert_non_null(text);
+  assert_int_equal(qmr_decode_base64(text, length, medial), 0);
+  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
+  for (int i = 0; i < 2; i++) qmat_value_release(solid[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
+  pipeline_free(&p);
+}
+
+static void test_spheres_of_a_skinned_model_follow_its_joints(void **state) {
+  (void)state;
+  qmr_medial medial;
+  describe_arm(&medial);
+  assert_true(medial.sphere_count >= 3);
+  assert_non_null(medial.joints);
+  size_t left = 0, right = 0, middle = 0;
+  for (uint32_t i = 0; i < medial.sphere_count; i++) {
+    /* Joint 1 turns by 90 degrees about z, joint 0 stays. */
+    const double *s = medial.spheres + 4 * (size_t)i;
+    double x = 0, y = 0, sum = 0;
+    for (size_t k = 4 * (size_t)i; k < 4 * (size_t)i + 4; k++) {
+      assert_true(medial.joints[k] < 2);
+      x += medial.weights[k] * (medial.joints[k] == 1 ? -s[1] : s[0]);
+      y += medial.weights[k] * (medial.joints[k] == 1 ? s[0] : s[1]);
+      sum += medial.weights[k];
+    }
+    assert_near(sum, 1, 1e-12);
+    if (s[0] < -1) {
+      left++;
+      assert_true(fabs(x - s[0]) < 1e-9 && fabs(y - s[1]) < 1e-9);
+    } else if (s[0] > 1) {
+      right++;
+      assert_true(fabs(x + s[1]) < 1e-9 && fabs(y - s[0]) < 1e-9);
+    } else if (fabs(s[0]) < 0.3) {
+      middle++; /* the ball at the elbow is near the axis of the turn and stays there */
+      assert_true(fabs(x) < 0.3 && fabs(y) < 0.3);
+    }
+  }
+  assert_true(left > 0 && right > 0 && middle > 0);
+  qmr_free(&medial);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
