@@ -72,6 +72,7 @@ typedef struct qmat_port {
   /* An output that may be a list of this type, or an input that takes a list as a whole. When any other input is given
    * a list, the node runs once per item. */
   bool list;
+  bool on_request; /* an output of a graph that is made only where a run saves it */
 } qmat_port;
 
 /* How an entry of a report enters the summary of a run, and how the reports of several meshes are merged. */

@@ -22,10 +22,15 @@ qmat_value_type qmat_graph_output_type(const qmat_graph *graph, size_t output) {
   return graph->nodes[made->node].type->outputs[made->port].type;
 }
 
+bool qmat_graph_on_request(const qmat_graph *graph, size_t output) {
+  const qmat_graph_output *made = &graph->outputs[output];
+  return graph->nodes[made->node].type->outputs[made->port].on_request;
+}
+
 size_t qmat_graph_file_count(const qmat_graph *graph, size_t *last) {
   size_t count = 0;
   for (size_t i = 0; i < graph->output_count; i++) {
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || qmat_graph_on_request(graph, i)) continue;
     *last = i;
     count++;
   }

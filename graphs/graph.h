@@ -73,7 +73,10 @@ const qmat_param *qmat_output_format_param(const qmat_node *type);
 /* The type of value that output `output` of the graph is. */
 qmat_value_type qmat_graph_output_type(const qmat_graph *graph, size_t output);
 
-/* How many outputs of the graph are files; `*last` becomes the last of them. */
+/* Whether output `output` is made only where a run saves it. */
+bool qmat_graph_on_request(const qmat_graph *graph, size_t output);
+
+/* How many outputs of the graph are files that every run makes; `*last` becomes the last of them. */
 size_t qmat_graph_file_count(const qmat_graph *graph, size_t *last);
 
 /* The first required parameter of a node that is not set, or NULL. */

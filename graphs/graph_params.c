@@ -15,6 +15,20 @@ static const char *path_ending(const char *path) {
   return dot && dot != name ? dot + 1 : "";
 }
 
+bool qmat_graph_output_of_ending(const qmat_graph *graph, const char *path, size_t *output) {
+  const char *ending = path_ending(path);
+  size_t found = 0;
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format) continue;
+    bool fits = false;
+    for (int k = 0; format->choices[k] && !fits; k++) fits = strcasecmp(format->choices[k], ending) == 0;
+    if (fits) *output = i;
+    found += fits;
+  }
+  return found == 1;
+}
+
 qmat_status qmat_graph_output_format(qmat_context *context, const qmat_graph *graph, size_t index, const char *path,
                                      int *choice) {
   static const char *const report_endings[] = {"json", NULL};

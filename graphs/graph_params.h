@@ -29,6 +29,9 @@ qmat_status qmat_graph_assign(qmat_context *context, qmat_graph *graph, const ch
 qmat_status qmat_graph_output_format(qmat_context *context, const qmat_graph *graph, size_t output, const char *path,
                                      int *choice);
 
+/* The only output that is a file and can be written with the ending of `path`: true, and its index in `*output`. */
+bool qmat_graph_output_of_ending(const qmat_graph *graph, const char *path, size_t *output);
+
 /* Checks the parameters of every node against the node's rules. A required parameter may be missing if an input of the
  * graph sets it. */
 qmat_status qmat_graph_check_params(qmat_context *context, const qmat_graph *graph);

@@ -76,6 +76,7 @@ static json_t *port_rows(const qmat_port *ports, size_t count, bool are_inputs) 
     json_t *row = json_pack("{s:s, s:s, s:s?}", "name", ports[i].name, "type", qmat_value_type_name(ports[i].type),
                             "doc", ports[i].doc);
     if (row && are_inputs) json_object_set_new(row, "optional", json_boolean(ports[i].optional));
+    if (row && ports[i].on_request) json_object_set_new(row, "on_request", json_true());
     if (!row || json_array_append_new(rows, row) != 0) {
       json_decref(rows);
       return NULL;

@@ -227,8 +227,9 @@ qmat_result qmat_job_want(qmat_job *job, const char *port) {
   return finish(job, status);
 }
 
-/* Finds the only output that is a file. */
-static qmat_status only_file(qmat_job *job, size_t *output) {
+/* Finds the output that alone has the ending of the path, else the only one that is a file. */
+static qmat_status only_file(qmat_job *job, const char *path, size_t *output) {
+  if (qmat_graph_output_of_ending(&job->graph, path, output)) return QMAT_OK;
   const size_t count = qmat_graph_file_count(&job->graph, output);
   if (count == 1) return QMAT_OK;
   return qmat_fail(&job->context, QMAT_ERROR_USAGE, "the graph makes %zu files: name the output to save", count);
@@ -238,8 +239,8 @@ qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
   if (!job->loaded) return job->problem.result;
   job_save save = {0};
   int choice;
-  qmat_status status =
-      output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output) : only_file(job, &save.output);
+  qmat_status status = output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output)
+                              : only_file(job, path, &save.output);
   if (status == QMAT_OK) status = qmat_graph_output_format(&job->context, &job->graph, save.output, path, &choice);
   if (status == QMAT_OK) {
     save.path = qmat_strdup(path);

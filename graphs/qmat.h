@@ -55,8 +55,9 @@ QMAT_API void qmat_text_free(char *text);
 /* ---- making a job ---- */
 
 /* A job with the built-in graph, graphs/qmat_plus.yaml: nodes model, surface, solid, thickness, samples, initial,
- * refined, features, simple, errors, skin, asset; inputs model, epsilon, vertices, features; output asset. `*job` is
- * NULL only when memory is short; after any other failure it has the error. Free it with qmat_job_free. */
+ * refined, features, simple, errors, skin, asset, chain, page, picture; inputs model, epsilon, vertices, features;
+ * outputs asset, page, picture. `*job` is NULL only when memory is short; after any other failure it has the error.
+ * Free it with qmat_job_free. */
 QMAT_API qmat_result qmat_job_new(qmat_job **job);
 /* The same with a graph file. Its relative paths are relative to its folder. */
 QMAT_API qmat_result qmat_job_new_from_file(qmat_job **job, const char *path);
@@ -82,8 +83,9 @@ QMAT_API qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const c
  * they and the saved outputs need run; without, every output of the graph is made. */
 QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
 
-/* Saves an output of the graph ("asset"; NULL: the only one that is a file) as `path` after a successful run. The
- * path's ending chooses the format. An output may be saved several times under different paths. */
+/* Saves an output of the graph ("asset"; NULL: the one that alone has the ending of `path`, else the only one that
+ * every run makes) as `path` after a successful run. The path's ending chooses the format. An output may be saved
+ * several times under different paths. */
 QMAT_API qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
 
 /* Sets the folder of the cache, which is made if it is missing; NULL, the default: no cache. A cached result is used

@@ -106,7 +106,7 @@ static qmat_status make_command(const batch_call *call, size_t index, qmat_asset
     const qmat_graph_output *output = &graph->outputs[i];
     const qmat_node *type = graph->nodes[output->node].type;
     const qmat_param *format = qmat_output_format_param(type);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format || qmat_graph_on_request(graph, i)) continue;
     char ending[64];
     qmat_param_format(format, graph->nodes[output->node].params, ending, sizeof ending);
     /* Several outputs differ by their names. */
@@ -294,7 +294,7 @@ static qmat_status check_format(const batch_call *call) {
     char path[64];
     int format;
     snprintf(path, sizeof path, "asset.%.48s", call->format);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || qmat_graph_on_request(graph, i)) continue;
     if (qmat_graph_output_format(call->context, graph, i, path, &format) != QMAT_OK)
       return qmat_fail_field(call->context, "--format");
   }

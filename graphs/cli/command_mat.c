@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graphs/built_in.h"
 #include "graphs/cli/command.h"
@@ -23,28 +24,38 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
       qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
     status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
   }
-  for (size_t i = 0; i < graph->output_count && status == QMAT_OK; i++) {
+  if (status != QMAT_OK) return status;
+  char *doc = invocation->docs[invocation->option_count];
+  size_t used =
+      (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE, "Save the result; may be repeated. The ending chooses the format:");
+  const char *comma = "";
+  for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
-    if (!format) continue;
-    char *doc = invocation->docs[invocation->option_count];
-    size_t used =
-        (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE, "Save the result; may be repeated. The ending chooses the format:");
-    for (int k = 0; format->choices[k] && used < QMAT_OPTION_DOC_SIZE; k++)
-      used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", k ? "," : "", format->choices[k]);
-    return qmat_invocation_add_option(context, invocation, (qmat_option){"output", 'o', "[NAME=]PATH", doc});
+    for (int k = 0; format && format->choices[k] && used < QMAT_OPTION_DOC_SIZE; k++, comma = ",")
+      used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", comma, format->choices[k]);
   }
-  return status;
+  return qmat_invocation_add_option(context, invocation, (qmat_option){"output", 'o', "[NAME=]PATH", doc});
 }
 
-/* Whether an output can hold a medial mesh for each mesh of a scene: glTF, or for a scene of USD a layer over it. */
+static bool has_ending(const char *path, const char *ending) {
+  const size_t length = strlen(path), size = strlen(ending);
+  return length > size && strcasecmp(path + length - size, ending) == 0;
+}
+
+/* Whether the outputs can hold a medial mesh for each mesh of a scene: glTF, or for a scene of USD a layer over it.
+ * Pages and pictures show what the others hold, and alone each mesh. */
 static bool saves_scene(const qmat_invocation *invocation) {
+  const qmat_format given = qmat_format_of_name(invocation->arguments[0]);
+  bool only_views = given == QMAT_FORMAT_GLB || given == QMAT_FORMAT_GLTF || given == QMAT_FORMAT_USD;
   for (size_t i = 0; i < invocation->given_count; i++) {
     if (strcmp(invocation->given[i].name, "output") != 0) continue;
-    const qmat_format format = qmat_format_of_name(invocation->given[i].value);
+    const char *path = invocation->given[i].value;
+    const qmat_format format = qmat_format_of_name(path);
     if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
-    if (format == QMAT_FORMAT_USD && qmat_format_of_name(invocation->arguments[0]) == QMAT_FORMAT_USD) return true;
+    if (format == QMAT_FORMAT_USD && given == QMAT_FORMAT_USD) return true;
+    only_views = only_views && (has_ending(path, ".html") || has_ending(path, ".png") || has_ending(path, ".svg"));
   }
-  return false;
+  return only_views;
 }
 
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {

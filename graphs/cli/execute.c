@@ -33,7 +33,7 @@ const qmat_option qmat_output_options[] = {
     {0},
 };
 
-/* Reads "NAME=PATH", or "PATH" if exactly one output of the graph is a file. */
+/* Reads "NAME=PATH", or "PATH" if one output alone has the ending, or if exactly one is a file. */
 static qmat_status read_save(qmat_context *context, const qmat_graph *graph, const char *text, qmat_run_save *save) {
   const char *equals = strchr(text, '=');
   char name[QMAT_GRAPH_NAME_SIZE];
@@ -44,8 +44,9 @@ static qmat_status read_save(qmat_context *context, const qmat_graph *graph, con
     save->path = equals + 1;
     return qmat_graph_find_output(context, graph, name, &save->output);
   }
-  const size_t files = qmat_graph_file_count(graph, &save->output);
   save->path = text;
+  if (qmat_graph_output_of_ending(graph, text, &save->output)) return QMAT_OK;
+  const size_t files = qmat_graph_file_count(graph, &save->output);
   if (files == 1) return QMAT_OK;
   qmat_fail(context, QMAT_ERROR_USAGE, "'%s' needs the name of an output: the graph makes %zu files",
             qmat_show(text).text, files);

@@ -120,7 +120,7 @@ static qmat_status plan_needs(run_planner *planner) {
   } else if (!options->only_wanted) {
     for (size_t i = 0; i < graph->output_count; i++) {
       bool saved = has_save(options, i) || graph->outputs[i].path;
-      if (!saved) planner->needed[graph->outputs[i].node] = true;
+      if (!saved && !qmat_graph_on_request(graph, i)) planner->needed[graph->outputs[i].node] = true;
     }
     for (size_t i = 0; i < graph->node_count; i++)
       if (qmat_output_count(graph->nodes[i].type) == 0) planner->needed[i] = true;

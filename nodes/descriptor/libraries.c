@@ -3,7 +3,9 @@
 
 #include <embree3/rtcore.h>
 #include <meshoptimizer.h>
+#include <png.h>
 #include <stdio.h>
+#include <zlib.h>
 
 #include "nodes/mesh/subdivision_osd.h"
 
@@ -17,6 +19,10 @@ static void describe_draco(char *text, size_t size) {
 
 static void describe_meshoptimizer(char *text, size_t size) {
   snprintf(text, size, "%d.%d", MESHOPTIMIZER_VERSION / 1000, MESHOPTIMIZER_VERSION % 1000 / 10);
+}
+
+static void describe_png(char *text, size_t size) {
+  snprintf(text, size, "%s zlib %s", png_get_libpng_ver(NULL), zlibVersion());
 }
 
 static void describe_tinygltf(char *text, size_t size) {
@@ -60,4 +66,5 @@ const qmat_library qmat_library_draco = {.name = "Draco", .describe = describe_d
 const qmat_library qmat_library_embree = {.name = "Embree", .describe = describe_embree};
 const qmat_library qmat_library_meshoptimizer = {.name = "meshoptimizer", .describe = describe_meshoptimizer};
 const qmat_library qmat_library_opensubdiv = {.name = "OpenSubdiv", .describe = describe_opensubdiv};
+const qmat_library qmat_library_png = {.name = "libpng", .describe = describe_png};
 const qmat_library qmat_library_tinygltf = {.name = "tinygltf", .describe = describe_tinygltf};

@@ -22,10 +22,11 @@ find core io nodes graphs -name '*.[ch]' -o -name '*.cpp' -o -name '*.c.in' | LC
   BEGIN {
     allow("core", "")
     allow("core/geometry", "core")
-    formats = "core core/geometry io io/mesh io/gltf io/usd"
+    formats = "core core/geometry io io/mesh io/gltf io/page io/usd"
     allow("io", formats)
     allow("io/mesh", formats)
     allow("io/gltf", formats)
+    allow("io/page", "core io")
     allow("io/usd", formats)
     allow("nodes/measure", "core core/geometry")
     allow("nodes/initial", "core core/geometry nodes/measure")
@@ -34,7 +35,8 @@ find core io nodes graphs -name '*.[ch]' -o -name '*.cpp' -o -name '*.c.in' | LC
     allow("nodes/skin", "core core/geometry nodes/measure")
     allow("nodes/descriptor", "core nodes/mesh")
     allow("nodes/simplify", "core core/geometry nodes/descriptor nodes/initial nodes/measure")
-    nodes = "core core/geometry nodes nodes/colliders nodes/descriptor nodes/initial nodes/measure nodes/mesh nodes/simplify nodes/skin"
+    allow("nodes/page", "core core/geometry io io/page nodes/measure nodes/simplify")
+    nodes = "core core/geometry nodes nodes/colliders nodes/descriptor nodes/initial nodes/measure nodes/mesh nodes/page nodes/simplify nodes/skin"
     allow("nodes", formats " " nodes)
     allow("graphs", formats " " nodes)
     allow("graphs/cache", formats " " nodes " graphs")

@@ -2,7 +2,7 @@
 file(READ ${INPUT} digits HEX)
 string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1, " bytes "${digits}")
 string(REGEX REPLACE "(0x0a, )" "\\1\n  " bytes "${bytes}")
-file(WRITE ${OUTPUT} "/* Written by CMake from graphs/. */
+file(WRITE ${OUTPUT} "/* Written by embed_text.cmake. */
 #include <stddef.h>
 
 extern const char ${NAME}[];

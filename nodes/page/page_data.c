@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/page/page_data.h"
+
+#include <math.h>
+
+#include "core/json_text.h"
+#include "io/base64.h"
+#include "io/bytes.h"
+#include "io/flat_medial.h"
+#include "nodes/measure/unit_spheres.h"
+#include "nodes/page/worst_places.h"
+#include "nodes/simplify/collapse_chain.h"
+
+static const double one = 32767;
+/* Stored errors end at this many ranges. */
+static const double error_span = 4;
+
+static void put_share(qmat_writer *writer, double share) {
+  qmat_put_u16(writer, (uint16_t)(int16_t)lround(one * fmin(fmax(share, -1), 1)));
+}
+
+/* Sets the written bytes as base64; the writer is empty afterwards. */
+static bool set_bytes(json_t *object, const char *key, qmat_writer *writer) {
+  char *text = writer->failed ? NULL : qmat_base64_encode(writer->bytes, writer->size);
+  const bool done = text && json_object_set_new(object, key, json_string(text)) == 0;
+  qmat_free(text);
+  qmat_writer_uninit(writer);
+  return done;
+}
+
+static json_t *surface_json(const qmat_shown *shown) {
+  const qmat_display_mesh *display = &shown->display;
+  qmat_writer positions = {0}, normals = {0}, errors = {0}, corners = {0};
+  for (size_t i = 0; i < 3 * display->vertex_count; i++) {
+    put_share(&positions, display->positions[i]);
+    put_share(&normals, display->normals[i]);
+  }
+  for (size_t i = 0; i < display->vertex_count; i++)
+    put_share(&errors, display->errors[i] / (error_span * shown->range));
+  for (size_t i = 0; i < 3 * display->triangle_count; i++) qmat_put_u32(&corners, display->triangles[i]);
+  json_t *surface = json_object();
+  bool done = set_bytes(surface, "positions", &positions);
+  done = set_bytes(surface, "normals", &normals) && done;
+  done = set_bytes(surface, "errors", &errors) && done;
+  done = set_bytes(surface, "corners", &corners) && done;
+  done = qmat_json_set_count(surface, "vertices", shown->mesh->vertex_count) == 0 && done;
+  done = qmat_json_set_count(surface, "triangles", display->triangle_count) == 0 && done;
+  if (done) return surface;
+  json_decref(surface);
+  return NULL;
+}
+
+/* Sets a medial mesh and its counts; `unit` has the arrays of a sealed medial mesh. */
+static qmat_status set_medial(qmat_context *context, json_t *object, const qmat_medial *unit) {
+  uint8_t *bytes;
+  size_t size;
+  const qmat_sphere_data none = {0};
+  const qmat_status status = qmat_flat_encode(context, unit, &none, NULL, true, &bytes, &size);
+  if (status != QMAT_OK) return status;
+  char *text = qmat_base64_encode(bytes, size);
+  qmat_free(bytes);
+  bool done = text && json_object_set_new(object, "medial", json_string(text)) == 0;
+  qmat_free(text);
+  done = qmat_json_set_count(object, "spheres", unit->sphere_count) == 0 && done;
+  done = qmat_json_set_count(object, "cones", unit->edge_count) == 0 && done;
+  done = qmat_json_set_count(object, "slabs", unit->triangle_count) == 0 && done;
+  return done ? QMAT_OK : qmat_fail_memory(context, "the page");
+}
+
+/* ---- the chain ---- */
+
+/* The collapses after the first `skipped`, with the numbers that the spheres have after those. */
+static qmat_status set_collapses(qmat_context *context, json_t *object, const qmat_chain *chain, size_t skipped,
+                                 const double *merged) {
+  const size_t spheres = chain->sphere_count;
+  uint32_t *roots = qmat_arena_alloc(&context->arena, spheres, sizeof *roots), next = 0;
+  uint32_t *ids = qmat_arena_alloc(&context->arena, spheres, sizeof *ids);
+  if (!roots || !ids) return qmat_fail_memory(context, "the page");
+  qmat_collapse_roots(chain->ends, skipped, spheres, roots);
+  for (size_t v = 0; v < spheres; v++) ids[v] = roots[v] == v ? next++ : UINT32_MAX;
+  qmat_writer ends = {0}, placed = {0}, errors = {0};
+  qmat_put_f32(&errors,
+               (float)(skipped > 0 ? chain->errors[skipped - 1] : 0)); /* of the level that the chain starts at */
+  for (size_t i = skipped; i < chain->collapse_count; i++) {
+    for (size_t k = 0; k < 2; k++) qmat_put_u32(&ends, ids[chain->ends[2 * i + k]]);
+    for (size_t k = 0; k < 4; k++) qmat_put_f32(&placed, (float)merged[4 * i + k]);
+    qmat_put_f32(&errors, (float)chain->errors[i]);
+  }
+  bool done = set_bytes(object, "ends", &ends);
+  done = set_bytes(object, "merged", &placed) && done;
+  done = set_bytes(object, "errors", &errors) && done;
+  return done ? QMAT_OK : qmat_fail_memory(context, "the page");
+}
+
+static qmat_status set_chain(qmat_context *context, const qmat_shown *shown, const qmat_chain *chain, size_t levels,
+                             json_t *object) {
+  if (chain->sphere_count == 0) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "the chain has no sphere");
+    return qmat_fail_field(context, "chain");
+  }
+  const size_t most = chain->sphere_count > levels ? chain->sphere_count - levels : 0;
+  const size_t skipped = most < chain->collapse_count ? most : chain->collapse_count;
+  qmat_medial *start = qmat_medial_new();
+  double *merged = qmat_arena_alloc(&context->arena, chain->collapse_count, 4 * sizeof *merged);
+  qmat_status status = start && merged ? QMAT_OK : qmat_fail_memory(context, "the page");
+  if (status == QMAT_OK) status = qmat_chain_extract(context, chain, skipped, start);
+  qmat_medial unit = {.sphere_count = 0};
+  if (status == QMAT_OK) {
+    unit = *start;
+    status = qmat_unit_spheres(context, &shown->frame, start, &unit.spheres);
+    if (status != QMAT_OK) qmat_fail_field(context, "chain");
+  }
+  if (status == QMAT_OK) status = set_medial(context, object, &unit);
+  if (status == QMAT_OK) {
+    qmat_frame_spheres_to_unit(&shown->frame, chain->merged, chain->collapse_count, merged);
+    status = set_collapses(context, object, chain, skipped, merged);
+  }
+  qmat_value_release(start ? &start->base : NULL);
+  return status;
+}
+
+/* ---- all of it ---- */
+
+static json_t *place_json(const qmat_worst_place *place) {
+  if (!(place->error > 0)) return json_null();
+  return json_pack("[f,f,f,f]", place->at[0], place->at[1], place->at[2], place->error);
+}
+
+static qmat_status fill(qmat_context *context, const qmat_shown *shown, const qmat_report *report,
+                        const qmat_chain *chain, size_t levels, json_t *root) {
+  qmat_worst_place of_surface, of_envelope;
+  qmat_status status =
+      qmat_worst_places_find(context, shown, qmat_shown_number(report, "surface_to_envelope_at_least"),
+                             qmat_shown_number(report, "envelope_to_surface_at_least"), &of_surface, &of_envelope);
+  if (status == QMAT_OK) status = set_medial(context, root, &shown->unit);
+  if (status != QMAT_OK) return status;
+  json_t *worst = json_object(), *chain_json = chain ? json_object() : json_null();
+  int bad = json_object_set_new(worst, "surface", place_json(&of_surface));
+  bad |= json_object_set_new(worst, "envelope", place_json(&of_envelope));
+  bad |= json_object_set_new(root, "worst", worst);
+  bad |= json_object_set_new(root, "chain", chain_json);
+  bad |= json_object_set_new(root, "surface", surface_json(shown));
+  bad |= json_object_set(root, "report", report ? report->root : json_null());
+  bad |= json_object_set_new(root, "range", json_real(shown->range));
+  bad |= json_object_set_new(root, "diagonal", json_real(shown->frame.diagonal));
+  bad |= json_object_set_new(root, "meters_per_unit", json_real(shown->mesh->meters_per_unit));
+  if (bad) return qmat_fail_memory(context, "the page");
+  return chain ? set_chain(context, shown, chain, levels, chain_json) : QMAT_OK;
+}
+
+json_t *qmat_page_data(qmat_context *context, const qmat_shown *shown, const qmat_report *report,
+                       const qmat_chain *chain, size_t levels) {
+  json_t *root = json_object();
+  const qmat_status status =
+      root ? fill(context, shown, report, chain, levels, root) : qmat_fail_memory(context, "the page");
+  if (status == QMAT_OK) return root;
+  json_decref(root);
+  return NULL;
+}

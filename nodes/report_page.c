@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* report.page: a surface and its medial mesh as one HTML file, to look at in a browser. */
+#include "core/node.h"
+#include "io/page/page_write.h"
+#include "nodes/descriptor/libraries.h"
+#include "nodes/page/figure.h"
+#include "nodes/page/look.h"
+#include "nodes/page/page_data.h"
+
+typedef enum page_format { FORMAT_HTML, FORMAT_HTM } page_format;
+
+typedef struct report_page_params {
+  int format; /* a page_format */
+  int up;     /* of qmat_up_axes */
+  int64_t levels;
+  double turn, tilt;
+} report_page_params;
+
+/* The picture for browsers without WebGL. */
+enum { PICTURE_WIDTH = 960, PICTURE_HEIGHT = 480 };
+
+static const char *name_of(const qmat_value *const inputs[], size_t index) {
+  const qmat_value *medial = inputs[QMAT_SHOWN_MEDIAL];
+  if (medial->type == QMAT_LIST) return ((const qmat_list *)medial)->names[index];
+  const qmat_scene *scene = (const qmat_scene *)inputs[QMAT_SHOWN_SCENE];
+  return scene && *scene->name ? scene->name : "model";
+}
+
+/* A list of several meshes has the scene's name, else that of its first mesh. */
+static const char *title_of(const qmat_value *const inputs[]) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[QMAT_SHOWN_SCENE];
+  return scene && *scene->name ? scene->name : name_of(inputs, 0);
+}
+
+/* Adds one mesh to the page; the first makes the picture. A mesh that could not be described has only its reason. */
+static qmat_status add_mesh(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
+                            size_t index, json_t *meshes, char **picture) {
+  const qmat_mesh *mesh = (const qmat_mesh *)qmat_shown_given(inputs[QMAT_SHOWN_MESH], index);
+  const qmat_medial *medial = (const qmat_medial *)qmat_shown_given(inputs[QMAT_SHOWN_MEDIAL], index);
+  const qmat_report *report = (const qmat_report *)qmat_shown_given(inputs[QMAT_SHOWN_REPORT], index);
+  const qmat_scene *scene = (const qmat_scene *)inputs[QMAT_SHOWN_SCENE];
+  const char *name = name_of(inputs, index);
+  if (!mesh || !medial) {
+    const char *reason = qmat_value_failure(qmat_value_at(inputs[mesh ? QMAT_SHOWN_MEDIAL : QMAT_SHOWN_MESH], index));
+    if (json_array_append_new(meshes, json_pack("{s:s, s:s}", "name", name, "failure", reason))) goto short_of_memory;
+    return QMAT_OK;
+  }
+  qmat_shown shown;
+  json_t *data = NULL;
+  qmat_status status = qmat_shown_init(context, mesh, medial, report, &shown);
+  if (status == QMAT_OK) {
+    data =
+        qmat_page_data(context, &shown, report, (const qmat_chain *)qmat_shown_given(inputs[QMAT_SHOWN_CHAIN], index),
+                       (size_t)params->levels);
+    status = data ? QMAT_OK : context->error.status;
+  }
+  qmat_picture drawn = {0};
+  if (status == QMAT_OK && !*picture) {
+    const qmat_picture_options options = {
+        .turn = params->turn, .tilt = params->tilt, .is_z_up = qmat_shown_is_z_up(params->up, scene)};
+    status = qmat_picture_init(context, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
+    if (status == QMAT_OK)
+      status = qmat_picture_draw(context, &shown, &options, 0, 0, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
+    if (status == QMAT_OK) *picture = qmat_figure_base64(context, &drawn);
+    if (status == QMAT_OK && !*picture) status = context->error.status;
+  }
+  qmat_picture_uninit(&drawn);
+  qmat_shown_uninit(&shown);
+  if (status != QMAT_OK) {
+    json_decref(data);
+    return qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]) > 1 ? qmat_fail_within(context, name) : status;
+  }
+  const bool is_named = json_object_set_new(data, "name", json_string(name)) == 0;
+  if (json_array_append_new(meshes, data) == 0 && is_named) return QMAT_OK;
+short_of_memory:
+  return qmat_fail_memory(context, "the page");
+}
+
+static qmat_status fill(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
+                        json_t *data, char **picture) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[QMAT_SHOWN_SCENE];
+  const bool is_z_up = qmat_shown_is_z_up(params->up, scene);
+  json_t *meshes = json_array();
+  int bad = json_object_set_new(data, "meshes", meshes);
+  bad |= json_object_set_new(data, "look", qmat_look_json());
+  bad |= json_object_set_new(data, "title", json_string(title_of(inputs)));
+  bad |= json_object_set_new(data, "format", json_string(scene ? scene->format : ""));
+  bad |= json_object_set_new(data, "version", json_string(QMAT_VERSION));
+  bad |= json_object_set_new(data, "camera",
+                             json_pack("{s:f, s:f, s:b}", "turn", params->turn, "tilt", params->tilt, "z_up", is_z_up));
+  if (bad) return qmat_fail_memory(context, "the page");
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]) && status == QMAT_OK; i++)
+    status = add_mesh(context, params, inputs, i, meshes, picture);
+  return status;
+}
+
+static qmat_status run(qmat_context *context, const void *parameters, const qmat_value *const inputs[],
+                       qmat_value *outputs[]) {
+  json_t *data = json_object();
+  char *picture = NULL;
+  qmat_writer writer = {0};
+  qmat_file *file = NULL;
+  qmat_status status = data ? fill(context, parameters, inputs, data, &picture) : qmat_fail_memory(context, "the page");
+  if (status == QMAT_OK) {
+    const qmat_page page = {.title = title_of(inputs), .picture = picture ? picture : "", .data = data};
+    status = qmat_page_put(context, &page, &writer);
+  }
+  if (status == QMAT_OK) status = qmat_writer_to_file(context, &writer, "html", &file);
+  qmat_writer_uninit(&writer);
+  qmat_free(picture);
+  json_decref(data);
+  if (status == QMAT_OK) outputs[0] = &file->base;
+  return status;
+}
+
+static const char *const formats[] = {[FORMAT_HTML] = "html", [FORMAT_HTM] = "htm", NULL};
+
+static const qmat_param params[] = {
+    {.name = "format",
+     .unit = "",
+     .doc = "The format of the file; the ending of an output path sets it",
+     .type = QMAT_PARAM_ENUM,
+     .default_number = FORMAT_HTML,
+     .choices = formats,
+     .flags = QMAT_PARAM_OUTPUT_FORMAT,
+     .offset = offsetof(report_page_params, format)},
+    QMAT_INT(report_page_params, levels, "spheres", 4000, 1, 1000000,
+             "The finest level of detail of the slider; more make the page larger"),
+    QMAT_SHOWN_PARAMS(report_page_params),
+    {0},
+};
+
+static const qmat_port inputs[] = {
+    QMAT_SHOWN_INPUTS,
+    {.name = "chain",
+     .type = QMAT_CHAIN,
+     .optional = true,
+     .doc = "From medial.chain, for the slider of levels of detail",
+     .list = true},
+    {0},
+};
+
+static qmat_status check_counts(qmat_context *context, const void *data, const size_t counts[]) {
+  (void)data;
+  return qmat_shown_check_counts(context, inputs, counts);
+}
+
+static const qmat_port outputs[] = {
+    {.name = "file", .type = QMAT_FILE, .doc = "The page", .on_request = true},
+    {0},
+};
+
+static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_library_png, NULL};
+
+const qmat_node qmat_node_report_page = {
+    .name = "report.page",
+    .version = 1,
+    .summary = "Makes a page that shows a surface and its medial mesh in a browser",
+    .doc =
+        "One HTML file, which needs no server, no network and no other file. It shows the surface, coloured by its "
+        "signed distance to the envelope, beside the spheres, cones and slabs or around them, with one camera; the "
+        "places where either error is largest; the errors and the topology; and each mesh of a scene.\n\n"
+        "With a chain a slider goes through its levels of detail, from `levels` spheres down to one. The spheres and "
+        "the error of a level are those of medial.lod.\n\n"
+        "Primitives are intersected exactly for each pixel (WebGL 2). Browsers without it show a picture, as "
+        "report.picture draws it.",
+    .citation = "",
+    .params_size = sizeof(report_page_params),
+    .params = params,
+    .inputs = inputs,
+    .outputs = outputs,
+    .libraries = libraries,
+    .check_counts = check_counts,
+    .run = run,
+};
