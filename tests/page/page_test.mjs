@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// page_test.mjs CHROMIUM FOLDER: opens FOLDER/page.html, and compares it with both.png, overlay.png, middle.ma, middle.json.
+// Chromium is driven through its pipe, so that no package is needed.
+import { spawn } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+
+const [chromium, folder] = process.argv.slice(2);
+const said = [];
+let failures = 0;
+
+function check(what, good, detail = '') {
+  if (good) return;
+  failures++;
+  console.log(`FAILED: ${what} ${detail}`);
+}
+
+class Browser {
+  constructor(...options) {
+    this.process = spawn(chromium, ['--headless=new', '--no-sandbox', '--remote-debugging-pipe', '--hide-scrollbars', '--use-angle=swiftshader',
+      `--user-data-dir=${folder}/profile${Browser.count++}`, ...options, 'about:blank'], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
+    this.waiting = new Map();
+    this.next = 1;
+    this.listeners = [];
+    let text = '';
+    this.process.stdio[4].setEncoding('utf8').on('data', (data) => {
+      const parts = (text + data).split('\0');
+      text = parts.pop();
+      for (const part of parts) this.take(JSON.parse(part));
+    });
+  }
+  static count = 0;
+  take(message) {
+    const done = this.waiting.get(message.id);
+    if (done) {
+      this.waiting.delete(message.id);
+      if (message.error) done.fail(new Error(message.error.message));
+      else done.give(message.result);
+    }
+    for (const listener of this.listeners) listener(message);
+  }
+  send(method, params = {}) {
+    const id = this.next++;
+    this.process.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId: this.session })}\0`);
+    return new Promise((give, fail) => this.waiting.set(id, { give, fail }));
+  }
+  async open(width, height, dark = false) {
+    const { targetId } = await this.send('Target.createTarget', { url: 'about:blank' });
+    this.session = (await this.send('Target.attachToTarget', { targetId, flatten: true })).sessionId;
+    this.listeners.push(({ method, params }) => {
+      if (method === 'Runtime.consoleAPICalled') said.push(params.args.map((x) => x.value ?? x.description).join(' '));
+      if (method === 'Runtime.exceptionThrown') said.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
+      if (method === 'Log.entryAdded') said.push(params.entry.text);
+      if (method === 'Network.requestWillBeSent' && !/^(file|data|blob):/.test(params.request.url)) said.push(`a request: ${params.request.url}`);
+    });
+    for (const domain of ['Runtime', 'Log', 'Page', 'Network']) await this.send(`${domain}.enable`);
+    await this.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: width < 600 });
+    await this.send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
+    const loaded = new Promise((give) => this.listeners.push(({ method }) => method === 'Page.loadEventFired' && give()));
+    await this.send('Page.navigate', { url: `file://${folder}/page.html` });
+    await loaded;
+  }
+  async run(expression) {
+    const { result, exceptionDetails } = await this.send('Runtime.evaluate', { expression: `(async () => { ${expression} })()`, awaitPromise: true, returnByValue: true });
+    if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
+    return result.value;
+  }
+  close() {
+    this.process.kill();
+  }
+}
+
+/** How two images differ: the mean of all channels, and the share of pixels with a channel that differs by more than 48. */
+const COMPARE = `
+  async function compare(image, base64) {
+    const other = await createImageBitmap(await (await fetch('data:image/png;base64,' + base64)).blob());
+    if (other.width !== image.width || other.height !== image.height) return { mean: 255, far: 1 };
+    const pen = (source) => {
+      const canvas = new OffscreenCanvas(image.width, image.height), context = canvas.getContext('2d');
+      context.fillStyle = '#808080';
+      context.fillRect(0, 0, image.width, image.height);
+      context.drawImage(source, 0, 0);
+      return context.getImageData(0, 0, image.width, image.height).data;
+    };
+    const a = pen(image), b = pen(other);
+    let sum = 0, far = 0, drawn = 0;
+    for (let i = 0; i < a.length; i += 4) {
+      const apart = [0, 1, 2].map((k) => Math.abs(a[i + k] - b[i + k]));
+      sum += apart[0] + apart[1] + apart[2];
+      far += Math.max(...apart) > 48;
+      drawn += a[i] !== 128 || a[i + 1] !== 128 || a[i + 2] !== 128;
+    }
+    return { mean: sum / (0.75 * a.length), far: far / (a.length / 4), drawn: drawn / (a.length / 4) };
+  }`;
+
+async function testView(browser) {
+  for (const [view, width, height] of [['both', 640, 320], ['overlay', 320, 320]]) {
+    const png = readFileSync(`${folder}/${view}.png`).toString('base64');
+    const apart = await browser.run(`${COMPARE}
+      qmatPage.setView('${view}');
+      return compare(qmatPage.picture(${width}, ${height}), '${png}');`);
+    console.log(`${view}: mean difference ${apart.mean.toFixed(3)} of 255, ${(100 * apart.far).toFixed(3)} % of the pixels differ by more than 48`);
+    check(`the view ${view} is that of report.picture`, apart.mean < 1.0 && apart.far < 0.01 && apart.drawn > 0.05, JSON.stringify(apart));
+  }
+  // The comparison itself must be able to fail.
+  const png = readFileSync(`${folder}/both.png`).toString('base64');
+  const turned = await browser.run(`${COMPARE} qmatPage.setView('both'); qmatPage.state.turn += 10;
+    const apart = await compare(qmatPage.picture(640, 320), '${png}'); qmatPage.state.turn -= 10; return apart;`);
+  check('a turned view differs', turned.mean > 1.0 && turned.far > 0.01, JSON.stringify(turned));
+}
+
+/** The level of 40 spheres against medial.lod's file and report. */
+async function testLevels(browser) {
+  const lines = readFileSync(`${folder}/middle.ma`, 'utf8').trim().split('\n').map((line) => line.split(/\s+/));
+  const wanted = { v: [], e: [], f: [] };
+  for (const [kind, ...numbers] of lines.slice(1)) wanted[kind].push(numbers.map(Number));
+  const report = JSON.parse(readFileSync(`${folder}/middle.json`, 'utf8'));
+  const level = await browser.run(`
+    const { state, setLevel, level } = qmatPage, mesh = state.mesh;
+    setLevel(40);
+    const c = level();
+    return { spheres: Array.from(c.spheres), edges: c.edges, slabs: c.slabs, error: mesh.chain.error(40), diagonal: mesh.diagonal, text: document.getElementById('level').textContent };`);
+  check('a level has the spheres of medial.lod', level.spheres.length / 4 === wanted.v.length && wanted.v.length === 40, level.spheres.length / 4);
+  check('a level has the error of medial.lod', Math.abs(level.error - report.threshold) < 1e-6, `${level.error} ${report.threshold}`);
+  check('a level says its spheres', level.text.startsWith('40 spheres: both errors at most'), level.text);
+  const pairs = (ids, size) => Array.from({ length: ids.length / size }, (_, i) => ids.slice(size * i, size * i + size).sort((a, b) => a - b).join(' ')).sort().join();
+  check('a level has the cones of medial.lod', pairs(level.edges, 2) === wanted.e.map((row) => row.join(' ')).sort().join());
+  check('a level has the slabs of medial.lod', pairs(level.slabs, 3) === wanted.f.map((row) => row.join(' ')).sort().join());
+  const apart = (i) => Math.hypot(...[0, 1, 2].map((k) => (level.spheres[4 * i + k] - level.spheres[k]) * level.diagonal - (wanted.v[i][k] - wanted.v[0][k])));
+  check('a level has the centres of medial.lod', wanted.v.every((_, i) => apart(i) < 1e-5 * level.diagonal));
+  check('a level has the radii of medial.lod', wanted.v.every((row, i) => Math.abs(level.spheres[4 * i + 3] * level.diagonal - row[3]) < 1e-5 * level.diagonal));
+  const moved = await browser.run(`
+    const slider = document.getElementById('slider'), counts = [];
+    for (const value of [0, 250, 500, 750, 1000]) {
+      slider.value = value;
+      slider.dispatchEvent(new Event('input'));
+      counts.push([qmatPage.state.spheres, qmatPage.level().spheres.length / 4, qmatPage.state.mesh.chain.error(qmatPage.state.spheres)]);
+    }
+    document.getElementById('result').click();
+    return { counts, back: qmatPage.state.spheres };`);
+  check('the slider goes from the finest level to one sphere', moved.counts[0][0] === 300 && moved.counts[4][0] === 1, JSON.stringify(moved));
+  check('each level has as many spheres as it says', moved.counts.every(([n, own]) => n === own), JSON.stringify(moved));
+  check('fewer spheres, a larger error', moved.counts.every(([n, , error], i, all) => i === 0 || (n < all[i - 1][0] && error >= all[i - 1][2])), JSON.stringify(moved));
+  check('the result comes back', moved.back === null);
+}
+
+async function testHands(browser) {
+  const did = await browser.run(`
+    const { state } = qmatPage, stage = document.getElementById('stage'), before = { ...state };
+    const press = (key, on = document.body) => on.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true }));
+    press('ArrowLeft', stage); const turned = state.turn !== before.turn;
+    press('+'); const nearer = state.zoom < before.zoom;
+    press('2'); const view = state.view;
+    press('w'); qmatPage.draw(); const marks = document.querySelectorAll('.mark').length;
+    press('r'); const back = state.turn === before.turn && state.zoom === 1;
+    press('t'); const dark = document.documentElement.dataset.theme;
+    press('t'); press('1');
+    const touch = (type, id, x, y) => stage.dispatchEvent(new PointerEvent(type, { pointerId: id, clientX: x, clientY: y, pointerType: 'touch', bubbles: true }));
+    stage.setPointerCapture = () => {};
+    touch('pointerdown', 1, 100, 100); touch('pointerdown', 2, 200, 100); touch('pointermove', 2, 300, 100); const pinched = state.zoom < 0.6;
+    touch('pointerup', 1, 100, 100); touch('pointerup', 2, 300, 100); press('r');
+    return { turned, nearer, view, marks, back, dark, pinched };`);
+  check('keys and fingers', did.turned && did.nearer && did.view === 'overlay' && did.marks === 1 && did.back && did.dark === 'dark' && did.pinched, JSON.stringify(did));
+}
+
+/** Texts and controls do not overlap, and nothing is wider than the window. */
+const LAYOUT = `
+  const wide = [...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('#labels')).map((e) => e.id || e.tagName);
+  const boxes = [...document.querySelectorAll('h1, #lead, h2, button, select, td, th, #ticks span, output, label, input, .caption')]
+    .map((e) => [e, e.getBoundingClientRect()]).filter(([, r]) => r.width > 0 && r.height > 0);
+  const over = [];
+  for (const [a, r] of boxes) for (const [b, q] of boxes) if (a !== b && !a.contains(b) && !b.contains(a) &&
+    Math.min(r.right, q.right) - Math.max(r.left, q.left) > 1.5 && Math.min(r.bottom, q.bottom) - Math.max(r.top, q.top) > 1.5) over.push([a, b].map((e) => e.id || e.textContent).join(' / '));
+  return { wide, over, canvas: !document.getElementById('canvas').hidden, still: document.getElementById('still').getBoundingClientRect().width };`;
+
+async function inBrowser(options, act) {
+  const browser = new Browser(...options);
+  const limit = setTimeout(() => browser.close(), 150000);
+  try {
+    await act(browser);
+  } finally {
+    clearTimeout(limit);
+    browser.close();
+  }
+}
+
+await inBrowser(['--enable-unsafe-swiftshader'], async (browser) => {
+  await browser.open(1280, 900);
+  if (!(await browser.run("return !document.getElementById('canvas').hidden"))) {
+    console.log('skipped in part: this Chromium has no WebGL 2');
+    process.exitCode = 77;
+    return;
+  }
+  await testView(browser);
+  await testLevels(browser);
+  await testHands(browser);
+  for (const [width, dark] of [[360, false], [768, true], [1600, false]]) {
+    await browser.open(width, 900, dark);
+    const layout = await browser.run(LAYOUT);
+    check(`nothing overlaps at ${width} pixels`, layout.wide.length === 0 && layout.over.length === 0, JSON.stringify(layout));
+    const paper = await browser.run('return getComputedStyle(document.body).backgroundColor');
+    check('dark is dark', (paper === 'rgb(255, 255, 255)') === !dark, paper);
+  }
+});
+await inBrowser(['--disable-3d-apis'], async (browser) => {
+  await browser.open(360, 900);
+  const layout = await browser.run(LAYOUT);
+  check('without WebGL there is a picture, and the numbers', !layout.canvas && layout.still > 300 && layout.wide.length === 0, JSON.stringify(layout));
+});
+check('nothing is said on the console, and nothing is fetched', said.length === 0, said.join('; '));
+if (failures > 0) process.exitCode = 1;
