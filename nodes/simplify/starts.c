@@ -38,12 +38,11 @@ static qmat_status run_start(qmat_context *own, void *user, size_t start) {
 
 /* A single start uses all threads by itself. */
 static qmat_status run_alone(qmat_context *context, all_starts *all) {
-  qmat_context own = *context;
-  own.arena = (qmat_arena){0};
-  const qmat_status status = run_start(&own, all, 0);
-  qmat_context_uninit(&own);
-  context->error = own.error;
-  context->progress_time = own.progress_time;
+  const qmat_arena arena = context->arena;
+  context->arena = (qmat_arena){0};
+  const qmat_status status = run_start(context, all, 0);
+  qmat_arena_uninit(&context->arena);
+  context->arena = arena;
   return status;
 }
 
