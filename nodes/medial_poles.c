@@ -15,9 +15,6 @@
 
 #define NO_SPHERE UINT32_MAX
 
-/* Half the width of the box around the samples, in diagonals of the surface: the paper's box is five times as large. */
-static const double box_reach = 2.5;
-
 typedef struct medial_poles_params {
   double sampling;
   double propagation;
@@ -38,21 +35,12 @@ typedef struct power_crust {
   size_t sphere_count;
 } power_crust;
 
-/* The sites in the unit frame, and behind them the corners of the box. */
-static qmat_status make_points(power_crust *p, double **points) {
-  const size_t count = p->sites.count;
-  *points = qmat_arena_alloc(&p->context->arena, count + 8, 3 * sizeof **points);
-  if (!*points) return qmat_fail_memory(p->context, "samples");
-  qmat_frame_to_unit(&p->frame, p->sites.points, count, *points);
-  for (size_t i = 0; i < 24; i++) (*points)[3 * count + i] = (i / 3) >> (i % 3) & 1 ? box_reach : -box_reach;
-  return QMAT_OK;
-}
-
 static qmat_status find_inner_poles(power_crust *p) {
   qmat_context *context = p->context;
   double *points;
-  qmat_status status = make_points(p, &points);
-  if (status == QMAT_OK) status = qmat_delaunay_tetrahedra(context, points, p->sites.count + 8, &p->cells);
+  qmat_status status = qmat_boxed_points(context, &p->frame, &p->sites, &points);
+  if (status == QMAT_OK)
+    status = qmat_delaunay_tetrahedra(context, points, p->sites.count + QMAT_BOX_CORNERS, &p->cells);
   if (status == QMAT_OK)
     status =
         qmat_poles_find(context, points, p->sites.count, &p->cells, p->params->sampling, p->params->merge, &p->poles);

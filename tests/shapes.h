@@ -137,6 +137,25 @@ static inline qmat_mesh *shape_torus(double big, double small, uint32_t around, 
   return mesh;
 }
 
+/* Rings of points at the heights -1, 0 and 1, and two apexes: a capsule whose upper half of vertices lies on a sphere
+ * around (0, 0, 1/2), as does the lower half around (0, 0, -1/2). */
+static inline qmat_mesh *shape_two_balls(uint32_t around) {
+  qmat_mesh *mesh = shape_new();
+  const double pi = 3.14159265358979323846;
+  shape_vertex(mesh, 0, 0, -0.5 - sqrt(1.25));
+  for (int level = -1; level <= 1; level++)
+    for (uint32_t i = 0; i < around; i++) shape_vertex(mesh, cos(2 * pi * i / around), sin(2 * pi * i / around), level);
+  shape_vertex(mesh, 0, 0, 0.5 + sqrt(1.25));
+  for (uint32_t i = 0; i < around; i++) {
+    const uint32_t a = 1 + i, b = 1 + (i + 1) % around;
+    shape_triangle(mesh, b, a, 0);
+    shape_quad(mesh, a, b, b + around, a + around);
+    shape_quad(mesh, a + around, b + around, b + 2 * around, a + 2 * around);
+    shape_triangle(mesh, a + 2 * around, b + 2 * around, 1 + 3 * around);
+  }
+  return mesh;
+}
+
 /* The L of [0,2]x[0,2] without (1,2]x(1,2], one high. */
 static inline qmat_mesh *shape_l(void) {
   static const double outline[6][2] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};

@@ -5,6 +5,8 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 
+#include "core/geometry/reserve_cells_cgal.h"
+
 #include <algorithm>
 #include <array>
 #include <exception>
@@ -19,12 +21,9 @@ using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data
  * one plane. CGAL's convex_hull_3 goes by addresses of memory there, so its triangles differ between runs. */
 qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count) {
   try {
-    /* A shortage of memory must come before CGAL notes the new cells, as in initial/delaunay_cgal.cpp. */
-    constexpr size_t kMostCells = Delaunay::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
     Delaunay delaunay;
-    auto &cells = delaunay.tds().cells();
     for (size_t i = 0; i < count; i++) {
-      if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
+      qmat_reserve_cells(delaunay);
       const double *p = points + 3 * i;
       delaunay.insert(Kernel::Point_3(p[0], p[1], p[2]))->info() = static_cast<uint32_t>(i);
     }

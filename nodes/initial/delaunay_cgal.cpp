@@ -10,6 +10,8 @@
 #include <CGAL/property_map.h>
 #include <CGAL/spatial_sort.h>
 
+#include "core/geometry/reserve_cells_cgal.h"
+
 #include <algorithm>
 #include <array>
 #include <exception>
@@ -29,15 +31,6 @@ using Triangulation =
 
 constexpr size_t kPointsPerReport = 4096;
 
-/* Reserves memory for the cells of the next point. CGAL records the new cells around a point in a thread-local map. If
- * memory runs out meanwhile, the map keeps stale cells and corrupts the thread's next triangulation, so a shortage must
- * occur before. CGAL uses that map for at most this many cells. */
-void reserve_cells(Triangulation &triangulation) {
-  constexpr size_t kMostCells = Triangulation::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
-  auto &cells = triangulation.tds().cells();
-  if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
-}
-
 qmat_status triangulate(qmat_context *context, const std::vector<Point> &points, Triangulation &triangulation) {
   using PointMap = CGAL::Pointer_property_map<Point>::const_type;
   using SortTraits = CGAL::Spatial_sort_traits_adapter_3<Kernel, PointMap>;
@@ -51,7 +44,7 @@ qmat_status triangulate(qmat_context *context, const std::vector<Point> &points,
       if (status != QMAT_OK) return status;
     }
     const auto id = static_cast<uint32_t>(order[i]);
-    reserve_cells(triangulation);
+    qmat_reserve_cells(triangulation);
     const size_t before = triangulation.number_of_vertices();
     const auto vertex = triangulation.insert(points[order[i]], hint);
     const bool is_new = triangulation.number_of_vertices() > before;

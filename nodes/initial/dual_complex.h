@@ -56,4 +56,9 @@ static inline uint32_t qmat_dual_step_around(const qmat_dual_complex *dual, uint
   return next;
 }
 
+/* Sets `edges` and `triangles`: an edge across each facet between two kept tetrahedra with different medial vertices,
+ * and the triangles of a polygon for each Delaunay edge whose whole ring is kept. Reads `cells`, `kinds` and
+ * `sphere_of`; in voronoi_dual.c. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear. */
+qmat_status qmat_dual_connect(qmat_dual_complex *dual);
+
 #endif

@@ -3,68 +3,26 @@
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Regular_triangulation_3.h>
-#include <CGAL/Regular_triangulation_cell_base_3.h>
 #include <CGAL/Regular_triangulation_vertex_base_3.h>
-#include <CGAL/Spatial_sort_traits_adapter_3.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
-#include <CGAL/property_map.h>
-#include <CGAL/spatial_sort.h>
+
+#include "nodes/initial/regular_insert_cgal.h"
 
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <exception>
 #include <new>
-#include <numeric>
 #include <vector>
 
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Sphere = Kernel::Weighted_point_3;
-constexpr uint32_t kNoId = UINT32_MAX;
-struct SphereId {
-  uint32_t value = kNoId;
-};
 using VertexBase =
     CGAL::Triangulation_vertex_base_with_info_3<SphereId, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>;
-using CellBase = CGAL::Regular_triangulation_cell_base_3<Kernel>;
+using CellBase = RegularCellBase;
 using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
-
-constexpr size_t kSpheresPerReport = 1024;
-
-/* As in delaunay_cgal.cpp: a shortage of memory must not occur while CGAL records new cells in its thread-local map. */
-void reserve_cells(Triangulation &triangulation) {
-  constexpr size_t kMostCells = Triangulation::Triangulation_data_structure::maximal_nb_of_facets_of_small_hole;
-  auto &cells = triangulation.tds().cells();
-  if (cells.capacity() - cells.size() < kMostCells) cells.reserve(cells.size() + kMostCells);
-}
-
-qmat_status triangulate(qmat_context *context, const std::vector<Sphere> &spheres, Triangulation &triangulation) {
-  std::vector<Kernel::Point_3> centres;
-  centres.reserve(spheres.size());
-  for (const Sphere &sphere : spheres) centres.push_back(sphere.point());
-  using PointMap = CGAL::Pointer_property_map<Kernel::Point_3>::const_type;
-  std::vector<size_t> order(spheres.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  CGAL::spatial_sort(order.begin(), order.end(),
-                     CGAL::Spatial_sort_traits_adapter_3<Kernel, PointMap>(PointMap(centres.data())));
-  Triangulation::Cell_handle hint;
-  for (size_t i = 0; i < order.size(); i++) {
-    if (i % kSpheresPerReport == 0) {
-      const qmat_status status = qmat_progress(context, i, order.size(), "spheres");
-      if (status != QMAT_OK) return status;
-    }
-    reserve_cells(triangulation);
-    const auto vertex = triangulation.insert(spheres[order[i]], hint);
-    if (vertex == Triangulation::Vertex_handle()) continue; /* hidden */
-    const auto id = static_cast<uint32_t>(order[i]);
-    uint32_t &known = vertex->info().value;
-    if (known == kNoId || id < known || spheres[known].weight() != spheres[id].weight()) known = id;
-    hint = vertex->cell();
-  }
-  return QMAT_OK;
-}
 
 template <size_t N>
 using Simplices = std::vector<std::array<uint32_t, N>>;
@@ -117,7 +75,7 @@ qmat_status qmat_regular_simplices_find(qmat_context *context, const double *sph
       sites.emplace_back(Kernel::Point_3(s[0], s[1], s[2]), s[3] * s[3]);
     }
     Triangulation triangulation;
-    const qmat_status status = triangulate(context, sites, triangulation);
+    const qmat_status status = insert_spheres(context, sites, triangulation);
     return status == QMAT_OK ? collect(context, triangulation, count, simplices) : status;
   } catch (const std::bad_alloc &) {
     return qmat_fail_memory(context, "the power diagram");

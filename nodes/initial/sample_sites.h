@@ -2,7 +2,7 @@
 #ifndef QMAT_NODES_INITIAL_SAMPLE_SITES_H
 #define QMAT_NODES_INITIAL_SAMPLE_SITES_H
 
-#include "core/value.h"
+#include "core/geometry/frame.h"
 
 /* The samples of the solids of a mesh. Both arrays live in the context's arena. */
 typedef struct qmat_sample_sites {
@@ -15,5 +15,11 @@ typedef struct qmat_sample_sites {
  * belong to the mesh; QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_sample_sites_find(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
                                    qmat_sample_sites *sites);
+
+/* The sites in the unit frame, and behind them the corners of a box around them, five times as large as a box with the
+ * surface's diagonal as its sides: 3 doubles per point, in the context's arena. QMAT_ERROR_MEMORY. */
+enum { QMAT_BOX_CORNERS = 8 };
+qmat_status qmat_boxed_points(qmat_context *context, const qmat_frame *frame, const qmat_sample_sites *sites,
+                              double **points);
 
 #endif

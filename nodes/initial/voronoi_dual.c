@@ -54,9 +54,7 @@ static size_t fan(const uint32_t *polygon, size_t count, uint32_t *triangles) {
   return made;
 }
 
-/* A medial edge across each facet between two kept tetrahedra, and medial triangles for each Delaunay edge whose whole
- * ring is kept. */
-static qmat_status connect(qmat_dual_complex *d) {
+qmat_status qmat_dual_connect(qmat_dual_complex *d) {
   qmat_context *context = d->context;
   const size_t count = d->cells.count;
   size_t edge_capacity = 0, triangle_capacity = 0;
@@ -283,7 +281,7 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
     qmat_fail_field(context, "mesh");
     return qmat_fail_hint(context, "check that the surface is closed and its normals point outwards");
   }
-  if ((status = connect(d)) != QMAT_OK) return status;
+  if ((status = qmat_dual_connect(d)) != QMAT_OK) return status;
   return qmat_dual_components_join(d, &made->joined);
 }
 

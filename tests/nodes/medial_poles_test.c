@@ -48,30 +48,11 @@ static size_t index_of(const qmat_medial *medial, double z) {
 
 enum { AROUND = 8 };
 
-/* Rings of 8 points at the heights -1, 0 and 1, and two apexes, so that the upper 17 points and the lower 17 lie on a
- * sphere each, with centres at the heights 1/2 and -1/2. */
-static qmat_mesh *two_balls(void) {
-  qmat_mesh *mesh = shape_new();
-  const double pi = acos(-1);
-  shape_vertex(mesh, 0, 0, -0.5 - sqrt(1.25));
-  for (int level = -1; level <= 1; level++)
-    for (int i = 0; i < AROUND; i++) shape_vertex(mesh, cos(2 * pi * i / AROUND), sin(2 * pi * i / AROUND), level);
-  shape_vertex(mesh, 0, 0, 0.5 + sqrt(1.25));
-  for (uint32_t i = 0; i < AROUND; i++) {
-    const uint32_t a = 1 + i, b = 1 + (i + 1) % AROUND;
-    shape_triangle(mesh, b, a, 0);
-    shape_quad(mesh, a, b, b + AROUND, a + AROUND);
-    shape_quad(mesh, a + AROUND, b + AROUND, b + 2 * AROUND, a + 2 * AROUND);
-    shape_triangle(mesh, a + 2 * AROUND, b + 2 * AROUND, 1 + 3 * AROUND);
-  }
-  return shape_seal(mesh);
-}
-
 /* The default sampling constant asks for more samples than these. */
 static void test_two_balls_have_two_inner_poles_and_the_edge_between_them(void **state) {
   (void)state;
   pipeline s;
-  pipeline_sample(&s, two_balls(), VERTICES);
+  pipeline_sample(&s, shape_two_balls(AROUND), VERTICES);
   poles p = make_poles(&s, 0, "sampling=1");
   assert_int_equal(p.medial->sphere_count, 2);
   assert_int_equal(p.medial->edge_count, 1);
@@ -300,7 +281,7 @@ static void test_eight_corners_are_too_few_samples(void **state) {
 static void test_constant_that_rejects_every_inner_pole_is_named(void **state) {
   (void)state;
   pipeline p;
-  pipeline_sample(&p, two_balls(), VERTICES);
+  pipeline_sample(&p, shape_two_balls(AROUND), VERTICES);
   expect_error(p.mesh, p.samples, "sampling=0.01", "sampling");
   pipeline_free(&p);
 }

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_INITIAL_REGULAR_INSERT_CGAL_H
+#define QMAT_NODES_INITIAL_REGULAR_INSERT_CGAL_H
+
+/* What the adapters of CGAL's regular triangulation share; for them alone. */
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Hidden_point_memory_policy.h>
+#include <CGAL/Regular_triangulation_cell_base_3.h>
+#include <CGAL/Spatial_sort_traits_adapter_3.h>
+#include <CGAL/Triangulation_cell_base_3.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
+
+#include <numeric>
+#include <vector>
+
+#include "core/context.h"
+#include "core/geometry/reserve_cells_cgal.h"
+
+/* What a vertex knows of its sphere. */
+constexpr uint32_t kNoSphereId = UINT32_MAX;
+struct SphereId {
+  uint32_t value = kNoSphereId;
+};
+
+/* The base of cells. Hidden spheres are not kept: only the rest of the triangulation is asked for. */
+using RegularCellBase = CGAL::Regular_triangulation_cell_base_3<
+    CGAL::Exact_predicates_inexact_constructions_kernel,
+    CGAL::Triangulation_cell_base_3<CGAL::Exact_predicates_inexact_constructions_kernel>, CGAL::Discard_hidden_points>;
+
+/* Inserts the spheres in a spatial order. A vertex gets the smallest id of the spheres that are equal to its own. */
+template <class Triangulation>
+qmat_status insert_spheres(qmat_context *context, const std::vector<typename Triangulation::Weighted_point> &spheres,
+                           Triangulation &triangulation) {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using PointMap = CGAL::Pointer_property_map<Kernel::Point_3>::const_type;
+  constexpr size_t kSpheresPerReport = 1024;
+  std::vector<Kernel::Point_3> centres;
+  centres.reserve(spheres.size());
+  for (const auto &sphere : spheres) centres.push_back(sphere.point());
+  std::vector<size_t> order(spheres.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  CGAL::spatial_sort(order.begin(), order.end(),
+                     CGAL::Spatial_sort_traits_adapter_3<Kernel, PointMap>(PointMap(centres.data())));
+  typename Triangulation::Cell_handle hint;
+  for (size_t i = 0; i < order.size(); i++) {
+    if (i % kSpheresPerReport == 0) {
+      const qmat_status status = qmat_progress(context, i, order.size(), "spheres");
+      if (status != QMAT_OK) return status;
+    }
+    qmat_reserve_cells(triangulation);
+    const auto vertex = triangulation.insert(spheres[order[i]], hint);
+    if (vertex == typename Triangulation::Vertex_handle()) continue; /* hidden */
+    const auto id = static_cast<uint32_t>(order[i]);
+    uint32_t &known = vertex->info().value;
+    if (known == kNoSphereId || id < known || spheres[known].weight() != spheres[id].weight()) known = id;
+    hint = vertex->cell();
+  }
+  return QMAT_OK;
+}
+
+#endif
