@@ -4,11 +4,23 @@
 
 #include "graphs/graph.h"
 
-/* The text of graphs/qmat_plus.yaml, embedded by CMake. */
-extern const char qmat_plus_graph[];
-extern const size_t qmat_plus_graph_size; /* without the terminating zero */
+/* The shipped graphs, whose texts CMake embeds. */
 
-/* Reads that graph. Errors call it "qmat_plus.yaml (built in)". */
-qmat_status qmat_graph_read_built_in(qmat_context *context, const qmat_registry *registry, qmat_graph *graph);
+typedef struct qmat_built_in_graph {
+  const char *name; /* of its file, without ".yaml" */
+  const char *text;
+  const size_t *size; /* without the terminating zero */
+} qmat_built_in_graph;
+
+/* The first is qmat_plus. */
+extern const qmat_built_in_graph qmat_built_in_graphs[];
+extern const size_t qmat_built_in_graph_count;
+
+/* The built-in graph of that name, with or without ".yaml"; NULL: none. */
+const qmat_built_in_graph *qmat_built_in_graph_find(const char *name);
+
+/* Reads one. Errors call it "qmat_plus.yaml (built in)". */
+qmat_status qmat_graph_read_built_in(qmat_context *context, const qmat_registry *registry,
+                                     const qmat_built_in_graph *built_in, qmat_graph *graph);
 
 #endif

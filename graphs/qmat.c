@@ -108,8 +108,8 @@ static qmat_result finish_new(qmat_job *job, qmat_status status) {
 qmat_result qmat_job_new(qmat_job **job) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
-  return finish_new(
-      *job, qmat_graph_read_built_in(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, &(*job)->graph));
+  return finish_new(*job, qmat_graph_read_built_in(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count},
+                                                   &qmat_built_in_graphs[0], &(*job)->graph));
 }
 
 qmat_result qmat_job_new_from_file(qmat_job **job, const char *path) {

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/cli/batch.h"
 
-#include <errno.h>
 #include <fcntl.h>
-#include <glob.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
@@ -14,94 +12,6 @@
 #include <unistd.h>
 
 #include "graphs/run/run.h"
-#include "io/bytes.h"
-#include "io/model.h"
-
-/* ---- finding ---- */
-
-static qmat_status add_asset(qmat_context *context, qmat_batch *batch, const char *folder, size_t folder_length,
-                             const char *path, size_t length) {
-  if (*path == '/') folder_length = 0;
-  char *input = qmat_alloc(folder_length + length + 1, 1);
-  if (!input || qmat_grow((void **)&batch->assets, &batch->capacity, batch->count + 1, sizeof *batch->assets) != 0) {
-    qmat_free(input);
-    return qmat_fail_memory(context, "assets");
-  }
-  memcpy(input, folder, folder_length);
-  memcpy(input + folder_length, path, length);
-  input[folder_length + length] = 0;
-  qmat_asset *asset = &batch->assets[batch->count++];
-  *asset = (qmat_asset){.input = input, .stem = qmat_model_name(input)};
-  return asset->stem ? QMAT_OK : qmat_fail_memory(context, "assets");
-}
-
-/* A missing folder has no match; every other error of a folder ends the search. */
-static int is_unreadable(const char *folder, int number) {
-  (void)folder;
-  return number != ENOENT && number != ENOTDIR;
-}
-
-static qmat_status find_matches(qmat_context *context, const char *pattern, qmat_batch *batch) {
-  glob_t found;
-  int result = glob(pattern, 0, is_unreadable, &found);
-  if (result == GLOB_NOMATCH) return qmat_fail(context, QMAT_ERROR_USAGE, "no file matches '%s'", pattern);
-  if (result != 0)
-    return qmat_fail(context, result == GLOB_NOSPACE ? QMAT_ERROR_MEMORY : QMAT_ERROR_IO,
-                     "cannot read the folders of '%s'", pattern);
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < found.gl_pathc && status == QMAT_OK; i++)
-    status = add_asset(context, batch, "", 0, found.gl_pathv[i], strlen(found.gl_pathv[i]));
-  globfree(&found);
-  return status;
-}
-
-static qmat_status read_list(qmat_context *context, const char *path, qmat_batch *batch) {
-  qmat_bytes bytes = {0};
-  qmat_status status = qmat_bytes_read_file(context, path, &bytes);
-  const char *slash = strrchr(path, '/'), *line = (const char *)bytes.data;
-  size_t folder_length = slash ? (size_t)(slash - path) + 1 : 0;
-  for (const char *end = line + bytes.size; status == QMAT_OK && line < end;) {
-    size_t length = strcspn(line, "\r\n");
-    if (memchr(line, 0, length + 1) && line + length < end) {
-      qmat_fail(context, QMAT_ERROR_FORMAT, "this is not a list of paths: it has a zero byte");
-      status = qmat_fail_at(context, path, 0, 0);
-    } else if (length > 0 && *line != '#') {
-      status = add_asset(context, batch, path, folder_length, line, length);
-    }
-    line += length + 1;
-  }
-  qmat_bytes_uninit(&bytes);
-  if (status == QMAT_OK && batch->count == 0) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "the list is empty");
-    status = qmat_fail_at(context, path, 0, 0);
-  }
-  return status;
-}
-
-static int by_stem(const void *a, const void *b) {
-  return strcmp((*(const qmat_asset *const *)a)->stem, (*(const qmat_asset *const *)b)->stem);
-}
-
-static qmat_status check_stems(qmat_context *context, const qmat_batch *batch) {
-  const qmat_asset **sorted = qmat_alloc(batch->count, sizeof *sorted);
-  if (!sorted) return qmat_fail_memory(context, "assets");
-  for (size_t i = 0; i < batch->count; i++) sorted[i] = &batch->assets[i];
-  qsort(sorted, batch->count, sizeof *sorted, by_stem);
-  qmat_status status = QMAT_OK;
-  for (size_t i = 1; i < batch->count && status == QMAT_OK; i++)
-    if (strcmp(sorted[i - 1]->stem, sorted[i]->stem) == 0)
-      status = qmat_fail(context, QMAT_ERROR_USAGE, "the results of '%s' and '%s' would have the same name",
-                         sorted[i - 1]->input, sorted[i]->input);
-  qmat_free(sorted);
-  return status;
-}
-
-qmat_status qmat_batch_find(qmat_context *context, const char *inputs, qmat_batch *batch) {
-  *batch = (qmat_batch){0};
-  qmat_status status =
-      strpbrk(inputs, "*?[") ? find_matches(context, inputs, batch) : read_list(context, inputs, batch);
-  return status == QMAT_OK ? check_stems(context, batch) : status;
-}
 
 void qmat_batch_uninit(qmat_batch *batch) {
   for (size_t i = 0; i < batch->count; i++) {

@@ -51,7 +51,7 @@ qmat_status qmat_open_cache(qmat_context *context, const qmat_invocation *invoca
     qmat_fail(context, QMAT_ERROR_USAGE, "expected a size such as 500MB or 10GB, found '%s'", qmat_show(size).text);
     return qmat_fail_field(context, "--cache-size");
   }
-  if (qmat_invocation_value(invocation, "no-cache")) return QMAT_OK;
+  if (qmat_invocation_chooses(invocation, "no-cache", "cache")) return QMAT_OK;
   if (named && !*named) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the folder of the cache is empty");
     return qmat_fail_field(context, "--cache");

@@ -9,9 +9,9 @@
 #include "graphs/graph_names.h"
 
 const qmat_command *const qmat_commands[] = {
-    &qmat_command_mat,   &qmat_command_run,   &qmat_command_batch,   &qmat_command_watch, &qmat_command_why,
-    &qmat_command_cache, &qmat_command_check, &qmat_command_dot,     &qmat_command_info,  &qmat_command_extract,
-    &qmat_command_nodes, &qmat_command_node,  &qmat_command_version, &qmat_command_help,
+    &qmat_command_mat,    &qmat_command_run,   &qmat_command_batch, &qmat_command_watch,   &qmat_command_why,
+    &qmat_command_cache,  &qmat_command_check, &qmat_command_dot,   &qmat_command_info,    &qmat_command_extract,
+    &qmat_command_graphs, &qmat_command_nodes, &qmat_command_node,  &qmat_command_version, &qmat_command_help,
 };
 const size_t qmat_command_count = sizeof qmat_commands / sizeof *qmat_commands;
 

@@ -2,6 +2,7 @@
 #ifndef QMAT_GRAPHS_CLI_COMMAND_H
 #define QMAT_GRAPHS_CLI_COMMAND_H
 
+#include "graphs/cli/standard_streams.h"
 #include "graphs/run/run_plan.h"
 
 /* The commands of the command line. Each command is one constant descriptor at the end of its file. Parsing, errors and
@@ -35,8 +36,10 @@ typedef struct qmat_invocation {
   size_t given_count;
   const char **arguments; /* the words that are not options */
   size_t argument_count;
-  bool help;        /* --help was given */
-  qmat_graph graph; /* of commands that work on one */
+  bool help;               /* --help was given */
+  bool inputs_are_options; /* each input of the graph is an option of its name */
+  qmat_graph graph;        /* of commands that work on one */
+  qmat_streams streams;    /* the standard input and output, where a path is "-" */
 } qmat_invocation;
 
 struct qmat_command {
@@ -50,7 +53,7 @@ struct qmat_command {
 
 extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_watch, qmat_command_why,
     qmat_command_cache, qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node,
-    qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract;
+    qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract, qmat_command_graphs;
 
 /* All commands, in the order of the help. */
 extern const qmat_command *const qmat_commands[];
@@ -119,8 +122,15 @@ qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocat
                                  bool foresee, qmat_planned_run *planned);
 void qmat_planned_run_uninit(qmat_planned_run *planned);
 
-/* A `prepare` that reads the graph file named by the first argument. */
+/* A `prepare` that reads the graph named by the first argument: a file, "-", or a built-in graph. */
 qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation);
+
+/* ---- many models ---- */
+
+/* Runs the command once per model, each in a process of its own. `inputs` are models, folders and patterns; `graph` is
+ * the argument of `qmat run`, or NULL for `qmat mat` with its options. Results go below the folder `results`. */
+qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, const char *graph,
+                           const char *const *inputs, size_t count, const char *results);
 
 /* ---- running ---- */
 

@@ -8,19 +8,22 @@
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/built_in.h"
 #include "graphs/cli/batch.h"
 #include "graphs/cli/command.h"
 #include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
 #include "graphs/cli/terminal.h"
 #include "graphs/graph_params.h"
+#include "graphs/run/run_paths.h"
 #include "graphs/run/run_summary.h"
 
 /* One call of `qmat batch`. */
 typedef struct batch_call {
   qmat_context *context;
   qmat_invocation *invocation;
-  const char *folder, *format, *input; /* --out, --format, and the graph's input that takes the model */
+  const char *graph;          /* the argument of `qmat run`; NULL: `qmat mat` */
+  const char *folder, *input; /* of the results, and the graph's input that takes the model */
   char program[4096], reports[4096];
   int jobs, threads;
   bool json, quiet, verbose, slurm;
@@ -79,42 +82,65 @@ __attribute__((format(printf, 2, 3))) static void add_word(word_list *list, cons
   list->words[list->count] = NULL;
 }
 
-/* Adds the options that every asset gets: the cache, parameters, --force. */
-static void add_shared_words(word_list *list, const qmat_invocation *invocation) {
-  for (size_t i = 0; i < invocation->given_count; i++) {
-    const qmat_given_option *given = &invocation->given[i];
-    bool shared = strcmp(given->name, "set") == 0 || strcmp(given->name, "force") == 0;
-    for (const qmat_option *option = qmat_cache_option_rows; option->name; option++)
-      shared = shared || strcmp(option->name, given->name) == 0;
-    if (shared) add_word(list, *given->value ? "--%s=%s" : "--%s", given->name, given->value);
-  }
+/* Whether every asset gets this option: the cache, parameters, --force. */
+static bool is_shared(const batch_call *call, const char *name) {
+  const qmat_graph *graph = &call->invocation->graph;
+  bool shared = strcmp(name, "set") == 0 || strcmp(name, "force") == 0 || strcmp(name, "colliders") == 0;
+  for (const qmat_option *option = qmat_cache_option_rows; option->name; option++)
+    shared = shared || strcmp(option->name, name) == 0;
+  for (size_t i = 0; call->invocation->inputs_are_options && i < graph->input_count; i++)
+    shared = shared || strcmp(graph->inputs[i].name, name) == 0;
+  return shared;
 }
 
-static qmat_status make_command(const batch_call *call, size_t index, qmat_asset *asset) {
-  const qmat_graph *graph = &call->invocation->graph;
-  word_list list = {0};
+static bool output_has_format(const qmat_graph *graph, size_t output, const char *ending) {
+  const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[output].node].type);
+  for (int k = 0; format && format->choices[k]; k++)
+    if (strcmp(format->choices[k], ending) == 0) return true;
+  return false;
+}
+
+/* Adds the paths of an asset's results: in each --format, or in the graph's. */
+static void add_outputs(const batch_call *call, word_list *list, const qmat_asset *asset) {
+  const qmat_invocation *invocation = call->invocation;
+  const qmat_graph *graph = &invocation->graph;
   size_t last;
-  const size_t files = qmat_graph_file_count(graph, &last);
-  add_word(&list, "%s", call->program);
-  add_word(&list, "run");
-  add_word(&list, "--quiet");
-  add_word(&list, "--threads=%d", call->threads);
-  add_word(&list, "--report=%s/%zu.json", call->reports, index);
-  add_shared_words(&list, call->invocation);
-  add_word(&list, "--set=%s=%s", call->input, asset->input);
+  const bool several = qmat_graph_file_count(graph, &last) > 1;
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_graph_output *output = &graph->outputs[i];
     const qmat_node *type = graph->nodes[output->node].type;
     const qmat_param *format = qmat_output_format_param(type);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format || qmat_graph_on_request(graph, i)) continue;
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format) continue;
     char ending[64];
     qmat_param_format(format, graph->nodes[output->node].params, ending, sizeof ending);
+    const bool chosen = qmat_invocation_value(invocation, "format") != NULL;
     /* Several outputs differ by their names. */
-    add_word(&list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, files > 1 ? "-" : "",
-             files > 1 ? output->name : "", call->format ? call->format : ending);
+    for (size_t k = 0; k < invocation->given_count; k++)
+      if (strcmp(invocation->given[k].name, "format") == 0 && output_has_format(graph, i, invocation->given[k].value))
+        add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
+                 several ? output->name : "", invocation->given[k].value);
+    if (!chosen && !qmat_graph_on_request(graph, i))
+      add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
+               several ? output->name : "", ending);
   }
+}
+
+static qmat_status make_command(const batch_call *call, size_t index, qmat_asset *asset) {
+  const qmat_invocation *invocation = call->invocation;
+  word_list list = {0};
+  add_word(&list, "%s", call->program);
+  add_word(&list, "%s", call->graph ? "run" : "mat");
+  add_word(&list, "--quiet");
+  add_word(&list, "--threads=%d", call->threads);
+  add_word(&list, "--report=%s/%zu.json", call->reports, index);
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    const qmat_given_option *given = &invocation->given[i];
+    if (is_shared(call, given->name)) add_word(&list, *given->value ? "--%s=%s" : "--%s", given->name, given->value);
+  }
+  if (call->graph) add_word(&list, "--set=%s=%s", call->input, asset->input);
+  add_outputs(call, &list, asset);
   add_word(&list, "--");
-  add_word(&list, "%s", call->invocation->arguments[0]);
+  add_word(&list, "%s", call->graph ? call->graph : asset->input);
   asset->words = list.words;
   size_t size = strlen(call->reports) + 32;
   asset->report = qmat_alloc(size, 1);
@@ -288,15 +314,20 @@ static void print_totals(const batch_call *call, const qmat_batch *batch) {
 /* ---- the call ---- */
 
 /* Refuses a format that an output of the graph does not have. */
-static qmat_status check_format(const batch_call *call) {
+static qmat_status check_formats(const batch_call *call) {
   const qmat_graph *graph = &call->invocation->graph;
-  for (size_t i = 0; call->format && i < graph->output_count; i++) {
-    char path[64];
-    int format;
-    snprintf(path, sizeof path, "asset.%.48s", call->format);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE || qmat_graph_on_request(graph, i)) continue;
-    if (qmat_graph_output_format(call->context, graph, i, path, &format) != QMAT_OK)
+  for (size_t k = 0; k < call->invocation->given_count; k++) {
+    const qmat_given_option *given = &call->invocation->given[k];
+    bool known = strcmp(given->name, "format") != 0;
+    for (size_t i = 0; !known && i < graph->output_count; i++) known = output_has_format(graph, i, given->value);
+    for (size_t i = 0; !known && i < graph->output_count; i++) {
+      char path[64];
+      int format;
+      snprintf(path, sizeof path, "asset.%.48s", given->value);
+      if (qmat_graph_output_type(graph, i) != QMAT_FILE || qmat_graph_on_request(graph, i)) continue;
+      qmat_graph_output_format(call->context, graph, i, path, &format);
       return qmat_fail_field(call->context, "--format");
+    }
   }
   return QMAT_OK;
 }
@@ -318,16 +349,14 @@ static qmat_status prepare(batch_call *call) {
   qmat_context *context = call->context;
   const qmat_invocation *invocation = call->invocation;
   struct stat about;
-  call->folder = qmat_invocation_value(invocation, "out");
-  call->format = qmat_invocation_value(invocation, "format");
-  if (!qmat_invocation_value(invocation, "inputs") || !call->folder) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "--inputs and --out are required");
-    return qmat_fail_hint(context, "--inputs 'models/*.off' --out results");
-  }
-  if (mkdir(call->folder, 0777) != 0 && (stat(call->folder, &about) != 0 || !S_ISDIR(about.st_mode))) {
+  char inside[4096];
+  snprintf(inside, sizeof inside, "%.4000s/", call->folder);
+  qmat_status status = qmat_make_folders(context, inside);
+  if (status == QMAT_OK && (stat(call->folder, &about) != 0 || !S_ISDIR(about.st_mode))) {
     qmat_fail(context, QMAT_ERROR_IO, "cannot make the folder of the results");
-    return qmat_fail_at(context, call->folder, 0, 0);
+    status = qmat_fail_at(context, call->folder, 0, 0);
   }
+  if (status != QMAT_OK) return status;
   const char *engine = qmat_invocation_value(invocation, "engine");
   call->slurm = engine && strcmp(engine, "slurm") == 0;
   if (engine && !call->slurm && strcmp(engine, "local") != 0) {
@@ -336,11 +365,11 @@ static qmat_status prepare(batch_call *call) {
   }
   /* The cluster decides how many tasks run at a time. */
   call->jobs = call->slurm ? 0 : qmat_threads(context);
-  qmat_status status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &call->jobs);
+  status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &call->jobs);
   call->threads = call->slurm || call->jobs > qmat_threads(context) ? 1 : qmat_threads(context) / call->jobs;
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 1, 1024, &call->threads);
-  if (status == QMAT_OK) status = check_format(call);
-  if (status == QMAT_OK) status = find_input(call);
+  if (status == QMAT_OK) status = check_formats(call);
+  if (status == QMAT_OK && call->graph) status = find_input(call);
   if (status != QMAT_OK) return status;
   ssize_t length = readlink("/proc/self/exe", call->program, sizeof call->program - 1);
   if (length <= 0) return qmat_fail(context, QMAT_ERROR_IO, "cannot find the path of this program");
@@ -348,21 +377,25 @@ static qmat_status prepare(batch_call *call) {
   return make_report_folder(call);
 }
 
-static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, const char *graph,
+                           const char *const *inputs, size_t count, const char *results) {
   batch_call call = {.context = context,
                      .invocation = invocation,
+                     .graph = graph,
+                     .folder = results,
                      .json = qmat_invocation_value(invocation, "json") != NULL,
                      .quiet = qmat_invocation_chooses(invocation, "quiet", "verbose"),
                      .verbose = qmat_invocation_chooses(invocation, "verbose", "quiet"),
                      .redraws = qmat_can_redraw(),
                      .started = qmat_clock_seconds()};
   qmat_batch batch = {0};
-  qmat_status status = qmat_read_graph_argument(context, invocation);
+  qmat_status status = QMAT_OK;
   for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
     if (strcmp(invocation->given[i].name, "set") == 0)
       status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
+  if (status == QMAT_OK)
+    status = qmat_batch_find(context, inputs, count, qmat_invocation_value(invocation, "inputs"), results, &batch);
   if (status == QMAT_OK) status = prepare(&call);
-  if (status == QMAT_OK) status = qmat_batch_find(context, qmat_invocation_value(invocation, "inputs"), &batch);
   for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
   bool started = status == QMAT_OK;
   if (started && call.slurm)
@@ -387,12 +420,33 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   return status;
 }
 
+static bool names_graph(const char *argument) {
+  const char *dot = strrchr(argument, '.');
+  const bool ends = dot && (strcmp(dot, ".yaml") == 0 || strcmp(dot, ".yml") == 0 || strcmp(dot, ".json") == 0);
+  return ends || (access(argument, F_OK) != 0 && qmat_built_in_graph_find(argument));
+}
+
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  const char *results = qmat_invocation_value(invocation, "out");
+  const bool graph = invocation->argument_count > 0 && names_graph(invocation->arguments[0]);
+  if (!results || (invocation->argument_count == graph && !qmat_invocation_value(invocation, "inputs"))) {
+    qmat_fail(context, QMAT_ERROR_USAGE, results ? "the models are missing" : "the folder of the results is missing");
+    return qmat_fail_hint(context, "qmat batch models --out results");
+  }
+  const qmat_status status =
+      graph ? qmat_read_graph_argument(context, invocation)
+            : qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[0], &invocation->graph);
+  return status == QMAT_OK ? qmat_run_batch(context, invocation, graph ? invocation->arguments[0] : NULL,
+                                            invocation->arguments + graph, invocation->argument_count - graph, results)
+                           : status;
+}
+
 static const qmat_option options[] = {
-    {"inputs", 0, "GLOB|LIST", "The models: a quoted pattern with *, ? or [, or a file with one path a line"},
-    {"out", 0, "DIR", "Folder of the results, which get the models' names; made if it is missing"},
-    {"format", 0, "ENDING", "Format of the results; default the graph's"},
+    {"inputs", 'i', "GLOB|LIST", "More models: a folder, a quoted pattern, or a file with one path a line"},
+    {"out", 'o', "DIR", "Folder of the results, which get the models' names; made if it is missing"},
+    {"format", 'f', "ENDING", "Format of the results; default the graph's; may be repeated"},
     {"input", 0, "NAME", "The graph's input that takes the model; default the only one that is a file"},
-    {"jobs", 0, "N", "How many models at a time; default one per processor"},
+    {"jobs", 'j', "N", "How many models at a time; default one per processor"},
     {"threads", 0, "N", "Threads of each model; default an equal share of the processors"},
     {"engine", 0, "local|slurm", "Run here, or as a job array on a Slurm cluster that shares folders and cache"},
     {"set", 0, "NAME=VALUE", "Set a parameter for all models; may be repeated"},
@@ -405,15 +459,18 @@ static const qmat_option options[] = {
 
 const qmat_command qmat_command_batch = {
     .name = "batch",
-    .arguments = "GRAPH",
+    .arguments = "[GRAPH] MODEL... --out DIR",
     .summary = "Run a graph on many models",
     .doc =
-        "Runs a graph file on many models, each in a process of its own. A failure does not stop the others; failures "
-        "are listed at the end, and the exit code is then 1. Finished work is in the cache, so an interrupted batch "
-        "continues when it is started again.",
+        "Runs a graph on many models, each in a process of its own. A model is a file, a folder with all models in and "
+        "below it, or a quoted pattern with *, ?, [ or ** for any folders. Results have the names of the models, in "
+        "the "
+        "same sub-folders. Without a graph, as 'qmat mat'. A failure does not stop the others; failures are listed at "
+        "the end, and the exit code is then 1. Finished work is in the cache, so an interrupted batch continues when "
+        "it "
+        "is started again.",
     .options = options,
     .caching = qmat_cache_option_rows,
-    .least = 1,
-    .most = 1,
+    .most = SIZE_MAX,
     .run = run,
 };

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 #include "graphs/built_in.h"
 #include "graphs/cli/command.h"
@@ -9,25 +10,43 @@
 #include "graphs/node_json.h"
 #include "io/model.h"
 
-/* The first input of the built-in graph is the argument; each other input is an option of that name. */
-static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
-  qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, &invocation->graph);
-  if (status != QMAT_OK) return status;
-  const qmat_graph *graph = &invocation->graph;
+/* The graph of a call: qmat_plus, or colliders with --colliders. */
+static const qmat_built_in_graph *graph_of(const qmat_invocation *invocation) {
+  return qmat_built_in_graph_find(qmat_invocation_value(invocation, "colliders") ? "colliders" : "qmat_plus");
+}
+
+static bool has_option(const qmat_invocation *invocation, const char *name) {
+  for (size_t i = 0; i < invocation->option_count; i++)
+    if (strcmp(invocation->options[i].name, name) == 0) return true;
+  return false;
+}
+
+/* The first input of a graph is the argument; each other input is an option of that name. */
+static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation, const qmat_graph *graph,
+                              const char *prefix) {
+  qmat_status status = QMAT_OK;
   for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
     const qmat_graph_input *input = &graph->inputs[i];
+    if (has_option(invocation, input->name)) continue;
     const qmat_graph_node *node = &graph->nodes[input->params[0].node];
     const qmat_param *param = &node->type->params[input->params[0].param];
-    char *doc = invocation->docs[invocation->option_count];
-    int length = snprintf(doc, QMAT_OPTION_DOC_SIZE, "%s: ", param->doc);
-    if (length > 0 && length < QMAT_OPTION_DOC_SIZE)
-      qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(QMAT_OPTION_DOC_SIZE - length));
-    status = qmat_invocation_add_option(context, invocation, (qmat_option){input->name, 0, "VALUE", doc});
+    char *doc = invocation->docs[invocation->option_count], *name = doc + QMAT_OPTION_DOC_SIZE - QMAT_GRAPH_NAME_SIZE;
+    const int room = QMAT_OPTION_DOC_SIZE - QMAT_GRAPH_NAME_SIZE;
+    /* The graph is freed before the options are. */
+    snprintf(name, QMAT_GRAPH_NAME_SIZE, "%s", input->name);
+    const int length = snprintf(doc, (size_t)room, "%s%s: ", prefix, param->doc);
+    if (length > 0 && length < room)
+      qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(room - length));
+    status = qmat_invocation_add_option(context, invocation, (qmat_option){name, 0, "VALUE", doc});
   }
-  if (status != QMAT_OK) return status;
+  return status;
+}
+
+static qmat_status add_output(qmat_context *context, qmat_invocation *invocation, const qmat_graph *graph) {
   char *doc = invocation->docs[invocation->option_count];
-  size_t used =
-      (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE, "Save the result; may be repeated. The ending chooses the format:");
+  size_t used = (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE,
+                                 "Save the result; may be repeated. A folder for several models, - for the standard "
+                                 "output. The ending chooses the format:");
   const char *comma = "";
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
@@ -35,6 +54,19 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
       used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", comma, format->choices[k]);
   }
   return qmat_invocation_add_option(context, invocation, (qmat_option){"output", 'o', "[NAME=]PATH", doc});
+}
+
+static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
+  static const char *const prefixes[] = {"", "With --colliders: "};
+  qmat_status status = QMAT_OK;
+  for (int i = 0; i < 2 && status == QMAT_OK; i++) {
+    qmat_graph graph = {0};
+    status = qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[i], &graph);
+    if (status == QMAT_OK && i == 0) status = add_output(context, invocation, &graph);
+    if (status == QMAT_OK) status = add_inputs(context, invocation, &graph, prefixes[i]);
+    qmat_graph_uninit(&graph);
+  }
+  return status;
 }
 
 static bool has_ending(const char *path, const char *ending) {
@@ -45,17 +77,41 @@ static bool has_ending(const char *path, const char *ending) {
 /* Whether the outputs can hold a medial mesh for each mesh of a scene: glTF, or for a scene of USD a layer over it.
  * Pages and pictures show what the others hold, and alone each mesh. */
 static bool saves_scene(const qmat_invocation *invocation) {
+  const char *chosen = qmat_invocation_value(invocation, "format");
+  char stream[32];
+  snprintf(stream, sizeof stream, "-.%s", chosen ? chosen : "glb");
   const qmat_format given = qmat_format_of_name(invocation->arguments[0]);
   bool only_views = given == QMAT_FORMAT_GLB || given == QMAT_FORMAT_GLTF || given == QMAT_FORMAT_USD;
   for (size_t i = 0; i < invocation->given_count; i++) {
-    if (strcmp(invocation->given[i].name, "output") != 0) continue;
     const char *path = invocation->given[i].value;
-    const qmat_format format = qmat_format_of_name(path);
+    if (strcmp(invocation->given[i].name, "output") != 0) continue;
+    const qmat_format format = qmat_format_of_name(strcmp(path, "-") == 0 ? stream : path);
     if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
     if (format == QMAT_FORMAT_USD && given == QMAT_FORMAT_USD) return true;
     only_views = only_views && (has_ending(path, ".html") || has_ending(path, ".png") || has_ending(path, ".svg"));
   }
   return only_views;
+}
+
+/* Reads the graph; refuses options of the other one. */
+static qmat_status read_graph(qmat_context *context, qmat_invocation *invocation) {
+  qmat_graph *graph = &invocation->graph;
+  const qmat_built_in_graph *built_in = graph_of(invocation);
+  qmat_graph_uninit(graph);
+  qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, built_in, graph);
+  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++) {
+    bool known = false, made = false;
+    for (size_t k = 0; k < graph->input_count; k++) known |= !strcmp(graph->inputs[k].name, invocation->given[i].name);
+    for (size_t k = 0; k < invocation->option_count; k++)
+      made |= invocation->options[k].doc == invocation->docs[k] && invocation->options[k].letter != 'o' &&
+              !strcmp(invocation->options[k].name, invocation->given[i].name);
+    if (!made || known) continue;
+    const bool colliders = qmat_invocation_value(invocation, "colliders") != NULL;
+    status = qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' is %s --colliders", invocation->given[i].name,
+                       colliders ? "not for" : "for");
+  }
+  invocation->inputs_are_options = true;
+  return status;
 }
 
 static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation) {
@@ -67,35 +123,72 @@ static qmat_status set_inputs(qmat_context *context, qmat_invocation *invocation
   if (status == QMAT_OK && qmat_invocation_value(invocation, "vertices") &&
       !qmat_invocation_value(invocation, "epsilon"))
     status = qmat_graph_set_named(context, graph, "epsilon", "0");
-  for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
-    const char *value = qmat_invocation_value(invocation, graph->inputs[i].name);
-    if (value) status = qmat_graph_set_named(context, graph, graph->inputs[i].name, value);
-  }
   return status;
 }
 
+static bool is_folder(const char *path) {
+  struct stat about;
+  return (stat(path, &about) == 0 && S_ISDIR(about.st_mode)) || (*path && path[strlen(path) - 1] == '/');
+}
+
+static bool is_missing(const char *path) {
+  struct stat about;
+  return stat(path, &about) != 0;
+}
+
+/* Several models, or one whose results go to a folder. */
+static qmat_status run_many(qmat_context *context, qmat_invocation *invocation) {
+  const char *results = qmat_invocation_value(invocation, "output");
+  size_t outputs = 0;
+  for (size_t i = 0; i < invocation->given_count; i++) outputs += !strcmp(invocation->given[i].name, "output");
+  if (outputs > 1 || qmat_is_stream(results) ||
+      (!is_folder(results) && qmat_format_of_name(results) != QMAT_FORMAT_UNKNOWN)) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the results of several models need a folder, not '%s'",
+              qmat_show(results).text);
+    return qmat_fail_hint(context, "-o results/ --format glb");
+  }
+  return qmat_run_batch(context, invocation, NULL, invocation->arguments, invocation->argument_count, results);
+}
+
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  if (!qmat_invocation_value(invocation, "output")) {
+  const char *first = invocation->arguments[0], *output = qmat_invocation_value(invocation, "output");
+  if (!output) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the output path is missing");
     return qmat_fail_hint(context, "-o PATH");
   }
+  const qmat_status status = read_graph(context, invocation);
+  if (status != QMAT_OK) return status;
+  const bool pattern = strpbrk(first, "*?[") && is_missing(first);
+  if (invocation->argument_count > 1 || is_folder(first) || is_folder(output) || pattern)
+    return run_many(context, invocation);
   return qmat_execute(context, invocation, set_inputs, NULL, NULL);
 }
 
+static const qmat_option options[] = {
+    {"colliders", 0, NULL, "Make colliders too, by the built-in graph 'colliders'"},
+    {"format", 'f', "ENDING",
+     "Format of the results in a folder or on the standard output; default glb; may be repeated"},
+    {"jobs", 'j', "N", "How many models at a time; default one per processor. With one model, its threads"},
+    {0},
+};
+
 const qmat_command qmat_command_mat = {
     .name = "mat",
-    .arguments = "INPUT -o OUTPUT",
+    .arguments = "INPUT... -o OUTPUT",
     .summary = "Describe a model by medial spheres, cones and slabs",
     .doc =
-        "Runs the built-in graph, graphs/qmat_plus.yaml, on one model. --vertices without --epsilon sets epsilon to 0: "
+        "Runs the built-in graph qmat_plus on a model ('-': the standard input), or on several models, folders and "
+        "patterns as 'qmat batch' does. Of two options that say the same, the later counts. --vertices without "
+        "--epsilon sets epsilon to 0: "
         "no bound on the distance.\n"
         "A glTF scene saved as glTF keeps its contents, and each of its meshes gets a medial mesh. So does a USD scene "
         "saved as USD, by a layer over it, and as glTF. For other formats the meshes are merged (model.mesh=merged).\n"
         "--set reaches every other parameter; 'qmat nodes' lists the nodes, 'qmat node NAME' their parameters.",
+    .options = options,
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,
     .least = 1,
-    .most = 1,
+    .most = SIZE_MAX,
     .add_options = add_options,
     .run = run,
 };

@@ -10,7 +10,8 @@ const qmat_command qmat_command_run = {
     .arguments = "GRAPH",
     .summary = "Run a graph file",
     .doc =
-        "Runs a graph file. Files are written only after every node has succeeded. Paths in the graph are relative to "
+        "Runs a graph file, one from the standard input (-), or a built-in one ('qmat graphs'). Files are written only "
+        "after every node has succeeded. Paths in the graph are relative to "
         "the graph file; paths given here are relative to the working folder.",
     .options = qmat_output_options,
     .common = qmat_common_options,

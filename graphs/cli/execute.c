@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "graphs/built_in.h"
 #include "graphs/cli/command.h"
 #include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
@@ -29,6 +31,8 @@ const qmat_option qmat_common_options[] = {
 
 const qmat_option qmat_output_options[] = {
     {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
+    {"format", 'f', "ENDING", "Format of an output that goes to the standard output, as in -o -"},
+    {"jobs", 'j', "N", "Another name for --threads"},
     {"to", 0, "NODE", "Run only this node and the nodes that it needs"},
     {0},
 };
@@ -57,8 +61,28 @@ static qmat_status read_save(qmat_context *context, const qmat_graph *graph, con
   return context->error.status;
 }
 
-static qmat_status plan(qmat_context *context, const qmat_invocation *invocation, bool foresee,
-                        qmat_planned_run *planned) {
+/* Makes the folder of a path that is written, or puts the standard output in its place. */
+static qmat_status prepare_save(qmat_context *context, qmat_invocation *invocation, qmat_run_save *save) {
+  const qmat_graph *graph = &invocation->graph;
+  const char *format = qmat_invocation_value(invocation, "format");
+  if (!qmat_is_stream(save->path)) {
+    int choice;
+    const qmat_status status = qmat_graph_output_format(context, graph, save->output, save->path, &choice);
+    return status == QMAT_OK ? qmat_make_folders(context, save->path) : status;
+  }
+  char ending[32] = "json";
+  const qmat_graph_node *node = &graph->nodes[graph->outputs[save->output].node];
+  const qmat_param *param = qmat_output_format_param(node->type);
+  if (param) qmat_param_format(param, node->params, ending, sizeof ending);
+  if (format) snprintf(ending, sizeof ending, "%s", format);
+  if (save->path[1]) snprintf(ending, sizeof ending, "%s", save->path + 2);
+  char name[40];
+  snprintf(name, sizeof name, "x.%s", ending);
+  qmat_graph_output_of_ending(graph, name, &save->output);
+  return qmat_streams_write(context, &invocation->streams, ending, &save->path);
+}
+
+static qmat_status plan(qmat_context *context, qmat_invocation *invocation, bool foresee, qmat_planned_run *planned) {
   qmat_run_options options = {.saves = planned->saves,
                               .may_lack_params = foresee,
                               .to_node = qmat_invocation_value(invocation, "to"),
@@ -73,26 +97,57 @@ static qmat_status plan(qmat_context *context, const qmat_invocation *invocation
       if (status != QMAT_OK) return qmat_fail_field(context, "--force");
     }
     if (strcmp(name, "output") == 0) {
-      status = read_save(context, &invocation->graph, value, &planned->saves[options.save_count++]);
+      qmat_run_save *save = &planned->saves[options.save_count++];
+      status = read_save(context, &invocation->graph, value, save);
+      if (status == QMAT_OK && (!foresee || qmat_is_stream(save->path)))
+        status = prepare_save(context, invocation, save);
       if (status != QMAT_OK) return qmat_fail_field(context, "--output");
     }
   }
   return qmat_run_plan(context, &invocation->graph, &options, &planned->run);
 }
 
+/* Applies an option that sets parameters. The later of two wins. */
+static qmat_status assign(qmat_context *context, qmat_invocation *invocation, size_t index) {
+  qmat_graph *graph = &invocation->graph;
+  const qmat_given_option *given = &invocation->given[index];
+  if (strcmp(given->name, "set") == 0) {
+    const qmat_status status = qmat_graph_assign(context, graph, given->value);
+    return status == QMAT_OK || context->error.node_id[0] ? status : qmat_fail_field(context, "--set");
+  }
+  for (size_t i = 0; invocation->inputs_are_options && i < graph->input_count; i++)
+    if (strcmp(graph->inputs[i].name, given->name) == 0)
+      return qmat_graph_set_named(context, graph, given->name, given->value);
+  return QMAT_OK;
+}
+
+/* Where an input file is "-", the run reads the standard input. */
+static qmat_status read_standard_input(qmat_context *context, qmat_invocation *invocation) {
+  qmat_graph *graph = &invocation->graph;
+  for (size_t i = 0; i < graph->node_count; i++)
+    for (size_t row = 0; row < qmat_param_count(graph->nodes[i].type); row++) {
+      const qmat_param *param = &graph->nodes[i].type->params[row];
+      const char *text = graph->nodes[i].texts[row], *path;
+      const bool reads = param->type == QMAT_PARAM_PATH && (param->flags & QMAT_PARAM_INPUT_FILE);
+      if (!reads || !text || strcmp(text, "-") != 0) continue;
+      qmat_status status = qmat_streams_read(context, &invocation->streams, &path);
+      if (status == QMAT_OK) status = qmat_graph_set(context, graph, i, row, path, "");
+      if (status != QMAT_OK) return status;
+    }
+  return QMAT_OK;
+}
+
 qmat_status qmat_plan_invocation(qmat_context *context, qmat_invocation *invocation,
                                  qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                                  bool foresee, qmat_planned_run *planned) {
   *planned = (qmat_planned_run){0};
+  invocation->streams.output[0] = 0; /* of the run before, where files are watched */
   planned->saves = qmat_calloc(invocation->given_count, sizeof *planned->saves);
   planned->forced = qmat_calloc(invocation->given_count, sizeof *planned->forced);
   if (!planned->saves || !planned->forced) return qmat_fail_memory(context, "options");
   qmat_status status = prepare(context, invocation);
-  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
-    if (strcmp(invocation->given[i].name, "set") == 0) {
-      status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
-      if (status != QMAT_OK && !context->error.node_id[0]) qmat_fail_field(context, "--set");
-    }
+  for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++) status = assign(context, invocation, i);
+  if (status == QMAT_OK) status = read_standard_input(context, invocation);
   if (status == QMAT_OK) status = qmat_open_cache(context, invocation, &planned->cache, &planned->cached);
   return status == QMAT_OK ? plan(context, invocation, foresee, planned) : status;
 }
@@ -106,7 +161,13 @@ void qmat_planned_run_uninit(qmat_planned_run *planned) {
 }
 
 qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation) {
-  return qmat_graph_read_file(context, &invocation->registry, invocation->arguments[0], &invocation->graph);
+  const char *name = invocation->arguments[0], *path = name;
+  const qmat_built_in_graph *built_in = access(name, F_OK) == 0 ? NULL : qmat_built_in_graph_find(name);
+  if (built_in) return qmat_graph_read_built_in(context, &invocation->registry, built_in, &invocation->graph);
+  qmat_status status = strcmp(name, "-") == 0 ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
+  if (status == QMAT_OK) status = qmat_graph_read_file(context, &invocation->registry, path, &invocation->graph);
+  if (status != QMAT_OK && access(path, F_OK) != 0) qmat_fail_hint(context, "'qmat graphs' lists the built-in ones");
+  return status;
 }
 
 /* The report of a failure must not replace a file that the run would have read or written. */
@@ -161,6 +222,24 @@ static void print_warnings(const qmat_run *run, bool quiet) {
   }
 }
 
+/* Copies what goes to the standard output there, and gives it its name in reports. */
+static qmat_status finish_stream(qmat_context *context, const qmat_invocation *invocation, qmat_run *run) {
+  for (size_t i = 0; i < run->file_count; i++) {
+    qmat_run_file *file = &run->files[i];
+    if (strcmp(file->path, invocation->streams.output) != 0) continue;
+    if (file->written && file->written->part_count > 1) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "a .%s has side files, which the standard output cannot hold",
+                file->written->format);
+      return qmat_fail_hint(context, "-o -.glb");
+    }
+    char *name = qmat_strdup("-");
+    if (!name) return qmat_fail_memory(context, "output path");
+    qmat_free(file->path);
+    file->path = name;
+  }
+  return qmat_streams_flush(context, &invocation->streams);
+}
+
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                          void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
@@ -174,8 +253,10 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   qmat_planned_run planned = {0};
   qmat_run *run = &planned.run;
   qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
+  if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 0, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
+  if (status == QMAT_OK && report_path) status = qmat_make_folders(context, report_path);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
   if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
     status = qmat_run_check_path(context, run, "the depfile", qmat_invocation_value(invocation, "depfile"));
@@ -190,6 +271,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     qmat_progress_view_end(&view);
     context->progress = NULL;
     if (status == QMAT_OK) status = qmat_run_write(context, run);
+    if (status == QMAT_OK) status = finish_stream(context, invocation, run);
   }
   const char *depfile = qmat_invocation_value(invocation, "depfile");
   if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
@@ -199,7 +281,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     json_decref(report);
     reported = true;
   }
-  if (status == QMAT_OK && !quiet && !dry) qmat_print_run(run, verbose, stdout);
+  if (status == QMAT_OK && !quiet && !dry)
+    qmat_print_run(run, verbose, invocation->streams.output[0] ? stderr : stdout);
   if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
     /* A failure to write the report must not replace this error. */
     const qmat_error error = context->error;

@@ -26,6 +26,7 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
     else
       status = command->run(context, invocation);
   }
+  qmat_streams_close(context, &invocation->streams);
   qmat_invocation_uninit(invocation);
   qmat_free(invocation);
   return status;
@@ -39,7 +40,7 @@ int main(int argc, char **argv) {
   qmat_context context = {0};
   const char *name = argc > 1 ? argv[1] : "help";
   if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";
-  if (strcmp(name, "--version") == 0) name = "version";
+  if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) name = "version";
   size_t count = argc > 2 ? (size_t)argc - 2 : 0;
   qmat_status status = call(&context, name, argv + (argc > 2 ? 2 : argc), count);
   if (status == QMAT_OK && argc < 2) status = qmat_fail(&context, QMAT_ERROR_USAGE, "no command is given");

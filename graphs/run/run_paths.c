@@ -73,6 +73,18 @@ qmat_status qmat_check_can_write(qmat_context *context, const char *path) {
   return status == QMAT_OK ? status : qmat_fail_at(context, path, 0, 0);
 }
 
+qmat_status qmat_make_folders(qmat_context *context, const char *path) {
+  char *folder = qmat_strdup(path);
+  if (!folder) return qmat_fail_memory(context, "output path");
+  for (char *slash = folder; (slash = strchr(slash + 1, '/'));) {
+    *slash = 0;
+    mkdir(folder, 0777);
+    *slash = '/';
+  }
+  qmat_free(folder);
+  return QMAT_OK;
+}
+
 qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
   qmat_status status = qmat_run_check_not_input(context, run, what, path);
   for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++)

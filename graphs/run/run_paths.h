@@ -21,6 +21,10 @@ qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run,
 /* Whether a file can be written at `path`, so that a long run does not fail at its end. QMAT_ERROR_IO. */
 qmat_status qmat_check_can_write(qmat_context *context, const char *path);
 
+/* Makes the missing folders of the file `path`. A folder that cannot be made is reported by qmat_check_can_write.
+ * QMAT_ERROR_MEMORY. */
+qmat_status qmat_make_folders(qmat_context *context, const char *path);
+
 /* Both checks; the path may not be one of the run's outputs either. */
 qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, const char *what, const char *path);
 

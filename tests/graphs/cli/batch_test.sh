@@ -111,11 +111,11 @@ holds "no folder for temporary files" test $? -eq 1
 holds "no folder for temporary files is told" grep -q "^qmat: $work/nowhere: " err.txt
 
 # Mistakes.
-mkdir other
-cp models/box1.off other/
-batch --inputs '[mo]*/*.off' --out results
+cp models/box1.off models/box1.stl
+batch --inputs 'models/box1.*' --out results
 holds "two results of one name" test $code -eq 2
 holds "two results of one name are told" grep -q "would have the same name" err.txt
+rm models/box1.stl
 batch --inputs 'nothing*' --out results
 holds "a pattern without a match" test $code -eq 2
 batch --inputs 'nowhere/*.off' --out results

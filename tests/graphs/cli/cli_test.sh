@@ -18,7 +18,7 @@ expect 0 "qmat COMMAND" "$qmat" help
 expect 0 "qmat COMMAND" "$qmat" --help
 expect 2 "did you mean 'run'?" "$qmat" rnu
 expect 2 "did you mean 'check'?" "$qmat" help chekc
-for command in mat run batch watch why cache check info extract dot nodes node version help; do
+for command in mat run batch watch why cache check info extract dot graphs nodes node version help; do
   expect 0 "Options:" "$qmat" help $command
   expect 0 "qmat $command" "$qmat" $command --help
 done
@@ -73,7 +73,7 @@ expect 2 "known endings" "$qmat" mat box.off -o box.xyz
 expect 2 "between 0 and 1" "$qmat" mat box.off -o box.glb --epsilon 200%
 expect 2 "two outputs" "$qmat" mat box.off -o box.glb -o ./box.glb
 expect 2 "did you mean 'asset'?" "$qmat" mat box.off -o aset=box.glb
-expect 1 "output folder" "$qmat" mat box.off -o missing/box.glb
+expect 1 "output folder" "$qmat" mat box.off -o box.off/box.glb
 expect 1 "nothere.off" "$qmat" mat nothere.off -o box.glb --report failed.json
 holds "the failure in the report" grep -q '"node": "model"' failed.json
 holds "no file after a failure" test ! -e box.glb

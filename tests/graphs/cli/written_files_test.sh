@@ -76,8 +76,8 @@ cp -r a b textures both/
 mv both/a/scene.gltf both/a/first.gltf
 mv both/b/scene.gltf both/b/second.gltf
 expect 0 "2 done" "$qmat" batch graph.yaml --inputs 'both/*/*.gltf' --out batched --jobs 2 --format gltf
-holds "batch: the first buffer" cmp a/buf.bin batched/first.bin
-holds "batch: the second buffer" cmp b/buf.bin batched/second.bin
+holds "batch: the first buffer" cmp a/buf.bin batched/a/first.bin
+holds "batch: the second buffer" cmp b/buf.bin batched/b/second.bin
 
 # A .glb needs no other file; side_files leaves them outside.
 mkdir alone

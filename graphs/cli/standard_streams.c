@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "graphs/cli/standard_streams.h"
+
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+bool qmat_is_stream(const char *path) {
+  return path[0] == '-' && (!path[1] || (path[1] == '.' && !strchr(path, '/')));
+}
+
+static qmat_status make_folder(qmat_context *context, qmat_streams *streams) {
+  const char *temporary = getenv("TMPDIR");
+  if (streams->folder[0]) return QMAT_OK;
+  if (!temporary || !*temporary) temporary = "/tmp";
+  const int length = snprintf(streams->folder, sizeof streams->folder, "%s/qmat-XXXXXX", temporary);
+  if (length < (int)sizeof streams->folder && mkdtemp(streams->folder)) return QMAT_OK;
+  streams->folder[0] = 0;
+  qmat_fail(context, QMAT_ERROR_IO, "cannot make a folder for the standard streams in it");
+  return qmat_fail_at(context, temporary, 0, 0);
+}
+
+/* Copies to the end. False: an error of either. */
+static bool copy(FILE *from, FILE *to) {
+  char bytes[65536];
+  for (size_t size; (size = fread(bytes, 1, sizeof bytes, from)) > 0;)
+    if (fwrite(bytes, 1, size, to) != size) return false;
+  return !ferror(from);
+}
+
+qmat_status qmat_streams_read(qmat_context *context, qmat_streams *streams, const char **path) {
+  *path = streams->input;
+  if (streams->input[0]) return QMAT_OK;
+  const qmat_status status = make_folder(context, streams);
+  if (status != QMAT_OK) return status;
+  snprintf(streams->input, sizeof streams->input, "%s/stdin", streams->folder);
+  FILE *file = fopen(streams->input, "wbe");
+  bool done = file && copy(stdin, file);
+  if (file && fclose(file) != 0) done = false;
+  return done ? QMAT_OK : qmat_fail(context, QMAT_ERROR_IO, "cannot read the standard input");
+}
+
+qmat_status qmat_streams_write(qmat_context *context, qmat_streams *streams, const char *ending, const char **path) {
+  if (streams->output[0]) return qmat_fail(context, QMAT_ERROR_USAGE, "only one file can go to the standard output");
+  const qmat_status status = make_folder(context, streams);
+  if (status != QMAT_OK) return status;
+  snprintf(streams->output, sizeof streams->output, "%s/stdout.%.32s", streams->folder, ending);
+  *path = streams->output;
+  return QMAT_OK;
+}
+
+qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *streams) {
+  if (!streams->output[0]) return QMAT_OK;
+  FILE *file = fopen(streams->output, "rbe");
+  const bool done = file && copy(file, stdout) && fflush(stdout) == 0;
+  if (file) fclose(file);
+  return done ? QMAT_OK : qmat_fail(context, QMAT_ERROR_IO, "cannot write to the standard output");
+}
+
+void qmat_streams_close(qmat_context *context, qmat_streams *streams) {
+  if (!streams->folder[0]) return;
+  if (streams->input[0] && strcmp(context->error.file, streams->input) == 0)
+    snprintf(context->error.file, sizeof context->error.file, "standard input");
+  DIR *folder = opendir(streams->folder);
+  for (const struct dirent *entry; folder && (entry = readdir(folder));) unlinkat(dirfd(folder), entry->d_name, 0);
+  if (folder) closedir(folder);
+  rmdir(streams->folder);
+  streams->folder[0] = 0;
+}

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_GRAPHS_CLI_STANDARD_STREAMS_H
+#define QMAT_GRAPHS_CLI_STANDARD_STREAMS_H
+
+#include "core/context.h"
+
+/* "-" as the name of a file: the standard input or output, through a temporary folder. A file that is read several
+ * times, or written with others, cannot be a pipe. */
+typedef struct qmat_streams {
+  char folder[4096]; /* "": none is needed yet */
+  char input[4110];  /* "": the standard input has not been read */
+  char output[4170]; /* "": nothing goes to the standard output */
+} qmat_streams;
+
+/* Whether a path names a standard stream: "-", or "-.ma" for one with a format. */
+bool qmat_is_stream(const char *path);
+
+/* Copies the standard input to a file; a second call gives the same file. QMAT_ERROR_IO. */
+qmat_status qmat_streams_read(qmat_context *context, qmat_streams *streams, const char **path);
+
+/* The file that goes to the standard output, of that name in the temporary folder. QMAT_ERROR_USAGE: there is one
+ * already. */
+qmat_status qmat_streams_write(qmat_context *context, qmat_streams *streams, const char *ending, const char **path);
+
+/* Copies that file to the standard output. */
+qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *streams);
+
+/* Removes the folder, and names the stream in an error about its file. */
+void qmat_streams_close(qmat_context *context, qmat_streams *streams);
+
+#endif

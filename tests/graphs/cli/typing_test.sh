@@ -1,0 +1,102 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Files, folders, patterns, streams and built-in graphs, as people type them: typing_test.sh PROGRAM SOURCE_FOLDER
+qmat=$1
+source=$2
+. "$(dirname "$0")/../../lib.sh"
+QMAT_CACHE=$work/cache
+TMPDIR=$work/temporary
+export QMAT_CACHE TMPDIR
+mkdir temporary
+coarse="--epsilon 10% --set samples.spacing=10%"
+
+write_box box.off
+expect 0 "" "$qmat" mat box.off -o right.glb -o right.ma $coarse
+
+# The standard input and output.
+"$qmat" mat - -o - $coarse <box.off >out.glb 2>err.txt
+holds "what is printed about a file on the standard output is elsewhere" grep -q "^stdin: [0-9]* spheres" err.txt
+holds "glTF on the standard output" test "$(head -c 4 out.glb)" = glTF
+"$qmat" mat - -o -.ma $coarse --quiet <box.off >out.ma 2>err.txt
+holds "a format on the standard output" cmp right.ma out.ma
+"$qmat" mat box.off -o - --format ma $coarse --quiet >out.ma 2>err.txt
+holds "--format on the standard output" cmp right.ma out.ma
+"$qmat" run - --set model=box.off --set epsilon=10% --set samples.spacing=10% -o -.ma -q \
+  <"$source/graphs/qmat_plus.yaml" >out.ma 2>err.txt
+holds "a graph from the standard input" cmp right.ma out.ma
+expect 2 "only one file can go to" "$qmat" mat box.off -o - -o -.ma $coarse
+echo "OFF 1 2" | expect 1 "qmat: standard input:1:6: " "$qmat" mat - -o out.ma
+printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' | expect 2 "standard input:3:14: " "$qmat" check -
+holds "nothing is left in the temporary folder" test -z "$(ls temporary)"
+
+# Output folders are made, but not by a mistake.
+expect 0 "deep/down/box.glb (" "$qmat" mat box.off -o deep/down/box.glb --report deep/reports/box.json $coarse
+holds "the same file" cmp right.glb deep/down/box.glb
+holds "a report in a new folder" test -s deep/reports/box.json
+expect 2 "known endings" "$qmat" mat box.off -o typo/box.xyz
+holds "a mistake makes no folder" test ! -e typo
+
+# Several models, folders and patterns: results have the models' sub-folders.
+mkdir -p models/a models/b/c models/.hidden
+for name in a/spot b/spot b/c/spot .hidden/spot; do cp box.off models/$name.off; done
+echo "a text" >models/a/notes.txt
+ln -s .. models/b/back
+mirrored="a/spot.glb b/c/spot.glb b/spot.glb"
+# made FOLDER: the files in it.
+made() { (cd "$1" && find . -type f | sed 's/..//' | LC_ALL=C sort | tr '\n' ' ' | sed 's/ $//'); }
+expect 0 "" "$qmat" mat models/a/spot.off -o alone.glb $coarse
+expect 0 "3 done, 0 failed, 0 not run: " "$qmat" mat models -o folder $coarse
+holds "a folder" test "$(made folder)" = "$mirrored"
+holds "the same bytes as alone" cmp alone.glb folder/b/c/spot.glb
+expect 0 "3 done" "$qmat" batch models --out batched --set epsilon=10% --set samples.spacing=10%
+holds "batch without a graph" test "$(made batched)" = "$mirrored"
+holds "batch without a graph is as mat" cmp alone.glb batched/a/spot.glb
+expect 0 "3 done" "$qmat" batch qmat_plus 'models/**/spot.off' --out stars -j 2 --set epsilon=10% --set samples.spacing=10%
+holds "two stars are any folders" test "$(made stars)" = "$mirrored"
+expect 0 "2 done" "$qmat" mat models/a/spot.off ./models/b/spot.off -o two -f ma -f ply $coarse
+holds "two files, two formats" test "$(made two)" = "a/spot.ma a/spot.ply b/spot.ma b/spot.ply"
+expect 0 "2 done" "$qmat" mat models/a models/b/spot.off models/a/spot.off -o twice $coarse
+holds "a model that is named twice is taken once" test "$(made twice)" = "a/spot.glb b/spot.glb"
+expect 0 "1 done" "$qmat" mat box.off -o into/ $coarse
+holds "one model into a folder" cmp right.glb into/box.glb
+cp -r models within
+expect 0 "3 done" "$qmat" mat within -o within/results $coarse -f ply
+expect 0 "3 done" "$qmat" mat within -o within/results $coarse -f ply
+holds "results are no models" test ! -e within/results/results
+expect 1 "nothere.off: " "$qmat" mat models/a nothere.off -o some $coarse
+expect 2 "-o results/" "$qmat" mat models -o x.glb
+expect 2 "there are no models in this folder" "$qmat" mat temporary -o none
+expect 2 "no file matches" "$qmat" mat 'models/**/*.obj' -o none
+expect 2 "qmat batch models --out results" "$qmat" batch models
+expect 2 "qmat batch models --out results" "$qmat" batch qmat_plus --out results
+
+# Options: short ones, and the later of two.
+expect 0 "qmat 0" "$qmat" -V
+expect 0 "" "$qmat" mat box.off -o later.ma -j 1 --set epsilon=30% $coarse --quiet
+holds "--epsilon after --set" cmp right.ma later.ma
+expect 0 "" "$qmat" mat box.off -o later.ma --epsilon 30% $coarse --set epsilon=10% --quiet
+holds "--set after --epsilon" cmp right.ma later.ma
+expect 0 "" "$qmat" run qmat_plus -j 1 --set model=box.off --set epsilon=10% --set samples.spacing=10% -o later.ma
+holds "a built-in graph by name" cmp right.ma later.ma
+
+# Built-in graphs.
+expect 0 "lod " "$qmat" graphs
+"$qmat" graphs lod >out.txt
+holds "the text of a graph" cmp out.txt "$source/graphs/lod.yaml"
+expect 2 "did you mean 'colliders'?" "$qmat" graphs collider
+expect 2 "'qmat graphs' lists the built-in ones" "$qmat" run qmat_plsu
+cp "$source/graphs/lod.yaml" qmat_plus
+expect 0 "9 nodes" sh -c '"$0" check qmat_plus | sed "s/: [0-9]* nodes/: 9 nodes/"' "$qmat"
+holds "a file comes before a built-in graph" sh -c '"$0" dot qmat_plus | grep -q medial.lod' "$qmat"
+rm qmat_plus
+
+# Colliders.
+expect 0 "box.xml (" "$qmat" mat box.off -o box.xml --colliders --kind spheres --epsilon 10% --set samples.spacing=10%
+holds "MuJoCo's colliders" grep -q '<geom .*type="sphere"' box.xml
+expect 0 "" "$qmat" run colliders --set model=box.off --set kind=spheres --set epsilon=10% --set samples.spacing=10% \
+  -o run.xml
+holds "as the graph makes them" cmp run.xml box.xml
+expect 2 "'--kind' is for --colliders" "$qmat" mat box.off -o box.xml --kind spheres
+expect 2 "'--vertices' is not for --colliders" "$qmat" mat box.off -o box.xml --colliders --vertices 9
+
+finish
