@@ -16,7 +16,7 @@ sh .ci/packages.sh packages.txt
 
 say "Building ..."
 mkdir -p build
-if ! { cmake --preset release && cmake --build --preset release -j "$(nproc)" --target qmat qmat_models qmat_picture; } >build/demo.log 2>&1; then
+if ! { cmake --preset release && cmake --build --preset release -j "$(nproc)" --target qmat qmat_models; } >build/demo.log 2>&1; then
   tail -n 30 build/demo.log
   echo "The build failed; all of it: $PWD/build/demo.log"
   exit 1
@@ -44,9 +44,9 @@ rows=$out/cards.html
 : >"$rows"
 for surface in "$out"/*.off; do
   name=$(basename "$surface" .off)
-  "$build/qmat" mat "$surface" -o "$out/$name.glb" -o "$out/$name.ma" --epsilon 1% --report "$out/$name.json" --quiet \
+  "$build/qmat" mat "$surface" -o "$out/$name.glb" -o "$out/$name.ma" -o "$out/$name.html" -o "$out/$name.png" \
+    --set page.up=z --set picture.up=z --set picture.view=overlay --set picture.width=480 --epsilon 1% --report "$out/$name.json" --quiet \
     --progress off
-  "$build/qmat_picture" "$surface" "$out/$name.ma" -o "$out/$name.svg" --width 480
   triangles=$(sed -n 2p "$surface" | cut -d ' ' -f 2)
   spheres=$(number "$out/$name.json" spheres)
   error_out=$(percent "$(number "$out/$name.json" surface_to_envelope)")
@@ -58,12 +58,12 @@ for surface in "$out"/*.off; do
   if [ "$spheres" -eq 1 ]; then plural=; fi
   {
     printf '<figure>\n'
-    cat "$out/$name.svg"
+    printf '<a href="%s.html"><img src="%s.png" alt="%s and its medial mesh"></a>\n' "$name" "$name" "$name"
     printf '<figcaption><b>%s</b><span class="n">%d triangles &rarr; %d sphere%s</span>' \
       "$name" "$triangles" "$spheres" "$plural"
     printf '<span>surface to envelope %s, envelope to surface %s; %s s</span>' "$error_out" "$error_in" "$seconds"
-    printf '<span><a href="%s.glb">glb</a> <a href="%s.ma">ma</a> <a href="%s.off">off</a> <a href="%s.json">report</a>' \
-      "$name" "$name" "$name" "$name"
+    printf '<span><a href="%s.html">page</a> <a href="%s.glb">glb</a> <a href="%s.ma">ma</a> <a href="%s.off">off</a> <a href="%s.json">report</a>' \
+      "$name" "$name" "$name" "$name" "$name"
     printf '</span></figcaption>\n</figure>\n'
   } >>"$rows"
 done
@@ -78,12 +78,11 @@ body{margin:0 auto;max-width:1180px;padding:32px 24px 64px;font:16px/1.5 system-
 h1{font-size:28px;margin:0 0 8px}p{max-width:44em;margin:0 0 12px;color:#465362}
 main{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:20px;margin-top:28px}
 figure{margin:0;padding:16px;border:1px solid #dfe5ec;border-radius:8px;display:flex;flex-direction:column}
-figure svg{width:100%;height:230px;margin-bottom:12px}figcaption{margin-top:auto}
+figure img{width:100%;height:230px;object-fit:contain;margin-bottom:12px}figcaption{margin-top:auto}
 figcaption b{font-size:17px}figcaption span{display:block;font-size:14px;color:#5b6878}
 figcaption .n{color:#1d2733;font-size:15px}a{color:#9a4708;margin-right:8px}
-i{display:inline-block;width:.8em;height:.8em;border-radius:50%;background:#ffe2bd;border:1px solid #b4540a;vertical-align:-1px}
-i.c{border-radius:0;border:0;height:2px;width:1.2em;background:#8a3a06;vertical-align:4px}
-i.t{border-radius:0;background:#f3ab5c;border-color:#8a3a06}
+i{display:inline-block;width:.8em;height:.8em;border-radius:50%;background:#e69f00;vertical-align:-1px}
+i.c{background:#56b4e9}i.t{background:#009e73}
 </style></head><body>
 <h1>Models, and the medial meshes in them</h1>
 <p>Each model is described by a few medial spheres <i></i>, joined by cones <i class="c"></i> and slabs <i class="t"></i>.
@@ -101,6 +100,7 @@ cat <<END
 The files are in $PWD/$out
 
   index.html   a page with a picture of each model and its medial mesh; open it in a browser
+  *.html       a page of each, to turn it and to go through its levels of detail
   *.glb        for any viewer of glTF (Blender, three.js, an engine)
   *.ma         the medial mesh as plain text: spheres "v x y z r", cones "e i j", slabs "f i j k"
   *.json       what was done, with times and errors

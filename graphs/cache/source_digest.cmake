@@ -4,7 +4,7 @@
 set(digest "")
 if(ENABLED)
   file(GLOB_RECURSE sources RELATIVE ${SOURCE} ${SOURCE}/core/*.[ch] ${SOURCE}/io/*.[ch] ${SOURCE}/io/*.cpp ${SOURCE}/nodes/*.[ch]
-    ${SOURCE}/nodes/*.cpp ${SOURCE}/io/page/page.* ${SOURCE}/examples/readers/qmat_reader.mjs)
+    ${SOURCE}/nodes/*.cpp ${SOURCE}/io/page/* ${SOURCE}/examples/readers/qmat_reader.mjs)
   list(SORT sources)
   set(list "")
   foreach(source IN LISTS sources)

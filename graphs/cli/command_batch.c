@@ -10,6 +10,7 @@
 #include "core/json_text.h"
 #include "graphs/built_in.h"
 #include "graphs/cli/batch.h"
+#include "graphs/cli/batch_page.h"
 #include "graphs/cli/command.h"
 #include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
@@ -27,6 +28,7 @@ typedef struct batch_call {
   char program[4096], reports[4096];
   int jobs, threads;
   bool json, quiet, verbose, slurm;
+  bool pages;   /* outputs on request are saved too, and a page of all assets */
   bool redraws; /* stderr is a terminal: its last line says how far the batch is */
   size_t ended;
   double started; /* seconds, monotonic */
@@ -100,6 +102,13 @@ static bool output_has_format(const qmat_graph *graph, size_t output, const char
   return false;
 }
 
+static bool gives_format(const qmat_invocation *invocation, const char *ending) {
+  for (size_t i = 0; i < invocation->given_count; i++)
+    if (strcmp(invocation->given[i].name, "format") == 0 && strcmp(invocation->given[i].value, ending) == 0)
+      return true;
+  return false;
+}
+
 /* Adds the paths of an asset's results: in each --format, or in the graph's. */
 static void add_outputs(const batch_call *call, word_list *list, const qmat_asset *asset) {
   const qmat_invocation *invocation = call->invocation;
@@ -119,7 +128,8 @@ static void add_outputs(const batch_call *call, word_list *list, const qmat_asse
       if (strcmp(invocation->given[k].name, "format") == 0 && output_has_format(graph, i, invocation->given[k].value))
         add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
                  several ? output->name : "", invocation->given[k].value);
-    if (!chosen && !qmat_graph_on_request(graph, i))
+    const bool on_request = qmat_graph_on_request(graph, i);
+    if (on_request ? call->pages && !gives_format(invocation, ending) : !chosen)
       add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
                several ? output->name : "", ending);
   }
@@ -385,6 +395,7 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
                      .folder = results,
                      .json = qmat_invocation_value(invocation, "json") != NULL,
                      .quiet = qmat_invocation_chooses(invocation, "quiet", "verbose"),
+                     .pages = qmat_invocation_value(invocation, "pages") != NULL,
                      .verbose = qmat_invocation_chooses(invocation, "verbose", "quiet"),
                      .redraws = qmat_can_redraw(),
                      .started = qmat_clock_seconds()};
@@ -413,6 +424,8 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   if (prints && call.verbose) print_table(&batch, &call.invocation->graph);
   if (prints) print_totals(&call, &batch);
   if (started && !call.json) print_failures(&batch, call.quiet ? stderr : stdout);
+  if (status == QMAT_OK && call.pages)
+    status = qmat_batch_page_save(context, &batch, summary_entries(&call.invocation->graph), call.folder);
   if (status == QMAT_OK && failed > 0)
     status = qmat_fail(context, QMAT_ERROR_IO, "%zu of %zu assets failed", failed, batch.count);
   if (*call.reports) rmdir(call.reports);
@@ -445,6 +458,7 @@ static const qmat_option options[] = {
     {"inputs", 'i', "GLOB|LIST", "More models: a folder, a quoted pattern, or a file with one path a line"},
     {"out", 'o', "DIR", "Folder of the results, which get the models' names; made if it is missing"},
     {"format", 'f', "ENDING", "Format of the results; default the graph's; may be repeated"},
+    {"pages", 0, NULL, "Also save a page and a picture of each model, and DIR/index.html with all of them"},
     {"input", 0, "NAME", "The graph's input that takes the model; default the only one that is a file"},
     {"jobs", 'j', "N", "How many models at a time; default one per processor"},
     {"threads", 0, "N", "Threads of each model; default an equal share of the processors"},

@@ -6,7 +6,7 @@
 #include "core/json_text.h"
 
 /* The sources, which CMake embeds. */
-extern const char qmat_page_html[], qmat_page_css[], qmat_page_js[], qmat_reader_mjs[];
+extern const char qmat_page_html[], qmat_index_html[], qmat_page_css[], qmat_page_js[], qmat_reader_mjs[];
 
 void qmat_put_markup(qmat_writer *writer, const char *text) {
   static const struct {
@@ -37,16 +37,24 @@ static void put_data(qmat_writer *writer, const char *text) {
   }
 }
 
-static void put_slot(const qmat_page *page, const char *data, char slot, qmat_writer *writer) {
+/* What fills the slots of a template. */
+typedef struct slots {
+  const char *title, *picture, *data, *rows;
+} slots;
+
+static void put_slot(const slots *given, char slot, qmat_writer *writer) {
   switch (slot) {
     case 't':
-      qmat_put_markup(writer, page->title);
+      qmat_put_markup(writer, given->title);
       break;
     case 'p':
-      qmat_put_text(writer, page->picture);
+      qmat_put_text(writer, given->picture);
       break;
     case 'd':
-      put_data(writer, data);
+      put_data(writer, given->data);
+      break;
+    case 'r':
+      qmat_put_text(writer, given->rows);
       break;
     case 'c':
       qmat_put_text(writer, qmat_page_css);
@@ -58,16 +66,25 @@ static void put_slot(const qmat_page *page, const char *data, char slot, qmat_wr
   }
 }
 
+/* Slots are written {{title}}, {{picture}}, {{data}}, {{rows}}, {{css}} and {{js}}. */
+static qmat_status put_template(qmat_context *context, const char *at, const slots *given, qmat_writer *writer) {
+  for (const char *open; (open = strstr(at, "{{")) != NULL; at = strstr(open, "}}") + 2) {
+    qmat_put_bytes(writer, at, (size_t)(open - at));
+    put_slot(given, open[2], writer);
+  }
+  qmat_put_text(writer, at);
+  return writer->failed ? qmat_fail_memory(context, "the page") : QMAT_OK;
+}
+
 qmat_status qmat_page_put(qmat_context *context, const qmat_page *page, qmat_writer *writer) {
   char *data = qmat_json_text(page->data, JSON_COMPACT | JSON_SORT_KEYS, NULL);
   if (!data) return qmat_fail_memory(context, "the page");
-  /* Slots are written {{title}}, {{picture}}, {{data}}, {{css}} and {{js}}. */
-  const char *at = qmat_page_html;
-  for (const char *open; (open = strstr(at, "{{")) != NULL; at = strstr(open, "}}") + 2) {
-    qmat_put_bytes(writer, at, (size_t)(open - at));
-    put_slot(page, data, open[2], writer);
-  }
-  qmat_put_text(writer, at);
+  const slots given = {.title = page->title, .picture = page->picture, .data = data};
+  const qmat_status status = put_template(context, qmat_page_html, &given, writer);
   qmat_free(data);
-  return writer->failed ? qmat_fail_memory(context, "the page") : QMAT_OK;
+  return status;
+}
+
+qmat_status qmat_index_put(qmat_context *context, const char *title, const char *rows, qmat_writer *writer) {
+  return put_template(context, qmat_index_html, &(slots){.title = title, .rows = rows}, writer);
 }

@@ -17,6 +17,10 @@ typedef struct qmat_page {
 /* Appends the page. QMAT_ERROR_MEMORY. The same bytes for the same arguments. Cost: linear. */
 qmat_status qmat_page_put(qmat_context *context, const qmat_page *page, qmat_writer *writer);
 
+/* Appends index.html: a page with a table that is sorted by clicks. `title` is UTF-8; `rows` is the inside of the
+ * table, a head and a body. QMAT_ERROR_MEMORY. */
+qmat_status qmat_index_put(qmat_context *context, const char *title, const char *rows, qmat_writer *writer);
+
 /* Appends text with the five characters escaped that HTML and XML reserve; control characters are left out. */
 void qmat_put_markup(qmat_writer *writer, const char *text);
 

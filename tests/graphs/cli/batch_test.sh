@@ -53,6 +53,38 @@ holds "a line of JSON each" test "$(grep -c '"result":"ok"' out.txt)" -eq 9
 holds "what was done before comes from the cache" test "$(grep -c '"hits":4' out.txt)" -eq 9
 holds "the other format" test -s results/box1.ma
 
+# Pages: one of each model, and one of all, with failures first. Names may need escapes.
+cat >pages.yaml <<'END'
+qmat: 1
+inputs:
+  model: model.path
+nodes:
+  model: { type: scene.read }
+  ball: { type: medial.read, params: { path: ball.ma } }
+  picture: { type: report.picture, in: { mesh: model.mesh, medial: ball.medial }, params: { width: 32, height: 16 } }
+  page: { type: report.page, in: { scene: model.scene, mesh: model.mesh, medial: ball.medial } }
+  asset: { type: scene.write, in: { medial: ball.medial } }
+outputs:
+  asset: asset.file
+  picture: picture.file
+  page: page.file
+END
+printf '1 0 0\nv 0 0 0 1\n' >ball.ma
+mkdir several
+cp models/box1.off 'several/a #1.off'
+cp models/box2.off several/b.off
+echo OFF >'several/z & bad.off'
+timeout 100 "$qmat" batch pages.yaml --inputs 'several/*.off' --out shown --pages --quiet 2>err.txt
+holds "a page and a picture of each" test -s 'shown/a #1.html' -a -s 'shown/a #1.png' -a -s shown/b.html -a -s shown/b.glb
+holds "rows with escaped names, failures first" sh -c '
+  grep "^<tr>" shown/index.html | cut -c 1-400 >rows.txt
+  [ "$(wc -l <rows.txt)" -eq 3 ] && sed -n 1p rows.txt | grep -q "z &amp; bad</th><td class=\"result bad\" data-value=\"0\">several/z &amp; bad.off" &&
+  sed -n 2p rows.txt | grep -q "src=\"a%20%231.png\".*href=\"a%20%231.html\">a #1</a>"'
+timeout 100 "$qmat" batch pages.yaml --inputs 'several/b*.off' --out plain --quiet
+holds "without --pages there are none" test "$(ls plain)" = b.glb
+timeout 100 "$qmat" run pages.yaml --set model=models/box1.off -o alone.png --no-cache --report alone.json --quiet
+holds "a picture alone makes nothing else" sh -c 'grep -q report.picture alone.json && ! grep -q "scene.write\|report.page" alone.json'
+
 # A list, relative to its folder.
 printf '# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
 batch --inputs models/list.txt --out listed --quiet
