@@ -29,6 +29,9 @@ if ! cmake --install "$build" --prefix "$HOME/.local" >"$work/said.txt" 2>&1; th
   fail "the installation"
   exit 1
 fi
+for file in man/man1/qmat.1 bash-completion/completions/qmat zsh/site-functions/_qmat fish/vendor_completions.d/qmat.fish; do
+  [ -s "$HOME/.local/share/$file" ] || fail "$file is not installed"
+done
 # The page says where this program is; it is not installed.
 ln -s "$build/qmat_models" "$HOME/.local/bin/"
 PATH=$HOME/.local/bin:$PATH

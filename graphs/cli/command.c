@@ -9,9 +9,10 @@
 #include "graphs/graph_names.h"
 
 const qmat_command *const qmat_commands[] = {
-    &qmat_command_mat,    &qmat_command_run,   &qmat_command_batch, &qmat_command_watch,   &qmat_command_why,
-    &qmat_command_cache,  &qmat_command_check, &qmat_command_dot,   &qmat_command_info,    &qmat_command_extract,
-    &qmat_command_graphs, &qmat_command_nodes, &qmat_command_node,  &qmat_command_version, &qmat_command_help,
+    &qmat_command_mat,      &qmat_command_run,     &qmat_command_batch, &qmat_command_watch, &qmat_command_why,
+    &qmat_command_cache,    &qmat_command_check,   &qmat_command_dot,   &qmat_command_info,  &qmat_command_extract,
+    &qmat_command_graphs,   &qmat_command_nodes,   &qmat_command_node,  &qmat_command_man,   &qmat_command_completion,
+    &qmat_command_complete, &qmat_command_version, &qmat_command_help,
 };
 const size_t qmat_command_count = sizeof qmat_commands / sizeof *qmat_commands;
 
@@ -225,7 +226,8 @@ void qmat_command_print_help(const qmat_invocation *invocation) {
 
 void qmat_commands_print(void) {
   printf("qmat COMMAND [ARGUMENTS] [OPTIONS]\n\nThe medial axis transform of 3D models, for asset pipelines.\n\n");
-  for (size_t i = 0; i < qmat_command_count; i++) print_row(qmat_commands[i]->name, qmat_commands[i]->summary);
+  for (size_t i = 0; i < qmat_command_count; i++)
+    if (qmat_commands[i]->summary) print_row(qmat_commands[i]->name, qmat_commands[i]->summary);
   putchar('\n');
   qmat_print_wrapped("'qmat help COMMAND' explains a command.", 0, 0);
   qmat_print_wrapped("Exit codes: 0 done, 1 a run failed, 2 bad usage or a bad graph, 3 cancelled.", 0, 0);

@@ -43,7 +43,7 @@ typedef struct qmat_invocation {
 } qmat_invocation;
 
 struct qmat_command {
-  const char *name, *arguments, *summary, *doc;
+  const char *name, *arguments, *summary, *doc;  /* without a summary it is in no list */
   const qmat_option *options, *common, *caching; /* its own, and shared tables; NULL: none */
   size_t least, most;                            /* how many arguments it takes */
   /* Adds options that depend on a graph; NULL: none. */
@@ -53,7 +53,8 @@ struct qmat_command {
 
 extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_watch, qmat_command_why,
     qmat_command_cache, qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node,
-    qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract, qmat_command_graphs;
+    qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract, qmat_command_graphs,
+    qmat_command_man, qmat_command_completion, qmat_command_complete;
 
 /* All commands, in the order of the help. */
 extern const qmat_command *const qmat_commands[];
