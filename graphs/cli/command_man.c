@@ -44,7 +44,8 @@ static void put_option(const qmat_option *option) {
     snprintf(tag, sizeof tag, "-%c, --%s", option->letter, option->name);
   else
     snprintf(tag, sizeof tag, "--%s", option->name);
-  if (option->value) snprintf(rest, sizeof rest, "%s%s", *option->value == '[' ? "" : " ", option->value);
+  if (option->value)
+    snprintf(rest, sizeof rest, "%s%s", strncmp(option->value, "[=", 2) == 0 ? "" : " ", option->value);
   put_row(tag, rest, option->doc);
 }
 
