@@ -502,12 +502,29 @@ function drawLabels(panels, height) {
   $('labels').replaceChildren(...labels);
 }
 
+// While the view moves it is drawn with fewer pixels where frames take too long, and with all of them once it rests.
+const pace = { quality: 1, last: 0, moving: false, rest: 0 };
+
+function paced() {
+  const now = performance.now(), gap = now - pace.last;
+  pace.last = now;
+  clearTimeout(pace.rest);
+  if (!pace.moving && gap > 400) return 1;
+  if (gap > 40) pace.quality = Math.max(0.05, pace.quality * Math.max(0.25, 30 / gap));
+  if (gap < 22) pace.quality = Math.min(1, 1.1 * pace.quality);
+  if (pace.quality < 1) pace.rest = setTimeout(() => {
+    pace.last = 0;
+    if (!pace.moving) redraw();
+  }, 300);
+  return Math.sqrt(pace.quality);
+}
+
 function draw() {
   waiting = false;
   const stage = $('stage'), width = stage.clientWidth, height = stage.clientHeight;
   if (!drawing || width === 0 || height === 0) return;
   // Four pixels are drawn for each that is shown, as far as a screen of 4K needs.
-  const ratio = devicePixelRatio || 1, scale = Math.min(ratio < 2 ? 2 * ratio : ratio, Math.sqrt(9e6 / (width * height)));
+  const ratio = devicePixelRatio || 1, scale = paced() * Math.min(ratio < 2 ? 2 * ratio : ratio, Math.sqrt(9e6 / (width * height)));
   const panels = panelsOf(width, height);
   const scaled = panels.map((p) => ({ view: p.view, x: Math.round(scale * p.x), y: Math.round(scale * p.y),
     width: Math.round(scale * (p.x + p.width)) - Math.round(scale * p.x), height: Math.round(scale * (p.y + p.height)) - Math.round(scale * p.y) }));
@@ -591,13 +608,18 @@ function showNumbers() {
     make('span', {}, x === 0 ? '0' : `${x < 0 ? '\u2212' : '+'}${percent(Math.abs(x) * mesh.range)}`)));
 }
 
+/** The colour bar is there where the surface has its colours. */
+function showBar() {
+  $('bar-section').hidden = !drawing || state.spheres !== null || !['both', 'surface'].includes(state.view);
+}
+
 function showLevel() {
   const chain = state.mesh.chain;
   $('levels').hidden = !chain;
   complex = state.spheres === null ? state.mesh.result : chain.level(state.spheres);
   drawing?.setMedial(complex);
   $('result').disabled = state.spheres === null;
-  $('bar-section').hidden = !drawing || state.spheres !== null;
+  showBar();
   $('worst').disabled = places().length === 0;
   const slabs = complex.slabs.length / 3, cones = complex.edges.length / 2;
   const numbers = [complex.spheres.length / 4, cones, slabs];
@@ -606,7 +628,7 @@ function showLevel() {
     const n = state.spheres ?? state.mesh.spheres;
     $('slider').value = String(Math.round(1000 * Math.log(chain.most / Math.min(Math.max(n, chain.least), chain.most)) / Math.log(chain.most / chain.least || 1)) || 0);
     $('level').textContent = state.spheres === null ? `The result: ${counted(n, 'sphere')}` :
-      `${counted(n, 'sphere')}: both errors at most ${percent(chain.error(n))}, ${length(state.mesh, chain.error(n))}`;
+      `${counted(n, 'sphere')}: both errors at most ${percent(chain.error(n))}, ${length(state.mesh, chain.error(n))}, at the constraint points`;
     $('slider').setAttribute('aria-valuetext', $('level').textContent);
   }
   redraw();
@@ -630,6 +652,7 @@ function showMesh() {
 function setView(view) {
   state.view = view;
   for (const button of $('views').children) button.setAttribute('aria-pressed', String(button.dataset.view === view));
+  showBar();
   redraw();
 }
 
@@ -714,6 +737,7 @@ function listen() {
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     stage.setPointerCapture(event.pointerId);
     stage.classList.add('turning');
+    pace.moving = true;
   });
   stage.addEventListener('pointermove', (event) => {
     const before = fingers.get(event.pointerId);
@@ -734,7 +758,9 @@ function listen() {
   for (const name of ['pointerup', 'pointercancel']) {
     stage.addEventListener(name, (event) => {
       fingers.delete(event.pointerId);
-      stage.classList.toggle('turning', fingers.size > 0);
+      pace.moving = fingers.size > 0;
+      stage.classList.toggle('turning', pace.moving);
+      redraw();
     });
   }
   stage.addEventListener('contextmenu', (event) => event.preventDefault());
@@ -820,4 +846,4 @@ function start() {
 start();
 
 /** For tests. */
-globalThis.qmatPage = { state, setLevel, setView, picture, redraw, draw, level: () => complex, meshes };
+globalThis.qmatPage = { state, pace, setLevel, setView, picture, redraw, draw, level: () => complex, meshes };
