@@ -16,7 +16,20 @@ typedef struct graph_reader {
   qmat_context *context;
   qmat_graph *graph;
   const qmat_tree *root;
+  qmat_mistake_fn *mistake; /* NULL: the first mistake ends the reading */
+  size_t mistakes;
+  qmat_error pending; /* the newest mistake */
 } graph_reader;
+
+enum { MOST_MISTAKES = 50 };
+
+/* Goes on after a mistake where all are wanted. Any other failure, and too many mistakes, end the reading. */
+static qmat_status note(graph_reader *reader, qmat_status status) {
+  if (status != QMAT_ERROR_USAGE || !reader->mistake || reader->mistakes == MOST_MISTAKES) return status;
+  if (reader->mistakes++ > 0) reader->mistake(&reader->pending);
+  reader->pending = reader->context->error;
+  return QMAT_OK;
+}
 
 static qmat_status at_mark(graph_reader *reader, qmat_mark mark) {
   return qmat_fail_at(reader->context, reader->graph->file, mark.line, mark.column);
@@ -46,7 +59,8 @@ static qmat_status check_keys(graph_reader *reader, const qmat_tree *mapping, co
     qmat_name_list names = {0};
     for (size_t i = 0; i < count; i++) qmat_name_list_add(&names, keys[i]);
     qmat_suggest_name(reader->context, entry->key, "keys", &names);
-    return at_mark(reader, entry->mark);
+    const qmat_status status = note(reader, at_mark(reader, entry->mark));
+    if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
 }
@@ -100,21 +114,24 @@ static qmat_status read_version(graph_reader *reader) {
   return at_mark(reader, version->mark);
 }
 
-static qmat_status read_params(graph_reader *reader, size_t index, const qmat_tree *params) {
+static qmat_status read_param(graph_reader *reader, size_t index, const qmat_tree_entry *entry) {
   qmat_graph_node *node = &reader->graph->nodes[index];
-  qmat_status status = expect_mapping(reader, params, "params", "params: { name: value }");
+  size_t row;
+  qmat_status status = qmat_graph_node_param(reader->context, node, entry->key, &row);
+  if (status != QMAT_OK) return at_mark(reader, entry->mark);
+  status = expect_text(reader, entry->value, entry->key);
   if (status != QMAT_OK) return status;
-  for (const qmat_tree_entry *entry = params->entries; entry; entry = entry->next) {
-    size_t row;
-    status = qmat_graph_node_param(reader->context, node, entry->key, &row);
-    if (status != QMAT_OK) return at_mark(reader, entry->mark);
-    status = expect_text(reader, entry->value, entry->key);
-    if (status != QMAT_OK) return status;
-    status = qmat_graph_set(reader->context, reader->graph, index, row, entry->value->text, reader->graph->folder);
-    if (status != QMAT_OK) return at_mark(reader, entry->value->mark);
-    node->marks[row] = entry->value->mark;
-  }
+  status = qmat_graph_set(reader->context, reader->graph, index, row, entry->value->text, reader->graph->folder);
+  if (status != QMAT_OK) return at_mark(reader, entry->value->mark);
+  node->marks[row] = entry->value->mark;
   return QMAT_OK;
+}
+
+static qmat_status read_params(graph_reader *reader, size_t index, const qmat_tree *params) {
+  qmat_status status = expect_mapping(reader, params, "params", "params: { name: value }");
+  for (const qmat_tree_entry *entry = params->entries; entry && status == QMAT_OK; entry = entry->next)
+    status = note(reader, read_param(reader, index, entry));
+  return status;
 }
 
 static qmat_status read_node(graph_reader *reader, const qmat_tree_entry *entry) {
@@ -166,43 +183,60 @@ static void suggest_type(graph_reader *reader, qmat_value_type wanted, size_t bu
   }
 }
 
-static qmat_status read_links(graph_reader *reader, size_t index, const qmat_tree *wiring) {
+/* Whether a name leads to a node that the file has and that could not be read. Its mistake has been told. */
+static bool is_broken(const graph_reader *reader, const char *name) {
+  const qmat_tree *nodes = find_key(reader->root, "nodes");
+  const size_t length = strcspn(name, ".");
+  for (size_t i = 0; i < reader->graph->node_count; i++)
+    if (strlen(reader->graph->nodes[i].id) == length && memcmp(reader->graph->nodes[i].id, name, length) == 0)
+      return false;
+  for (const qmat_tree_entry *entry = nodes && nodes->is_mapping ? nodes->entries : NULL; entry; entry = entry->next)
+    if (strlen(entry->key) == length && memcmp(entry->key, name, length) == 0) return true;
+  return false;
+}
+
+static qmat_status read_link(graph_reader *reader, size_t index, const qmat_tree_entry *entry) {
   qmat_graph *graph = reader->graph;
   qmat_graph_node *node = &graph->nodes[index];
-  qmat_status status = expect_mapping(reader, wiring, "in", "in: { port: node.port }");
-  if (status != QMAT_OK) return status;
-  for (const qmat_tree_entry *entry = wiring->entries; entry; entry = entry->next) {
-    size_t port;
-    status = qmat_graph_node_input(reader->context, node, entry->key, &port);
-    if (status != QMAT_OK) return at_mark(reader, entry->mark);
-    status = expect_text(reader, entry->value, entry->key);
-    if (status != QMAT_OK) return status;
-    qmat_graph_link *link = &node->links[port];
-    qmat_graph_link found = {.mark = entry->value->mark};
-    status = qmat_graph_find_port(reader->context, graph, entry->value->text, &found.node, &found.port);
-    if (status != QMAT_OK) return at_mark(reader, entry->value->mark);
-    qmat_value_type wanted = node->type->inputs[port].type;
-    qmat_value_type given = graph->nodes[found.node].type->outputs[found.port].type;
-    if (given != wanted) {
-      qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes a %s, but '%s' is a %s", entry->key,
-                node->id, qmat_value_type_name(wanted), qmat_show(entry->value->text).text,
-                qmat_value_type_name(given));
-      suggest_type(reader, wanted, index);
-      return at_mark(reader, entry->value->mark);
-    }
-    *link = found;
+  size_t port;
+  qmat_status status = qmat_graph_node_input(reader->context, node, entry->key, &port);
+  if (status != QMAT_OK) return at_mark(reader, entry->mark);
+  qmat_graph_link *link = &node->links[port];
+  qmat_graph_link found = {.mark = entry->value->mark};
+  link->mark = entry->value->mark; /* so that it is not reported as missing, too */
+  status = expect_text(reader, entry->value, entry->key);
+  if (status != QMAT_OK || is_broken(reader, entry->value->text)) return status;
+  status = qmat_graph_find_port(reader->context, graph, entry->value->text, &found.node, &found.port);
+  if (status != QMAT_OK) return at_mark(reader, entry->value->mark);
+  qmat_value_type wanted = node->type->inputs[port].type;
+  qmat_value_type given = graph->nodes[found.node].type->outputs[found.port].type;
+  if (given != wanted) {
+    qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes a %s, but '%s' is a %s", entry->key,
+              node->id, qmat_value_type_name(wanted), qmat_show(entry->value->text).text, qmat_value_type_name(given));
+    suggest_type(reader, wanted, index);
+    return at_mark(reader, entry->value->mark);
   }
+  *link = found;
   return QMAT_OK;
+}
+
+static qmat_status read_links(graph_reader *reader, size_t index, const qmat_tree *wiring) {
+  qmat_status status = note(reader, expect_mapping(reader, wiring, "in", "in: { port: node.port }"));
+  for (const qmat_tree_entry *entry = wiring->entries; entry && status == QMAT_OK; entry = entry->next)
+    status = note(reader, read_link(reader, index, entry));
+  return status;
 }
 
 static qmat_status check_connected(graph_reader *reader, size_t index) {
   const qmat_graph_node *node = &reader->graph->nodes[index];
   for (size_t port = 0; port < qmat_input_count(node->type); port++) {
-    if (node->links[port].node != SIZE_MAX || node->type->inputs[port].optional) continue;
+    const qmat_graph_link *link = &node->links[port];
+    if (link->node != SIZE_MAX || link->mark.line > 0 || node->type->inputs[port].optional) continue;
     qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' (%s) is not connected",
               node->type->inputs[port].name, node->id, node->type->name);
     suggest_type(reader, node->type->inputs[port].type, index);
-    return at_mark(reader, node->mark);
+    const qmat_status status = note(reader, at_mark(reader, node->mark));
+    if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
 }
@@ -224,16 +258,18 @@ static qmat_status read_nodes(graph_reader *reader) {
   graph->nodes = qmat_calloc(entry_count(nodes), sizeof *graph->nodes);
   if (!graph->nodes) return qmat_fail_memory(reader->context, "graph");
   for (const qmat_tree_entry *entry = nodes->entries; entry; entry = entry->next) {
-    status = read_node(reader, entry);
+    status = note(reader, read_node(reader, entry));
     if (status != QMAT_OK) return status;
   }
   /* A node may take its input from a node later in the file. */
   size_t index = 0;
-  for (const qmat_tree_entry *entry = nodes->entries; entry; entry = entry->next, index++) {
+  for (const qmat_tree_entry *entry = nodes->entries; entry; entry = entry->next) {
+    if (index == graph->node_count || strcmp(graph->nodes[index].id, entry->key) != 0) continue; /* a broken one */
     const qmat_tree *wiring = find_key(entry->value, "in");
     if (wiring) status = read_links(reader, index, wiring);
     if (status == QMAT_OK) status = check_connected(reader, index);
     if (status != QMAT_OK) return status;
+    index++;
   }
   return QMAT_OK;
 }
@@ -255,6 +291,7 @@ static qmat_status read_input(graph_reader *reader, const qmat_tree_entry *entry
       if (status != QMAT_OK) return status;
       snprintf(joined, sizeof joined, "%s.%s", member->key, member->value->text);
     }
+    if (is_broken(reader, member ? joined : value->text)) return QMAT_OK;
     qmat_graph_param *param = &input->params[input->param_count];
     status = qmat_graph_find_param(reader->context, reader->graph, member ? joined : value->text, param);
     if (status != QMAT_OK) return at_mark(reader, member ? member->mark : value->mark);
@@ -273,7 +310,7 @@ static qmat_status read_inputs(graph_reader *reader) {
   graph->inputs = qmat_calloc(entry_count(inputs), sizeof *graph->inputs);
   if (!graph->inputs) return qmat_fail_memory(reader->context, "graph");
   for (const qmat_tree_entry *entry = inputs->entries; entry; entry = entry->next) {
-    status = read_input(reader, entry, &graph->inputs[graph->input_count++]);
+    status = note(reader, read_input(reader, entry, &graph->inputs[graph->input_count++]));
     if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
@@ -302,6 +339,7 @@ static qmat_status read_output(graph_reader *reader, const qmat_tree_entry *entr
   qmat_graph_output *output = &graph->outputs[graph->output_count++];
   snprintf(output->name, sizeof output->name, "%s", entry->key);
   output->mark = from->mark;
+  if (is_broken(reader, from->text)) return QMAT_OK;
   status = qmat_graph_find_port(reader->context, graph, from->text, &output->node, &output->port);
   if (status != QMAT_OK) return at_mark(reader, from->mark);
   if (!path) return QMAT_OK;
@@ -327,7 +365,7 @@ static qmat_status read_outputs(graph_reader *reader) {
   graph->outputs = qmat_calloc(entry_count(outputs), sizeof *graph->outputs);
   if (!graph->outputs) return qmat_fail_memory(reader->context, "graph");
   for (const qmat_tree_entry *entry = outputs->entries; entry; entry = entry->next) {
-    status = read_output(reader, entry);
+    status = note(reader, read_output(reader, entry));
     if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
@@ -341,18 +379,23 @@ static qmat_status read_graph(graph_reader *reader) {
   if (status == QMAT_OK) status = check_keys(reader, reader->root, "a graph", keys, 4);
   if (status == QMAT_OK) status = read_version(reader);
   if (status == QMAT_OK) status = read_nodes(reader);
-  if (status == QMAT_OK) status = read_inputs(reader);
-  if (status == QMAT_OK) status = read_outputs(reader);
+  if (status == QMAT_OK) status = note(reader, read_inputs(reader));
+  if (status == QMAT_OK) status = note(reader, read_outputs(reader));
+  if (status == QMAT_OK && reader->mistakes > 0) {
+    reader->context->error = reader->pending;
+    return QMAT_ERROR_USAGE;
+  }
   if (status == QMAT_OK) status = qmat_graph_order_nodes(reader->context, reader->graph);
   if (status == QMAT_OK) status = qmat_graph_check_reached(reader->context, reader->graph);
   return status;
 }
 
 static qmat_status read_text(qmat_context *context, const qmat_registry *registry, const char *file, const char *folder,
-                             size_t folder_length, const char *text, size_t size, qmat_graph *graph) {
+                             size_t folder_length, const char *text, size_t size, qmat_mistake_fn *mistake,
+                             qmat_graph *graph) {
   *graph = (qmat_graph){.registry = *registry};
   qmat_arena arena = {0};
-  graph_reader reader = {.context = context, .graph = graph};
+  graph_reader reader = {.context = context, .graph = graph, .mistake = mistake};
   graph->file = qmat_strdup(file);
   graph->folder = qmat_calloc(folder_length + 1, 1);
   qmat_status status = QMAT_OK;
@@ -370,7 +413,7 @@ static qmat_status read_text(qmat_context *context, const qmat_registry *registr
 
 qmat_status qmat_graph_read_text(qmat_context *context, const qmat_registry *registry, const char *file,
                                  const char *text, size_t size, qmat_graph *graph) {
-  return read_text(context, registry, file, "", 0, text, size, graph);
+  return read_text(context, registry, file, "", 0, text, size, NULL, graph);
 }
 
 /* Reads at most one byte more than a graph file may have. Every failure is a bad graph (QMAT_ERROR_USAGE), not a failed
@@ -410,13 +453,18 @@ static qmat_status read_bytes(qmat_context *context, const char *path, char **te
 
 qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *registry, const char *path,
                                  qmat_graph *graph) {
+  return qmat_graph_read_file_all(context, registry, path, NULL, graph);
+}
+
+qmat_status qmat_graph_read_file_all(qmat_context *context, const qmat_registry *registry, const char *path,
+                                     qmat_mistake_fn *mistake, qmat_graph *graph) {
   *graph = (qmat_graph){0};
   char *text;
   size_t size = 0;
   qmat_status status = read_bytes(context, path, &text, &size);
   if (status != QMAT_OK) return status;
   const char *slash = strrchr(path, '/');
-  status = read_text(context, registry, path, path, slash ? (size_t)(slash - path) + 1 : 0, text, size, graph);
+  status = read_text(context, registry, path, path, slash ? (size_t)(slash - path) + 1 : 0, text, size, mistake, graph);
   qmat_free(text);
   graph->is_file = status == QMAT_OK;
   return status;

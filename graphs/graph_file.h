@@ -23,7 +23,15 @@
 qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *registry, const char *path,
                                  qmat_graph *graph);
 
-/* The same for `size` bytes of text. Errors call it `file`; relative paths are not resolved. */
+/* Called with each mistake but the last. */
+typedef void qmat_mistake_fn(const qmat_error *error);
+
+/* The same, but goes on after a mistake: the last one is the error. What follows from an earlier mistake is left out.
+ * At most 51 are told. `mistake` may be NULL: the first is the only one. */
+qmat_status qmat_graph_read_file_all(qmat_context *context, const qmat_registry *registry, const char *path,
+                                     qmat_mistake_fn *mistake, qmat_graph *graph);
+
+/* qmat_graph_read_file for `size` bytes of text. Errors call it `file`; relative paths are not resolved. */
 qmat_status qmat_graph_read_text(qmat_context *context, const qmat_registry *registry, const char *file,
                                  const char *text, size_t size, qmat_graph *graph);
 

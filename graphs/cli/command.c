@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/cli/command.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "core/json_text.h"
 #include "graphs/cli/terminal.h"
@@ -184,6 +186,13 @@ static int help_width(void) {
 
 void qmat_print_wrapped(const char *text, int column, int indent) {
   qmat_put_wrapped(stdout, text, column, indent, help_width(), false);
+}
+
+void qmat_print_error(const qmat_error *error) {
+  char line[2048];
+  qmat_error_format(error, line, sizeof line);
+  fputs("qmat: ", stderr);
+  qmat_put_wrapped(stderr, line, 6, 2, isatty(STDERR_FILENO) ? qmat_terminal_width(stderr) : INT_MAX, true);
 }
 
 qmat_status qmat_print_json(qmat_context *context, json_t *json) {

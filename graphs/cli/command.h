@@ -95,6 +95,9 @@ qmat_status qmat_invocation_number(qmat_context *context, const qmat_invocation 
  * `column`; the others are indented by `indent`. */
 void qmat_print_wrapped(const char *text, int column, int indent);
 
+/* Prints an error on stderr, on one line; wrapped where stderr is a terminal. */
+void qmat_print_error(const qmat_error *error);
+
 /* Prints JSON, indented, and releases it. NULL: QMAT_ERROR_MEMORY. */
 qmat_status qmat_print_json(qmat_context *context, json_t *json);
 

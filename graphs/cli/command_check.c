@@ -25,9 +25,8 @@ const qmat_command qmat_command_check = {
     .arguments = "GRAPH",
     .summary = "Check a graph file without running it",
     .doc =
-        "Checks the names, connections and parameters of a graph file. The first mistake is printed with its file, "
-        "line "
-        "and column, and the exit code is 2. A required parameter may be missing if it is an input of the graph.",
+        "Checks the names, connections and parameters of a graph file. Each mistake is printed with its file, line and "
+        "column, and the exit code is 2. A required parameter may be missing if it is an input of the graph.",
     .options = options,
     .least = 1,
     .most = 1,

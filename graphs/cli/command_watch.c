@@ -123,11 +123,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_graph_uninit(&invocation->graph);
     add_as_it_is(&watcher, invocation->arguments[0]);
     status = qmat_execute(context, invocation, qmat_read_graph_argument, on_run, &watcher);
-    if (status != QMAT_OK && status != QMAT_CANCELLED) {
-      char line[2048];
-      qmat_error_format(&context->error, line, sizeof line);
-      fprintf(stderr, "qmat: %s\n", line);
-    }
+    if (status != QMAT_OK && status != QMAT_CANCELLED) qmat_print_error(&context->error);
     fflush(stdout);
     if (!quiet && !qmat_interrupted())
       fprintf(stderr, "qmat: watching %zu file%s\n", watcher.count, watcher.count == 1 ? "" : "s");

@@ -1,14 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include <limits.h>
 #include <locale.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
-#include "graphs/cli/terminal.h"
 #include "nodes/nodes.h"
 
 static qmat_status call(qmat_context *context, const char *name, char *const *words, size_t count) {
@@ -47,10 +44,7 @@ int main(int argc, char **argv) {
   if (fflush(stdout) != 0 && status == QMAT_OK)
     status = qmat_fail(&context, QMAT_ERROR_IO, "cannot write to the standard output");
   if (status != QMAT_OK) {
-    char line[2048];
-    qmat_error_format(&context.error, line, sizeof line);
-    fputs("qmat: ", stderr);
-    qmat_put_wrapped(stderr, line, 6, 2, isatty(STDERR_FILENO) ? qmat_terminal_width(stderr) : INT_MAX, true);
+    qmat_print_error(&context.error);
   }
   qmat_context_uninit(&context);
   return qmat_status_exit_code(status);

@@ -53,6 +53,20 @@ expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report failed.json
 holds "a report of the failure" grep -q '"line": 3' failed.json
 expect 2 "bad.yaml:3:14" "$qmat" run bad.yaml --report bad.yaml
 holds "the graph file is never overwritten" grep -q 'mesh.sfd' bad.yaml
+cat >mistakes.yaml <<'END'
+qmat: 1
+nods: {}
+nodes:
+  m: { type: scene.raed }
+  t: { type: mesh.sdf, in: { mesh: m.mesh }, params: { rayz: 3, cone: wide, neighbours: 2 } }
+  s: { type: mesh.sample, in: { thickness: t.thicknes } }
+outputs: { a: t.thickness, b: s.nothing, c: m.mesh }
+inputs: { model: m.path, n: t.nix }
+END
+expect 2 "did you mean 'scene.read'?" "$qmat" check mistakes.yaml
+sed 's/^qmat: mistakes.yaml:\([0-9]*:[0-9]*\): .*/\1/' err.txt | tr '\n' ' ' >places.txt
+holds "all mistakes, and nothing that follows from them: $(cat places.txt)" grep -qx \
+  '2:1 4:14 5:56 5:65 5:77 6:44 6:3 8:29 7:31 ' places.txt
 expect 2 "did you mean '--set'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --sat model=box.off
 expect 2 "did you mean 'epsilon'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --set simple.epsilom=1
 expect 2 "path must be given (--set model=FILE)" "$qmat" run "$source/graphs/qmat_plus.yaml" -o a.glb
