@@ -111,6 +111,18 @@ const char *qmat_value_type_name(qmat_value_type type) {
   return (unsigned)type < QMAT_VALUE_TYPE_COUNT ? qmat_value_layouts[type].name : "unknown";
 }
 
+bool qmat_value_array_at(const qmat_value *value, size_t index, qmat_value_array *array) {
+  for (const qmat_value_row *row = qmat_value_rows(value); row->name; row++) {
+    const bool is_ids = row->kind == QMAT_ROW_U32;
+    if ((!is_ids && row->kind != QMAT_ROW_F64) || index-- > 0) continue;
+    const void *data = qmat_row_pointer(value, row);
+    *array = (qmat_value_array){row->name, qmat_row_count(value, row), row->components, is_ids ? NULL : data,
+                                is_ids ? data : NULL};
+    return true;
+  }
+  return false;
+}
+
 const qmat_value_count_row *qmat_value_count_rows(qmat_value_type type) {
   return qmat_value_layouts[type].counts;
 }

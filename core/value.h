@@ -46,6 +46,17 @@ const char *qmat_value_type_name(qmat_value_type type);
 /* The bytes that the value's arrays, texts and files occupy; a list's are those of its items. */
 size_t qmat_value_bytes(const qmat_value *value);
 
+/* One table of numbers in a value: rows * columns doubles or ids, row by row; the other pointer is NULL. */
+typedef struct qmat_value_array {
+  const char *name; /* of the field in its struct: "positions" */
+  size_t rows, columns;
+  const double *numbers;
+  const uint32_t *ids;
+} qmat_value_array;
+
+/* Table `index` of a value, in the order of its fields; the value owns it. False beyond the last. */
+bool qmat_value_array_at(const qmat_value *value, size_t index, qmat_value_array *array);
+
 /* The counts of a type, at most QMAT_MOST_COUNTS, ended by a row without a name. */
 const qmat_value_count_row *qmat_value_count_rows(qmat_value_type type);
 /* Those counts of one value, in that order; of a list their sums. Unused counts are 0. */

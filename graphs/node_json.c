@@ -105,6 +105,27 @@ json_t *qmat_node_json(const qmat_node *type) {
   return node;
 }
 
+json_t *qmat_graph_json(const qmat_graph *graph) {
+  json_t *inputs = json_array(), *nodes = json_array(), *outputs = json_array();
+  for (size_t i = 0; i < graph->input_count; i++) json_array_append_new(inputs, json_string(graph->inputs[i].name));
+  for (size_t i = 0; i < graph->node_count; i++) {
+    const qmat_node *type = graph->nodes[i].type;
+    json_t *ports = json_object();
+    for (size_t k = 0; k < qmat_output_count(type); k++)
+      json_object_set_new(ports, type->outputs[k].name, json_string(qmat_value_type_name(type->outputs[k].type)));
+    json_array_append_new(nodes,
+                          json_pack("{s:s, s:s, s:o}", "id", graph->nodes[i].id, "type", type->name, "outputs", ports));
+  }
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    const qmat_graph_node *node = &graph->nodes[output->node];
+    json_array_append_new(outputs, json_pack("{s:s, s:s++, s:s}", "name", output->name, "port", node->id, ".",
+                                             node->type->outputs[output->port].name, "type",
+                                             qmat_value_type_name(qmat_graph_output_type(graph, i))));
+  }
+  return json_pack("{s:o, s:o, s:o}", "inputs", inputs, "nodes", nodes, "outputs", outputs);
+}
+
 json_t *qmat_registry_json(const qmat_registry *registry) {
   json_t *nodes = json_array();
   for (size_t i = 0; nodes && i < registry->count; i++)

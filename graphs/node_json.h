@@ -14,6 +14,9 @@ json_t *qmat_node_json(const qmat_node *type);
 /* An array of all node types, in the registry's order. */
 json_t *qmat_registry_json(const qmat_registry *registry);
 
+/* The inputs, nodes and outputs of a graph, without their values: see qmat_job_graph. */
+json_t *qmat_graph_json(const qmat_graph *graph);
+
 /* A parameter's value: a boolean, a number or a text; null for a text that is not set. */
 json_t *qmat_param_json(const qmat_param *param, const void *params);
 

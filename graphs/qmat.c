@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/qmat.h"
 
+#include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/envelope.h"
+#include "core/geometry/medial_build.h"
 #include "core/json_text.h"
 #include "graphs/built_in.h"
 #include "graphs/graph_file.h"
@@ -17,6 +21,8 @@
 #include "graphs/run/run_report.h"
 #include "io/soup.h"
 #include "nodes/nodes.h"
+
+enum { PORT_SIZE = 2 * QMAT_GRAPH_NAME_SIZE }; /* of "node.port" with the terminating zero */
 
 typedef struct job_save {
   size_t output;
@@ -89,6 +95,11 @@ static const qmat_job_problem no_memory = {
 
 const qmat_job_problem *qmat_job_error(const qmat_job *job) {
   return job ? &job->problem : &no_memory;
+}
+
+static qmat_status dump(qmat_context *context, const json_t *root, char **json) {
+  *json = root ? qmat_json_text(root, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
+  return *json ? QMAT_OK : qmat_fail_memory(context, "report");
 }
 
 /* ---- making ---- */
@@ -193,16 +204,23 @@ static qmat_status give(qmat_job *job, size_t node, size_t port, qmat_value *val
   return QMAT_OK;
 }
 
+/* Finds an output port that takes values of this type. */
+static qmat_status find_given_port(qmat_job *job, const char *port, qmat_value_type type, size_t *node, size_t *index) {
+  const qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, node, index);
+  if (status != QMAT_OK) return status;
+  const qmat_value_type takes = job->graph.nodes[*node].type->outputs[*index].type;
+  if (takes == type) return QMAT_OK;
+  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name(takes),
+                   qmat_value_type_name(type));
+}
+
 qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
                                size_t vertex_count, const uint32_t *triangles, size_t triangle_count) {
   if (!job->loaded) return job->problem.result;
   size_t node, index;
-  qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, &node, &index);
+  qmat_status status = find_given_port(job, port, QMAT_MESH, &node, &index);
   if (status != QMAT_OK) return finish(job, status);
   const qmat_node *type = job->graph.nodes[node].type;
-  if (type->outputs[index].type != QMAT_MESH)
-    return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' is a %s, not a mesh", port,
-                                 qmat_value_type_name(type->outputs[index].type)));
   if (!name || !*name) name = "mesh";
   qmat_mesh *mesh;
   status = make_mesh(&job->context, name, positions, vertex_count, triangles, triangle_count, &mesh);
@@ -216,6 +234,90 @@ qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name
   return finish(job, status);
 }
 
+static qmat_status make_medial(qmat_context *context, const double *spheres, size_t sphere_count, const uint32_t *edges,
+                               size_t edge_count, const uint32_t *triangles, size_t triangle_count,
+                               qmat_medial **made) {
+  qmat_medial *medial = *made = qmat_medial_new();
+  if (medial) medial->spheres = qmat_alloc(sphere_count, 4 * sizeof *spheres);
+  if (!medial || !medial->spheres) {
+    qmat_value_release(medial ? &medial->base : NULL);
+    return qmat_fail_memory(context, "the medial mesh");
+  }
+  if (sphere_count > 0) memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
+  medial->sphere_count = sphere_count;
+  qmat_status status = qmat_medial_set_simplices(context, medial, edges, edge_count, triangles, triangle_count);
+  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
+  if (status != QMAT_OK) qmat_value_release(&medial->base);
+  return status;
+}
+
+qmat_result qmat_job_give_medial(qmat_job *job, const char *port, const double *spheres, size_t sphere_count,
+                                 const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
+                                 size_t triangle_count) {
+  if (!job->loaded) return job->problem.result;
+  size_t node, index;
+  qmat_medial *medial;
+  qmat_status status = find_given_port(job, port, QMAT_MEDIAL, &node, &index);
+  if (status == QMAT_OK)
+    status = make_medial(&job->context, spheres, sphere_count, edges, edge_count, triangles, triangle_count, &medial);
+  if (status == QMAT_OK) status = give(job, node, index, &medial->base);
+  return finish(job, status);
+}
+
+/* The item that "node.port[7]" names, and its port; SIZE_MAX: none. */
+static qmat_status split_item(qmat_context *context, const char *text, char port[PORT_SIZE], size_t *item) {
+  const char *bracket = strchr(text, '[');
+  const size_t length = bracket ? (size_t)(bracket - text) : strlen(text);
+  *item = SIZE_MAX;
+  snprintf(port, PORT_SIZE, "%.*s", length < PORT_SIZE ? (int)length : PORT_SIZE, text);
+  if (!bracket) return QMAT_OK;
+  char *end = NULL;
+  errno = 0;
+  if (bracket[1] >= '0' && bracket[1] <= '9') *item = strtoull(bracket + 1, &end, 10);
+  if (end && strcmp(end, "]") == 0 && errno == 0) return QMAT_OK;
+  return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is not of the form node.port[item]", qmat_show(text).text);
+}
+
+/* The value of a port of a job that ran, of any type. `*name` (may be NULL) is that of an item. */
+static qmat_status find_value(qmat_context *context, const qmat_job *job, const char *port, const qmat_value **value,
+                              const char **name) {
+  size_t node, index, item;
+  char plain[PORT_SIZE];
+  *value = NULL;
+  if (!job->ran) return qmat_fail(context, QMAT_ERROR_USAGE, "the job has no results: run it first");
+  qmat_status status = split_item(context, port, plain, &item);
+  if (status == QMAT_OK) status = qmat_graph_find_port(context, &job->graph, plain, &node, &index);
+  if (status != QMAT_OK) return status;
+  const qmat_value *found = qmat_run_value(&job->run, node, index);
+  if (!found) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not requested before the run", plain);
+    return qmat_fail_hint(context, "qmat_job_want");
+  }
+  if (item != SIZE_MAX) {
+    const size_t count = found->type == QMAT_LIST ? qmat_value_count(found) : 0;
+    if (item >= count)
+      return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a list of %zu items, without item %zu", plain, count, item);
+    if (name) *name = ((const qmat_list *)found)->names[item];
+    found = qmat_value_at(found, item);
+    if (found->type == QMAT_FAILURE) {
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "%s", qmat_value_failure(found));
+      return qmat_fail_element(context, "item", (int64_t)item);
+    }
+  }
+  *value = found;
+  return QMAT_OK;
+}
+
+qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job *from, const char *from_port) {
+  if (!job->loaded) return job->problem.result;
+  size_t node, index;
+  const qmat_value *value;
+  qmat_status status = find_value(&job->context, from, from_port, &value, NULL);
+  if (status == QMAT_OK) status = find_given_port(job, port, qmat_value_item_type(value), &node, &index);
+  if (status == QMAT_OK) status = give(job, node, index, qmat_value_retain(value));
+  return finish(job, status);
+}
+
 qmat_result qmat_job_want(qmat_job *job, const char *port) {
   if (!job->loaded) return job->problem.result;
   qmat_run_port want;
@@ -224,6 +326,15 @@ qmat_result qmat_job_want(qmat_job *job, const char *port) {
       qmat_grow((void **)&job->wants, &job->want_capacity, job->want_count + 1, sizeof *job->wants) != 0)
     status = qmat_fail_memory(&job->context, "ports");
   if (status == QMAT_OK) job->wants[job->want_count++] = want;
+  return finish(job, status);
+}
+
+qmat_result qmat_job_graph(qmat_job *job, char **json) {
+  *json = NULL;
+  if (!job->loaded) return job->problem.result;
+  json_t *graph = qmat_graph_json(&job->graph);
+  const qmat_status status = dump(&job->context, graph, json);
+  json_decref(graph);
   return finish(job, status);
 }
 
@@ -341,22 +452,14 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
 
 /* ---- results ---- */
 
-static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type type, const qmat_value **value) {
+static qmat_status find_single(qmat_job *job, const char *port, qmat_value_type type, const qmat_value **value) {
   qmat_context *context = &job->context;
-  *value = NULL;
-  if (!job->ran) return qmat_fail(context, QMAT_ERROR_USAGE, "the job has no results: run it first");
-  size_t node, index;
-  qmat_status status = qmat_graph_find_port(context, &job->graph, port, &node, &index);
+  const qmat_status status = find_value(context, job, port, value, NULL);
   if (status != QMAT_OK) return status;
-  *value = qmat_run_value(&job->run, node, index);
-  if (!*value) {
-    qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not requested before the run", port);
-    return qmat_fail_hint(context, "qmat_job_want");
-  }
   if ((*value)->type == QMAT_LIST) {
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has %zu values, one for each mesh of the scene", port,
               qmat_value_count(*value));
-    return qmat_fail_hint(context, "set model.mesh to the name of a mesh, or to merged");
+    return qmat_fail_hint(context, "name one as %s[0], or set model.mesh to the name of a mesh, or to merged", port);
   }
   if ((*value)->type != type)
     return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name((*value)->type),
@@ -368,7 +471,52 @@ static qmat_status find_value(qmat_job *job, const char *port, qmat_value_type t
 static const void *result_value(qmat_job *job, const char *port, qmat_value_type type) {
   const qmat_value *value;
   if (!job->loaded) return NULL;
-  return finish(job, find_value(job, port, type, &value)) == QMAT_RESULT_OK ? value : NULL;
+  return finish(job, find_single(job, port, type, &value)) == QMAT_RESULT_OK ? value : NULL;
+}
+
+qmat_result qmat_job_value(qmat_job *job, const char *port, qmat_value_view *view) {
+  const qmat_value *value;
+  *view = (qmat_value_view){.type = "", .name = ""};
+  if (!job->loaded) return job->problem.result;
+  qmat_status status = find_value(&job->context, job, port, &value, &view->name);
+  if (status != QMAT_OK) return finish(job, status);
+  view->type = qmat_value_type_name(qmat_value_item_type(value));
+  if (value->type == QMAT_LIST) {
+    view->item_count = qmat_value_count(value);
+  } else {
+    qmat_value_array array;
+    while (qmat_value_array_at(value, view->array_count, &array)) view->array_count++;
+  }
+  return QMAT_RESULT_OK;
+}
+
+qmat_result qmat_job_array(qmat_job *job, const char *port, size_t index, qmat_array_view *view) {
+  const qmat_value *value;
+  qmat_value_array array = {0};
+  *view = (qmat_array_view){.name = ""};
+  if (!job->loaded) return job->problem.result;
+  qmat_status status = find_value(&job->context, job, port, &value, NULL);
+  if (status == QMAT_OK && (value->type == QMAT_LIST || !qmat_value_array_at(value, index, &array)))
+    status = qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' has no array %zu", port, index);
+  if (status != QMAT_OK) return finish(job, status);
+  *view = (qmat_array_view){array.name, array.rows, array.columns, array.numbers, array.ids};
+  return QMAT_RESULT_OK;
+}
+
+qmat_result qmat_job_distances(qmat_job *job, const char *port, const double *points, size_t count, double *distances) {
+  const qmat_medial *medial = result_value(job, port, QMAT_MEDIAL);
+  if (!medial) return job->problem.result;
+  qmat_envelope *envelope = NULL;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < 3 * count && status == QMAT_OK; i++) {
+    if (isfinite(points[i])) continue;
+    qmat_fail(&job->context, QMAT_ERROR_GEOMETRY, "a coordinate is not finite");
+    status = qmat_fail_element(&job->context, "point", (int64_t)(i / 3));
+  }
+  if (status == QMAT_OK) status = qmat_envelope_of_medial(&job->context, medial, &envelope);
+  if (status == QMAT_OK) status = qmat_envelope_distances(&job->context, envelope, points, count, distances);
+  qmat_envelope_free(envelope);
+  return finish(job, status);
 }
 
 qmat_result qmat_job_medial(qmat_job *job, const char *port, qmat_medial_view *view) {
@@ -410,11 +558,6 @@ qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t part, con
   *bytes = file->parts[part].bytes;
   *size = file->parts[part].size;
   return QMAT_RESULT_OK;
-}
-
-static qmat_status dump(qmat_context *context, const json_t *root, char **json) {
-  *json = root ? qmat_json_text(root, JSON_INDENT(2) | JSON_REAL_PRECISION(15), NULL) : NULL;
-  return *json ? QMAT_OK : qmat_fail_memory(context, "report");
 }
 
 qmat_result qmat_job_report(qmat_job *job, const char *port, char **json) {

@@ -79,9 +79,24 @@ QMAT_API qmat_result qmat_job_set(qmat_job *job, const char *assignment);
 QMAT_API qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
                                         size_t vertex_count, const uint32_t *triangles, size_t triangle_count);
 
+/* Sets an output port ("medial.medial" of a medial.read) to a medial mesh: `spheres` has 4 * sphere_count doubles x y z
+ * radius, `edges` 2 * edge_count and `triangles` 3 * triangle_count indices below sphere_count; all are copied, and an
+ * array of count 0 may be NULL. Edges and triangles are sorted, repeated ones are left out, and missing sides of
+ * triangles become edges. Cost: linear. */
+QMAT_API qmat_result qmat_job_give_medial(qmat_job *job, const char *port, const double *spheres, size_t sphere_count,
+                                          const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
+                                          size_t triangle_count);
+/* Sets an output port to a result of any type of another job, or of the same one. Nothing is copied; `from` may then be
+ * freed, changed or run again. For a list, all of it. */
+QMAT_API qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job *from, const char *from_port);
+
 /* Requests the value of an output port ("simple.medial"), to be read after the run. With requests, only the nodes that
  * they and the saved outputs need run; without, every output of the graph is made. */
 QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
+
+/* The graph's inputs, nodes and outputs as JSON: {"inputs": ["model"], "nodes": [{"id", "type", "outputs": {"mesh":
+ * "mesh"}}], "outputs": [{"name", "port", "type"}]}. Free with qmat_text_free. */
+QMAT_API qmat_result qmat_job_graph(qmat_job *job, char **json);
 
 /* Saves an output of the graph ("asset"; NULL: the one that alone has the ending of `path`, else the only one that
  * every run makes) as `path` after a successful run. The path's ending chooses the format. An output may be saved
@@ -114,8 +129,29 @@ QMAT_API qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress 
 
 /* ---- results ---- */
 /* Pointers are valid until the next run or the end of the job. Each call fails with QMAT_RESULT_USAGE when the port was
- * not requested before the run, has another type, or has one value per mesh of a glTF scene: set "model.mesh=NAME" to
- * choose a mesh, or "model.mesh=merged" to merge them. */
+ * not requested before the run, has another type, or has one value per mesh of a glTF or USD scene. Such a list has
+ * items, which a port may name: "simple.medial[0]". (Or set "model.mesh=NAME" to choose a mesh, or "model.mesh=merged"
+ * to merge them.) An item that could not be made is QMAT_RESULT_FAILED with the reason. */
+
+/* What a value is. */
+typedef struct qmat_value_view {
+  const char *type;   /* "mesh", "field", "samples", "medial", "chain", "report", "file", "scene", "colliders" */
+  const char *name;   /* of the mesh in its scene, for an item of a list; else "" */
+  size_t item_count;  /* of a list, at least 2; 0: it is no list */
+  size_t array_count; /* tables of numbers that it has; 0 for a list, a report and a file */
+} qmat_value_view;
+
+/* A table of numbers: rows * columns doubles, or as many indices, row by row. One of the pointers is NULL. */
+typedef struct qmat_array_view {
+  const char *name; /* "positions", "spheres", "values" */
+  size_t rows, columns;
+  const double *numbers;
+  const uint32_t *ids;
+} qmat_array_view;
+
+QMAT_API qmat_result qmat_job_value(qmat_job *job, const char *port, qmat_value_view *view);
+/* Table `array` of a value of any type; QMAT_RESULT_USAGE beyond the last. */
+QMAT_API qmat_result qmat_job_array(qmat_job *job, const char *port, size_t array, qmat_array_view *view);
 
 /* A medial mesh. */
 typedef struct qmat_medial_view {
@@ -143,6 +179,11 @@ QMAT_API qmat_result qmat_job_file(qmat_job *job, const char *port, qmat_file_vi
 /* Part `part` of that file: its name ("" for part 0) and bytes. */
 QMAT_API qmat_result qmat_job_file_part(qmat_job *job, const char *port, size_t part, const char **name,
                                         const uint8_t **bytes, size_t *size);
+/* The signed distances of `count` points (3 doubles each) to the envelope of the medial mesh of a port: exact outside
+ * of it; negative inside, where the depth is at least as large. Threads are those of the run. Cost: O(log n) a point.
+ */
+QMAT_API qmat_result qmat_job_distances(qmat_job *job, const char *port, const double *points, size_t count,
+                                        double *distances);
 /* A report as JSON text; free with qmat_text_free. */
 QMAT_API qmat_result qmat_job_report(qmat_job *job, const char *port, char **json);
 /* The report of the run, as `qmat run --report` writes it; free with qmat_text_free. */

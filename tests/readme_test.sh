@@ -5,6 +5,7 @@
 # - A block of commands (```sh) is typed line by line. A command that fails is a failure. A block after a comment
 #   `<!-- not typed: REASON -->` is listed with its reason instead. One after `<!-- interrupted -->` has to run until it
 #   is interrupted.
+# - A block of Python is run, as a file.
 # - Of the code within sentences, `qmat ...` is typed; where it has a placeholder in capitals, the help of its command
 #   is. `--set NODE.PARAMETER=VALUE` has to be accepted by the shipped graph, and any other `--option` has to be in the
 #   help of a command.
@@ -36,6 +37,11 @@ done
 ln -s "$build/qmat_models" "$HOME/.local/bin/"
 PATH=$HOME/.local/bin:$PATH
 export PATH
+module=$(find "$HOME/.local" -name qmat.py)
+mistakes=7 python=
+for candidate in python3 /usr/bin/python3; do
+  if [ -z "$python" ] && $candidate -c 'import cffi, numpy' 2>/dev/null; then mistakes=8 python=$candidate; fi
+done
 cd "$work/folder" || exit 1
 
 # blocks PAGE: "LINE<tab>COMMAND" for each command to be typed, "LINE<tab># REASON" for each block that is not,
@@ -49,8 +55,10 @@ blocks() {
       fenced = 1
       language = substr($0, 4)
       typed = language == "sh" && reason == ""
+      python = language == "python" && reason == ""
+      if (python) say("@" FILENAME)
       if (reason != "") say("# " reason)
-      else if (language !~ /^(sh|c|cmake|nginx|yaml|json|text)$/) say("!a block of code names its language")
+      else if (language !~ /^(sh|c|cmake|python|nginx|yaml|json|text)$/) say("!a block of code names its language")
       reason = ""
       next
     }
@@ -88,6 +96,16 @@ type_it() {
   fi
 }
 
+# run_python LINE PAGE: the block of Python that starts on that line.
+run_python() {
+  awk -v first="$1" 'NR > first && /^```$/ { exit } NR > first' "$2" >block.py
+  if [ -n "$python" ]; then
+    type_it "$1" "PYTHONPATH=$(dirname "$module") $python block.py"
+  else
+    echo "skipped: line $1: there is no Python with cffi and numpy (Debian: apt install python3-cffi python3-numpy)"
+  fi
+}
+
 # interrupt LINE COMMAND
 interrupt() {
   timeout -s INT 5 bash -c "exec $2" >"$work/said.txt" 2>&1 </dev/null
@@ -106,6 +124,7 @@ type_page() {
     : >"$work/said.txt"
     case $command in
       '!'*) fail "line $line: ${command#!}" ;;
+      '@'*) run_python "$line" "${command#@}" ;;
       '^'*) interrupt "$line" "${command#^}" ;;
       '# '*) echo "not typed: line $line: ${command#\# }" ;;
       *) type_it "$line" "$command" ;;
@@ -153,12 +172,15 @@ false
 ```sh
 true
 ```
+```python
+print(len(V))
+```
 END
 failures=0
 type_page "$work/wrong.md" >"$work/wrong.txt"
-if [ "$failures" -ne 7 ]; then
+if [ "$failures" -ne $mistakes ]; then
   cat "$work/wrong.txt"
-  echo "FAILED: of seven mistakes in a page $failures were found"
+  echo "FAILED: of $mistakes mistakes in a page $failures were found"
   found=$((found + 1))
 fi
 [ "$found" -eq 0 ]

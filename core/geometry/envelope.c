@@ -382,6 +382,20 @@ double qmat_envelope_distance(const qmat_envelope *envelope, const double point[
   return distance;
 }
 
+qmat_status qmat_envelope_distances(qmat_context *context, const qmat_envelope *envelope, const double *points,
+                                    size_t count, double *distances) {
+  enum { BATCH = 16384 }; /* points between two calls of the progress function */
+  qmat_status status = QMAT_OK;
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < count && status == QMAT_OK; first += BATCH) {
+    const size_t end = count - first < BATCH ? count : first + BATCH;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t i = first; i < end; i++) distances[i] = qmat_envelope_distance(envelope, &points[3 * i], NULL);
+    status = qmat_progress(context, end, count, "points");
+  }
+  return status;
+}
+
 double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3], const double corners[][3], int count,
                            double *bound) {
   envelope_item nearest = {0, 0};

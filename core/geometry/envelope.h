@@ -42,6 +42,10 @@ int qmat_envelope_primitive(const qmat_envelope *envelope, size_t primitive, uin
  * primitive that attains it. Cost: O(log n) for a point near the boundary when primitives overlap little. */
 double qmat_envelope_distance(const qmat_envelope *envelope, const double point[3], size_t *primitive);
 
+/* F of `count` points, 3 doubles each, on the context's threads; distances[i] is that of point i. QMAT_CANCELLED. */
+qmat_status qmat_envelope_distances(qmat_context *context, const qmat_envelope *envelope, const double *points,
+                                    size_t count, double *distances);
+
 /* F(point), and in `*bound` an upper bound of F over the convex hull of `count` corners (3 doubles each): the largest
  * distance of a corner to the primitive that attains F(point), since the distance to one primitive is convex. INFINITY
  * for both when there is no primitive. */

@@ -187,6 +187,62 @@ static void test_the_progress_function_cancels_and_the_job_runs_again(void **sta
   rmdir(folder);
 }
 
+/* Values of any type pass from job to job without a file. */
+static void test_values_are_given_read_and_passed_on(void **state) {
+  (void)state;
+  static const char text[] =
+      "qmat: 1\nnodes:\n  given: { type: medial.read }\n  skin: { type: medial.skin, in: { medial: given.medial } }\n"
+      "outputs: { skin: skin.mesh }\n";
+  static const double capsule[] = {0, 0, 0, 1, 4, 0, 0, 1};
+  static const uint32_t edges[] = {1, 0, 0, 1};
+  static const double points[] = {2, 3, 0, 7, 0, 0, 2, 0, 0}, right[] = {2, 2, -1};
+  qmat_job *first, *second;
+  ok(first, qmat_job_new_from_text(&first, text, sizeof text - 1));
+  char *json;
+  ok(first, qmat_job_graph(first, &json));
+  json_t *graph = json_loads(json, 0, NULL);
+  const json_t *output = json_array_get(json_object_get(graph, "outputs"), 0);
+  assert_string_equal(json_string_value(json_object_get(output, "port")), "skin.mesh");
+  assert_string_equal(json_string_value(json_object_get(output, "type")), "mesh");
+  json_decref(graph);
+  qmat_text_free(json);
+  ok(first, qmat_job_give_medial(first, "given.medial", capsule, 2, edges, 2, NULL, 0));
+  ok(first, qmat_job_want(first, "given.medial"));
+  ok(first, qmat_job_run(first, 2, NULL, NULL));
+  qmat_value_view value;
+  ok(first, qmat_job_value(first, "given.medial", &value));
+  assert_string_equal(value.type, "medial");
+  assert_string_equal(value.name, "");
+  assert_int_equal(value.item_count, 0);
+  qmat_array_view array;
+  ok(first, qmat_job_array(first, "given.medial", 1, &array));
+  assert_string_equal(array.name, "edges");
+  assert_int_equal(array.rows, 1);
+  assert_int_equal(array.columns, 2);
+  assert_null(array.numbers);
+  assert_int_equal(array.ids[0], 0);
+  assert_int_equal(qmat_job_array(first, "given.medial", value.array_count, &array), QMAT_RESULT_USAGE);
+  ok(first, qmat_job_new_from_text(&second, text, sizeof text - 1));
+  ok(second, qmat_job_give_result(second, "given.medial", first, "given.medial"));
+  assert_int_equal(qmat_job_give_result(second, "skin.mesh", first, "given.medial"), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_give_result(second, "given.medial", first, "skin.mesh"), QMAT_RESULT_USAGE);
+  qmat_job_free(first);
+  ok(second, qmat_job_want(second, "given.medial"));
+  ok(second, qmat_job_run(second, 1, NULL, NULL));
+  double distances[3];
+  ok(second, qmat_job_distances(second, "given.medial", points, 3, distances));
+  for (int i = 0; i < 3; i++) assert_true(fabs(distances[i] - right[i]) < 1e-12);
+  const double nowhere[] = {0, 0, 0, 0, NAN, 0};
+  assert_int_equal(qmat_job_distances(second, "given.medial", nowhere, 2, distances), QMAT_RESULT_FAILED);
+  assert_int_equal(qmat_job_error(second)->element, 1);
+  const uint32_t beyond[] = {0, 2};
+  assert_int_equal(qmat_job_give_medial(second, "given.medial", capsule, 2, beyond, 1, NULL, 0), QMAT_RESULT_FAILED);
+  assert_int_equal(qmat_job_value(second, "given.medial[0]", &value), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_value(second, "given.medial[x]", &value), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_value(second, "given.medial[0", &value), QMAT_RESULT_USAGE);
+  qmat_job_free(second);
+}
+
 static void test_mistakes_are_results_with_a_problem(void **state) {
   (void)state;
   qmat_job *job;
@@ -299,6 +355,7 @@ int main(void) {
       cmocka_unit_test(test_a_mesh_in_memory_becomes_spheres_inside_it),
       cmocka_unit_test(test_the_saved_file_is_the_file_in_memory),
       cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
+      cmocka_unit_test(test_values_are_given_read_and_passed_on),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
       cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),
