@@ -119,9 +119,10 @@ json_t *qmat_graph_json(const qmat_graph *graph) {
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_graph_output *output = &graph->outputs[i];
     const qmat_graph_node *node = &graph->nodes[output->node];
-    json_array_append_new(outputs, json_pack("{s:s, s:s++, s:s}", "name", output->name, "port", node->id, ".",
+    json_array_append_new(outputs, json_pack("{s:s, s:s++, s:s, s:b}", "name", output->name, "port", node->id, ".",
                                              node->type->outputs[output->port].name, "type",
-                                             qmat_value_type_name(qmat_graph_output_type(graph, i))));
+                                             qmat_value_type_name(qmat_graph_output_type(graph, i)), "on_request",
+                                             qmat_graph_on_request(graph, i)));
   }
   return json_pack("{s:o, s:o, s:o}", "inputs", inputs, "nodes", nodes, "outputs", outputs);
 }

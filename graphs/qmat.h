@@ -95,7 +95,8 @@ QMAT_API qmat_result qmat_job_give_result(qmat_job *job, const char *port, const
 QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
 
 /* The graph's inputs, nodes and outputs as JSON: {"inputs": ["model"], "nodes": [{"id", "type", "outputs": {"mesh":
- * "mesh"}}], "outputs": [{"name", "port", "type"}]}. Free with qmat_text_free. */
+ * "mesh"}}], "outputs": [{"name", "port", "type", "on_request"}]}: on_request, it is made only where a run saves
+ * it. Free with qmat_text_free. */
 QMAT_API qmat_result qmat_job_graph(qmat_job *job, char **json);
 
 /* Saves an output of the graph ("asset"; NULL: the one that alone has the ending of `path`, else the only one that

@@ -431,6 +431,7 @@ class Graph:
         described = self._job.json(_lib.qmat_job_graph)
         self.inputs = described["inputs"]
         self.outputs = {output["name"]: output["port"] for output in described["outputs"]}
+        self._made = [output["name"] for output in described["outputs"] if not output["on_request"]]
         self.ports = {f"{node['id']}.{port}": kind for node in described["nodes"]
                       for port, kind in node["outputs"].items()}
         if cache is True:
@@ -484,13 +485,14 @@ class Graph:
         return self
 
     def run(self, *want, save=None, threads=0, progress=None):
-        """Runs what these ports or outputs need; without any, all outputs. Returns their Results.
+        """Runs what these ports or outputs need; without any, the outputs that every run makes. Returns
+        their Results.
 
-        `save`: paths by output, or one path for the only output that is a file. `threads` 0: one per processor.
+        `save`: paths by output, or one path, or a list: the ending chooses the output. `threads` 0: one per processor.
         `progress(node, done, total, unit)` is called while nodes run; it cancels by returning False or by raising.
         """
         saves = save if isinstance(save, Mapping) else {} if save is None else {None: save}
-        names = want or (() if saves else self.outputs)
+        names = want or (() if saves else self._made)
         ports = {name: self.outputs.get(name, name) for name in names}
         job, self._job = self._current(), None
         for output, paths in saves.items():
@@ -547,10 +549,11 @@ class MedialMesh(Medial):
         return graph.run("skin.mesh", threads=threads, progress=progress)["skin.mesh"]
 
     def save(self, *paths, threads=0, progress=None):
-        """Writes the file; its ending is the format: .glb, .gltf, .usda, .usdz, .ma, .ply."""
+        """Writes the file; its ending is the format: .glb, .gltf, .usda, .usdz, .ma, .ply; .html, a page; .png, .svg,
+        a picture."""
         graph = Graph(cache=self._cache).set(self._settings)
-        self._continue(graph, ["model.scene", "simple.medial", "errors.report"])
-        graph.run(save={"asset": list(paths)}, threads=threads, progress=progress)
+        self._continue(graph, ["model.scene", "solid.mesh", "simple.medial", "errors.report"])
+        graph.run(save={None: list(paths)}, threads=threads, progress=progress)
 
 
 _COLLIDERS = """

@@ -181,7 +181,8 @@ class OfFiles(InAFolder):
         subprocess.run([program, "mat", "box.off", "-o", "right.glb", "-o", "right.ma", "--epsilon", "3%", "--set",
                         "asset.flat=none", "--no-cache", "-q"], check=True, capture_output=True)
         m = qmat.mat("box.off", epsilon="3%", set={"asset.flat": "none"})
-        m.save("made.glb", Path("made.ma"))
+        m.save("made.glb", Path("made.ma"), "made.svg")
+        self.assertIn("<svg", Path("made.svg").read_text())
         for ending in ("glb", "ma"):
             self.assertEqual(Path(f"made.{ending}").read_bytes(), Path(f"right.{ending}").read_bytes())
         self.assertEqual(m.report["nodes"][0]["id"], "model")
@@ -191,7 +192,7 @@ class OfFiles(InAFolder):
         Path("mine.yaml").write_text((source / "graphs" / "qmat_plus.yaml").read_text())
         graph = qmat.Graph("mine.yaml").set({"asset.format": "ma"}, model=Path("box.off"), epsilon=.05)
         self.assertIn("epsilon", graph.inputs)
-        self.assertEqual(graph.outputs, {"asset": "asset.file"})
+        self.assertEqual(graph.outputs["asset"], "asset.file")
         self.assertEqual(graph.ports["thickness.thickness"], "field")
         found = graph.run("asset", "samples.samples", "thickness.thickness", "errors.report", save="saved.ma")
         self.assertEqual((found["asset"].format, found["asset"].bytes), ("ma", Path("saved.ma").read_bytes()))
