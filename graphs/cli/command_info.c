@@ -3,11 +3,20 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "core/node.h"
 #include "graphs/cli/command.h"
+#include "graphs/run/run_report.h"
 #include "io/extract.h"
 #include "io/model.h"
 #include "nodes/nodes.h"
+
+/* One call of `qmat info`. */
+typedef struct info_call {
+  qmat_context *context;
+  const char *node, *against; /* --node and --against; NULL: not given */
+  json_t *json;               /* of the file at hand; NULL: the facts are printed */
+} info_call;
 
 /* Prints a text of the file without its control characters. */
 static void print_text(const char *key, const char *text) {
@@ -43,7 +52,7 @@ static double number_of(const json_t *object, const char *key) {
 }
 
 /* Compares the errors that the file states with measured bounds. A stated error below its lower bound is refuted. */
-static qmat_status compare(qmat_context *context, const json_t *facts, const json_t *measured) {
+static qmat_status compare(const info_call *call, const json_t *facts, const json_t *measured) {
   const struct {
     const char *title, *stated, *most, *least;
   } rows[] = {
@@ -53,18 +62,20 @@ static qmat_status compare(qmat_context *context, const json_t *facts, const jso
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < 2; i++) {
     const double stated = number_of(facts, rows[i].stated), least = number_of(measured, rows[i].least);
-    printf("  %s: between %.6g and %.6g of the diagonal", rows[i].title, least, number_of(measured, rows[i].most));
-    if (isnan(stated)) {
-      printf("; the file states none\n");
-      continue;
-    }
     const bool holds = !(least > stated);
-    printf("; stated %.6g: %s\n", stated, holds ? "not refuted" : "REFUTED");
+    if (!call->json) {
+      printf("  %s: between %.6g and %.6g of the diagonal", rows[i].title, least, number_of(measured, rows[i].most));
+      if (isnan(stated))
+        printf("; the file states none\n");
+      else
+        printf("; stated %.6g: %s\n", stated, holds ? "not refuted" : "REFUTED");
+    }
     if (!holds) {
-      status =
-          qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states", rows[i].title);
+      status = qmat_fail(call->context, QMAT_ERROR_GEOMETRY, "the error from %s is larger than the file states",
+                         rows[i].title);
     }
   }
+  if (call->json) return status;
   printf("  %s for an epsilon of %.6g\n",
          json_is_true(json_object_get(measured, "certified")) ? "certified" : "not certified",
          number_of(measured, "epsilon"));
@@ -117,13 +128,13 @@ static void print_components(const json_t *report) {
 }
 
 /* Replaces a mesh by the solid's surface, made as in the shipped graph, and prints its components. */
-static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value **mesh) {
+static qmat_status make_solid(const info_call *call, double epsilon, qmat_value **mesh) {
   static const char *const nodes[] = {"mesh.subdivide", "mesh.solid"};
   for (size_t i = 0; i < sizeof nodes / sizeof *nodes; i++) {
     qmat_value *outputs[2] = {NULL};
-    const qmat_status status = run_node(context, nodes[i], epsilon, (const qmat_value *const[]){*mesh}, outputs);
+    const qmat_status status = run_node(call->context, nodes[i], epsilon, (const qmat_value *const[]){*mesh}, outputs);
     if (status != QMAT_OK) return status;
-    print_components(((const qmat_report *)outputs[1])->root);
+    if (!call->json) print_components(((const qmat_report *)outputs[1])->root);
     qmat_value_release(outputs[1]);
     qmat_value_release(*mesh);
     *mesh = outputs[0];
@@ -132,8 +143,9 @@ static qmat_status make_solid(qmat_context *context, double epsilon, qmat_value 
 }
 
 /* Evaluates the medial mesh against a model. `mesh_choice` is the mesh of the model that it describes, or "merged". */
-static qmat_status check_against(qmat_context *context, const char *path, const char *mesh_choice,
-                                 const qmat_medial *medial, const json_t *facts) {
+static qmat_status check_against(const info_call *call, const char *path, const char *mesh_choice,
+                                 const qmat_medial *medial, const json_t *facts, json_t *json) {
+  qmat_context *context = call->context;
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
   qmat_scene *scene;
   qmat_value *mesh;
@@ -142,12 +154,13 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
   qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
   if (status == QMAT_OK) {
     const double epsilon = number_of(facts, "qmat_epsilon");
-    printf("against %s\n", path);
-    status = make_solid(context, epsilon, &mesh);
+    if (!json) printf("against %s\n", path);
+    status = make_solid(call, epsilon, &mesh);
     if (status == QMAT_OK)
       status = run_node(context, "medial.evaluate", epsilon, (const qmat_value *const[]){mesh, &medial->base}, &output);
     if (status == QMAT_OK) {
-      status = compare(context, facts, ((const qmat_report *)output)->root);
+      if (json) json_object_set(json, "against", ((const qmat_report *)output)->root);
+      status = compare(call, facts, ((const qmat_report *)output)->root);
       if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
     }
     qmat_value_release(output);
@@ -159,8 +172,9 @@ static qmat_status check_against(qmat_context *context, const char *path, const 
 }
 
 /* Prints the medial mesh of node `name`, or the only one. `carrier` (NULL: unknown) has the number of its mesh. */
-static qmat_status print_medial(qmat_context *context, const char *path, const char *name, const json_t *carrier,
-                                const char *against) {
+static qmat_status print_medial(const info_call *call, const char *path, const char *name, const json_t *carrier) {
+  qmat_context *context = call->context;
+  const char *against = call->against;
   qmat_medial *medial;
   json_t *facts = json_object();
   if (!facts) return qmat_fail_memory(context, "facts");
@@ -169,11 +183,19 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
     const qmat_value_count_row *rows = qmat_value_count_rows(QMAT_MEDIAL);
     size_t counts[QMAT_MOST_COUNTS];
     qmat_value_counts(&medial->base, counts);
-    printf("%s: a medial mesh of", path);
-    for (size_t i = 0; rows[i].name; i++) printf("%s %zu %s", i ? "," : "", counts[i], rows[i].name);
-    if (name) printf(" on node %s", qmat_show(name).text);
-    printf("\n");
-    print_object(facts);
+    json_t *json = call->json ? json_object() : NULL;
+    if (json) {
+      if (name) json_object_set_new(json, "node", qmat_json_string(name));
+      for (size_t i = 0; rows[i].name; i++) qmat_json_set_count(json, rows[i].name, counts[i]);
+      json_object_update(json, facts);
+      json_array_append_new(json_object_get(call->json, "medial_meshes"), json);
+    } else {
+      printf("%s: a medial mesh of", path);
+      for (size_t i = 0; rows[i].name; i++) printf("%s %zu %s", i ? "," : "", counts[i], rows[i].name);
+      if (name) printf(" on node %s", qmat_show(name).text);
+      printf("\n");
+      print_object(facts);
+    }
     if (against) {
       const json_t *mesh = json_object_get(carrier, "mesh");
       const qmat_format format = qmat_format_of_name(against);
@@ -181,7 +203,7 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
       char number[24] = "merged";
       if (by_mesh) snprintf(number, sizeof number, "%lld", (long long)json_integer_value(mesh));
       const char *prim = json_string_value(json_object_get(facts, "qmat_prim"));
-      status = check_against(context, against, format == QMAT_FORMAT_USD && prim ? prim : number, medial, facts);
+      status = check_against(call, against, format == QMAT_FORMAT_USD && prim ? prim : number, medial, facts, json);
     }
     qmat_value_release(&medial->base);
   }
@@ -190,7 +212,9 @@ static qmat_status print_medial(qmat_context *context, const char *path, const c
 }
 
 /* Prints the medial mesh of one node, or all. */
-static qmat_status print_medials(qmat_context *context, const char *path, const char *name, const char *against) {
+static qmat_status print_medials(const info_call *call, const char *path) {
+  qmat_context *context = call->context;
+  const char *name = call->node;
   json_t *carriers = qmat_medial_carriers(context, path);
   if (!carriers) return context->error.status;
   const size_t count = json_array_size(carriers);
@@ -201,13 +225,12 @@ static qmat_status print_medials(qmat_context *context, const char *path, const 
       const json_t *other = json_array_get(carriers, i);
       if (strcmp(json_string_value(json_object_get(other, "node")), name) == 0) carrier = other;
     }
-    status = print_medial(context, path, name, carrier, against);
+    status = print_medial(call, path, name, carrier);
   }
   for (size_t i = 0; !name && count >= 2 && i < count; i++) {
     const json_t *carrier = json_array_get(carriers, i);
     const qmat_error before = context->error;
-    const qmat_status of_one =
-        print_medial(context, path, json_string_value(json_object_get(carrier, "node")), carrier, against);
+    const qmat_status of_one = print_medial(call, path, json_string_value(json_object_get(carrier, "node")), carrier);
     /* The first error is reported; the other medial meshes are still compared. */
     if (status != QMAT_OK)
       context->error = before;
@@ -218,8 +241,22 @@ static qmat_status print_medials(qmat_context *context, const char *path, const 
   return status;
 }
 
-static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
-  const char *path = invocation->arguments[0], *against = qmat_invocation_value(invocation, "against");
+static void describe_surface(const info_call *call, const char *path, const qmat_mesh *mesh, const json_t *report) {
+  qmat_value *outputs[2] = {NULL};
+  if (call->json) json_object_set(call->json, "surface", (json_t *)(uintptr_t)report);
+  if (!call->json) printf("%s: a surface\n", path);
+  if (!call->json) print_object(report);
+  if (run_node(call->context, "mesh.solid", 0, (const qmat_value *const[]){&mesh->base}, outputs) != QMAT_OK) return;
+  if (call->json)
+    json_object_set(call->json, "solid", ((const qmat_report *)outputs[1])->root);
+  else
+    print_components(((const qmat_report *)outputs[1])->root);
+  qmat_value_release(outputs[0]);
+  qmat_value_release(outputs[1]);
+}
+
+static qmat_status describe_file(const info_call *call, const char *path) {
+  qmat_context *context = call->context;
   const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
   qmat_scene *scene;
   qmat_mesh *mesh;
@@ -227,23 +264,16 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &report);
   const bool has_surface = status == QMAT_OK;
   if (has_surface) {
-    printf("%s: a surface\n", path);
-    print_object(report->root);
-    qmat_value *outputs[2] = {NULL};
-    if (run_node(context, "mesh.solid", 0, (const qmat_value *const[]){&mesh->base}, outputs) == QMAT_OK) {
-      print_components(((const qmat_report *)outputs[1])->root);
-      qmat_value_release(outputs[0]);
-      qmat_value_release(outputs[1]);
-    }
+    describe_surface(call, path, mesh, report->root);
     qmat_value_release(&scene->base);
     qmat_value_release(&mesh->base);
     qmat_value_release(&report->base);
   }
   const qmat_error first = context->error;
-  const qmat_status carried = print_medials(context, path, qmat_invocation_value(invocation, "node"), against);
+  const qmat_status carried = print_medials(call, path);
   if (carried == QMAT_OK) {
     status = QMAT_OK;
-  } else if (against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
+  } else if (call->against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
     status = carried; /* its medial mesh is ambiguous, unreadable, or missing with --against */
   } else if (!has_surface) {
     context->error = first;
@@ -251,19 +281,53 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   return status;
 }
 
+static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
+  const bool json = qmat_invocation_value(invocation, "json") != NULL;
+  const size_t count = invocation->argument_count;
+  size_t failures = 0;
+  json_t *all = json_array();
+  if (!all) return qmat_fail_memory(context, "listing");
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count; i++) {
+    const char *path = invocation->arguments[i];
+    info_call call = {context, qmat_invocation_value(invocation, "node"), qmat_invocation_value(invocation, "against"),
+                      json ? json_pack("{s:o, s:[]}", "file", qmat_json_string(path), "medial_meshes") : NULL};
+    qmat_status of_one = qmat_is_stream(path) ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
+    if (of_one == QMAT_OK) of_one = describe_file(&call, path);
+    if (call.json && of_one != QMAT_OK) json_object_update_new(call.json, qmat_error_report(&context->error));
+    if (call.json) json_array_append_new(all, call.json);
+    if (of_one == QMAT_OK) continue;
+    if (failures++ == 0) status = of_one;
+    if (count > 1) qmat_print_error(&context->error);
+  }
+  if (json) {
+    const qmat_error error = context->error;
+    const qmat_status printed = qmat_print_json(context, json_incref(all));
+    if (printed == QMAT_OK)
+      context->error = error;
+    else
+      status = printed;
+  }
+  json_decref(all);
+  if (count > 1 && failures > 0) qmat_fail(context, status, "%zu of %zu files have failed", failures, count);
+  return status;
+}
+
 static const qmat_option options[] = {
     {"against", 0, "MODEL",
      "Measure the errors of the medial mesh against this model, and compare them with the stated ones"},
     {"node", 0, "NAME", "The node or prim whose medial mesh to use, if several have one"},
+    {"json", 0, NULL, "Print a list with an object of each file as JSON"},
     {0},
 };
 
 const qmat_command qmat_command_info = {
     .name = "info",
-    .arguments = "FILE",
-    .summary = "Print what a model file contains",
+    .arguments = "FILE...",
+    .summary = "Print what model files contain",
     .doc =
-        "Prints the contents of a model file: counts, units, what was left out, and what mesh.solid takes each "
+        "Prints the contents of model files ('-': the standard input): counts, units, what was left out, and what "
+        "mesh.solid takes each "
         "component for, with the caps of its holes; for each medial mesh in it, its counts and stated errors.\n"
         "With --against, bounds the errors anew, on limit surfaces of subdivision cages and on the solids and sheets "
         "of mesh.solid. The exit code is 1 if an error is certainly larger than stated. If both files are glTF, each "
@@ -271,6 +335,6 @@ const qmat_command qmat_command_info = {
         "mesh is compared with the mesh that its node refers to, in that mesh's own space.",
     .options = options,
     .least = 1,
-    .most = 1,
+    .most = SIZE_MAX,
     .run = run,
 };

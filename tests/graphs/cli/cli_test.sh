@@ -103,6 +103,18 @@ holds "all files" test -s box.glb -a -s box.gltf -a -s box.ma
 expect 0 "a medial mesh of" "$qmat" info box.glb
 expect 0 "triangles: 12" "$qmat" info box.off
 expect 0 "not refuted" "$qmat" info box.glb --against box.off
+expect 0 "triangles: 12" "$qmat" info box.glb box.off
+expect 1 "qmat: nothere.off: cannot open" "$qmat" info box.glb nothere.off box.off
+holds "the others are described" grep -q '^box.off: a surface' out.txt
+holds "the failures are counted" grep -q '^qmat: 1 of 3 files have failed' err.txt
+expect 1 "" "$qmat" info box.glb nothere.off box.off --json
+holds "a list of three as JSON" node -e '
+  const all = JSON.parse(require("fs").readFileSync("out.txt"));
+  process.exit(all.length === 3 && all[0].medial_meshes[0].spheres > 0 && all[1].error.file === "nothere.off" &&
+    all[2].surface.triangles === 12 && all[2].solid.components.length === 1 ? 0 : 1)'
+expect 0 "" "$qmat" mat box.off -o box.ply --epsilon 5% $coarse --quiet
+expect 0 "box.ply: a medial mesh of" "$qmat" info box.ply
+expect 0 "standard input: " sh -c '"$0" info - <box.off | sed "s/.*stdin:/standard input:/"' "$qmat"
 sed 's/^{$/{"images": [{"uri": "\\u001b[2J.png"}],/' box.gltf >odd.gltf
 expect 0 'the file "?[2J.png" cannot be read' "$qmat" info odd.gltf
 expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
