@@ -155,14 +155,15 @@ static void describe_files(const qmat_run *run, long_text *text) {
     append(text, ", %zu of %zu steps from cache", hits, run->step_count);
 }
 
+/* Where nothing was saved, which outputs could be. */
 static void print_not_saved(const qmat_run *run, FILE *out) {
   const qmat_graph *graph = run->graph;
-  for (size_t i = 0; i < graph->output_count; i++) {
+  for (size_t i = 0; i < graph->output_count && run->file_count == 0; i++) {
     const qmat_graph_output *output = &graph->outputs[i];
-    bool saved = graph->nodes[output->node].type->outputs[output->port].type != QMAT_FILE, made = false;
-    for (size_t k = 0; k < run->file_count; k++) saved = saved || run->files[k].output == i;
+    const bool is_file = graph->nodes[output->node].type->outputs[output->port].type == QMAT_FILE;
+    bool made = false;
     for (size_t k = 0; k < run->step_count; k++) made = made || run->steps[k].node == output->node;
-    if (made && !saved) fprintf(out, "  %s was not saved (-o %s=PATH)\n", output->name, output->name);
+    if (made && is_file) fprintf(out, "  %s was not saved (-o %s=PATH)\n", output->name, output->name);
   }
 }
 
