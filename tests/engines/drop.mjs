@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drops the colliders of glTF files on a plane and down a staircase, in Rapier and Jolt, for ten seconds each:
+//   node drop.mjs READERS FILE.glb SURFACE [FILE.glb SURFACE...]
+// A line a file; exit 1 unless every body stays finite and slow enough, no vertex of the surface gets below what is under
+// it, and the surface ends within 1 % of its diagonal of what it lies on.
+import { readFileSync } from 'node:fs';
+import { pathToFileURL } from 'node:url';
+import RAPIER from '@dimforge/rapier3d-compat';
+import initJolt from 'jolt-physics';
+
+const [readers, ...files] = process.argv.slice(2);
+const { openGlb, bodiesOf, moved, addToRapier, addToJolt } = await import(pathToFileURL(`${readers}/qmat_physics.mjs`));
+await RAPIER.init();
+const Jolt = await initJolt();
+
+const STEP = 1 / 120, SECONDS = 10, GRAVITY = 9.81;
+const TREADS = 5, DEPTH = 0.5, RISE = 0.2;
+// All in diagonals of the model. A staircase goes down along x to a floor at 0.
+const scenes = {
+  plane: { boxes: [{ at: [0, -1, 0], half: [50, 1, 50] }], start: [0, 1, 0], push: 0 },
+  stairs: {
+    boxes: [{ at: [0, -1, 0], half: [50, 1, 50] }, ...Array.from({ length: TREADS }, (_, i) => (
+      { at: [-DEPTH * (i + 0.5), RISE * (i + 1) / 2, 0], half: [DEPTH / 2, RISE * (i + 1) / 2, 4] }))],
+    start: [-DEPTH * (TREADS - 0.5), RISE * TREADS + 1, 0], push: 0.6,
+  },
+};
+
+/** The height of what is under a point. */
+function ground(boxes, [x, , z]) {
+  return boxes.reduce((top, { at, half }) =>
+    (Math.abs(x - at[0]) <= half[0] && Math.abs(z - at[2]) <= half[2] ? Math.max(top, at[1] + half[1]) : top), -Infinity);
+}
+
+/** The distance from a point to a box; below 0 inside. */
+function toBox(p, { at, half }) {
+  const d = p.map((v, k) => Math.abs(v - at[k]) - half[k]);
+  return Math.hypot(...d.map((v) => Math.max(v, 0))) + Math.min(Math.max(...d), 0);
+}
+
+/** The vertices of a surface: OFF, OBJ, STL; a .glb is its own. */
+function verticesOf(path) {
+  const bytes = readFileSync(path), points = [];
+  if (path.endsWith('.stl') && bytes.length === 84 + 50 * bytes.readUInt32LE(80)) {
+    for (let i = 84; i < bytes.length; i += 50)
+      for (let c = 1; c < 4; c++) points.push([0, 4, 8].map((k) => bytes.readFloatLE(i + 12 * c + k)));
+    return points;
+  }
+  const lines = bytes.toString('utf8').split('\n').map((line) => line.replace(/#.*/, '').trim()).filter(Boolean);
+  if (path.endsWith('.off')) {
+    const words = lines.join(' ').replace(/^C?N?OFF/, '').trim().split(/\s+/).map(Number);
+    for (let i = 0; i < words[0]; i++) points.push(words.slice(3 + 3 * i, 6 + 3 * i));
+  } else {
+    for (const line of lines) {
+      const words = line.split(/\s+/);
+      if (words[0] === 'v' || words[0] === 'vertex') points.push(words.slice(1, 4).map(Number));
+    }
+  }
+  return points;
+}
+
+const engines = {
+  rapier(scene, body, scale, at) {
+    const world = new RAPIER.World({ x: 0, y: -GRAVITY, z: 0 });
+    world.timestep = STEP;
+    for (const { at: p, half } of scene.boxes) {
+      const floor = world.createRigidBody(RAPIER.RigidBodyDesc.fixed().setTranslation(...p));
+      world.createCollider(RAPIER.ColliderDesc.cuboid(...half).setFriction(0.7), floor);
+    }
+    const made = addToRapier(RAPIER, world, body, { at, scale });
+    made.setAngularDamping(0.8);
+    made.setLinvel({ x: scene.push, y: 0, z: 0 }, true);
+    return {
+      step: () => world.step(),
+      pose: () => [made.translation(), made.rotation()],
+      speed: () => Math.hypot(...Object.values(made.linvel())),
+      free: () => world.free(),
+    };
+  },
+  jolt(scene, body, scale, at) {
+    const settings = new Jolt.JoltSettings(), pairs = new Jolt.ObjectLayerPairFilterTable(2);
+    settings.mMaxWorkerThreads = 1;
+    pairs.EnableCollision(0, 1);
+    const broad = new Jolt.BroadPhaseLayerInterfaceTable(2, 2);
+    for (const i of [0, 1]) broad.MapObjectToBroadPhaseLayer(i, new Jolt.BroadPhaseLayer(i));
+    settings.mObjectLayerPairFilter = pairs;
+    settings.mBroadPhaseLayerInterface = broad;
+    settings.mObjectVsBroadPhaseLayerFilter = new Jolt.ObjectVsBroadPhaseLayerFilterTable(broad, 2, pairs, 2);
+    const jolt = new Jolt.JoltInterface(settings), system = jolt.GetPhysicsSystem();
+    const physics = system.GetPhysicsSettings(), bodies = system.GetBodyInterface();
+    physics.mPenetrationSlop = 0.002; // its default, 2 cm, is for lengths in metres
+    system.SetPhysicsSettings(physics);
+    for (const { at: p, half } of scene.boxes) {
+      const box = new Jolt.BodyCreationSettings(new Jolt.BoxShape(new Jolt.Vec3(...half), 0.001), new Jolt.RVec3(...p),
+        new Jolt.Quat(0, 0, 0, 1), Jolt.EMotionType_Static, 0);
+      box.mFriction = 0.7;
+      bodies.AddBody(bodies.CreateBody(box).GetID(), Jolt.EActivation_DontActivate);
+    }
+    const made = addToJolt(Jolt, system, body, { at, scale });
+    made.GetMotionProperties().SetAngularDamping(0.8);
+    made.SetLinearVelocity(new Jolt.Vec3(scene.push, 0, 0));
+    const three = (v) => ({ x: v.GetX(), y: v.GetY(), z: v.GetZ() });
+    return {
+      step: () => jolt.Step(STEP, 1),
+      pose: () => [three(made.GetPosition()), { ...three(made.GetRotation()), w: made.GetRotation().GetW() }],
+      speed: () => made.GetLinearVelocity().Length(),
+      free: () => Jolt.destroy(jolt),
+    };
+  },
+};
+
+function matrixOf({ x: px, y: py, z: pz }, { x, y, z, w }) {
+  return [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0, 2 * (x * y - z * w), 1 - 2 * (x * x + z * z),
+    2 * (y * z + x * w), 0, 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0, px, py, pz, 1];
+}
+
+/** What went wrong, and how far the surface ends from what it lies on, in percent. */
+function drop(start, name, body, points, scale) {
+  const scene = scenes[name], low = Math.min(...points.map((p) => p[1]));
+  const centre = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
+  const at = [scene.start[0] - centre[0], scene.start[1] - low - 0.5, scene.start[2] - centre[2]];
+  const run = start(scene, body, scale, at), most = 1.2 * Math.sqrt(2 * GRAVITY * 3);
+  let deepest = 0;
+  const check = () => {
+    const m = matrixOf(...run.pose());
+    let gap = Infinity;
+    for (const point of points) {
+      const p = moved(m, point);
+      const near = Math.min(...scene.boxes.map((box) => toBox(p, box)));
+      if (!Number.isFinite(near)) return NaN;
+      gap = Math.min(gap, near);
+    }
+    deepest = Math.max(deepest, -gap);
+    return gap;
+  };
+  for (let i = 0; i < SECONDS / STEP; i++) {
+    run.step();
+    if (!(run.speed() < most)) return { wrong: `explodes after ${(i * STEP).toFixed(2)} s`, gap: NaN };
+    if (i % 30 === 0 && Number.isNaN(check())) return { wrong: 'is no number', gap: NaN };
+  }
+  const gap = check(), speed = run.speed(), [place] = run.pose();
+  run.free();
+  const wrong = deepest > 0.02 ? `sinks by ${(100 * deepest).toFixed(1)} %` : Math.abs(gap) > 0.01 ? 'hovers or sinks' :
+    speed > 0.05 ? `still moves at ${speed.toFixed(2)}` : ground(scene.boxes, [place.x, 0, place.z]) === -Infinity ? 'is gone' : null;
+  return { wrong, gap };
+}
+
+let failures = 0;
+for (let i = 0; i + 1 < files.length; i += 2) {
+  const file = openGlb(readFileSync(files[i])), [body] = bodiesOf(file).filter((one) => one.motion);
+  const all = verticesOf(files[i + 1]), spans = [0, 1, 2].map((k) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (const p of all) [low, high] = [Math.min(low, p[k]), Math.max(high, p[k])];
+    return high - low;
+  });
+  const scale = 1 / Math.hypot(...spans), every = Math.ceil(all.length / 4000);
+  const points = all.filter((_, k) => k % every === 0).map((p) => p.map((v) => scale * v));
+  const kinds = [(s) => s.radius, (s) => s.ends, (s) => s.points].map((is) => body?.shapes.filter(is).length);
+  const cells = [];
+  for (const engine of Object.keys(engines)) for (const scene of Object.keys(scenes)) {
+    let result;
+    try {
+      if (!body) throw new Error('no body that moves');
+      result = drop(engines[engine], scene, body, points, scale);
+    } catch (error) {
+      result = { wrong: error.message ?? String(error), gap: NaN };
+    }
+    if (result.wrong) failures++;
+    cells.push(`${engine} ${scene} ${result.wrong ?? `${(100 * result.gap).toFixed(2)} %`}`);
+  }
+  console.log(`${files[i]}: ${kinds[0]} spheres, ${kinds[1]} capsules, ${kinds[2]} hulls: ${cells.join('; ')}`);
+}
+process.exit(failures > 0 ? 1 : 0);
