@@ -10,6 +10,9 @@
  * them is within twice the height of one of them, which is below the resolution of double precision. */
 #define FLAT 1e-13
 
+/* A bound that exceeds a distance by this does so in spite of rounding. */
+#define SURE 1e-12
+
 static double clamp(double x, double high) {
   x = x > 0 ? x : 0;
   return x < high ? x : high;
@@ -166,8 +169,9 @@ static inline double edge_at(const qmat_slab_edge *edge, double u, double v, dou
 
 /* The distance. `part` is the edge that attains it, and at[0] the position along that edge; or 3 for the tangent
  * planes, and `at` the weights of own corners 1 and 2. f is convex: when its unconstrained minimum is outside the
- * triangle, the constrained one is on an edge that faces it, so at most two edges are tested. */
-static inline double slab_at(const qmat_slab *slab, const double point[3], int *part, double at[2]) {
+ * triangle, the constrained one is on an edge that faces it, so at most two edges are tested. None is where the
+ * unconstrained one is surely above `enough` already: that is returned. */
+static inline double slab_at(const qmat_slab *slab, const double point[3], double enough, int *part, double at[2]) {
   double w[3] = {point[0] - slab->origin[0], point[1] - slab->origin[1], point[2] - slab->origin[2]};
   double u = qmat_dot(w, slab->u), v = qmat_dot(w, slab->v), z = fabs(qmat_dot(w, slab->normal));
   unsigned faces = 7;
@@ -175,11 +179,12 @@ static inline double slab_at(const qmat_slab *slab, const double point[3], int *
     double b2 = (v + slab->lean[1] * z) * slab->inverse_height;
     double b1 = (u + slab->lean[0] * z - b2 * slab->third) * slab->inverse_side;
     faces = (unsigned)(b1 + b2 > 1) | (unsigned)(b1 < 0) << 1 | (unsigned)(b2 < 0) << 2;
-    if (!faces) {
+    const double least = z * slab->rise - slab->radius - slab->gradient[0] * u - slab->gradient[1] * v;
+    if (!faces || least > enough + SURE) {
       *part = 3;
       at[0] = b1;
       at[1] = b2;
-      return z * slab->rise - slab->radius - slab->gradient[0] * u - slab->gradient[1] * v;
+      return least;
     }
   }
   double best = INFINITY;
@@ -198,12 +203,13 @@ static inline double slab_at(const qmat_slab *slab, const double point[3], int *
 double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3]) {
   int part;
   double at[2];
-  return slab_at(slab, point, &part, at);
+  return slab_at(slab, point, INFINITY, &part, at);
 }
 
-double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]) {
+double qmat_slab_foot_below(const qmat_slab *slab, const double point[3], double best, double weights[3]) {
   int part = 3;
-  double at[2] = {0, 0}, own[3] = {0, 0, 0}, distance = slab_at(slab, point, &part, at);
+  double at[2] = {0, 0}, own[3] = {0, 0, 0}, distance = slab_at(slab, point, best, &part, at);
+  if (distance > best) return distance;
   if (part == 3) {
     own[1] = at[0];
     own[2] = at[1];
@@ -220,6 +226,10 @@ double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weigh
   }
   for (int i = 0; i < 3; i++) weights[slab->order[i]] = own[i];
   return distance;
+}
+
+double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]) {
+  return qmat_slab_foot_below(slab, point, INFINITY, weights);
 }
 
 double qmat_slab_distance(const double a[4], const double b[4], const double c[4], const double point[3]) {

@@ -70,5 +70,8 @@ void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], co
 double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3]);
 /* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point that attains it. */
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]);
+/* The same where the distance is at most `best`; else some distance that is more, and no weights. Points that are
+ * far from the slab's tangent planes are decided by these. */
+double qmat_slab_foot_below(const qmat_slab *slab, const double point[3], double best, double weights[3]);
 
 #endif

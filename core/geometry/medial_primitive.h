@@ -54,4 +54,12 @@ static inline double qmat_primitive_foot(const qmat_primitive *primitive, const 
   return qmat_cone_foot(&primitive->cone, point, weights);
 }
 
+/* The same where the distance is at most `best`; else some distance that is more, which takes less time. */
+static inline double qmat_primitive_foot_below(const qmat_primitive *primitive, const double *point, double best,
+                                               double weights[3]) {
+  if (primitive->is_slab) return qmat_slab_foot_below(&primitive->slab, point, best, weights);
+  weights[2] = 0;
+  return qmat_cone_foot(&primitive->cone, point, weights);
+}
+
 #endif

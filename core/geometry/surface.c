@@ -320,6 +320,14 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
   return depth <= limit ? depth : INFINITY;
 }
 
+double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
+                                 double limit) {
+  if (!surface->blocks || surface->leaf_count > 0) return INFINITY;
+  for (int i = 0; i < count; i++) /* the distance then stays positive, so that no point of the simplex is outside */
+    if (!(spheres[i][3] > limit)) return INFINITY;
+  return qmat_triangle_blocks_excess(surface->blocks, spheres, count, lowest, limit);
+}
+
 /* --- building --------------------------------------------------------------------------------------------------- */
 
 typedef struct sort_item {

@@ -62,6 +62,12 @@ double qmat_surface_signed_distance_near(const qmat_surface *surface, const doub
 /* The depth of a point whose signed distance is known to be negative; INFINITY where it exceeds `limit`. */
 double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[3], double limit);
 
+/* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), one point of
+ * which is known to be inside the solid: at least `lowest`, and exact up to that beside flat or convex surface.
+ * INFINITY where it is above `limit` or hard to find. */
+double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
+                                 double limit);
+
 /* The first hit beyond `start` (>= 0) of a ray from `origin` along the unit vector `direction`: its distance in double
  * precision, its triangle (the smallest of equally distant ones), and the triangle's unit normal (3 doubles, zero for a
  * degenerate triangle). Each may be NULL. False when nothing is hit. */

@@ -20,12 +20,18 @@ typedef struct block {
   uint32_t triangles[LANES];
 } block;
 
+/* The corners of a block's triangles lie between two planes: low <= normal . corner <= high. */
+typedef struct block_layer {
+  double normal[3], low, high; /* a unit normal, or zero */
+} block_layer;
+
 struct qmat_triangle_blocks {
   const double *positions;
   const uint32_t *triangles;
   size_t count, block_count;
   block *blocks;
-  RTCScene scene; /* of a user geometry: the blocks */
+  block_layer *layers; /* per block */
+  RTCScene scene;      /* of a user geometry: the blocks */
 };
 
 static void corners_of(const qmat_triangle_blocks *blocks, uint32_t triangle, const double *corners[3]) {
@@ -204,6 +210,97 @@ double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const d
   return distance;
 }
 
+/* --- radius less distance over a simplex -------------------------------------------------------------------------- */
+
+/* More blocks around a piece than this are not worth a bound. */
+enum { MOST_BLOCKS = 2048 };
+
+typedef struct excess_query {
+  const qmat_triangle_blocks *blocks;
+  const double *const *spheres;
+  int count;
+  double centre[3], reach; /* triangles beyond `reach` cannot exceed the lowest bound */
+  double bound, limit;
+  size_t visited;
+} excess_query;
+
+/* The largest r - s over the piece, where s is the signed distance to the plane through `on` with a unit normal. */
+static double bound_by_plane(const excess_query *query, const double on[3], const double normal[3]) {
+  double bound = -INFINITY;
+  for (int i = 0; i < query->count; i++) {
+    double offset[3];
+    qmat_subtract(query->spheres[i], on, offset);
+    bound = qmat_larger(bound, query->spheres[i][3] - qmat_dot(offset, normal));
+  }
+  return bound;
+}
+
+/* The same for the planes that bound a layer, on the side of the piece. */
+static double bound_by_layer(const excess_query *query, const block_layer *layer) {
+  double above = -INFINITY, below = -INFINITY;
+  for (int i = 0; i < query->count; i++) {
+    const double height = qmat_dot(query->spheres[i], layer->normal), r = query->spheres[i][3];
+    above = qmat_larger(above, r - (height - layer->high));
+    below = qmat_larger(below, r - (layer->low - height));
+  }
+  return qmat_smaller(above, below);
+}
+
+/* A triangle is convex: it lies beyond the plane through its point closest to the centre, across their line, and on
+ * its own plane. The better of both counts. */
+static double bound_by_triangle(const excess_query *query, uint32_t triangle) {
+  const double *corners[3];
+  double closest[3], normal[3], square;
+  const double distance = sqrt(closest_on_triangle(query->blocks, triangle, query->centre, INFINITY, closest));
+  if (distance > query->reach) return -INFINITY;
+  if (!(distance > 0)) return INFINITY;
+  double across[3];
+  qmat_subtract(query->centre, closest, across);
+  for (int k = 0; k < 3; k++) across[k] /= distance;
+  const double bound = bound_by_plane(query, closest, across);
+  corners_of(query->blocks, triangle, corners);
+  if (!find_normal(corners, normal, &square)) return bound;
+  const double scale = (qmat_dot(normal, across) < 0 ? -1 : 1) / sqrt(square);
+  for (int k = 0; k < 3; k++) normal[k] *= scale;
+  return qmat_smaller(bound, bound_by_plane(query, corners[0], normal));
+}
+
+static bool bound_block_excess(struct RTCPointQueryFunctionArguments *args) {
+  excess_query *query = args->userPtr;
+  const qmat_triangle_blocks *blocks = query->blocks;
+  const block *b = &blocks->blocks[args->primID];
+  double bound = bound_by_layer(query, &blocks->layers[args->primID]);
+  if (bound > query->limit) {
+    const size_t left = blocks->count - LANES * (size_t)args->primID;
+    bound = -INFINITY;
+    for (size_t k = 0; k < left && k < LANES && bound <= query->limit; k++)
+      bound = qmat_larger(bound, bound_by_triangle(query, b->triangles[k]));
+  }
+  query->bound = qmat_larger(query->bound, ++query->visited > MOST_BLOCKS ? INFINITY : bound);
+  if (query->bound <= query->limit) return false;
+  args->query->radius = 0; /* no bound: ends the search */
+  return true;
+}
+
+double qmat_triangle_blocks_excess(const qmat_triangle_blocks *blocks, const double *const spheres[], int count,
+                                   double lowest, double limit) {
+  excess_query query = {.blocks = blocks, .spheres = spheres, .count = count, .bound = lowest, .limit = limit};
+  for (int i = 0; i < count; i++)
+    for (int k = 0; k < 3; k++) query.centre[k] += spheres[i][k] / count;
+  for (int i = 0; i < count; i++)
+    query.reach = fmax(query.reach, qmat_point_distance(spheres[i], query.centre) + spheres[i][3] - lowest);
+  if (!(query.reach > 0)) return lowest;
+  struct RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  struct RTCPointQuery ball = {
+      .x = (float)query.centre[0],
+      .y = (float)query.centre[1],
+      .z = (float)query.centre[2],
+      .radius = nextafterf((float)(query.reach * (1 + 1e-6) + 8 * (double)FLT_EPSILON), INFINITY)};
+  rtcPointQuery(blocks->scene, &ball, &context, bound_block_excess, &query);
+  return query.bound <= limit ? query.bound : INFINITY;
+}
+
 /* --- building --------------------------------------------------------------------------------------------------- */
 
 static double farthest_corner(const double *const corners[3], const double centre[3]) {
@@ -235,6 +332,30 @@ static void fill_lane(const qmat_triangle_blocks *blocks, block *b, size_t lane,
   }
   b->radius[lane] = nextafterf((float)farthest_corner(corners, centre), INFINITY);
   b->triangles[lane] = triangle;
+}
+
+/* Sets the planes around a block, across the mean normal of its triangles. */
+static void fill_layer(const qmat_triangle_blocks *blocks, size_t number) {
+  const size_t left = blocks->count - LANES * number, count = left < LANES ? left : LANES;
+  block_layer layer = {.low = INFINITY, .high = -INFINITY};
+  const double *corners[3];
+  for (size_t lane = 0; lane < count; lane++) {
+    double normal[3], square;
+    corners_of(blocks, blocks->blocks[number].triangles[lane], corners);
+    find_normal(corners, normal, &square);
+    for (int k = 0; k < 3; k++) layer.normal[k] += normal[k];
+  }
+  const double length = sqrt(qmat_dot(layer.normal, layer.normal));
+  for (int k = 0; k < 3; k++) layer.normal[k] = length > 0 ? layer.normal[k] / length : 0;
+  for (size_t lane = 0; lane < count; lane++) {
+    corners_of(blocks, blocks->blocks[number].triangles[lane], corners);
+    for (int i = 0; i < 3; i++) {
+      const double height = qmat_dot(corners[i], layer.normal);
+      layer.low = fmin(layer.low, height);
+      layer.high = fmax(layer.high, height);
+    }
+  }
+  blocks->layers[number] = layer;
 }
 
 /* The box of a block, rounded outwards. */
@@ -342,7 +463,8 @@ static qmat_status fill_blocks(qmat_context *context, qmat_triangle_blocks *bloc
   const size_t count = blocks->count;
   item *items = qmat_alloc(count, sizeof *items);
   blocks->blocks = qmat_calloc(blocks->block_count, sizeof *blocks->blocks);
-  const bool made = items && blocks->blocks;
+  blocks->layers = qmat_calloc(blocks->block_count, sizeof *blocks->layers);
+  const bool made = items && blocks->blocks && blocks->layers;
   if (made) {
     const int threads = qmat_threads(context);
 #pragma omp parallel num_threads(threads)
@@ -358,6 +480,8 @@ static qmat_status fill_blocks(qmat_context *context, qmat_triangle_blocks *bloc
       divide(items, count);
 #pragma omp for schedule(static)
       for (size_t t = 0; t < count; t++) fill_lane(blocks, &blocks->blocks[t / LANES], t % LANES, items[t].triangle);
+#pragma omp for schedule(static)
+      for (size_t b = 0; b < blocks->block_count; b++) fill_layer(blocks, b);
     }
   }
   qmat_free(items);
@@ -380,5 +504,6 @@ void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks) {
   if (!blocks) return;
   if (blocks->scene) rtcReleaseScene(blocks->scene);
   qmat_free(blocks->blocks);
+  qmat_free(blocks->layers);
   qmat_free(blocks);
 }

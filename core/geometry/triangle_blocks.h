@@ -31,4 +31,12 @@ double qmat_triangle_blocks_distance(const qmat_triangle_blocks *blocks, const d
 /* The distance to one triangle, by its number. */
 double qmat_triangle_blocks_distance_to(const qmat_triangle_blocks *blocks, uint32_t triangle, const double point[3]);
 
+/* An upper bound of r - d over a simplex of `count` (1 to 3) spheres (4 doubles each), where d is the distance to the
+ * triangles and r the radius between the spheres: at least `lowest`. INFINITY where it is above `limit` or hard to
+ * find. It is exact, up to `lowest`, where the triangles nearby lie on the boundary of a convex set: r less the
+ * distance to a plane is linear. Cost: a visit to each block within reach of the spheres; a failure costs few visits.
+ */
+double qmat_triangle_blocks_excess(const qmat_triangle_blocks *blocks, const double *const spheres[], int count,
+                                   double lowest, double limit);
+
 #endif

@@ -87,6 +87,19 @@ static bool is_done(search *s, double bound, double size, bool last) {
   return true;
 }
 
+/* Larger pieces, in limits, are worth a bound of the whole piece. It need not be lower than this share of the limit. */
+static const double flat_size = 1, flat_share = 0.25;
+
+/* Whether a closed formula accepts a piece with a point inside the solid. */
+static bool is_flat(search *s, const piece *p) {
+  const double *const spheres[3] = {p->spheres[0], p->spheres[1], p->spheres[2]};
+  const double bound =
+      qmat_surface_excess_bound(s->lattice->surface, spheres, p->count, flat_share * s->limit, s->accepted);
+  if (!(bound <= s->accepted)) return false;
+  s->bound = qmat_larger(s->bound, bound);
+  return true;
+}
+
 static bool search_piece(search *s, const piece *p, int level) {
   double centre[4] = {0, 0, 0, 0}, size = 0, farthest = -INFINITY;
   const double share = 1.0 / p->count;
@@ -109,6 +122,7 @@ static bool search_piece(search *s, const piece *p, int level) {
       return false;
     }
     if (is_done(s, farthest - near + gap, size, last)) return true;
+    if (size > flat_size * s->limit && near > gap && is_flat(s, p)) return true;
     ask = size <= s->smallest || last;
     if (ask && is_done(s, farthest - qmat_depth_lattice_least(s->lattice, centre), size, last)) return true;
   }

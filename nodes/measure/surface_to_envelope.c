@@ -170,18 +170,26 @@ static qmat_status prepare_link(qmat_context *context, qmat_surface_to_envelope 
   return status;
 }
 
-/* The nearest primitive of the merged vertex's star. */
+/* A primitive whose ball is farther than the nearest by this is farther in spite of rounding. */
+static const double surely = 1e-12;
+
+/* The nearest primitive of the merged vertex's star, the first of equally near ones. `*first` is the one to try first,
+ * QMAT_NONE for none, and becomes the nearest; it does not change the answer. */
 static double search_star(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse,
-                          const double sphere[4], const double *point, new_witness *witness) {
+                          const double sphere[4], const double *point, uint32_t *first, new_witness *witness) {
+  const uint32_t start = *first;
   double best = qmat_sphere_distance(sphere, point);
   *witness = (new_witness){witness->point, {collapse->kept, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-  for (size_t i = 0; i < tracker->star.count; i++) {
+  *first = QMAT_NONE;
+  for (uint32_t n = start == QMAT_NONE; n <= tracker->star.count; n++) {
+    const uint32_t i = n == 0 ? start : n - 1;
     double weights[3];
-    if (qmat_primitive_is_farther(&tracker->star.balls[i], point, best)) continue;
+    if ((n > 0 && i == start) || qmat_primitive_is_farther(&tracker->star.balls[i], point, best + surely)) continue;
     const star_primitive *item = &tracker->star.items[i];
-    const double f = qmat_primitive_foot(&item->primitive, point, weights);
-    if (!(f < best)) continue;
+    const double f = qmat_primitive_foot_below(&item->primitive, point, best, weights);
+    if (!(f < best || (f == best && *first != QMAT_NONE && i < *first))) continue;
     best = f;
+    *first = i;
     memcpy(witness->vertices, item->vertices, sizeof witness->vertices);
     memcpy(witness->weights, weights, sizeof witness->weights);
   }
@@ -196,7 +204,7 @@ static double search_link(const qmat_surface_to_envelope *tracker, const double 
     double weights[3];
     if (qmat_primitive_is_farther(&tracker->link.balls[i], point, best)) continue;
     const star_primitive *item = &tracker->link.items[i];
-    const double f = qmat_primitive_foot(&item->primitive, point, weights);
+    const double f = qmat_primitive_foot_below(&item->primitive, point, best, weights);
     if (!(f < best)) continue;
     best = f;
     memcpy(witness->vertices, item->vertices, sizeof witness->vertices);
@@ -221,7 +229,8 @@ static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *t
   new_witness *witness = &tracker->found[tracker->found_count];
   witness->point = point;
   const double *p = &tracker->points[3 * (size_t)point];
-  const double star = search_star(tracker, collapse, sphere, p, witness);
+  uint32_t nearest = QMAT_NONE;
+  const double star = search_star(tracker, collapse, sphere, p, &nearest, witness);
   if (star <= limit) {
     tracker->found_count++;
     return QMAT_OK;
@@ -243,9 +252,9 @@ static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *t
 
 double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4], const double point[3],
-                                          double foot[4], double *share) {
+                                          uint32_t *nearest, double foot[4], double *share) {
   new_witness witness = {.point = QMAT_NONE};
-  const double distance = search_star(tracker, collapse, sphere, point, &witness);
+  const double distance = search_star(tracker, collapse, sphere, point, nearest, &witness);
   *share = witness.weights[0];
   for (int i = 0; i < 4; i++) foot[i] = witness.weights[0] * sphere[i];
   for (size_t k = 1; k < 3 && witness.vertices[k] != QMAT_NONE; k++)
@@ -278,7 +287,8 @@ qmat_status qmat_surface_to_envelope_of_collapse(qmat_context *context, qmat_sur
       const double *p = &tracker->points[3 * (size_t)point];
       new_witness witness = {.point = point};
       double f = witness_distance(tracker, complex, collapse, sphere, point);
-      if (f > *error) f = fmin(f, search_star(tracker, collapse, sphere, p, &witness));
+      uint32_t nearest = QMAT_NONE;
+      if (f > *error) f = fmin(f, search_star(tracker, collapse, sphere, p, &nearest, &witness));
       if (f > *error) f = fmin(f, search_link(tracker, p, *error, &witness));
       *error = fmax(*error, f);
     }

@@ -61,10 +61,11 @@ qmat_status qmat_surface_to_envelope_prepare(qmat_context *context, qmat_surface
                                              const double sphere[4]);
 
 /* The signed distance from a point to the primitives prepared last, for `sphere`. `foot` (4 doubles) is the medial
- * sphere that attains it, `*share` the weight of `sphere` in that. */
+ * sphere that attains it, `*share` the weight of `sphere` in that. `*nearest` is the primitive to try first, QMAT_NONE
+ * for none, and becomes the nearest: the result for the same point and collapse, with another sphere, saves time. */
 double qmat_surface_to_envelope_star_foot(const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4], const double point[3],
-                                          double foot[4], double *share);
+                                          uint32_t *nearest, double foot[4], double *share);
 
 /* The largest F after `collapse` to `sphere` over the points of its vertices, among the first `point_count`. F is taken
  * to the primitives of the merged vertex and of the vertices around it. -INFINITY where there is no such point.

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
 #include "nodes/simplify/collapse_test.h"
 
 qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
@@ -14,8 +15,9 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const 
   qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
                                               s->constraints->surface_count, QMAT_FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
+    const double enough = i > 0 ? qmat_larger(errors[least], qmat_test_ratio * s->threshold) : INFINITY;
     status = qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, c->spheres[i],
-                                   &errors[i]);
+                                   enough, &errors[i]);
     if (errors[i] < errors[least]) least = i;
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);

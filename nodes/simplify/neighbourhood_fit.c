@@ -147,7 +147,7 @@ static double find_foot(const qmat_neighbourhood_fit *fit, fit_target *target, d
     const fit_primitive *item = &fit->primitives[i];
     double w[3];
     if (qmat_primitive_is_farther(&item->ball, target->point, best)) continue;
-    const double f = qmat_primitive_foot(&item->primitive, target->point, w);
+    const double f = qmat_primitive_foot_below(&item->primitive, target->point, best, w);
     if (!(f < best)) continue;
     best = f;
     nearest = i;

@@ -9,6 +9,7 @@
 
 void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   qmat_free(fit->points);
+  qmat_free(fit->nearest);
   *fit = (qmat_sphere_fit){0};
 }
 
@@ -21,7 +22,8 @@ static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_co
 
 qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
                                    const qmat_collapse *collapse, size_t surface_count, size_t most) {
-  if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points))
+  if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points) ||
+      qmat_grow((void **)&fit->nearest, &fit->nearest_capacity, most, sizeof *fit->nearest))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
   size_t slots = 0, skip = 0;
@@ -38,19 +40,21 @@ qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, 
       skip = stride - 1;
       if (slot / 3 < surface_count && is_first_slot(tracker, collapse, slot)) fit->points[fit->count++] = slot / 3;
     }
+  for (size_t i = 0; i < fit->count; i++) fit->nearest[i] = QMAT_NONE;
   return QMAT_OK;
 }
 
-qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+qmat_status qmat_sphere_fit_error(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                   const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
-                                  double *error) {
+                                  double enough, double *error) {
   *error = 0;
   const qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, sphere);
   if (status != QMAT_OK) return status;
-  for (size_t i = 0; i < fit->count; i++) {
+  for (size_t i = 0; i < fit->count && *error <= enough; i++) {
     double foot[4], share;
     const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, sphere,
-                                                        &tracker->points[3 * (size_t)fit->points[i]], foot, &share);
+                                                        &tracker->points[3 * (size_t)fit->points[i]], &fit->nearest[i],
+                                                        foot, &share);
     *error = qmat_larger(*error, fabs(f));
   }
   return QMAT_OK;
@@ -91,7 +95,7 @@ static void add_damping(qmat_quadric *sum, const double *sphere) {
   }
 }
 
-qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+qmat_status qmat_sphere_fit_run(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                 const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
                                 double sphere[4], double *error) {
   double current[4], worst = 0, last_worst = INFINITY;
@@ -103,10 +107,11 @@ qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fi
     qmat_quadric sum = {.c = 0};
     last_worst = worst;
     worst = 0;
-    for (size_t i = 0; i < fit->count; i++) {
+    for (size_t i = 0; i < fit->count && (step < STEPS || worst < *error); i++) {
       const double *point = &tracker->points[3 * (size_t)fit->points[i]];
       double foot[4], share;
-      const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, current, point, foot, &share);
+      const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, current, point, &fit->nearest[i],
+                                                          foot, &share);
       worst = qmat_larger(worst, fabs(f));
       if (step == STEPS || !(share > 1e-3)) continue;
       double weight = 1;

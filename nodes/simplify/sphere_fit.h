@@ -8,8 +8,9 @@
  * vertex, on either side. Quadrics only know the tangent planes of the initial medial mesh; a fit uses the surface
  * itself. */
 typedef struct qmat_sphere_fit {
-  uint32_t *points; /* the constraint points of the newest fit */
-  size_t count, capacity;
+  uint32_t *points;  /* the constraint points of the newest fit */
+  uint32_t *nearest; /* per point: the primitive that was nearest last */
+  size_t count, capacity, nearest_capacity;
   bool keeps_radius; /* spheres are moved only, as those of sheets */
 } qmat_sphere_fit;
 
@@ -20,16 +21,17 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit);
 qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
                                    const qmat_collapse *collapse, size_t surface_count, size_t most);
 
-/* The largest |F| at the chosen points, F being the distance to the star of `collapse` with `sphere`. */
-qmat_status qmat_sphere_fit_error(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+/* The largest |F| at the chosen points, F being the distance to the star of `collapse` with `sphere`; above `enough`
+ * any value above. */
+qmat_status qmat_sphere_fit_error(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                   const qmat_complex *complex, const qmat_collapse *collapse, const double sphere[4],
-                                  double *error);
+                                  double enough, double *error);
 
 /* Moves and resizes `sphere` so that the largest |F| at the chosen points becomes small: least squares with weights
  * that rise with the error from step to step (Gauss-Newton on norms of rising order). Ends early where the error stays
  * well above `give_up_error`. `*error` is the largest |F| of the returned sphere, no more than before.
  * QMAT_ERROR_MEMORY. Cost: ten queries at each point. */
-qmat_status qmat_sphere_fit_run(qmat_context *context, const qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
+qmat_status qmat_sphere_fit_run(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                 const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
                                 double sphere[4], double *error);
 

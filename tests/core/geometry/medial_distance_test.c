@@ -376,6 +376,31 @@ static void test_small_models_keep_relative_precision(void **unused) {
   }
 }
 
+static void test_a_foot_below_a_limit_is_the_foot(void **unused) {
+  (void)unused;
+  state = 14;
+  int below = 0, above = 0;
+  for (int i = 0; i < 3000; i++) {
+    double a[4], b[4], c[4], p[3], weights[3], w[3];
+    random_sphere(a), random_sphere(b), random_sphere(c), point_in(p, 1);
+    const double *const spheres[3] = {a, b, c};
+    qmat_primitive primitive;
+    qmat_primitive_ball ball;
+    qmat_primitive_prepare(spheres, 2 + i % 2, &primitive, &ball);
+    const double f = qmat_primitive_foot(&primitive, p, weights), best = f + uniform(-0.2, 0.2);
+    const double got = qmat_primitive_foot_below(&primitive, p, best, w);
+    if (f < best) {
+      assert_near(got, f, 0);
+      assert_memory_equal(w, weights, sizeof w);
+    } else {
+      assert_true(got >= best - EXACT && got <= f + EXACT);
+    }
+    below += f < best;
+    above += f >= best && got < f - 1e-6;
+  }
+  assert_true(below > 1000 && above > 100);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_hand_computed_distances),
@@ -393,6 +418,7 @@ int main(void) {
       cmocka_unit_test(test_the_foot_attains_the_distance),
       cmocka_unit_test(test_what_the_ball_of_a_primitive_passes_over_is_farther),
       cmocka_unit_test(test_small_models_keep_relative_precision),
+      cmocka_unit_test(test_a_foot_below_a_limit_is_the_foot),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

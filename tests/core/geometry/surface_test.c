@@ -725,6 +725,78 @@ static void test_thickness_takes_minimum_at_vertices_and_facet_value_at_samples(
   qmat_value_release(&mesh->base);
 }
 
+/* --- radius less depth over simplices ----------------------------------------------------------------------------- */
+
+/* Bounds random simplices inside the solid and compares with the depth at points of them. Returns the share of finite
+ * bounds. */
+static double check_excess(qmat_mesh *mesh, size_t count) {
+  qmat_surface *surface = surface_of(mesh);
+  const double lowest = 0.005, limit = 0.02;
+  size_t tried = 0, bounded = 0;
+  for (size_t i = 0; i < count; i++) {
+    double spheres[3][4];
+    const double *corners[3] = {spheres[0], spheres[1], spheres[2]};
+    const int corner_count = 1 + (int)(i % 3);
+    bool inside = true;
+    for (size_t c = 0; c < 3; c++) {
+      for (size_t k = 0; k < 3; k++)
+        spheres[c][k] =
+            c == 0 ? uniform(60, 3 * i + k, -0.5, 0.5) : spheres[0][k] + uniform(61, 9 * i + 3 * c + k, -0.15, 0.15);
+      const double depth = -qmat_surface_signed_distance(surface, spheres[c]);
+      spheres[c][3] = depth + uniform(62, 3 * i + c, -0.02, 0.01);
+      inside &= depth > 0 || c >= (size_t)corner_count;
+    }
+    if (!inside) continue;
+    tried++;
+    const double bound = qmat_surface_excess_bound(surface, corners, corner_count, lowest, limit);
+    if (!isfinite(bound)) continue;
+    bounded++;
+    assert_true(bound >= lowest && bound <= limit);
+    for (size_t sample = 0; sample < 20; sample++) {
+      double p[4] = {0, 0, 0, 0}, left = 1;
+      for (int c = 0; c < corner_count; c++) {
+        const double weight = c + 1 < corner_count ? left * uniform(63, 60 * i + 3 * sample + (size_t)c, 0, 1) : left;
+        for (int k = 0; k < 4; k++) p[k] += weight * spheres[c][k];
+        left -= weight;
+      }
+      assert_true(p[3] + qmat_surface_signed_distance(surface, p) <= bound + 1e-12);
+    }
+  }
+  assert_true(tried > count / 200);
+  release(surface);
+  return (double)bounded / (double)tried;
+}
+
+static void test_excess_bounds_hold_between_the_spheres(void **state) {
+  (void)state;
+  assert_true(check_excess(shape_seal(shape_box(1, 2, 3)), 9000) > 0.5); /* linear: only thin spheres have none */
+  assert_true(check_excess(shape_seal(shape_l()), 9000) > 0.2);
+  assert_true(check_excess(shape_seal(shape_torus(1, 0.3, 40, 20)), 6000) > 0.05);
+  assert_true(check_excess(nested_shell(), 9000) > 0.1);
+}
+
+static void test_excess_in_a_box_is_exact(void **state) {
+  (void)state;
+  qmat_surface *surface = surface_of(shape_seal(shape_box(2, 2, 1)));
+  const double half = 1.0 / 6; /* the diagonal is 3 long */
+  const double a[4] = {-0.1, -0.1, 0, half + 0.01}, b[4] = {0.1, -0.1, 0, half}, c[4] = {0, 0.1, 0.004, half};
+  const double *const slab[3] = {a, b, c};
+  assert_near(qmat_surface_excess_bound(surface, slab, 3, 0.001, 0.02), 0.01, 1e-12);
+  assert_near(qmat_surface_excess_bound(surface, &slab[1], 2, 0.001, 0.02), 0.004, 1e-12);
+  assert_near(qmat_surface_excess_bound(surface, slab, 3, 0.015, 0.02), 0.015, 0);
+  assert_true(isinf(qmat_surface_excess_bound(surface, slab, 3, 0.001, 0.009)));
+  release(surface);
+}
+
+static void test_surfaces_that_are_not_closed_have_no_excess_bound(void **state) {
+  (void)state;
+  qmat_surface *surface = surface_of(cup());
+  const double a[4] = {0, 0, 0, 0.1}, b[4] = {0.01, 0, 0, 0.1};
+  const double *const cone[2] = {a, b};
+  assert_true(isinf(qmat_surface_excess_bound(surface, cone, 2, 0.001, 0.02)));
+  release(surface);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_box_agrees_with_brute_force),
@@ -754,6 +826,9 @@ int main(void) {
       cmocka_unit_test(test_meshes_without_extent_are_refused),
       cmocka_unit_test(test_overflowing_bounding_box_is_refused),
       cmocka_unit_test(test_unused_vertices_do_not_widen_the_frame),
+      cmocka_unit_test(test_excess_bounds_hold_between_the_spheres),
+      cmocka_unit_test(test_excess_in_a_box_is_exact),
+      cmocka_unit_test(test_surfaces_that_are_not_closed_have_no_excess_bound),
       cmocka_unit_test(test_thickness_takes_minimum_at_vertices_and_facet_value_at_samples),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -315,6 +316,37 @@ static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void *
   free_model(&m);
 }
 
+static void test_a_slab_between_flat_faces_takes_few_queries(void **unused) {
+  (void)unused;
+  solid s;
+  make_solid(&s, shape_box(4, 4, 1));
+  const double half = 0.5 / sqrt(33), limit = 0.005;
+  const double spheres[12] = {-0.2, -0.2, 0, half, 0.2, -0.2, 0, half, 0, 0.2, 0, half}, depths[3] = {half, half, half};
+  const uint32_t corners[3] = {0, 1, 2};
+  qmat_medial *medial = qmat_medial_new();
+  medial->sphere_count = 3;
+  medial->spheres = qmat_alloc(3, 4 * sizeof *spheres);
+  memcpy(medial->spheres, spheres, sizeof spheres);
+  assert_int_equal(qmat_medial_set_simplices(&s.context, medial, NULL, 0, corners, 1), QMAT_OK);
+  qmat_complex complex;
+  qmat_envelope_to_surface tracker;
+  qmat_collapse collapse = {.kept = 0};
+  assert_int_equal(qmat_complex_init(&s.context, &complex, medial, NULL), QMAT_OK);
+  assert_int_equal(qmat_envelope_to_surface_init(&s.context, &tracker, s.surface, &complex, depths, limit), QMAT_OK);
+  assert_int_equal(qmat_complex_preview_move(&s.context, &complex, 2, &collapse), QMAT_OK);
+  const double moved[4] = {0.05, 0.2, 0, half};
+  bool kept;
+  assert_true(qmat_envelope_to_surface_test_sphere(&tracker, &complex, &collapse, moved));
+  assert_int_equal(qmat_envelope_to_surface_test(&s.context, &tracker, &complex, &collapse, moved, &kept), QMAT_OK);
+  assert_true(kept && tracker.lattice.queries < 20);
+  assert_true(tracker.new_triangle_bounds[0] <= 0.5 * limit); /* 0 up to what is not resolved */
+  qmat_collapse_uninit(&collapse);
+  qmat_envelope_to_surface_uninit(&tracker);
+  qmat_complex_uninit(&complex);
+  qmat_value_release(&medial->base);
+  free_solid(&s);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_spheres_in_a_cube_by_hand),
@@ -323,6 +355,7 @@ int main(void) {
       cmocka_unit_test(test_bound_against_dense_samples_in_an_l),
       cmocka_unit_test(test_bounds_hold_after_random_collapses_of_a_torus),
       cmocka_unit_test(test_bounds_hold_after_random_collapses_of_an_l),
+      cmocka_unit_test(test_a_slab_between_flat_faces_takes_few_queries),
       cmocka_unit_test(test_spheres_out_of_the_solid_are_refused_without_a_limit_too),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
