@@ -265,11 +265,11 @@ static double wrap_distance(const solidifier *s) {
   return wrap_offset * fmax(epsilon_of(s), least_wrap_epsilon) * s->frame.diagonal;
 }
 
-/* Replaces everything by a wrap. */
-static qmat_status wrap_all(solidifier *s) {
+/* A wrap of triangles of the given vertices. */
+static qmat_status wrap_triangles(solidifier *s, const uint32_t *triangles, size_t count) {
   const double offset = wrap_distance(s);
-  return qmat_wrap_triangles(s->context, s->mesh->positions, s->mesh->vertex_count, s->mesh->triangles,
-                             s->mesh->triangle_count, wrap_alpha * offset, offset, &s->wrap);
+  return qmat_wrap_triangles(s->context, s->mesh->positions, s->mesh->vertex_count, triangles, count,
+                             wrap_alpha * offset, offset, &s->wrap);
 }
 
 /* ---- the mesh ---- */
@@ -479,7 +479,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
   if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
   if (s->united.why_not) {
     char text[160];
-    snprintf(text, sizeof text, "intersecting parts are not united: %s", s->united.why_not);
+    snprintf(text, sizeof text, "the solids are wrapped: those that intersect cannot be united: %s", s->united.why_not);
     bad |= json_object_set_new(root, "warnings", json_pack("[s]", text));
   }
   return bad ? qmat_fail_memory(s->context, "the report") : qmat_value_seal(s->context, &report->base);
@@ -502,6 +502,8 @@ static qmat_status make_solid(solidifier *s) {
   if (status == QMAT_OK)
     status = qmat_unite_overlaps(s->context, s->mesh->vertex_count, s->mesh->positions, s->solids.count,
                                  s->solids.corners, &s->united);
+  /* The last resort: without their union, the inside of what intersects is not defined. */
+  if (status == QMAT_OK && s->united.why_not) status = wrap_triangles(s, s->solids.corners, s->solids.count);
   return status == QMAT_OK ? drop_inner_sheets(s) : status;
 }
 
@@ -516,7 +518,9 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK && s.mesh->triangle_count >= UINT32_MAX / 6)
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu triangles; at most %u are made a solid",
                        s.mesh->triangle_count, UINT32_MAX / 6);
-  if (status == QMAT_OK && !keep) status = s.params->solid == SOLID_WRAP ? wrap_all(&s) : make_solid(&s);
+  if (status == QMAT_OK && !keep)
+    status =
+        s.params->solid == SOLID_WRAP ? wrap_triangles(&s, s.mesh->triangles, s.mesh->triangle_count) : make_solid(&s);
   if (status == QMAT_OK && !keep && !is_unchanged(&s)) status = make_mesh(&s, &made);
   if (status == QMAT_OK) status = fill_report(&s, made, report);
   qmat_free(s.united.positions);
@@ -563,7 +567,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 1,
+    .version = 2,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
@@ -576,7 +580,7 @@ const qmat_node qmat_node_mesh_solid = {
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
-        "If solids cannot be united, they stay as they are, with a warning.",
+        "If solids that overlap cannot be united, all solids are wrapped, with a warning.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,

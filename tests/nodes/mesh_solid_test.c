@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "io/model.h"
+#include "nodes/mesh/overlaps.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 #include "tests/shapes.h"
@@ -87,6 +88,8 @@ static long euler_of(const qmat_mesh *mesh) {
 
 /* ---- the node ---- */
 
+static bool is_refused; /* every union */
+
 typedef struct result {
   qmat_mesh *from, *mesh;
   qmat_report *report;
@@ -111,7 +114,7 @@ static result unite_with(qmat_mesh *mesh, const char *params) {
   shape_seal(copy);
   if (strcmp(params, "solid=as_is") != 0)
     assert_true(copy->closed && copy->oriented && r.mesh->closed && r.mesh->oriented);
-  if (!strstr(params, "wrap") && pipeline_count(r.report, "vertices_welded") == 0)
+  if (!strstr(params, "wrap") && !is_refused && pipeline_count(r.report, "vertices_welded") == 0)
     assert_true(r.mesh->deviation == mesh->deviation);
   qmat_value_release(&copy->base);
   return r;
@@ -907,8 +910,45 @@ static void test_each_choice_does_what_it_says(void **state) {
   release(&r);
 }
 
+/* ---- without a union ---- */
+
+qmat_status __real_qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
+                                       size_t triangle_count, const uint32_t *triangles, qmat_united *united);
+qmat_status __wrap_qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
+                                       size_t triangle_count, const uint32_t *triangles, qmat_united *united);
+qmat_status __wrap_qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
+                                       size_t triangle_count, const uint32_t *triangles, qmat_united *united) {
+  if (!is_refused)
+    return __real_qmat_unite_overlaps(context, vertex_count, positions, triangle_count, triangles, united);
+  *united = (qmat_united){.why_not = "the test says so"};
+  return QMAT_OK;
+}
+
+/* Two boxes in each other and a square beside them: one wrap, a little larger than the union, and the square. */
+static void test_solids_that_cannot_be_united_are_wrapped(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(2, 1, 1), *other = shape_box(2, 1, 1);
+  shape_map(other, 1, 1.25, 0.25, 0.25);
+  add(mesh, other);
+  qmat_value_release(&other->base);
+  const uint32_t a = shape_vertex(mesh, 6, 0, 0), b = shape_vertex(mesh, 7, 0, 0), c = shape_vertex(mesh, 7, 1, 0),
+                 d = shape_vertex(mesh, 6, 1, 0);
+  shape_quad(mesh, a, b, c, d);
+  is_refused = true;
+  result r = unite_with(mesh, "epsilon=0.02 solid=auto");
+  is_refused = false;
+  assert_int_equal(r.mesh->sheet_triangle_count, 2);
+  assert_true(pipeline_count(r.report, "wrap_triangles") > 0);
+  assert_int_equal(json_array_size(json_object_get(r.report->root, "warnings")), 1);
+  assert_int_equal(r.mesh->triangle_count, pipeline_count(r.report, "wrap_triangles") + 2);
+  const double volume = volume_of(r.mesh), offset = r.mesh->deviation, common = 0.75 * 0.75 * 0.75;
+  assert_true(offset > 0 && volume > 4 - common && volume < 4 - common + 2 * offset * 18);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_solids_that_cannot_be_united_are_wrapped),
       cmocka_unit_test(test_a_box_through_the_side_of_another),
       cmocka_unit_test(test_boxes_across_each_others_corner),
       cmocka_unit_test(test_boxes_that_share_a_face_become_one),
