@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: 2026 the qmat authors
+// SPDX-License-Identifier: MIT
+//
+// Serves the page with the assets that the build made: node serve.mjs [FOLDER_OF_ASSETS [PORT]]
+import { createReadStream, existsSync, readdirSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { join, normalize } from 'node:path';
+
+const here = import.meta.dirname, assets = process.argv[2] ?? join(here, '../build/assets');
+const folders = { '/assets/': assets, '/readers/': join(here, '../../readers'), '/': here };
+const types = { html: 'text/html', js: 'text/javascript', mjs: 'text/javascript', wasm: 'application/wasm', json: 'application/json' };
+
+const server = createServer((request, response) => {
+  const path = normalize(new URL(request.url, 'http://localhost').pathname);
+  if (path === '/assets.json') {
+    response.setHeader('Content-Type', 'application/json');
+    response.end(JSON.stringify(readdirSync(assets).filter((name) => name.endsWith('.glb'))));
+    return;
+  }
+  const prefix = Object.keys(folders).find((start) => path.startsWith(start));
+  const file = join(folders[prefix], path === '/' ? 'index.html' : path.slice(prefix.length));
+  if (!existsSync(file)) {
+    response.statusCode = 404;
+    response.end();
+    return;
+  }
+  response.setHeader('Content-Type', types[file.split('.').pop()] ?? 'application/octet-stream');
+  createReadStream(file).pipe(response);
+});
+server.listen(Number(process.argv[3] ?? 8080), 'localhost', () => console.log(`http://localhost:${server.address().port}/`));
