@@ -46,6 +46,7 @@ expect 2 "did you mean 'medial.simplify'?" "$qmat" node medial.simplfy
 expect 0 "no mistakes" "$qmat" check "$source/graphs/qmat_plus.yaml"
 expect 0 "digraph" "$qmat" dot "$source/graphs/qmat_plus.yaml"
 expect 0 "no mistakes" "$qmat" check "$source/graphs/lod.yaml"
+for graph in "$source"/graphs/paper/*.yaml; do expect 0 "no mistakes" "$qmat" check "$graph"; done
 expect 2 "cannot open the graph file" "$qmat" check missing.yaml
 printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' >bad.yaml
 expect 2 "bad.yaml:3:14: there is no node type 'mesh.sfd' (did you mean 'mesh.sdf'?)" "$qmat" check bad.yaml
