@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/triangle.h"
+#include "core/hash.h"
 #include "core/node.h"
 #include "nodes/skin/skin_collapse_cgal.h"
 
@@ -15,6 +16,12 @@ enum { PARTS = 4 };
 static const double LEAST_AREA = 1e-3, LEAST_COSINE = 0.3;
 /* The share of the error that samples may have: the rest is for what lies between them. */
 static const double SAMPLE_SHARE = 0.75;
+/* A triangle with more points than this keeps about so many of those that are near it, by the share of the error. A
+ * flat face would gather all that was ever beside it otherwise, and each collapse would measure them again. */
+enum { MOST_FACE_POINTS = 128 };
+/* The costs of edges in a plane are all 0: without this limit a few vertices would take in thousands of triangles. */
+enum { MOST_STAR_FACES = 48 };
+static const double NEAR_SHARE = 0.25;
 /* No point, no face. */
 #define NONE UINT32_MAX
 
@@ -26,6 +33,7 @@ typedef struct decimation {
   double *points;        /* 3 each: the vertices of the original */
   uint32_t *first;       /* per face: the first point that is nearest to it, or NONE */
   uint32_t *next;        /* per point: the next one of its face, or NONE */
+  uint32_t *counts;      /* per face: its points, before some are left out */
   double *worst;         /* per face: the largest |F| that triangles had here */
   double *far;           /* per point: its distance to its face, at most */
   uint32_t *gathered;    /* the points around the edge that may collapse */
@@ -142,7 +150,7 @@ static bool place_points(decimation *d, const qmat_skin_star *star, double worst
 
 static bool accepts(void *user, const qmat_skin_star *star) {
   decimation *d = user;
-  if (star->kept_count == 0) return false;
+  if (star->kept_count == 0 || star->kept_count > MOST_STAR_FACES) return false;
   for (size_t t = 0; t < star->kept_count; t++)
     if (is_bad(star->before + 9 * t, star->after + 9 * t)) return false;
   double worst = 0;
@@ -155,17 +163,26 @@ static bool accepts(void *user, const qmat_skin_star *star) {
   return true;
 }
 
+/* Whether a point stays with its face. The choice goes by the point's number alone, so that the same points stay. */
+static bool stays(const decimation *d, uint32_t point, double distance, uint32_t count) {
+  if (count <= MOST_FACE_POINTS || !(distance < NEAR_SHARE * d->error)) return true;
+  return qmat_hash_unit(qmat_hash3(0, point, 0)) * count < MOST_FACE_POINTS;
+}
+
 static void collapsed(void *user, const uint32_t *faces) {
   decimation *d = user;
   for (size_t t = 0; t < d->star_size; t++) {
     d->first[faces[t]] = NONE;
+    d->counts[faces[t]] = 0;
     d->worst[faces[t]] = d->star_worst;
   }
+  for (size_t i = 0; i < d->gathered_count; i++) d->counts[faces[d->chosen[i]]]++;
   for (size_t i = 0; i < d->gathered_count; i++) {
     const uint32_t face = faces[d->chosen[i]], p = d->gathered[i];
+    d->far[p] = d->distances[i];
+    if (!stays(d, p, d->distances[i], d->counts[face])) continue;
     d->next[p] = d->first[face];
     d->first[face] = p;
-    d->far[p] = d->distances[i];
   }
 }
 
@@ -215,8 +232,10 @@ static qmat_status start(decimation *d, const qmat_skin_triangles *surface) {
   d->chosen = qmat_arena_alloc(arena, d->point_count, sizeof *d->chosen);
   d->distances = qmat_arena_alloc(arena, d->point_count, sizeof *d->distances);
   d->first = qmat_arena_alloc(arena, d->face_count, sizeof *d->first);
+  d->counts = qmat_arena_alloc(arena, d->face_count, sizeof *d->counts);
   d->worst = qmat_arena_alloc(arena, d->face_count, sizeof *d->worst);
-  if (!d->points || !d->next || !d->far || !d->gathered || !d->chosen || !d->distances || !d->first || !d->worst)
+  if (!d->points || !d->next || !d->far || !d->gathered || !d->chosen || !d->distances || !d->first || !d->counts ||
+      !d->worst)
     return qmat_fail_memory(d->context, "the skin");
   memcpy(d->points, surface->positions, 3 * d->point_count * sizeof *d->points);
   measure(d, surface, d->worst);
