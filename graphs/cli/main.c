@@ -2,7 +2,9 @@
 #include <locale.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "graphs/cli/command.h"
 #include "graphs/cli/progress.h"
@@ -29,7 +31,15 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
   return status;
 }
 
+/* Threads that wait for others give their processor away. OpenMP reads this from the environment before `main`, so the
+ * program starts itself once more. Where that fails it runs as it is. */
+static void wait_passively(char **argv) {
+  if (getenv("OMP_WAIT_POLICY") || getenv("GOMP_SPINCOUNT") || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
+  execv("/proc/self/exe", argv);
+}
+
 int main(int argc, char **argv) {
+  wait_passively(argv);
   /* Only the character set, for the progress bar: numbers are read and written without the locale. */
   setlocale(LC_CTYPE, "");
   qmat_catch_interrupts();
