@@ -28,10 +28,15 @@ left() {
   sed 's/\x1b\[[0-9;]*m//g; s/\r$//; s/.*\r//; s/\x1b\[K//g' raw.txt | sed '/^$/d'
 }
 
+widths="80 60"
+if ! script -qec true /dev/null </dev/null >/dev/null 2>&1; then
+  echo "skipped: what terminals show (this system has none: /dev/pts is not mounted)"
+  widths=
+fi
 write_box box.off
 cp box.off "a box with a name that is so long that it alone takes more columns than there are on any of these terminals.off"
 long=$(ls a*.off)
-for columns in 80 60; do
+for columns in $widths; do
   on $columns "$qmat mat box.off -o box$columns.glb $coarse --force"
   holds "mat" test $code -eq 0
   left >left.txt
@@ -60,7 +65,7 @@ write_graph graph.yaml 20%
 mkdir models
 for name in one two three; do cp box.off models/$name.off; done
 echo "OFF 1 2" >models/broken.off
-for columns in 80 60; do
+for columns in $widths; do
   on $columns "$qmat batch $plus --inputs 'models/*.off' --out results --set epsilon=5% --set samples.spacing=10% -v"
   holds "batch" test $code -eq 1
   left >left.txt
