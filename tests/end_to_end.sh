@@ -201,7 +201,12 @@ cp $model model.xyz
 printf 'not a model\n' >model.xyz
 refused "an unknown ending" model.xyz
 mkdir folder.off
-refused "a folder" folder.off
+if ! qmat mat folder.off -o results/ 2>complaints.txt && grep -qx 'qmat: folder.off: there are no models in this folder' complaints.txt &&
+  [ ! -e results ]; then
+  pass "refused: a folder without models"
+else
+  fail "refused: a folder without models: $(cat complaints.txt)"
+fi
 head -c 65536 /dev/zero >zeros.glb
 refused "zeros" zeros.glb
 head -c 65536 "$build/qmat" >program.ply
