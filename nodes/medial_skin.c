@@ -230,10 +230,22 @@ static qmat_status count_components(skin *s, size_t *components) {
   return QMAT_OK;
 }
 
+/* A contour above this number of triangles is made again with cells twice as large: the decimation would take minutes
+ * for shells that are thin everywhere. */
+enum { MOST_CONTOUR_TRIANGLES = 200000 };
+
 static qmat_status make_envelope_surface(skin *s) {
   const medial_skin_params *p = s->params;
-  qmat_status status = qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
-                                             1 / (double)p->resolution, (int)p->detail, &s->surface, &s->grid);
+  qmat_status status = QMAT_OK;
+  for (int detail = (int)p->detail; status == QMAT_OK; detail--) {
+    status = qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
+                                   1 / (double)p->resolution, detail, &s->surface, &s->grid);
+    if (detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
+    if (status != QMAT_OK) return status;
+    qmat_free(s->surface.positions);
+    qmat_free(s->surface.triangles);
+    s->surface = (qmat_skin_triangles){.vertex_count = 0};
+  }
   s->contour_triangle_count = s->surface.triangle_count;
   if (status == QMAT_OK && p->error > 0) {
     status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
@@ -369,8 +381,10 @@ static const qmat_param params[] = {
               "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it"),
     QMAT_INT(medial_skin_params, resolution, "cells", 128, 8, 2048,
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
-    QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
-             "envelope: cells are halved up to this many times where medial radii are small"),
+    QMAT_INT(
+        medial_skin_params, detail, "halvings", 3, 0, 6,
+        "envelope: cells are halved up to this many times where medial radii are small; less often where that makes "
+        "more than 200,000 triangles to decimate"),
     QMAT_LENGTH(medial_skin_params, error, 2e-3, 0, 0.1,
                 "envelope: the distance from the envelope that decimation may make; 0: no decimation"),
     QMAT_INT(medial_skin_params, triangles, "triangles", 0, 0, 100000000,
@@ -399,7 +413,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 4,
+    .version = 5,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "

@@ -35,7 +35,8 @@ qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *trian
       const auto inside = cell->neighbor(cell->index(delaunay.infinite_vertex()));
       const int opposite = inside->index(cell);
       std::array<uint32_t, 3> row{};
-      for (int k = 0; k < 3; k++) row[k] = inside->vertex(Delaunay::vertex_triple_index(opposite, 2 - k))->info();
+      for (int k = 0; k < 3; k++)
+        row[static_cast<size_t>(2 - k)] = inside->vertex(Delaunay::vertex_triple_index(opposite, k))->info();
       std::rotate(row.begin(), std::min_element(row.begin(), row.end()), row.end());
       faces.push_back(row);
     }

@@ -930,7 +930,6 @@ static void test_solids_that_cannot_be_united_are_wrapped(void **state) {
   qmat_mesh *mesh = shape_box(2, 1, 1), *other = shape_box(2, 1, 1);
   shape_map(other, 1, 1.25, 0.25, 0.25);
   add(mesh, other);
-  qmat_value_release(&other->base);
   const uint32_t a = shape_vertex(mesh, 6, 0, 0), b = shape_vertex(mesh, 7, 0, 0), c = shape_vertex(mesh, 7, 1, 0),
                  d = shape_vertex(mesh, 6, 1, 0);
   shape_quad(mesh, a, b, c, d);
