@@ -22,6 +22,9 @@ static const double floor_tolerances = 5;
 
 static const double least_tolerance = 1e-5;
 
+/* The smallest pieces that are beyond epsilon, as a share of the others. */
+static const double denying_share = 1.0 / 64;
+
 /* Cells of space are searched instead of features where fewer than this share of the samples lie on the boundary, or
  * where there are more features than that. */
 static const double least_exposed = 0.05;
@@ -201,7 +204,9 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   if (inside && d > reach) *wanted &= WANT_EITHER_SIDE;
   if (d > qmat_smaller(s->lo[0], s->epsilon) || ((*wanted & WANT_OUTSIDE) && !inside && d > s->lo[1]))
     raise_lower_bound(s, is_cell, middle, *wanted, &result);
-  if (!s->last && reach > s->smallest) return result;
+  /* Where the bound of a piece alone would deny the certificate, it goes on: most such places are buried. */
+  const bool denies = (s->wanted & WANT_OUTSIDE) && s->lo[0] <= s->epsilon && d + reach > s->epsilon;
+  if (!s->last && reach > (denies ? denying_share * s->smallest : s->smallest)) return result;
   for (int i = 0; i < BOUND_COUNT; i++)
     if (*wanted >> i & 1) result.bound[i] = d + reach;
   *wanted = 0;
