@@ -32,4 +32,15 @@ static inline bool qmat_sets_join(uint32_t *leaders, uint32_t a, uint32_t b) {
   return a != b;
 }
 
+/* Counts the connected components of a graph of `count` items and `edge_count` edges, two items each. Scratch memory is
+ * the context's arena. QMAT_ERROR_MEMORY. Cost: nearly linear. */
+static inline qmat_status qmat_sets_count(qmat_context *context, size_t count, const uint32_t *edges, size_t edge_count,
+                                          size_t *components) {
+  *components = count;
+  uint32_t *leaders = qmat_sets_new(context, count);
+  if (!leaders) return qmat_fail_memory(context, "components");
+  for (size_t e = 0; e < edge_count; e++) *components -= qmat_sets_join(leaders, edges[2 * e], edges[2 * e + 1]);
+  return QMAT_OK;
+}
+
 #endif

@@ -133,15 +133,14 @@ static qmat_status make_medial(power_crust *p, qmat_medial *medial) {
 /* --- the report -------------------------------------------------------------------------------------------------- */
 
 static qmat_status make_report(const power_crust *p, const qmat_medial *medial, qmat_report *report) {
-  size_t by_label[3] = {0, 0, 0}, hidden = 0, components = medial->sphere_count;
+  size_t by_label[3] = {0, 0, 0}, hidden = 0, components;
   for (size_t i = 0; i < p->poles.count; i++) {
     by_label[p->labels[i]]++;
     hidden += p->labels[i] == QMAT_POLE_INSIDE && p->power.hidden[i];
   }
-  uint32_t *sets = qmat_sets_new(p->context, medial->sphere_count);
-  if (!sets) return qmat_fail_memory(p->context, "components");
-  for (size_t e = 0; e < medial->edge_count; e++)
-    components -= qmat_sets_join(sets, medial->edges[2 * e], medial->edges[2 * e + 1]);
+  const qmat_status status =
+      qmat_sets_count(p->context, medial->sphere_count, medial->edges, medial->edge_count, &components);
+  if (status != QMAT_OK) return status;
   const struct {
     const char *name;
     size_t value;

@@ -84,11 +84,10 @@ static qmat_status make_medial(qmat_context *context, const medial_scale_axis_pa
 
 static qmat_status make_report(qmat_context *context, const scale_axis_counts *counts, const qmat_medial *medial,
                                qmat_report *report) {
-  size_t components = medial->sphere_count;
-  uint32_t *sets = qmat_sets_new(context, medial->sphere_count);
-  if (!sets) return qmat_fail_memory(context, "components");
-  for (size_t e = 0; e < medial->edge_count; e++)
-    components -= qmat_sets_join(sets, medial->edges[2 * e], medial->edges[2 * e + 1]);
+  size_t components;
+  const qmat_status status =
+      qmat_sets_count(context, medial->sphere_count, medial->edges, medial->edge_count, &components);
+  if (status != QMAT_OK) return status;
   const struct {
     const char *name;
     size_t value;

@@ -254,13 +254,11 @@ qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat
 }
 
 qmat_status qmat_topology_of_medial(qmat_context *context, const qmat_medial *medial, qmat_topology *topology) {
-  *topology = (qmat_topology){.known = true, .components = medial->sphere_count};
+  *topology = (qmat_topology){.known = true};
   topology->euler = (int64_t)medial->sphere_count - (int64_t)medial->edge_count + (int64_t)medial->triangle_count;
-  uint32_t *parents = qmat_sets_new(context, medial->sphere_count);
-  if (!parents) return qmat_fail_memory(context, "the topology");
-  for (size_t e = 0; e < medial->edge_count; e++)
-    topology->components -= qmat_sets_join(parents, medial->edges[2 * e], medial->edges[2 * e + 1]);
-  const qmat_status status = count_voids(context, medial, &topology->voids, &topology->known);
+  qmat_status status =
+      qmat_sets_count(context, medial->sphere_count, medial->edges, medial->edge_count, &topology->components);
+  if (status == QMAT_OK) status = count_voids(context, medial, &topology->voids, &topology->known);
   topology->loops = (size_t)((int64_t)(topology->components + topology->voids) - topology->euler);
   return status;
 }
