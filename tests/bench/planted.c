@@ -182,7 +182,8 @@ static qmat_medial *medial_of(qmat_context *context, const shape *s) {
   return NULL;
 }
 
-/* The surface that medial.skin gives it with cells of that size; NULL with the context's error. */
+/* The surface that medial.skin gives it with cells of that size, all of them: decimation would leave few triangles.
+ * NULL with the context's error. */
 static qmat_mesh *skin(qmat_context *context, const qmat_medial *medial, double resolution) {
   const qmat_node *node = qmat_node_find("medial.skin");
   double params[16] = {0};
@@ -191,6 +192,7 @@ static qmat_mesh *skin(qmat_context *context, const qmat_medial *medial, double 
   snprintf(text, sizeof text, "%.0f", fmin(fmax(resolution, 16), 1024));
   qmat_params_default(node, params);
   if (qmat_param_parse(context, node, qmat_param_find(node, "resolution"), text, params) != QMAT_OK ||
+      qmat_param_parse(context, node, qmat_param_find(node, "error"), "0", params) != QMAT_OK ||
       qmat_node_run(context, node, params, (const qmat_value *[]){&medial->base}, outputs) != QMAT_OK)
     return NULL;
   qmat_value_release(outputs[1]);
