@@ -6,7 +6,7 @@
 
 #include "core/geometry/vector.h"
 
-enum { LARGEST_BEST_FAN = 64, MOST_PASSES = 64 };
+enum { MOST_PASSES = 64 };
 /* Limits the time for self-intersecting polygons. After this many tests, ears are clipped without a test. */
 static const uint64_t MOST_POINT_TESTS = (uint64_t)1 << 28;
 
@@ -75,20 +75,15 @@ static bool flatten(const double *points, size_t count, double *flat) {
   return true;
 }
 
-/* The margin keeps rounding errors from choosing between equal shapes. */
-static bool is_better(double shape, double than) {
-  return shape > than + 1e-9 * fabs(than);
-}
-
 static void set_triangle(uint32_t *triangle, uint32_t a, uint32_t b, uint32_t c) {
   triangle[0] = a;
   triangle[1] = b;
   triangle[2] = c;
 }
 
-static void fan(uint32_t apex, size_t count, uint32_t *triangles) {
-  for (size_t i = 1; i + 1 < count; i++)
-    set_triangle(triangles + 3 * (i - 1), apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count));
+/* The fan of corner 0. */
+static void fan(size_t count, uint32_t *triangles) {
+  for (uint32_t i = 1; i + 1 < count; i++) set_triangle(triangles + 3 * (size_t)(i - 1), 0, i, i + 1);
 }
 
 /* Whether all turns are left and the polygon winds around once: it changes between up and down at most twice. */
@@ -106,20 +101,11 @@ static bool is_convex(const double *flat, size_t count) {
   return turns <= 2;
 }
 
-/* The apex of the fan whose worst triangle has the best shape; the first of equals. */
-static uint32_t best_fan(const double *flat, size_t count) {
-  uint32_t best = 0;
-  double best_shape = 0;
-  for (uint32_t apex = 0; apex < count; apex++) {
-    double worst = INFINITY;
-    for (size_t i = 1; i + 1 < count; i++)
-      worst = fmin(worst, shape(flat, apex, (uint32_t)((apex + i) % count), (uint32_t)((apex + i + 1) % count)));
-    if (apex == 0 || is_better(worst, best_shape)) {
-      best_shape = worst;
-      best = apex;
-    }
-  }
-  return best;
+/* Whether the fan of corner 0 has no empty triangle, as a straight corner 1 makes. */
+static bool is_fan_full(const double *flat, size_t count) {
+  for (uint32_t i = 1; i + 1 < count; i++)
+    if (!(shape(flat, 0, i, i + 1) > 1e-7)) return false;
+  return true;
 }
 
 /* The remaining corners as a ring, and the state of each as the tip of an ear. */
@@ -243,18 +229,13 @@ static void clip_ears(ears *e, uint32_t *triangles) {
 bool qmat_polygon_triangulate(const double *points, const uint32_t *ids, size_t count, double *flat, uint32_t *links,
                               uint32_t *triangles) {
   if (count == 3 || !flatten(points, count, flat)) {
-    fan(0, count, triangles);
+    fan(count, triangles);
     return true;
   }
-  bool convex = is_convex(flat, count);
-  if (count > QMAT_LARGEST_CONCAVE_POLYGON) {
-    if (!convex) return false;
-    fan(0, count, triangles);
-    return true;
-  }
-  /* In a concave quadrilateral, only one diagonal gives two positive shapes; the best fan uses it. */
-  if (count == 4 || (convex && count <= LARGEST_BEST_FAN)) {
-    fan(best_fan(flat, count), count, triangles);
+  const bool convex = is_convex(flat, count);
+  if (count > QMAT_LARGEST_CONCAVE_POLYGON && !convex) return false;
+  if (convex && (count > QMAT_LARGEST_CONCAVE_POLYGON || is_fan_full(flat, count))) {
+    fan(count, triangles);
     return true;
   }
   size_t leaves = 4;

@@ -55,23 +55,28 @@ static void assert_fills(const double *points, const uint32_t *ids, size_t count
   free(triangles);
 }
 
-static void test_a_quadrilateral_is_cut_along_the_diagonal_of_better_shapes(void **state) {
+static void test_a_convex_polygon_is_the_fan_of_its_first_corner(void **state) {
   (void)state;
-  /* A kite: the short diagonal joins corners 1 and 3. */
-  const double kite[] = {-3, 0, 0, 0, -1, 0, 3, 0, 0, 0, 1, 0};
   bool done;
-  uint32_t *triangles = triangulate_ids(kite, NULL, 4, &done);
-  const uint32_t expected[] = {1, 2, 3, 1, 3, 0};
-  assert_memory_equal(triangles, expected, sizeof expected);
-  free(triangles);
-  /* Of equal diagonals the one at corner 0, on any scale. */
+  /* A square on any scale. */
   for (int power = -300; power <= 300; power += 50) {
     const double s = pow(10, power), square[] = {0, 0, 0, s, 0, 0, s, s, 0, 0, s, 0};
-    triangles = triangulate_ids(square, NULL, 4, &done);
+    uint32_t *triangles = triangulate_ids(square, NULL, 4, &done);
     const uint32_t first[] = {0, 1, 2, 0, 2, 3};
     assert_memory_equal(triangles, first, sizeof first);
     free(triangles);
   }
+  /* A bent kite whose other diagonal is shorter, and a bent hexagon. */
+  const double kite[] = {-3, 0, 0, 0, -1, 1, 3, 0, 0, 0, 1, 1};
+  uint32_t *triangles = triangulate_ids(kite, NULL, 4, &done);
+  const uint32_t halves[] = {0, 1, 2, 0, 2, 3};
+  assert_memory_equal(triangles, halves, sizeof halves);
+  free(triangles);
+  const double hexagon[] = {2, 0, 0, 1, 2, .2, -1, 2, 0, -2, 0, .2, -1, -2, 0, 1, -2, .2};
+  triangles = triangulate_ids(hexagon, NULL, 6, &done);
+  const uint32_t fan[] = {0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 5};
+  assert_memory_equal(triangles, fan, sizeof fan);
+  free(triangles);
 }
 
 static void test_a_concave_quadrilateral_is_cut_from_its_notch(void **state) {
@@ -234,7 +239,7 @@ static void test_only_concave_polygons_have_a_largest_size(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_a_quadrilateral_is_cut_along_the_diagonal_of_better_shapes),
+      cmocka_unit_test(test_a_convex_polygon_is_the_fan_of_its_first_corner),
       cmocka_unit_test(test_a_concave_quadrilateral_is_cut_from_its_notch),
       cmocka_unit_test(test_a_quadrilateral_with_a_straight_corner_gives_no_empty_triangle),
       cmocka_unit_test(test_convex_and_concave_polygons_are_filled),
