@@ -191,6 +191,7 @@ export function addToJolt(Jolt, system, body, { at = [0, 0, 0], rotation = [0, 0
     settings.mMotionQuality = Jolt.EMotionQuality_LinearCast;
   }
   settings.mFriction = friction;
+  settings.mUseManifoldReduction = false; // it leaves four contacts of a whole compound, and the body sinks between them
   const made = system.GetBodyInterface().CreateBody(settings);
   system.GetBodyInterface().AddBody(made.GetID(), Jolt.EActivation_Activate);
   return made;

@@ -37,25 +37,49 @@ function toBox(p, { at, half }) {
   return Math.hypot(...d.map((v) => Math.max(v, 0))) + Math.min(Math.max(...d), 0);
 }
 
-/** The vertices of a surface: OFF, OBJ, STL; a .glb is its own. */
-function verticesOf(path) {
-  const bytes = readFileSync(path), points = [];
+/** The triangles of a surface: OFF, OBJ, STL. { points, rows: three numbers of points each }. */
+function surfaceOf(path) {
+  const bytes = readFileSync(path), points = [], rows = [];
+  const fan = (ids) => ids.slice(2).forEach((_, k) => rows.push([ids[0], ids[k + 1], ids[k + 2]]));
   if (path.endsWith('.stl') && bytes.length === 84 + 50 * bytes.readUInt32LE(80)) {
     for (let i = 84; i < bytes.length; i += 50)
       for (let c = 1; c < 4; c++) points.push([0, 4, 8].map((k) => bytes.readFloatLE(i + 12 * c + k)));
-    return points;
-  }
-  const lines = bytes.toString('utf8').split('\n').map((line) => line.replace(/#.*/, '').trim()).filter(Boolean);
-  if (path.endsWith('.off')) {
-    const words = lines.join(' ').replace(/^C?N?OFF/, '').trim().split(/\s+/).map(Number);
-    for (let i = 0; i < words[0]; i++) points.push(words.slice(3 + 3 * i, 6 + 3 * i));
   } else {
-    for (const line of lines) {
-      const words = line.split(/\s+/);
-      if (words[0] === 'v' || words[0] === 'vertex') points.push(words.slice(1, 4).map(Number));
+    const lines = bytes.toString('utf8').split('\n').map((line) => line.replace(/#.*/, '').trim()).filter(Boolean);
+    if (path.endsWith('.off')) {
+      const words = lines.join(' ').replace(/^C?N?OFF/, '').trim().split(/\s+/).map(Number);
+      for (let i = 0; i < words[0]; i++) points.push(words.slice(3 + 3 * i, 6 + 3 * i));
+      for (let i = 0, at = 3 + 3 * words[0]; i < words[1]; at += words[at] + 1, i++) fan(words.slice(at + 1, at + 1 + words[at]));
+    } else {
+      for (const line of lines) {
+        const words = line.split(/\s+/), ids = words.slice(1).map((word) => parseInt(word, 10));
+        if (words[0] === 'v' || words[0] === 'vertex') points.push(words.slice(1, 4).map(Number));
+        if (words[0] === 'f') fan(ids.map((id) => (id < 0 ? points.length + id : id - 1)));
+      }
     }
   }
-  return points;
+  if (rows.length === 0) for (let i = 0; i + 2 < points.length; i += 3) rows.push([i, i + 1, i + 2]);
+  return { points, rows };
+}
+
+/** The distance from triangles to boxes, to 1e-4, by branch and bound: edges of boxes meet triangles far from a vertex. */
+function gapOf({ points, rows }, boxes) {
+  const near = (p) => boxes.reduce((least, box) => Math.min(least, toBox(p, box)), Infinity);
+  const middle = (p, q) => [0, 1, 2].map((k) => (p[k] + q[k]) / 2);
+  const all = points.map(near), stack = [];
+  let best = rows.reduce((least, row) => Math.min(least, all[row[0]], all[row[1]], all[row[2]]), Infinity);
+  for (const row of rows) {
+    stack.push(row.map((id) => points[id]));
+    while (stack.length > 0) {
+      const [a, b, c] = stack.pop(), at = [0, 1, 2].map((k) => (a[k] + b[k] + c[k]) / 3), value = near(at);
+      const reach = Math.max(...[a, b, c].map((p) => Math.hypot(...[0, 1, 2].map((k) => p[k] - at[k]))));
+      best = Math.min(best, value);
+      if (!(value - reach < best - 1e-4)) continue;
+      const [d, e, f] = [middle(a, b), middle(b, c), middle(c, a)];
+      stack.push([a, d, f], [d, b, e], [f, e, c], [d, e, f]);
+    }
+  }
+  return best;
 }
 
 const engines = {
@@ -113,8 +137,9 @@ function matrixOf({ x: px, y: py, z: pz }, { x, y, z, w }) {
     2 * (y * z + x * w), 0, 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0, px, py, pz, 1];
 }
 
-/** What went wrong, and how far the surface ends from what it lies on, in percent. */
-function drop(start, name, body, points, scale) {
+/** What went wrong, and how far the surface ends from what it lies on. */
+function drop(start, name, body, surface, scale) {
+  const every = Math.ceil(surface.points.length / 4000), points = surface.points.filter((_, k) => k % every === 0);
   const scene = scenes[name], low = Math.min(...points.map((p) => p[1]));
   const centre = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
   const at = [scene.start[0] - centre[0], scene.start[1] - low - 0.5, scene.start[2] - centre[2]];
@@ -137,9 +162,10 @@ function drop(start, name, body, points, scale) {
     if (!(run.speed() < most)) return { wrong: `explodes after ${(i * STEP).toFixed(2)} s`, gap: NaN };
     if (i % 30 === 0 && Number.isNaN(check())) return { wrong: 'is no number', gap: NaN };
   }
-  const gap = check(), speed = run.speed(), [place] = run.pose();
+  const [place, turn] = run.pose(), m = matrixOf(place, turn), speed = run.speed();
+  const gap = gapOf({ points: surface.points.map((p) => moved(m, p)), rows: surface.rows }, scene.boxes);
   run.free();
-  const wrong = deepest > 0.02 ? `sinks by ${(100 * deepest).toFixed(1)} %` : Math.abs(gap) > 0.01 ? 'hovers or sinks' :
+  const wrong = deepest > 0.02 ? `sinks by ${(100 * deepest).toFixed(1)} %` : Math.abs(gap) > 0.01 ? `${gap > 0 ? 'hovers' : 'lies deep'} by ${(100 * Math.abs(gap)).toFixed(2)} %` :
     speed > 0.05 ? `still moves at ${speed.toFixed(2)}` : ground(scene.boxes, [place.x, 0, place.z]) === -Infinity ? 'is gone' : null;
   return { wrong, gap };
 }
@@ -147,20 +173,20 @@ function drop(start, name, body, points, scale) {
 let failures = 0;
 for (let i = 0; i + 1 < files.length; i += 2) {
   const file = openGlb(readFileSync(files[i])), [body] = bodiesOf(file).filter((one) => one.motion);
-  const all = verticesOf(files[i + 1]), spans = [0, 1, 2].map((k) => {
+  const surface = surfaceOf(files[i + 1]), spans = [0, 1, 2].map((k) => {
     let [low, high] = [Infinity, -Infinity];
-    for (const p of all) [low, high] = [Math.min(low, p[k]), Math.max(high, p[k])];
+    for (const p of surface.points) [low, high] = [Math.min(low, p[k]), Math.max(high, p[k])];
     return high - low;
   });
-  const scale = 1 / Math.hypot(...spans), every = Math.ceil(all.length / 4000);
-  const points = all.filter((_, k) => k % every === 0).map((p) => p.map((v) => scale * v));
+  const scale = 1 / Math.hypot(...spans);
+  surface.points = surface.points.map((p) => p.map((v) => scale * v));
   const kinds = [(s) => s.radius, (s) => s.ends, (s) => s.points].map((is) => body?.shapes.filter(is).length);
   const cells = [];
   for (const engine of Object.keys(engines)) for (const scene of Object.keys(scenes)) {
     let result;
     try {
       if (!body) throw new Error('no body that moves');
-      result = drop(engines[engine], scene, body, points, scale);
+      result = drop(engines[engine], scene, body, surface, scale);
     } catch (error) {
       result = { wrong: error.message ?? String(error), gap: NaN };
     }
