@@ -296,7 +296,7 @@ static const qmat_param params[] = {
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 1, 0.1, 1,
                "Refinement starts only if some point of the surface is farther from the envelope than this"),
-    QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.75, 0.1, 1,
+    QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),
     QMAT_INT(medial_refine_params, rounds, "rounds", 4, 0, MOST_ROUNDS,
              "The most rounds; each halves the spacing of the added samples; 0: nothing is refined"),
@@ -321,7 +321,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 4,
+    .version = 5,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
