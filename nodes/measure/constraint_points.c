@@ -2,6 +2,7 @@
 #include "nodes/measure/constraint_points.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -94,11 +95,18 @@ static void fill_grid(const grid *g, double spacing, double *points) {
   }
 }
 
+/* Slabs are prepared where a point first asks for them, by whichever thread comes first, and kept for the others. Of
+ * more slabs than this none is kept: 200 MB. */
+static const size_t most_kept_slabs = 500000;
+enum { SLAB_NEW, SLAB_BUSY, SLAB_READY };
+
 /* The spheres that are responsible for each sample, and the places of the samples. */
 typedef struct {
   const qmat_mesh *mesh;
   const qmat_complex *complex;
-  size_t *sphere_starts; /* per sample, + 1 */
+  qmat_slab *slabs;             /* per triangle of the complex, once ready */
+  _Atomic uint8_t *slab_states; /* per triangle; NULL: none is kept */
+  size_t *sphere_starts;        /* per sample, + 1 */
   uint32_t *spheres;
   const double *reaches; /* per sphere, of find_reaches */
   qmat_point_grid samples;
@@ -152,17 +160,30 @@ static void take_sphere(const regions *a, const double *point, uint32_t sample, 
   }
 }
 
+/* A slab of the medial mesh; `own` is where it is made if it cannot be kept. */
+static const qmat_slab *prepared_slab(const regions *a, uint32_t triangle, qmat_slab *own) {
+  const double *spheres = a->complex->spheres;
+  const uint32_t *t = &a->complex->triangles[3 * (size_t)triangle];
+  _Atomic uint8_t *state = a->slab_states ? &a->slab_states[triangle] : NULL;
+  if (state && atomic_load_explicit(state, memory_order_acquire) == SLAB_READY) return &a->slabs[triangle];
+  uint8_t unprepared = SLAB_NEW;
+  const bool keep = state && atomic_compare_exchange_strong(state, &unprepared, SLAB_BUSY);
+  qmat_slab *slab = keep ? &a->slabs[triangle] : own;
+  qmat_slab_prepare(slab, &spheres[4 * (size_t)t[0]], &spheres[4 * (size_t)t[1]], &spheres[4 * (size_t)t[2]]);
+  if (keep) atomic_store_explicit(state, SLAB_READY, memory_order_release);
+  return slab;
+}
+
 /* The primitives at a sphere. */
-static void take_star(const qmat_complex *complex, const double *point, uint32_t vertex, witness *best) {
+static void take_star(const regions *a, const double *point, uint32_t vertex, witness *best) {
+  const qmat_complex *complex = a->complex;
   size_t count;
   const uint32_t *at = qmat_complex_triangles_at(complex, vertex, &count);
   for (size_t i = 0; i < count; i++) {
     const uint32_t *t = &complex->triangles[3 * (size_t)at[i]];
-    qmat_slab slab;
+    qmat_slab own;
     witness w = {.vertices = {t[0], t[1], t[2]}};
-    qmat_slab_prepare(&slab, &complex->spheres[4 * (size_t)t[0]], &complex->spheres[4 * (size_t)t[1]],
-                      &complex->spheres[4 * (size_t)t[2]]);
-    w.distance = qmat_slab_foot(&slab, point, w.weights);
+    w.distance = qmat_slab_foot_below(prepared_slab(a, at[i], &own), point, best->distance, w.weights);
     if (w.distance < best->distance) *best = w;
   }
   at = qmat_complex_edges_at(complex, vertex, &count);
@@ -201,7 +222,7 @@ static void search_regions(const regions *a, const double *point, const uint32_t
     for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
       const uint32_t v = a->spheres[i];
       if (qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point) - a->reaches[v] < best->distance)
-        take_star(a->complex, point, v, best);
+        take_star(a, point, v, best);
     }
 }
 
@@ -259,7 +280,7 @@ static qmat_status search_all_spheres(qmat_context *context, const regions *a, d
       }
       for (size_t v = 0; v < complex->vertex_count; v++)
         if (qmat_sphere_distance(&complex->spheres[4 * v], p) - a->reaches[v] < best.distance)
-          take_star(complex, p, (uint32_t)v, &best);
+          take_star(a, p, (uint32_t)v, &best);
       store(constraints, i, &best);
     }
   }
@@ -425,6 +446,11 @@ static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, 
                                   const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
                                   regions *a) {
   *a = (regions){.mesh = mesh, .complex = complex};
+  if (complex->triangle_count <= most_kept_slabs) {
+    a->slabs = qmat_arena_alloc(&context->arena, complex->triangle_count, sizeof *a->slabs);
+    a->slab_states = qmat_arena_calloc(&context->arena, complex->triangle_count, sizeof *a->slab_states);
+    if (!a->slabs || !a->slab_states) return qmat_fail_memory(context, "medial slabs");
+  }
   const qmat_status status = find_answering(context, samples, medial, a);
   return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
 }
