@@ -142,7 +142,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_report_picture = {
     .name = "report.picture",
-    .version = 1,
+    .version = 2,
     .summary = "Draws a surface and its medial mesh as PNG or SVG",
     .doc =
         "Spheres are orange, cones blue and slabs green, each cut exactly where others cover it. The surface has the "

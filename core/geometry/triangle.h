@@ -4,6 +4,9 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
 
 #include "core/geometry/vector.h"
 
@@ -31,6 +34,26 @@ static inline double qmat_triangle_area(const double a[3], const double b[3], co
   const bool degenerate = !(length > 2 * QMAT_DEGENERATE_AREA * longest);
   for (int k = 0; k < 3; k++) normal[k] = degenerate ? 0 : normal[k] / length;
   return degenerate ? 0 : 0.5 * length;
+}
+
+/* Divides a triangle at the middles of its sides. `corners`: 3 vertices; `middles`: the vertex between corners k and
+ * k + 1, or UINT32_MAX where that side stays whole; `pieces` (12 numbers) gets 3 vertices a piece, oriented as the
+ * triangle. Returns the number of pieces: one more than sides are halved. */
+static inline size_t qmat_triangle_divide(const uint32_t corners[3], const uint32_t middles[3], uint32_t pieces[12]) {
+  int halved = 0;
+  for (int k = 0; k < 3; k++) halved += middles[k] != UINT32_MAX;
+  /* Rotates the corners so that the halved sides come first. */
+  size_t s = 0;
+  if (halved == 1)
+    while (middles[s] == UINT32_MAX) s++;
+  if (halved == 2)
+    while (middles[(s + 2) % 3] != UINT32_MAX) s++;
+  const uint32_t a = corners[s], b = corners[(s + 1) % 3], c = corners[(s + 2) % 3];
+  const uint32_t ab = middles[s], bc = middles[(s + 1) % 3], ca = middles[(s + 2) % 3];
+  const uint32_t by_count[4][12] = {
+      {a, b, c}, {a, ab, c, ab, b, c}, {ab, b, bc, a, ab, bc, a, bc, c}, {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca}};
+  memcpy(pieces, by_count[halved], sizeof by_count[halved]);
+  return (size_t)halved + 1;
 }
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/geometry/triangle.h"
 
 #define NONE UINT32_MAX
 
@@ -40,24 +41,6 @@ static uint32_t middle_of(const qmat_medial *medial, const size_t *row_starts, c
       last = half;
   }
   return middles[first];
-}
-
-/* Divides a slab with halved sides into two to four slabs, or copies it. Returns their number. */
-static size_t divide(const uint32_t *corners, const uint32_t *middles, uint32_t *pieces) {
-  int halved = 0;
-  for (int k = 0; k < 3; k++) halved += middles[k] != NONE;
-  /* Rotates the corners so that the halved sides come first; middles[k] is between corners k and k + 1. */
-  size_t s = 0;
-  if (halved == 1)
-    while (middles[s] == NONE) s++;
-  if (halved == 2)
-    while (middles[(s + 2) % 3] != NONE) s++;
-  const uint32_t a = corners[s], b = corners[(s + 1) % 3], c = corners[(s + 2) % 3];
-  const uint32_t ab = middles[s], bc = middles[(s + 1) % 3], ca = middles[(s + 2) % 3];
-  const uint32_t by_count[4][12] = {
-      {a, b, c}, {a, ab, c, ab, b, c}, {ab, b, bc, a, ab, bc, a, bc, c}, {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca}};
-  memcpy(pieces, by_count[halved], sizeof by_count[halved]);
-  return (size_t)halved + 1;
 }
 
 /* One round; adds the number of halved edges to `*added`. */
@@ -112,7 +95,7 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
     const uint32_t *corners = &medial->triangles[3 * t];
     uint32_t sides[3], pieces[12];
     for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, row_starts, middles, corners[k], corners[(k + 1) % 3]);
-    const size_t made = divide(corners, sides, pieces);
+    const size_t made = qmat_triangle_divide(corners, sides, pieces);
     memcpy(&new_triangles[3 * triangle_count], pieces, 3 * made * sizeof *pieces);
     triangle_count += made;
   }

@@ -44,7 +44,7 @@ static json_t *surface_json(const qmat_shown *shown) {
   done = set_bytes(surface, "errors", &errors) && done;
   done = set_bytes(surface, "corners", &corners) && done;
   done = qmat_json_set_count(surface, "vertices", shown->mesh->vertex_count) == 0 && done;
-  done = qmat_json_set_count(surface, "triangles", display->triangle_count) == 0 && done;
+  done = qmat_json_set_count(surface, "triangles", shown->mesh->triangle_count) == 0 && done;
   if (done) return surface;
   json_decref(surface);
   return NULL;

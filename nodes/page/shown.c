@@ -5,9 +5,12 @@
 #include <string.h>
 
 #include "nodes/measure/unit_spheres.h"
+#include "nodes/page/error_detail.h"
 
 /* The least range of colours: below it errors are rounding. */
 static const double least_range = 1e-6;
+/* Colours between vertices may be this share of the range off. */
+static const double colour_tolerance = 0.1;
 
 double qmat_shown_number(const qmat_report *report, const char *key) {
   const json_t *value = report ? json_object_get(report->root, key) : NULL;
@@ -48,14 +51,10 @@ qmat_status qmat_shown_init(qmat_context *context, const qmat_mesh *mesh, const 
     status = qmat_display_mesh_make(context, mesh, &shown->frame, shown->envelope, &shown->display);
   if (status != QMAT_OK) return status;
   const double epsilon = qmat_shown_number(report, "epsilon");
-  if (epsilon > 0) {
-    shown->range = epsilon;
-    return QMAT_OK;
-  }
-  shown->range = least_range;
-  for (size_t i = 0; i < shown->display.vertex_count; i++)
+  shown->range = epsilon > 0 ? epsilon : least_range;
+  for (size_t i = 0; i < shown->display.vertex_count && !(epsilon > 0); i++)
     shown->range = fmax(shown->range, fabs(shown->display.errors[i]));
-  return QMAT_OK;
+  return qmat_display_mesh_refine(context, shown->envelope, colour_tolerance * shown->range, &shown->display);
 }
 
 void qmat_shown_uninit(qmat_shown *shown) {

@@ -6,8 +6,10 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/vector.h"
 #include "io/base64.h"
 #include "io/flat_medial.h"
+#include "nodes/page/display_mesh.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
@@ -111,22 +113,15 @@ static void test_vertices_on_creases_have_a_normal_for_each_side(void **state) {
   qmat_mesh *meshes[] = {shape_seal(shape_box(1, 1, 1)), shape_seal(shape_sphere(1, 24))};
   const size_t expected[] = {24, meshes[1]->vertex_count};
   for (size_t i = 0; i < 2; i++) {
-    qmat_medial *medial = sealed_medial_mesh((const double[]){0.5, 0.5, 0.5, 0.5}, 1, NULL, 0, NULL, 0);
-    qmat_file *file = make_page(1, "", (const qmat_value *[]){NULL, &meshes[i]->base, &medial->base, NULL, NULL});
-    json_t *data = data_of(file);
-    const json_t *surface = json_object_get(mesh_of(data, 0), "surface");
-    qmat_free(bytes_of(surface, "positions", 6 * expected[i]));
-    qmat_free(bytes_of(surface, "errors", 2 * expected[i]));
-    uint8_t *normals = bytes_of(surface, "normals", 6 * expected[i]);
-    for (size_t v = 0; v < expected[i]; v++) {
-      int16_t n[3];
-      memcpy(n, normals + 6 * v, sizeof n);
-      assert_near(sqrt((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2]), 32767, 2);
-    }
-    qmat_free(normals);
-    json_decref(data);
-    qmat_value_release(&file->base);
-    qmat_value_release(&medial->base);
+    qmat_context context = {0};
+    qmat_frame frame;
+    qmat_display_mesh display;
+    assert_int_equal(qmat_frame_of_mesh(&context, meshes[i], &frame), QMAT_OK);
+    assert_int_equal(qmat_display_mesh_make(&context, meshes[i], &frame, NULL, &display), QMAT_OK);
+    assert_int_equal(display.vertex_count, expected[i]);
+    for (size_t v = 0; v < display.vertex_count; v++)
+      assert_near(qmat_dot(&display.normals[3 * v], &display.normals[3 * v]), 1, 1e-12);
+    qmat_context_uninit(&context);
     qmat_value_release(&meshes[i]->base);
   }
 }
