@@ -10,10 +10,10 @@
 #include "core/node.h"
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/measure/point_grid.h"
 #include "nodes/mesh/border_weld.h"
 #include "nodes/mesh/half_edges.h"
 #include "nodes/mesh/hole_cgal.h"
+#include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/overlaps.h"
 #include "nodes/mesh/parts.h"
 #include "nodes/mesh/wrap_cgal.h"
@@ -312,25 +312,6 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   return QMAT_OK;
 }
 
-/* The nearest given vertex lends its joints. */
-static qmat_status fill_skin(const solidifier *s, qmat_mesh *mesh) {
-  const qmat_mesh *given = s->mesh;
-  if (given->skinned_count == 0) return QMAT_OK;
-  mesh->joints = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->joints);
-  mesh->weights = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->weights);
-  if (!mesh->joints || !mesh->weights) return fail_shortage(s);
-  mesh->skinned_count = mesh->vertex_count;
-  qmat_point_grid grid;
-  qmat_status status = qmat_point_grid_init(s->context, given->positions, given->vertex_count, &grid);
-  for (size_t v = 0; v < mesh->vertex_count && status == QMAT_OK; v++) {
-    const size_t nearest = qmat_point_grid_nearest(&grid, mesh->positions + 3 * v);
-    memcpy(mesh->joints + 4 * v, given->joints + 4 * nearest, 4 * sizeof *mesh->joints);
-    memcpy(mesh->weights + 4 * v, given->weights + 4 * nearest, 4 * sizeof *mesh->weights);
-    if (v % 1024 == 0) status = qmat_progress(s->context, v, mesh->vertex_count, "vertices");
-  }
-  return status;
-}
-
 /* The result, without joints and weights, and unsealed. */
 static qmat_status place_triangles(const solidifier *s, qmat_mesh *mesh) {
   if (s->wrap.triangles)
@@ -345,7 +326,7 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
   if (status == QMAT_OK && s->wrap.triangles) mesh->deviation += wrap_distance(s);
-  if (status == QMAT_OK) status = fill_skin(s, mesh);
+  if (status == QMAT_OK) status = qmat_lend_joints(s->context, s->mesh, mesh);
   if (status == QMAT_OK) status = qmat_value_seal(s->context, &mesh->base);
   if (status == QMAT_OK)
     *made = mesh;

@@ -10,6 +10,7 @@
 #include "io/soup.h"
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/subdivision_osd.h"
 
 typedef struct mesh_subdivide_params {
@@ -39,6 +40,7 @@ typedef struct group {
 typedef struct subdivision {
   qmat_context *context;
   const mesh_subdivide_params *params;
+  const qmat_mesh *given;
   qmat_cage source;      /* the mesh's cage, or its triangles as a cage; borrowed */
   uint8_t *face_groups;  /* per face of the source */
   size_t *first_corners; /* per face of the source */
@@ -331,7 +333,8 @@ static qmat_status make_attempt(const subdivision *s, int level, int depth, atte
     /* Nobody else has the mesh yet, so it may be sealed again. */
     a->mesh->deviation = fmax(a->deviation * diagonal, s->source_deviation);
     a->mesh->base.sealed = false;
-    status = qmat_value_seal(context, &a->mesh->base);
+    status = qmat_lend_joints(context, s->given, a->mesh);
+    if (status == QMAT_OK) status = qmat_value_seal(context, &a->mesh->base);
   }
   qmat_surface_free(surface);
   if (status != QMAT_OK && a->mesh) qmat_value_release(&a->mesh->base);
@@ -434,7 +437,7 @@ static qmat_status subdivide(subdivision *s, const qmat_mesh *mesh, attempt *bes
 static qmat_status run(qmat_context *context, const void *params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const qmat_mesh *mesh = (const qmat_mesh *)inputs[0];
-  subdivision s = {.context = context, .params = params, .meters_per_unit = mesh->meters_per_unit};
+  subdivision s = {.context = context, .params = params, .given = mesh, .meters_per_unit = mesh->meters_per_unit};
   attempt best = {.mesh = NULL};
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
@@ -498,7 +501,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_mesh_subdivide = {
     .name = "mesh.subdivide",
-    .version = 3,
+    .version = 4,
     .summary = "Replaces subdivision surfaces by triangles on their limit surface",
     .doc =
         "Subdivides the Catmull-Clark, Loop and bilinear surfaces of a USD file, with their creases, corners, boundary "

@@ -76,7 +76,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 10,
+    .version = 11,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
@@ -84,7 +84,8 @@ const qmat_node qmat_node_scene_read = {
         "A glTF scene is kept whole for scene.write, with its files; outside of its folder only images are read. Its "
         "meshes are read one by one, in their own spaces and in bind pose, and later nodes run once for each. Meshes "
         "on no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
-        "space, skins in their current pose. Skinned meshes keep the four strongest joints of each vertex.\n\n"
+        "space, skins in their current pose. Skinned meshes, also those of UsdSkel, keep the four strongest joints of "
+        "each vertex.\n\n"
         "A USD scene is read alike: equal meshes are one, wherever references, instances and point instancers place "
         "it, "
         "and warnings name what was left out. Subdivision surfaces are control cages, for mesh.subdivide. Sphere, "

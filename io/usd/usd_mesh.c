@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/joint_weights.h"
 #include "io/placement.h"
 
 /* ---- reading ---- */
@@ -84,6 +85,38 @@ static qmat_status read_sharpness(const qmat_usd_prim *prim, qmat_usd_mesh *mesh
   return QMAT_OK;
 }
 
+enum { MOST_INFLUENCES = 256 }; /* of a point; choosing the strongest is quadratic */
+
+/* Reads the joints and weights of UsdSkel. Each point has as many influences as elementSize says, or all points share
+ * them (a rigid binding). A skin that is no such thing is left out with a warning: the surface does not need it. */
+static qmat_status read_skin(const qmat_usd_prim *prim, qmat_usd_mesh *mesh) {
+  static const char *const names[] = {"primvars:skel:jointIndices", "primvars:skel:jointWeights"};
+  const qmat_usd_value *joints, *weights;
+  qmat_status status = qmat_usd_prim_attribute(prim, names[0], &joints);
+  if (status == QMAT_OK) status = qmat_usd_prim_attribute(prim, names[1], &weights);
+  if (status != QMAT_OK || !joints || !weights || !mesh->points || mesh->points->count == 0) return status;
+  const bool typed = joints->is_array && weights->is_array && qmat_usd_is_integer(joints->type) &&
+                     qmat_usd_is_number(weights->type) && joints->components == 1 && weights->components == 1 &&
+                     joints->count == weights->count && joints->count > 0;
+  if (!typed) return qmat_usd_warn(prim, "its joints are left out: %s and %s do not match", names[0], names[1]);
+  const qmat_usd_value *size = qmat_usd_prim_metadata(prim, names[0], "elementSize");
+  const char *interpolation = qmat_usd_text(qmat_usd_prim_metadata(prim, names[0], "interpolation"));
+  const size_t points = mesh->points->count;
+  const bool is_rigid = interpolation && strcmp(interpolation, "constant") == 0;
+  size_t influences = is_rigid ? joints->count : joints->count / points;
+  if (size && qmat_usd_is_integer(size->type) && !size->is_array && size->integers[0] > 0)
+    influences = (size_t)size->integers[0];
+  if (influences == 0 || influences > MOST_INFLUENCES || joints->count % influences != 0 ||
+      joints->count / influences != (is_rigid ? 1 : points)) {
+    return qmat_usd_warn(prim, "its joints are left out: %zu of them are no %zu for each of %zu points", joints->count,
+                         influences, is_rigid ? (size_t)1 : points);
+  }
+  mesh->joints = joints;
+  mesh->weights = weights;
+  mesh->influences = influences;
+  return QMAT_OK;
+}
+
 qmat_status qmat_usd_mesh_read(const qmat_usd_prim *prim, qmat_usd_mesh *mesh) {
   static const char *const schemes[] = {"none", "catmullClark", "loop", "bilinear"}, *const boundaries[] = {
                                                                                          "none", "edgeOnly",
@@ -102,6 +135,7 @@ qmat_status qmat_usd_mesh_read(const qmat_usd_prim *prim, qmat_usd_mesh *mesh) {
                          &boundary);
   }
   if (status == QMAT_OK && scheme != QMAT_SCHEME_NONE) status = read_sharpness(prim, mesh);
+  if (status == QMAT_OK) status = read_skin(prim, mesh);
   if (status != QMAT_OK) return status;
   mesh->is_left_handed = strcmp(handedness, "leftHanded") == 0;
   mesh->scheme = (qmat_scheme)scheme;
@@ -150,8 +184,9 @@ size_t qmat_usd_mesh_holes(const qmat_usd_mesh *mesh) {
 
 qmat_status qmat_usd_mesh_digest(const qmat_usd_mesh *mesh, qmat_digest *digest) {
   const qmat_usd_value *const arrays[] = {
-      mesh->points,         mesh->counts,           mesh->indices,        mesh->holes,           mesh->crease_lengths,
-      mesh->crease_indices, mesh->crease_sharpness, mesh->sharp_vertices, mesh->vertex_sharpness};
+      mesh->points,           mesh->counts,         mesh->indices,          mesh->holes,
+      mesh->crease_lengths,   mesh->crease_indices, mesh->crease_sharpness, mesh->sharp_vertices,
+      mesh->vertex_sharpness, mesh->joints,         mesh->weights};
   qmat_hasher hasher;
   qmat_status status = qmat_hasher_init(&hasher);
   for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
@@ -160,7 +195,7 @@ qmat_status qmat_usd_mesh_digest(const qmat_usd_mesh *mesh, qmat_digest *digest)
     /* Integers and numbers have 8 bytes each. */
     if (count > 0) qmat_hasher_add(&hasher, arrays[i]->numbers, 8 * count * arrays[i]->components);
   }
-  const double rest[] = {mesh->is_left_handed, mesh->scheme, mesh->boundary, mesh->deviation};
+  const double rest[] = {mesh->is_left_handed, mesh->scheme, mesh->boundary, mesh->deviation, (double)mesh->influences};
   qmat_hasher_add(&hasher, rest, sizeof rest);
   const qmat_status finished = qmat_hasher_finish(&hasher, digest);
   return status == QMAT_OK ? finished : status;
@@ -269,6 +304,28 @@ static qmat_status add_cage(qmat_context *context, const qmat_usd_mesh *mesh, si
   status = qmat_soup_add_cage(context, soup, &cage);
 done:
   qmat_arena_uninit(&arena);
+  return status;
+}
+
+qmat_status qmat_usd_mesh_add_skin(qmat_context *context, const qmat_usd_mesh *mesh, qmat_soup *soup) {
+  if (!mesh->joints) return QMAT_OK;
+  const size_t points = mesh->points->count, influences = mesh->influences;
+  const bool is_rigid = mesh->joints->count == influences;
+  uint32_t *joints = qmat_alloc(4 * points, sizeof *joints), *own = qmat_alloc(influences, sizeof *own);
+  double *weights = qmat_alloc(4 * points, sizeof *weights);
+  qmat_status status = joints && own && weights ? QMAT_OK : qmat_fail_memory(context, "the joints of a mesh");
+  for (size_t v = 0; v < points && status == QMAT_OK; v++) {
+    const size_t first = is_rigid ? 0 : influences * v;
+    for (size_t i = 0; i < influences; i++) {
+      const int64_t joint = mesh->joints->integers[first + i];
+      own[i] = joint >= 0 && joint < UINT32_MAX ? (uint32_t)joint : UINT32_MAX;
+    }
+    qmat_strongest_joints(own, mesh->weights->numbers + first, influences, joints + 4 * v, weights + 4 * v);
+  }
+  if (status == QMAT_OK) status = qmat_soup_add_skin(context, soup, joints, weights, points);
+  qmat_free(joints);
+  qmat_free(own);
+  qmat_free(weights);
   return status;
 }
 

@@ -9,6 +9,8 @@
 typedef struct qmat_usd_mesh {
   const qmat_usd_value *points, *counts, *indices, *holes;
   const qmat_usd_value *crease_lengths, *crease_indices, *crease_sharpness, *sharp_vertices, *vertex_sharpness;
+  const qmat_usd_value *joints, *weights; /* of UsdSkel, both or none; `influences` for each point, or for all points */
+  size_t influences;
   bool is_left_handed;
   qmat_scheme scheme;
   qmat_boundary boundary;
@@ -28,6 +30,11 @@ qmat_status qmat_usd_mesh_digest(const qmat_usd_mesh *mesh, qmat_digest *digest)
 
 /* The number of holes: faces that are left out. A face that is named twice counts twice. */
 size_t qmat_usd_mesh_holes(const qmat_usd_mesh *mesh);
+
+/* Gives the newest vertices of `soup`, which are the mesh's, its joints and weights: the four strongest of each. Joints
+ * are numbered as the mesh numbers them: by its skel:joints, else by those of its skeleton. QMAT_ERROR_MEMORY. Cost:
+ * linear. */
+qmat_status qmat_usd_mesh_add_skin(qmat_context *context, const qmat_usd_mesh *mesh, qmat_soup *soup);
 
 /* Adds a mesh that is not empty to `soup`, moved by `world`: its faces but holes, its polygons as a cage, and its
  * deviation. A mirroring transform and left-handed meshes turn the faces. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost:

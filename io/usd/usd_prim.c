@@ -160,6 +160,16 @@ qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name,
   return QMAT_OK;
 }
 
+const qmat_usd_value *qmat_usd_prim_metadata(const qmat_usd_prim *prim, const char *attribute, const char *field) {
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    const qmat_usd_spec *spec = qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_ATTRIBUTE, attribute);
+    const qmat_usd_value *value = spec ? qmat_usd_field_value(spec, field) : NULL;
+    if (value) return value;
+  }
+  return NULL;
+}
+
 qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, const char *otherwise,
                                 const char **token) {
   const qmat_usd_value *value;

@@ -62,6 +62,9 @@ const char *qmat_usd_prim_specifier(const qmat_usd_prim *prim);
  * its first sample, with a warning. */
 qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name, const qmat_usd_value **value);
 
+/* The strongest value of a field of an attribute ("interpolation"), or NULL. */
+const qmat_usd_value *qmat_usd_prim_metadata(const qmat_usd_prim *prim, const char *attribute, const char *field);
+
 /* The strongest value of an attribute that is a text, which the layer owns; `otherwise` for other values and for none.
  */
 qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, const char *otherwise, const char **token);

@@ -388,7 +388,8 @@ qmat_status qmat_usd_scene_report(qmat_context *context, const qmat_usd_scene *s
 
 qmat_status qmat_usd_scene_add_mesh(qmat_context *context, const qmat_usd_scene *scene, size_t mesh, qmat_soup *soup) {
   const qmat_usd_transform identity = qmat_usd_identity();
-  const qmat_status status = qmat_usd_mesh_add(context, &scene->meshes[mesh], &identity, soup);
+  qmat_status status = qmat_usd_mesh_add(context, &scene->meshes[mesh], &identity, soup);
+  if (status == QMAT_OK) status = qmat_usd_mesh_add_skin(context, &scene->meshes[mesh], soup);
   if (scene->meshes[mesh].scheme == QMAT_SCHEME_NONE) qmat_soup_clear_cage(soup); /* no subdivision surface */
   return status;
 }

@@ -196,12 +196,33 @@ static void put_skin(qmat_writer *writer, const qmat_mesh *skin) {
   qmat_put_text(writer, "        uniform token subdivisionScheme = \"none\"\n    }\n");
 }
 
+/* The joints and weights of the spheres, as UsdSkel has them. */
+static void put_joints(qmat_writer *writer, const qmat_medial *medial) {
+  static const char *const ending =
+      "] (\n            elementSize = 4\n            interpolation = \"vertex\"\n        )\n";
+  const size_t count = 4 * medial->skinned_count;
+  if (count == 0) return;
+  qmat_put_text(writer, "        int[] primvars:skel:jointIndices = [");
+  for (size_t i = 0; i < count; i++) {
+    put_separator(writer, i);
+    qmat_put_integer(writer, medial->joints[i]);
+  }
+  qmat_put_text(writer, ending);
+  qmat_put_text(writer, "        float[] primvars:skel:jointWeights = [");
+  for (size_t i = 0; i < count; i++) {
+    put_separator(writer, i);
+    put_single(writer, medial->weights[i]);
+  }
+  qmat_put_text(writer, ending);
+}
+
 static void put_spheres(qmat_writer *writer, const qmat_medial *medial) {
   qmat_put_text(writer, "\n    def Points \"spheres\"\n    {\n");
   put_extent(writer, medial->spheres, medial->sphere_count, 4, true);
   put_points(writer, medial->spheres, medial->sphere_count, 4);
   put_radii(writer, "primvars:radius", medial, NULL, medial->sphere_count, 1);
   put_radii(writer, "widths", medial, NULL, medial->sphere_count, 2);
+  put_joints(writer, medial);
   put_guide(writer);
 }
 

@@ -30,7 +30,7 @@ find core io nodes graphs -name '*.[ch]' -o -name '*.cpp' -o -name '*.c.in' | LC
     allow("io/usd", formats)
     allow("nodes/measure", "core core/geometry")
     allow("nodes/initial", "core core/geometry nodes/measure")
-    allow("nodes/mesh", "core core/geometry")
+    allow("nodes/mesh", "core core/geometry nodes/measure")
     allow("nodes/colliders", "core core/geometry nodes/measure")
     allow("nodes/skin", "core core/geometry nodes/measure")
     allow("nodes/descriptor", "core nodes/mesh")

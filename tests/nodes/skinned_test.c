@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -166,7 +167,161 @@ static void test_spheres_of_a_skinned_model_follow_its_joints(void **state) {
   qmr_free(&medial);
 }
 
+/* ---- USD ---- */
+
+/* The arm as a USD mesh with `binding` in place of its joints and weights; "" for those of arm_data. */
+static void write_usd_arm(const char *path, const char *scheme, const char *binding) {
+  size_t sizes[5];
+  uint32_t triangles;
+  qmat_writer data = arm_data(sizes, &triangles);
+  const uint32_t vertices = RINGS * AROUND + 2;
+  const float *points = (const float *)(const void *)data.bytes,
+              *weights = (const float *)(const void *)(data.bytes + sizes[0] + sizes[1] + sizes[2]);
+  const uint16_t *corners = (const uint16_t *)(const void *)(data.bytes + sizes[0]);
+  const uint8_t *joints = data.bytes + sizes[0] + sizes[1];
+  FILE *file = fopen(path, "w");
+  assert_non_null(file);
+  fprintf(file,
+          "#usda 1.0\n(metersPerUnit = 1)\ndef SkelRoot \"r\" {\ndef Mesh \"arm\" {\nrel skel:skeleton = </s>\n"
+          "uniform token subdivisionScheme = \"%s\"\npoint3f[] points = [",
+          scheme);
+  for (uint32_t v = 0; v < vertices; v++)
+    fprintf(file, "%s(%.9g, %.9g, %.9g)", v ? ", " : "", points[3 * v], points[3 * v + 1], points[3 * v + 2]);
+  fputs("]\nint[] faceVertexCounts = [", file);
+  for (uint32_t t = 0; t < triangles; t++) fputs(t ? ", 3" : "3", file);
+  fputs("]\nint[] faceVertexIndices = [", file);
+  for (uint32_t i = 0; i < 3 * triangles; i++) fprintf(file, "%s%u", i ? ", " : "", corners[i]);
+  fprintf(file, "]\n%s", binding);
+  for (int part = 0; part < 2 && !*binding; part++) {
+    fputs(part ? "float[] primvars:skel:jointWeights = [" : "int[] primvars:skel:jointIndices = [", file);
+    for (uint32_t v = 0; v < vertices; v++)
+      for (uint32_t k = 0; k < 2; k++)
+        fprintf(file, "%s%g", v + k ? ", " : "", part ? (double)weights[4 * v + k] : (double)joints[4 * v + k]);
+    fputs("] (elementSize = 2\ninterpolation = \"vertex\")\n", file);
+  }
+  fputs("}\n}\n", file);
+  assert_int_equal(fclose(file), 0);
+  qmat_writer_uninit(&data);
+}
+
+/* Reads the arm as scene.read does: outputs scene, mesh and report. */
+static void read_usd_arm(const char *scheme, const char *binding, qmat_value **read) {
+  char folder[64], path[96], setting[128];
+  make_folder(folder);
+  snprintf(path, sizeof path, "%s/arm.usda", folder);
+  write_usd_arm(path, scheme, binding);
+  snprintf(setting, sizeof setting, "path=%s", path);
+  pipeline_must_run(1, "scene.read", setting, NULL, read);
+  unlink(path);
+  rmdir(folder);
+}
+
+/* Vertices beyond the elbow belong to joint 1, those before it to joint 0. */
+static void assert_joints_follow(const double *places, size_t stride, const uint32_t *joints, const double *weights,
+                                 size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    const double x = places[stride * i];
+    if (fabs(x) < 1) continue;
+    assert_int_equal(joints[4 * i], x > 0);
+    assert_near(weights[4 * i], 1, 1e-6);
+  }
+}
+
+static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **state) {
+  (void)state;
+  qmat_value *read[PIPELINE_MOST_PORTS], *simple[PIPELINE_MOST_PORTS], *written[PIPELINE_MOST_PORTS];
+  read_usd_arm("none", "", read);
+  const qmat_mesh *mesh = (const qmat_mesh *)read[1];
+  assert_int_equal(mesh->skinned_count, RINGS * AROUND + 2);
+  assert_joints_follow(mesh->positions, 3, mesh->joints, mesh->weights, mesh->vertex_count);
+  pipeline p;
+  pipeline_make(&p, (qmat_mesh *)qmat_value_retain(read[1]), "", "");
+  pipeline_must_run(1, "medial.simplify", "epsilon=0.02",
+                    (const qmat_value *[]){read[1], &p.thickness->base, &p.samples->base, &p.medial->base}, simple);
+  const qmat_medial *medial = (const qmat_medial *)simple[0];
+  assert_int_equal(medial->skinned_count, medial->sphere_count);
+  assert_joints_follow(medial->spheres, 4, medial->joints, medial->weights, medial->sphere_count);
+  const qmat_node *write = qmat_node_find("scene.write");
+  const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
+  inputs[qmat_input_find(write, "medial")] = simple[0];
+  inputs[qmat_input_find(write, "scene")] = read[0];
+  pipeline_must_run(1, "scene.write", "format=usda", inputs, written);
+  const qmat_file *file = (const qmat_file *)written[0];
+  char *text = calloc(file->parts[0].size + 1, 1);
+  assert_non_null(text);
+  memcpy(text, file->parts[0].bytes, file->parts[0].size);
+  const char *at = strstr(text, "int[] primvars:skel:jointIndices = [");
+  assert_non_null(at);
+  at = strchr(at, '[') + 2;
+  at = strchr(at, '[') + 1;
+  for (size_t i = 0; i < 4 * medial->sphere_count; i++) {
+    char *end;
+    assert_int_equal(strtoul(at, &end, 10), medial->joints[i]);
+    at = end + (*end == ',');
+  }
+  assert_int_equal(strncmp(at, "] (\n            elementSize = 4\n", 20), 0);
+  assert_non_null(strstr(at, "float[] primvars:skel:jointWeights = ["));
+  free(text);
+  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
+  pipeline_free(&p);
+}
+
+static void test_a_subdivided_cage_keeps_its_joints(void **state) {
+  (void)state;
+  qmat_value *read[PIPELINE_MOST_PORTS], *fine[PIPELINE_MOST_PORTS];
+  read_usd_arm("catmullClark", "", read);
+  pipeline_must_run(1, "mesh.subdivide", "level=1", (const qmat_value *[]){read[1]}, fine);
+  const qmat_mesh *mesh = (const qmat_mesh *)fine[0];
+  assert_true(mesh->vertex_count > RINGS * AROUND + 2);
+  assert_int_equal(mesh->skinned_count, mesh->vertex_count);
+  assert_joints_follow(mesh->positions, 3, mesh->joints, mesh->weights, mesh->vertex_count);
+  for (int i = 0; i < 2; i++) qmat_value_release(fine[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
+}
+
+static void test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_aloud(void **state) {
+  (void)state;
+  static const struct {
+    const char *binding;
+    size_t joint; /* 0: none is read */
+  } cases[] = {
+      {"int[] primvars:skel:jointIndices = [7] (interpolation = \"constant\")\n"
+       "float[] primvars:skel:jointWeights = [1]\n",
+       7},
+      {"int[] primvars:skel:jointIndices = [2, 9, 4] (interpolation = \"constant\" elementSize = 3)\n"
+       "float[] primvars:skel:jointWeights = [0.2, 0.7, 0.1]\n",
+       9},
+      {"int[] primvars:skel:jointIndices = [7, 7, 7] (elementSize = 2)\n"
+       "float[] primvars:skel:jointWeights = [1, 1, 1]\n",
+       0},
+      {"int[] primvars:skel:jointIndices = [7, 7]\nfloat[] primvars:skel:jointWeights = [1]\n", 0},
+      {"float[] primvars:skel:jointIndices = [7]\nfloat[] primvars:skel:jointWeights = [1]\n", 0},
+      {"int[] primvars:skel:jointIndices = [-3] (interpolation = \"constant\" elementSize = -2)\n"
+       "float[] primvars:skel:jointWeights = [nan]\n",
+       0},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    qmat_value *read[PIPELINE_MOST_PORTS];
+    read_usd_arm("none", cases[i].binding, read);
+    const qmat_mesh *mesh = (const qmat_mesh *)read[1];
+    const json_t *warnings = json_object_get(((const qmat_report *)read[2])->root, "warnings");
+    bool warned = false;
+    for (size_t k = 0; k < json_array_size(warnings); k++)
+      warned = warned || strstr(json_string_value(json_array_get(warnings, k)), "/r/arm: its joints are left out: ");
+    if (i < 5) assert_int_equal(warned, cases[i].joint == 0);
+    if (i < 5) assert_int_equal(mesh->skinned_count, cases[i].joint ? mesh->vertex_count : 0);
+    for (size_t v = 0; v < mesh->skinned_count; v++) assert_int_equal(mesh->joints[4 * v], cases[i].joint);
+    for (int k = 0; k < 3; k++) qmat_value_release(read[k]);
+  }
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints),
+      cmocka_unit_test(test_joints_of_usd_meshes_reach_their_spheres_and_the_layer),
+      cmocka_unit_test(test_a_subdivided_cage_keeps_its_joints),
+      cmocka_unit_test(test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_aloud),
+  };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
