@@ -73,6 +73,7 @@ typedef struct qmat_port {
    * a list, the node runs once per item. */
   bool list;
   bool on_request; /* an output of a graph that is made only where a run saves it */
+  bool decides;    /* an input whose value `reads` needs; it takes no list */
 } qmat_port;
 
 /* How an entry of a report enters the summary of a run, and how the reports of several meshes are merged. */
@@ -133,8 +134,9 @@ typedef struct qmat_node {
    * counts are known. */
   qmat_status (*check_counts)(qmat_context *context, const void *params, const size_t counts[]);
   /* Whether an input is read with these parameters; NULL: each is. One that is not is as if unconnected, and what only
-   * it needs does not run. */
-  bool (*reads)(const void *params, size_t input);
+   * it needs does not run. `known` has per input the value of one that decides, once it is made, else NULL; NULL:
+   * nothing is made yet. An input that is not read stays so when more is known. */
+  bool (*reads)(const void *params, const qmat_value *const *known, size_t input);
   /* Makes every output: sealed, with one reference, which the caller releases. On failure no output is set. Scratch
    * memory comes from context->arena. */
   qmat_status (*run)(qmat_context *context, const void *params, const qmat_value *const inputs[],

@@ -118,6 +118,15 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
                                           .stated = stated}};
 }
 
+static bool is_usd(const scene_write_params *params) {
+  return params->format == FORMAT_USDA || params->format == FORMAT_USDZ;
+}
+
+/* Whether the scene itself is written, with its own meshes: a glTF scene as glTF, or a USD scene as USD. */
+static bool keeps_scene(const scene_write_params *params, const qmat_scene *scene) {
+  return scene && scene->part_count > 0 && (scene->placement_count > 0) == is_usd(params);
+}
+
 /* The name of a mesh in a list, else that of the scene; NULL: none. */
 static const char *name_of(const qmat_scene *scene, const qmat_value *medial, size_t index) {
   if (medial->type == QMAT_LIST) return ((const qmat_list *)medial)->names[index];
@@ -135,7 +144,7 @@ static unsigned collider_forms(const scene_write_params *params) {
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               json_t *report, qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  const bool placed = scene && scene->placement_count > 0, kept = scene && scene->part_count > 0 && !placed;
+  const bool placed = scene && scene->placement_count > 0, kept = keeps_scene(params, scene);
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
                expected = (kept || placed) && scene->mesh_count > 0 ? scene->mesh_count : 1;
   if (count != expected) {
@@ -219,8 +228,7 @@ static qmat_status fail_several(qmat_context *context, size_t count) {
 static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                              qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  if (scene && scene->placement_count > 0 && scene->part_count > 0)
-    return write_layer(context, params, inputs, stated, file);
+  if (keeps_scene(params, scene)) return write_layer(context, params, inputs, stated, file);
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   if (count > 1) return fail_several(context, count);
   qmat_usd_options options = usd_options_of(params, scene, (const qmat_medial *)inputs[IN_MEDIAL],
@@ -311,12 +319,14 @@ static qmat_status check_counts(qmat_context *context, const void *data, const s
   return QMAT_OK;
 }
 
-/* A medial mesh alone needs no skin, and colliders alone need neither that nor errors. */
-static bool reads(const void *data, size_t input) {
+/* A medial mesh alone needs no skin, nor does a scene that keeps its own meshes. Colliders alone need neither that nor
+ * errors. */
+static bool reads(const void *data, const qmat_value *const *known, size_t input) {
   const scene_write_params *params = data;
+  const qmat_scene *scene = known ? (const qmat_scene *)known[IN_SCENE] : NULL;
   const bool is_robot = params->format >= FORMAT_URDF,
              is_plain = params->format == FORMAT_MA || params->format == FORMAT_PLY;
-  if (input == IN_SKIN) return !is_robot && !is_plain;
+  if (input == IN_SKIN) return !is_robot && !is_plain && (params->skin_beside || !keeps_scene(params, scene));
   return input != IN_COLLIDERS || !is_plain;
 }
 
@@ -453,12 +463,13 @@ static const qmat_port inputs[] = {
     {.name = "scene",
      .type = QMAT_SCENE,
      .optional = true,
+     .decides = true,
      .doc = "The scene that the model was read from: a glTF scene to write back, else its name and unit"},
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh, or one for each mesh of the scene", .list = true},
     {.name = "skin",
      .type = QMAT_MESH,
      .optional = true,
-     .doc = "The surface that viewers show; not in ma and ply",
+     .doc = "The surface that viewers show; not in ma and ply, nor in a scene with meshes of its own",
      .list = true},
     {.name = "report",
      .type = QMAT_REPORT,

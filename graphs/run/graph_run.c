@@ -6,6 +6,7 @@
 
 #include "graphs/run/run_cache.h"
 #include "graphs/run/run_step.h"
+#include "graphs/run/run_unread.h"
 
 /* Names the run after its first scene. */
 static qmat_status take_name(qmat_executor *executor, const qmat_run_step *step, bool *named) {
@@ -88,6 +89,7 @@ static qmat_status execute_step(qmat_executor *executor, size_t index, bool *nam
   if (status == QMAT_OK && made_list(node->type, step)) status = check_list_lengths(executor, index + 1);
   for (size_t port = 0; port < qmat_input_count(node->type); port++)
     if (step->inputs[port] != SIZE_MAX) run->slots[step->inputs[port]].readers--;
+  if (status == QMAT_OK) qmat_run_drop_unread(run, index + 1);
   qmat_run_release_unread(run);
   return status;
 }
@@ -132,5 +134,7 @@ void qmat_run_foresee(qmat_run *run) {
       step->state = QMAT_STEP_DEPENDS;
     else if (!qmat_run_look_up(run, i))
       step->state = QMAT_STEP_RUN;
+    else
+      qmat_run_drop_unread(run, i + 1);
   }
 }

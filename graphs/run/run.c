@@ -83,14 +83,16 @@ qmat_status qmat_step_init(qmat_context *context, const qmat_graph *graph, size_
   return QMAT_OK;
 }
 
+void qmat_step_uninit(qmat_run_step *step) {
+  qmat_free(step->params);
+  qmat_free(step->inputs);
+  qmat_free(step->made);
+  json_decref(step->report);
+  json_decref(step->key_items);
+}
+
 void qmat_run_uninit(qmat_run *run) {
-  for (size_t i = 0; i < run->step_count; i++) {
-    qmat_free(run->steps[i].params);
-    qmat_free(run->steps[i].inputs);
-    qmat_free(run->steps[i].made);
-    json_decref(run->steps[i].report);
-    json_decref(run->steps[i].key_items);
-  }
+  for (size_t i = 0; i < run->step_count; i++) qmat_step_uninit(&run->steps[i]);
   for (size_t i = 0; i < run->hashed_count; i++) qmat_free(run->hashed[i].path);
   qmat_free(run->hashed);
   for (size_t i = 0; run->slots && i < run->slot_count; i++) release_slot(&run->slots[i]);

@@ -46,6 +46,7 @@ typedef struct qmat_run_step {
   size_t *inputs;            /* slot per input port; SIZE_MAX: not connected */
   size_t first_slot;         /* of its output ports */
   bool done;
+  bool wanted; /* runs whether or not its outputs are read */
   bool forced; /* runs whatever the cache has */
   qmat_step_state state;
   bool keyed;            /* the next three are set: there is a cache, and every input file is readable */
@@ -121,6 +122,9 @@ void qmat_run_reset(qmat_run *run);
 /* Makes a zeroed step a step of `node`: its parameters (NULL: the node's), and arrays for its ports. */
 qmat_status qmat_step_init(qmat_context *context, const qmat_graph *graph, size_t node, const void *params, int format,
                            qmat_run_step *step);
+
+/* Frees what a step holds. Works on a zeroed one. */
+void qmat_step_uninit(qmat_run_step *step);
 
 /* Frees what the run holds. Works on a zeroed and on a failed run. */
 void qmat_run_uninit(qmat_run *run);

@@ -7,6 +7,7 @@
 #include "graphs/graph_names.h"
 #include "graphs/graph_params.h"
 #include "graphs/run/run_paths.h"
+#include "graphs/run/run_unread.h"
 
 typedef struct run_planner {
   qmat_context *context;
@@ -16,7 +17,8 @@ typedef struct run_planner {
   int *formats;      /* per file: the format that its step runs in, or -1 */
   bool *within;      /* per node: options->to_node needs it, or is it */
   bool *replaced;    /* per node: values are given for it */
-  bool *needed;      /* per node: it runs with its own parameters */
+  bool *needed;      /* per node: it runs with its own parameters ... */
+  bool *wanted;      /* ... and not only because others read what it makes */
   size_t *base_step; /* per node: the step of that run */
 } run_planner;
 
@@ -106,7 +108,7 @@ static void mark_inputs(run_planner *planner, size_t index, int format, void *pa
   if (node->type->params_size > 0) memcpy(params, node->params, node->type->params_size);
   if (param) memcpy((char *)params + param->offset, &format, sizeof format);
   for (size_t port = 0; port < qmat_input_count(node->type); port++)
-    if (node->links[port].node != SIZE_MAX && (!node->type->reads || node->type->reads(params, port)))
+    if (node->links[port].node != SIZE_MAX && (!node->type->reads || node->type->reads(params, NULL, port)))
       planner->needed[node->links[port].node] = true;
 }
 
@@ -136,6 +138,7 @@ static qmat_status plan_needs(run_planner *planner) {
     for (size_t i = 0; i < graph->node_count; i++)
       if (qmat_output_count(graph->nodes[i].type) == 0) planner->needed[i] = true;
   }
+  memcpy(planner->wanted, planner->needed, graph->node_count * sizeof *planner->wanted);
   size_t largest = 1;
   for (size_t i = 0; i < graph->node_count; i++)
     if (graph->nodes[i].type->params_size > largest) largest = graph->nodes[i].type->params_size;
@@ -188,6 +191,7 @@ static qmat_status plan_steps(run_planner *planner) {
       planner->base_step[index] = run->step_count;
       qmat_status status = add_step(planner, index, choice_of(graph->nodes[index].type, graph->nodes[index].params));
       if (status != QMAT_OK) return status;
+      run->steps[planner->base_step[index]].wanted = planner->wanted[index];
     }
     for (size_t i = 0; i < run->file_count; i++) {
       if (graph->outputs[run->files[i].output].node != index || !needs_own_step(planner, i)) continue;
@@ -240,7 +244,7 @@ static qmat_status plan_slots(run_planner *planner) {
     for (size_t port = 0; port < qmat_input_count(node->type); port++) {
       const qmat_graph_link *link = &node->links[port];
       step->inputs[port] = SIZE_MAX;
-      if (link->node == SIZE_MAX || (node->type->reads && !node->type->reads(step->params, port))) continue;
+      if (link->node == SIZE_MAX || (node->type->reads && !node->type->reads(step->params, NULL, port))) continue;
       status = find_slot(planner, link->node, link->port, &step->inputs[port]);
       if (status != QMAT_OK) return status;
     }
@@ -287,9 +291,10 @@ qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const 
   planner.within = qmat_calloc(graph->node_count, sizeof *planner.within);
   planner.replaced = qmat_calloc(graph->node_count, sizeof *planner.replaced);
   planner.needed = qmat_calloc(graph->node_count, sizeof *planner.needed);
+  planner.wanted = qmat_calloc(graph->node_count, sizeof *planner.wanted);
   planner.base_step = qmat_calloc(graph->node_count, sizeof *planner.base_step);
   qmat_status status = QMAT_OK;
-  if (!planner.within || !planner.replaced || !planner.needed || !planner.base_step) {
+  if (!planner.within || !planner.replaced || !planner.needed || !planner.wanted || !planner.base_step) {
     status = qmat_fail_memory(context, "plan");
     goto cleanup;
   }
@@ -308,6 +313,7 @@ qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const 
   if (status == QMAT_OK) status = plan_steps(&planner);
   if (status == QMAT_OK) status = plan_slots(&planner);
   if (status != QMAT_OK) goto cleanup;
+  qmat_run_drop_unread(run, 0); /* given values may decide */
   name_run(run);
   for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
     char what[QMAT_GRAPH_NAME_SIZE + 16];
@@ -320,6 +326,7 @@ cleanup:
   qmat_free(planner.within);
   qmat_free(planner.replaced);
   qmat_free(planner.needed);
+  qmat_free(planner.wanted);
   qmat_free(planner.base_step);
   return status;
 }

@@ -116,6 +116,33 @@ static const qmat_node test_add = {.name = "test.add",
                                    .outputs = add_outputs,
                                    .run = add_run};
 
+/* The second number where the first is below 1, else the first, without reading the second. */
+static bool pick_reads(const void *params, const qmat_value *const *known, size_t input) {
+  (void)params;
+  return input == 0 || !known || !known[0] || test_value(known[0]) < 1;
+}
+
+static qmat_status pick_run(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                            qmat_value *outputs[]) {
+  (void)params;
+  const double first = test_value(inputs[0]);
+  assert_true((inputs[1] != NULL) == (first < 1));
+  return test_report(context, first < 1 ? test_value(inputs[1]) : first, &outputs[0]);
+}
+
+static const qmat_port pick_inputs[] = {{.name = "first", .type = QMAT_REPORT, .decides = true, .doc = "One"},
+                                        {.name = "second", .type = QMAT_REPORT, .optional = true, .doc = "Another"},
+                                        {0}};
+static const qmat_node test_pick = {.name = "test.pick",
+                                    .version = 1,
+                                    .summary = "One of two",
+                                    .doc = "",
+                                    .citation = "",
+                                    .inputs = pick_inputs,
+                                    .outputs = add_outputs,
+                                    .reads = pick_reads,
+                                    .run = pick_run};
+
 typedef struct print_params {
   int format;
   const char *label;
@@ -295,8 +322,8 @@ static const qmat_node test_ball = {.name = "test.ball",
                                     .report_summary = &qmat_medial_summary,
                                     .run = ball_run};
 
-static const qmat_node *const test_node_table[] = {&test_add,    &test_ball,  &test_fail, &test_mesh,
-                                                   &test_number, &test_print, &test_wait};
+static const qmat_node *const test_node_table[] = {&test_add,    &test_ball, &test_fail,  &test_mesh,
+                                                   &test_number, &test_pick, &test_print, &test_wait};
 static const qmat_registry test_registry = {test_node_table, sizeof test_node_table / sizeof *test_node_table};
 
 /* Reads graph text under the name "g.yaml". */

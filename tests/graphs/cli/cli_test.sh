@@ -136,6 +136,10 @@ for file in listed.*; do
   holds "$file is listed" grep -qF -e "$file (" out.txt
   holds "$file is in the report" grep -qF "\"$file\"" report_of_files.json
 done
+holds "a scene with meshes of its own needs no skin" sh -c '! grep -q medial.skin report_of_files.json'
+expect 0 "certified" "$qmat" mat roof.gltf -o beside.gltf --epsilon 10% $coarse --report beside.json --set asset.skin_beside=true
+holds "the skin beside it is made" grep -q medial.skin beside.json
+holds "the skin of a model is made" grep -q medial.skin report.json
 holds "the report names all" test "$(grep -c '"sha256"' report.json)" -eq 3
 holds "a valid glb" test "$(head -c 4 box.glb)" = glTF
 expect 0 "surface to envelope" "$qmat" run "$source/graphs/qmat_plus.yaml" --set model.path=box.off \

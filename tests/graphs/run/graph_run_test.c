@@ -337,6 +337,50 @@ static void test_given_values_replace_a_node(void **state) {
   assert_true(test_value(qmat_run_value(&f->run, 1, 0)) == 42);
 }
 
+static const char pick_graph[] =
+    "qmat: 1\n"
+    "inputs: { value: one.value }\n"
+    "nodes:\n"
+    "  one:   { type: test.number, params: { value: %s } }\n"
+    "  two:   { type: test.number, params: { value: 2 } }\n"
+    "  twice: { type: test.add, in: { first: two.number, second: two.number } }\n"
+    "  pick:  { type: test.pick, in: { first: one.number, second: twice.sum } }\n"
+    "outputs: { sum: pick.sum }\n";
+
+static void pick(fixture *f, const char *value, qmat_run_options options, double sum) {
+  char text[512];
+  snprintf(text, sizeof text, pick_graph, value);
+  qmat_run_uninit(&f->run);
+  qmat_graph_uninit(&f->graph);
+  f->log[0] = 0;
+  read_graph(f, text);
+  const qmat_run_port wants[2] = {{3, 0}, {2, 0}};
+  options.wants = wants;
+  options.want_count += 1;
+  run_all(f, options);
+  assert_true(test_value(qmat_run_value(&f->run, 3, 0)) == sum);
+}
+
+static void test_what_a_value_makes_unread_does_not_run_and_is_no_part_of_the_run(void **state) {
+  fixture *f = *state;
+  pick(f, "0.5", (qmat_run_options){0}, 4);
+  assert_string_equal(f->log, "one two twice pick ");
+  pick(f, "1", (qmat_run_options){0}, 1);
+  assert_string_equal(f->log, "one pick ");
+  assert_int_equal(f->run.step_count, 2);
+  /* It is wanted for itself. */
+  pick(f, "1", (qmat_run_options){.want_count = 1}, 1);
+  assert_string_equal(f->log, "one two twice pick ");
+  assert_true(test_value(qmat_run_value(&f->run, 2, 0)) == 4);
+  /* It is given, and so is what decides. */
+  qmat_value *value;
+  test_ok(&f->context, test_report(&f->context, 7, &value));
+  const qmat_run_given given = {0, 0, value};
+  pick(f, "0.5", (qmat_run_options){.given = &given, .given_count = 1}, 7);
+  qmat_value_release(value);
+  assert_string_equal(f->log, "pick ");
+}
+
 static void test_the_report_tells_every_node_file_and_the_summary(void **state) {
   fixture *f = *state;
   read_graph(f, ball_graph);
@@ -480,6 +524,7 @@ int main(void) {
       TEST(test_a_run_is_cancelled_inside_and_between_nodes),
       TEST(test_rules_between_parameters_are_checked_before_the_run),
       TEST(test_given_values_replace_a_node),
+      TEST(test_what_a_value_makes_unread_does_not_run_and_is_no_part_of_the_run),
       TEST(test_the_report_tells_every_node_file_and_the_summary),
       TEST(test_the_reports_of_several_meshes_become_one_summary),
       TEST(test_two_runs_give_the_same_digests),
