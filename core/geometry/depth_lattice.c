@@ -6,10 +6,7 @@
 
 #include "core/geometry/vector.h"
 
-enum { FIRST_CAPACITY = 1 << 13, PLACES = 1 << 14 };
-
-/* The width of the cubes that remember a place, in spacings. */
-static const double cube_share = 0.5;
+enum { FIRST_CAPACITY = 1 << 13 };
 
 /* A node decides the side of a point when its depth exceeds their distance by this much, which is far above the
  * rounding error of a depth. */
@@ -22,15 +19,11 @@ qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *l
                                     double spacing) {
   /* The key bits limit how fine the lattice can be. */
   *lattice = (qmat_depth_lattice){.surface = surface, .spacing = fmax(spacing, 4 * reach / (double)key_offset)};
-  lattice->places = qmat_calloc(PLACES, sizeof *lattice->places);
-  if (qmat_key_table_init(&lattice->nodes, FIRST_CAPACITY) || !lattice->places)
-    return qmat_fail_memory(context, "depths");
-  return QMAT_OK;
+  return qmat_key_table_init(&lattice->nodes, FIRST_CAPACITY) ? qmat_fail_memory(context, "depths") : QMAT_OK;
 }
 
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice) {
   qmat_key_table_uninit(&lattice->nodes);
-  qmat_free(lattice->places);
   *lattice = (qmat_depth_lattice){0};
 }
 
@@ -44,40 +37,12 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
   return -qmat_surface_signed_distance_near(lattice->surface, point, -near, distance * (1 + 1e-9) + side_margin);
 }
 
-/* The key of the cube that contains a point, and the slot of that cube. */
-static qmat_lattice_place *find_place(const qmat_depth_lattice *lattice, const double point[3], uint64_t *key) {
-  const double side = cube_share * lattice->spacing;
-  *key = 1;
-  for (int k = 0; k < 3; k++) *key = qmat_hash_mix(*key + (uint64_t)(int64_t)floor(point[k] / side));
-  return &lattice->places[*key & (PLACES - 1)];
-}
-
-static void remember(const qmat_depth_lattice *lattice, const double point[3], double least_depth) {
-  uint64_t key;
-  qmat_lattice_place *place = find_place(lattice, point, &key);
-  place->key = key;
-  memcpy(place->point, point, sizeof place->point);
-  place->least_depth = least_depth;
-}
-
-double qmat_depth_lattice_least(const qmat_depth_lattice *lattice, const double point[3]) {
-  uint64_t key;
-  const qmat_lattice_place *place = find_place(lattice, point, &key);
-  return place->key == key ? place->least_depth - qmat_point_distance(place->point, point) : -INFINITY;
-}
-
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth) {
   const double gap = distance * (1 + 1e-9) + side_margin;
-  double found;
-  if (near > gap && depth < near + gap) {
-    lattice->queries++;
-    found = qmat_surface_depth_up_to(lattice->surface, point, depth);
-  } else {
-    found = qmat_depth_lattice_exact_near(lattice, point, near, distance);
-  }
-  remember(lattice, point, found < INFINITY ? found : depth);
-  return found;
+  if (!(near > gap && depth < near + gap)) return qmat_depth_lattice_exact_near(lattice, point, near, distance);
+  lattice->queries++;
+  return qmat_surface_depth_up_to(lattice->surface, point, depth);
 }
 
 /* Computes the depth at a node, with the help of a neighbour whose depth is known. */

@@ -5,21 +5,14 @@
 #include "core/geometry/surface.h"
 #include "core/key_table.h"
 
-/* The newest point that was queried in one cube between the nodes. */
-typedef struct qmat_lattice_place {
-  uint64_t key; /* of the cube; 0: none */
-  double point[3], least_depth;
-} qmat_lattice_place;
-
 /* A cache of depths at the nodes of a cubic lattice. Depth is the distance to the surface, negative outside. Each node
  * is computed when it is first needed. Depth is 1-Lipschitz, so a node bounds it everywhere nearby. Results depend on
- * the point alone, not on earlier queries; only qmat_depth_lattice_least depends on them. One thread at a time. */
+ * the point alone, not on earlier queries. One thread at a time. */
 typedef struct qmat_depth_lattice {
   const qmat_surface *surface;
   double spacing;
-  qmat_key_table nodes;       /* the depths of the nodes known so far */
-  qmat_lattice_place *places; /* indexed by the lowest bits of the hash of their keys */
-  uint64_t queries;           /* number of distance queries to the surface */
+  qmat_key_table nodes; /* the depths of the nodes known so far */
+  uint64_t queries;     /* number of distance queries to the surface */
 } qmat_depth_lattice;
 
 /* Starts empty. `spacing` is in the unit frame, at least 1e-6. QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit,
@@ -42,9 +35,5 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
 /* The same, but INFINITY where the depth is certainly above `depth`, which is cheaper to decide. */
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth);
-
-/* A lower bound of the depth at `point` from the newest qmat_depth_lattice_exact_up_to query nearby; -INFINITY when
- * there was none. */
-double qmat_depth_lattice_least(const qmat_depth_lattice *lattice, const double point[3]);
 
 #endif

@@ -124,7 +124,6 @@ static bool search_piece(search *s, const piece *p, int level) {
     if (is_done(s, farthest - near + gap, size, last)) return true;
     if (size > flat_size * s->limit && near > gap && is_flat(s, p)) return true;
     ask = size <= s->smallest || last;
-    if (ask && is_done(s, farthest - qmat_depth_lattice_least(s->lattice, centre), size, last)) return true;
   }
   if (ask) {
     const double depth = s->lattice

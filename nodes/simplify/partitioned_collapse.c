@@ -35,7 +35,6 @@ typedef struct piece_result {
   uint32_t *edges, *triangles;
   double *edge_bounds, *triangle_bounds;
   qmat_collapse_counts counts;
-  size_t queries;
 } piece_result;
 
 typedef struct partition {
@@ -262,7 +261,6 @@ static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *
       d->constraints->weights[3 * (size_t)points[i] + k] = own->surface_tracker.weights[3 * i + k];
     }
   result->counts = own->counts;
-  result->queries = own->envelope_tracker.lattice.queries;
   if (take_rows(vertices, c->edge_alive, c->edges, own->envelope_tracker.edge_bounds, c->edge_count, 2,
                 &result->edge_count, &result->edges, &result->edge_bounds) ||
       take_rows(vertices, c->triangle_alive, c->triangles, own->envelope_tracker.triangle_bounds, c->triangle_count, 3,
@@ -340,7 +338,6 @@ static void add_counts(const partition *d) {
     whole->counts.refused_by_surface_to_envelope += result->counts.refused_by_surface_to_envelope;
     whole->counts.refused_by_envelope_to_surface += result->counts.refused_by_envelope_to_surface;
     whole->counts.refused_by_topology += result->counts.refused_by_topology;
-    whole->envelope_tracker.lattice.queries += result->queries;
   }
 }
 

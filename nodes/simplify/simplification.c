@@ -103,7 +103,6 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
   if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);
   qmat_simplify_figures_of(round, &a->figures);
   a->figures.filled += filled;
-  a->figures.queries = s->dense.envelope_tracker.lattice.queries;
   a->figures.surface_to_envelope = after.surface_to_envelope;
   a->figures.envelope_to_surface = after.envelope_to_surface;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);

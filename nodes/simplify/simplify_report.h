@@ -13,7 +13,7 @@ typedef struct qmat_simplify_figures {
   double crease_error, surface_to_envelope, envelope_to_surface;
   bool in_order;    /* then only the next member applies, else only those after it */
   double threshold; /* of the last collapse */
-  size_t rounds, filled, moves, queries;
+  size_t rounds, filled, moves;
 } qmat_simplify_figures;
 
 /* Takes over what a decimation tells. */

@@ -142,15 +142,14 @@ static void test_points_beyond_the_lattice_get_the_exact_depth(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
-static void test_queried_places_bound_the_depths_around_them(void **state) {
+static void test_a_depth_is_exact_up_to_a_limit(void **state) {
   qmat_depth_lattice lattice;
   make_lattice(&lattice, state, 0.02);
   random_numbers random = {.seed = 3};
-  size_t known = 0, inside = 0;
+  size_t above = 0, exact = 0;
   for (int round = 0; round < 6000; round++) {
-    double point[3], beside[3], gap;
+    double point[3], gap;
     random_point(&random, 0.3, point);
-    for (int k = 0; k < 3; k++) beside[k] = point[k] + random_between(&random, -0.002, 0.002);
     const double near = qmat_depth_lattice_near(&lattice, point, &gap), most = random_between(&random, 0, 0.1);
     const double asked = qmat_depth_lattice_exact_up_to(&lattice, point, near, gap, most);
     const double depth = qmat_depth_lattice_exact(&lattice, point);
@@ -158,16 +157,10 @@ static void test_queried_places_bound_the_depths_around_them(void **state) {
       assert_near(asked, depth, 1e-12);
     else
       assert_true(depth > most);
-    assert_near(qmat_depth_lattice_least(&lattice, point), asked < INFINITY ? depth : most, 1e-12);
-    const double least = qmat_depth_lattice_least(&lattice, beside);
-    const double truth = qmat_depth_lattice_exact(&lattice, beside);
-    assert_true(least <= truth + 1e-12);
-    known += least > -INFINITY;
-    inside += least > 0;
+    above += asked == INFINITY;
+    exact += asked < INFINITY && asked > 0;
   }
-  assert_true(known > 3000 && inside > 100);
-  static const double elsewhere[3] = {0.9, 0.9, 0.9};
-  assert_true(qmat_depth_lattice_least(&lattice, elsewhere) == -INFINITY);
+  assert_true(above > 100 && exact > 100);
   qmat_depth_lattice_uninit(&lattice);
 }
 
@@ -196,7 +189,7 @@ int main(void) {
       cmocka_unit_test(test_nodes_are_exact),
       cmocka_unit_test(test_depths_do_not_depend_on_earlier_queries),
       cmocka_unit_test(test_points_beyond_the_lattice_get_the_exact_depth),
-      cmocka_unit_test(test_queried_places_bound_the_depths_around_them),
+      cmocka_unit_test(test_a_depth_is_exact_up_to_a_limit),
       cmocka_unit_test(test_corners_of_the_lattice_have_different_keys),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);
