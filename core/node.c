@@ -288,7 +288,8 @@ static double find_diagonal(const qmat_node *node, const qmat_value *const input
 
 static qmat_status fail_unit(qmat_context *context, const qmat_param *param, const char *text) {
   qmat_fail(context, QMAT_ERROR_USAGE, "%s is %s, but the model has no unit of length", param->name, text);
-  qmat_fail_hint(context, "type a share of the diagonal, such as 1%%, or state the file's unit: --set model.unit=mm");
+  qmat_fail_hint(context,
+                 "type a share of the diagonal, such as 1%%, or state the file's unit; qmat mat: --set model.unit=mm");
   return qmat_fail_field(context, param->name);
 }
 

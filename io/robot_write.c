@@ -219,7 +219,7 @@ qmat_status qmat_robot_write(qmat_context *context, const qmat_colliders *collid
     if (format != QMAT_ROBOT_YAML) continue;
     qmat_fail(context, QMAT_ERROR_USAGE, "cuRobo's YAML holds spheres only");
     qmat_fail_field(context, "colliders");
-    return qmat_fail_hint(context, "set kind of medial.colliders to spheres");
+    return qmat_fail_hint(context, "set kind of medial.colliders to spheres; qmat mat: --kind spheres");
   }
   qmat_file *made = qmat_file_new();
   qmat_status status = made ? QMAT_OK : qmat_fail_memory(context, "the output file");

@@ -242,7 +242,7 @@ static qmat_status check_counts(conversion *c) {
 
 static qmat_status refuse_or_drop(conversion *c, size_t facet) {
   if (!c->drops_defects) {
-    qmat_fail_hint(c->context, "set 'defects: drop' to drop such facets (qmat mat: --set model.defects=drop)");
+    qmat_fail_hint(c->context, "set 'defects: drop' to drop such facets; qmat mat: --set model.defects=drop");
     return at_facet(c, facet);
   }
   c->dropped[facet] = 1;

@@ -207,7 +207,7 @@ static qmat_status make_skin_surface(skin *s) {
     qmat_format_number(list.spacing, spacing, sizeof spacing);
     qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "spacing %s needs more than %zu balls, too many for a skin surface",
               spacing, MOST_BALLS);
-    qmat_fail_hint(s->context, "raise the spacing, simplify the medial mesh further, or use method envelope");
+    qmat_fail_hint(s->context, "a larger spacing, a simpler medial mesh, or qmat mat: --set skin.method=envelope");
     status = qmat_fail_field(s->context, "spacing");
   }
   if (status == QMAT_OK) status = qmat_progress(s->context, 0, list.count, "balls");

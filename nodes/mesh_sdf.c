@@ -198,7 +198,10 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
   if (measured == 0) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "no ray hits an opposite side: the surface encloses no solid");
     qmat_fail_field(context, "mesh");
-    return qmat_fail_hint(context, "check that the surface is closed and its normals point outwards");
+    return qmat_fail_hint(context,
+                          "check that the surface is closed and its normals point outwards; qmat mat: --set "
+                          "solid.solid=auto makes solids "
+                          "and sheets of any surface");
   }
   const double mean = sum / (double)measured;
   vertex_facets around;

@@ -106,7 +106,7 @@ static qmat_status check_face(const subdivision *s, size_t face, uint32_t *last_
   if (size < 3) return fail_face(s->context, face, "a face of a subdivision surface has %u corners", size);
   if (s->groups[s->face_groups[face]].scheme == QMAT_SCHEME_LOOP && size != 3) {
     fail_face(s->context, face, "Loop's scheme needs triangles, but the face has %u corners", size);
-    return qmat_fail_hint(s->context, "scheme=catmull_clark accepts any polygons");
+    return qmat_fail_hint(s->context, "qmat mat: --set surface.scheme=catmull_clark accepts any polygons");
   }
   for (uint32_t k = 0; k < size; k++) {
     if (last_use[corners[k]] == (uint32_t)face + 1)
@@ -346,14 +346,18 @@ static qmat_status fail_too_fine(const subdivision *s, int level, int depth, con
   if (!coarser->mesh) {
     qmat_fail(s->context, QMAT_ERROR_GEOMETRY, "measuring level %d takes %.0f faces, and at most %.0f are made", level,
               faces_at(s, depth), MOST_FACES);
-    return qmat_fail_field(s->context, "level");
+    qmat_fail_field(s->context, "level");
+    int finest = level - 1;
+    while (finest > 0 && faces_at(s, finest + 1) > MOST_FACES) finest--;
+    if (finest > 0) qmat_fail_hint(s->context, "qmat mat: --set surface.level=%d", finest);
+    return QMAT_ERROR_GEOMETRY;
   }
   qmat_fail(s->context, QMAT_ERROR_GEOMETRY,
             "a deviation below %.2g of the diagonal takes %.0f faces, and at most %.0f are made", coarser->deviation,
             faces_at(s, depth), MOST_FACES);
   qmat_fail_field(s->context, "epsilon");
-  if (level == 1) return qmat_fail_hint(s->context, "set a larger epsilon or tolerance");
-  return qmat_fail_hint(s->context, "set a larger epsilon or tolerance, or level=%d", level - 1);
+  if (level == 1) return qmat_fail_hint(s->context, "a larger epsilon");
+  return qmat_fail_hint(s->context, "a larger epsilon, or qmat mat: --set surface.level=%d", level - 1);
 }
 
 /* Makes the given level, or the first whose deviation is allowed. Semi-sharp edges are subdivided deeper as long as

@@ -222,7 +222,9 @@ static qmat_status write_layer(qmat_context *context, const scene_write_params *
 static qmat_status fail_several(qmat_context *context, size_t count) {
   qmat_fail(context, QMAT_ERROR_USAGE, "this format holds one medial mesh, not %zu", count);
   qmat_fail_field(context, "medial");
-  return qmat_fail_hint(context, "set mesh of scene.read to a name, a number or merged, or write glb or gltf");
+  return qmat_fail_hint(
+      context,
+      "write .glb or .gltf, or choose a mesh: qmat mat: --set model.mesh=merged, or =0 or another number or name");
 }
 
 static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
@@ -362,7 +364,7 @@ static qmat_status check_certified(qmat_context *context, const qmat_value *give
                 out, in, epsilon);
     if (given->type == QMAT_LIST) qmat_fail_within(context, ((const qmat_list *)given)->names[i]);
     qmat_fail_field(context, "require");
-    return qmat_fail_hint(context, "a larger epsilon, or require=none");
+    return qmat_fail_hint(context, "a larger epsilon, or qmat mat: --require none");
   }
   return QMAT_OK;
 }

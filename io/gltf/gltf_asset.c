@@ -208,10 +208,11 @@ static qmat_status fail_choice(qmat_context *context, const char *path, const ch
                                size_t mesh_count) {
   if (named > 1) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu meshes have the name '%s'", named, choice);
-    qmat_fail_hint(context, "type a mesh number from 0 to %zu", mesh_count - 1);
+    qmat_fail_hint(context, "a number from 0 to %zu; qmat mat: --set model.mesh=0", mesh_count - 1);
   } else {
     qmat_fail(context, QMAT_ERROR_USAGE, "no node references a mesh named or numbered '%s'", choice);
-    qmat_fail_hint(context, "type all, merged, a mesh's name, or a mesh number below %zu", mesh_count);
+    qmat_fail_hint(context, "a mesh's name, a number below %zu, merged, or all; qmat mat: --set model.mesh=all",
+                   mesh_count);
   }
   qmat_fail_at(context, path, 0, 0);
   return qmat_fail_field(context, "mesh");

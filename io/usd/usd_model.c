@@ -33,12 +33,13 @@ static qmat_status choose(qmat_context *context, const qmat_usd_scene *scene, co
                           bool *chosen) {
   const bool all = strcmp(choice, "all") == 0;
   size_t found = 0, number = number_of(choice);
+  const char *first = NULL; /* path that ends in the choice */
   for (size_t i = 0; i < scene->mesh_count; i++) chosen[i] = all;
   for (size_t i = 0; i < scene->placement_count && !all; i++) {
     const qmat_usd_placement *placement = &scene->placements[i];
     if (chosen[placement->mesh] || !ends_in(placement->path, choice)) continue;
     chosen[placement->mesh] = true;
-    found++;
+    if (found++ == 0) first = placement->path;
   }
   if (found == 0 && !all && number < scene->mesh_count) {
     chosen[number] = true;
@@ -47,10 +48,11 @@ static qmat_status choose(qmat_context *context, const qmat_usd_scene *scene, co
   if (all || found == 1) return QMAT_OK;
   if (found == 0) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the scene has no mesh '%s'", choice);
-    qmat_fail_hint(context, "all, merged, the path of a prim, or a number below %zu", scene->mesh_count);
+    qmat_fail_hint(context, "the path of a prim, a number below %zu, merged, or all; qmat mat: --set model.mesh=all",
+                   scene->mesh_count);
   } else {
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu different meshes have a path that ends in '%s'", found, choice);
-    qmat_fail_hint(context, "give the whole path, say %s", qmat_usd_shown(scene->placements[0].path));
+    qmat_fail_hint(context, "give the whole path; qmat mat: --set model.mesh=%s", qmat_usd_shown(first));
   }
   qmat_fail_at(context, path, 0, 0);
   return qmat_fail_field(context, "mesh");
