@@ -321,11 +321,11 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
 }
 
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
-                                 double limit) {
+                                 double limit, uint32_t *failed) {
   if (!surface->blocks || surface->leaf_count > 0) return INFINITY;
   for (int i = 0; i < count; i++) /* the distance then stays positive, so that no point of the simplex is outside */
     if (!(spheres[i][3] > limit)) return INFINITY;
-  return qmat_triangle_blocks_excess(surface->blocks, spheres, count, lowest, limit);
+  return qmat_triangle_blocks_excess(surface->blocks, spheres, count, lowest, limit, failed);
 }
 
 /* --- building --------------------------------------------------------------------------------------------------- */

@@ -64,9 +64,10 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
 
 /* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), one point of
  * which is known to be inside the solid: at least `lowest`, and exact up to that beside flat or convex surface.
- * INFINITY where it is above `limit` or hard to find. */
+ * INFINITY where it is above `limit` or hard to find. `*failed` is what a failure near by left there, UINT32_MAX at
+ * first: it does not change the answer, and a part of a piece mostly fails for the same reason. */
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
-                                 double limit);
+                                 double limit, uint32_t *failed);
 
 /* The first hit beyond `start` (>= 0) of a ray from `origin` along the unit vector `direction`: its distance in double
  * precision, its triangle (the smallest of equally distant ones), and the triangle's unit normal (3 doubles, zero for a

@@ -9,7 +9,7 @@
 
 #include "core/geometry/vector.h"
 
-enum { LANES = 8 };
+enum { LANES = 8, GROUP = 8 };
 
 /* Beyond this distance single precision cannot tell the triangles apart. */
 static const double far_away = 1e4;
@@ -20,18 +20,21 @@ typedef struct block {
   uint32_t triangles[LANES];
 } block;
 
-/* The corners of a block's triangles lie between two planes: low <= normal . corner <= high. */
-typedef struct block_layer {
+/* The corners of a block's triangles, or of a group's, lie between two planes: low <= normal . corner <= high. They lie
+ * in a box, too. */
+typedef struct layer {
   double normal[3], low, high; /* a unit normal, or zero */
-} block_layer;
+  double least[3], most[3];
+} layer;
 
 struct qmat_triangle_blocks {
   const double *positions;
   const uint32_t *triangles;
-  size_t count, block_count;
+  size_t count, block_count, group_count;
   block *blocks;
-  block_layer *layers; /* per block */
-  RTCScene scene;      /* of a user geometry: the blocks */
+  layer *layers;               /* per block */
+  layer *group_layers;         /* per GROUP blocks: most of a smooth surface needs no closer look */
+  RTCScene scene, group_scene; /* of user geometries: the blocks, and the groups */
 };
 
 static void corners_of(const qmat_triangle_blocks *blocks, uint32_t triangle, const double *corners[3]) {
@@ -222,6 +225,7 @@ typedef struct excess_query {
   double centre[3], reach; /* triangles beyond `reach` cannot exceed the lowest bound */
   double bound, limit;
   size_t visited;
+  uint32_t failed; /* the place in the blocks of the triangle that exceeded the limit, or UINT32_MAX */
 } excess_query;
 
 /* The largest r - s over the piece, where s is the signed distance to the plane through `on` with a unit normal. */
@@ -236,7 +240,7 @@ static double bound_by_plane(const excess_query *query, const double on[3], cons
 }
 
 /* The same for the planes that bound a layer, on the side of the piece. */
-static double bound_by_layer(const excess_query *query, const block_layer *layer) {
+static double bound_by_layer(const excess_query *query, const layer *layer) {
   double above = -INFINITY, below = -INFINITY;
   for (int i = 0; i < query->count; i++) {
     const double height = qmat_dot(query->spheres[i], layer->normal), r = query->spheres[i][3];
@@ -265,31 +269,63 @@ static double bound_by_triangle(const excess_query *query, uint32_t triangle) {
   return qmat_smaller(bound, bound_by_plane(query, corners[0], normal));
 }
 
-static bool bound_block_excess(struct RTCPointQueryFunctionArguments *args) {
+static bool is_within_reach(const excess_query *query, const layer *layer) {
+  double square = 0;
+  for (int k = 0; k < 3; k++) {
+    const double beside = qmat_larger(layer->least[k] - query->centre[k], query->centre[k] - layer->most[k]);
+    if (beside > 0) square += beside * beside;
+  }
+  return square <= query->reach * query->reach;
+}
+
+static double bound_by_block(excess_query *query, size_t number) {
+  const qmat_triangle_blocks *blocks = query->blocks;
+  const size_t left = blocks->count - LANES * number;
+  double bound = bound_by_layer(query, &blocks->layers[number]);
+  if (!(bound > query->limit)) return bound;
+  bound = -INFINITY;
+  for (size_t k = 0; k < left && k < LANES; k++) {
+    bound = qmat_larger(bound, bound_by_triangle(query, blocks->blocks[number].triangles[k]));
+    if (!(bound > query->limit)) continue;
+    query->failed = (uint32_t)(LANES * number + k);
+    break;
+  }
+  return bound;
+}
+
+static bool bound_group_excess(struct RTCPointQueryFunctionArguments *args) {
   excess_query *query = args->userPtr;
   const qmat_triangle_blocks *blocks = query->blocks;
-  const block *b = &blocks->blocks[args->primID];
-  double bound = bound_by_layer(query, &blocks->layers[args->primID]);
+  const size_t first = GROUP * (size_t)args->primID;
+  double bound = bound_by_layer(query, &blocks->group_layers[args->primID]);
+  query->visited++;
   if (bound > query->limit) {
-    const size_t left = blocks->count - LANES * (size_t)args->primID;
     bound = -INFINITY;
-    for (size_t k = 0; k < left && k < LANES && bound <= query->limit; k++)
-      bound = qmat_larger(bound, bound_by_triangle(query, b->triangles[k]));
+    for (size_t b = first; b < first + GROUP && b < blocks->block_count && bound <= query->limit; b++) {
+      if (!is_within_reach(query, &blocks->layers[b])) continue;
+      query->visited++;
+      bound = qmat_larger(bound, bound_by_block(query, b));
+    }
   }
-  query->bound = qmat_larger(query->bound, ++query->visited > MOST_BLOCKS ? INFINITY : bound);
+  query->bound = qmat_larger(query->bound, query->visited > MOST_BLOCKS ? INFINITY : bound);
   if (query->bound <= query->limit) return false;
   args->query->radius = 0; /* no bound: ends the search */
   return true;
 }
 
 double qmat_triangle_blocks_excess(const qmat_triangle_blocks *blocks, const double *const spheres[], int count,
-                                   double lowest, double limit) {
-  excess_query query = {.blocks = blocks, .spheres = spheres, .count = count, .bound = lowest, .limit = limit};
+                                   double lowest, double limit, uint32_t *failed) {
+  excess_query query = {
+      .blocks = blocks, .spheres = spheres, .count = count, .bound = lowest, .limit = limit, .failed = UINT32_MAX};
   for (int i = 0; i < count; i++)
     for (int k = 0; k < 3; k++) query.centre[k] += spheres[i][k] / count;
   for (int i = 0; i < count; i++)
     query.reach = fmax(query.reach, qmat_point_distance(spheres[i], query.centre) + spheres[i][3] - lowest);
   if (!(query.reach > 0)) return lowest;
+  if (*failed != UINT32_MAX && bound_by_layer(&query, &blocks->group_layers[*failed / (LANES * GROUP)]) > limit &&
+      bound_by_layer(&query, &blocks->layers[*failed / LANES]) > limit &&
+      bound_by_triangle(&query, blocks->blocks[*failed / LANES].triangles[*failed % LANES]) > limit)
+    return INFINITY;
   struct RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   struct RTCPointQuery ball = {
@@ -297,7 +333,8 @@ double qmat_triangle_blocks_excess(const qmat_triangle_blocks *blocks, const dou
       .y = (float)query.centre[1],
       .z = (float)query.centre[2],
       .radius = nextafterf((float)(query.reach * (1 + 1e-6) + 8 * (double)FLT_EPSILON), INFINITY)};
-  rtcPointQuery(blocks->scene, &ball, &context, bound_block_excess, &query);
+  rtcPointQuery(blocks->group_scene, &ball, &context, bound_group_excess, &query);
+  if (query.failed != UINT32_MAX) *failed = query.failed;
   return query.bound <= limit ? query.bound : INFINITY;
 }
 
@@ -334,65 +371,64 @@ static void fill_lane(const qmat_triangle_blocks *blocks, block *b, size_t lane,
   b->triangles[lane] = triangle;
 }
 
-/* Sets the planes around a block, across the mean normal of its triangles. */
-static void fill_layer(const qmat_triangle_blocks *blocks, size_t number) {
-  const size_t left = blocks->count - LANES * number, count = left < LANES ? left : LANES;
-  block_layer layer = {.low = INFINITY, .high = -INFINITY};
+/* Sets the planes around `count` triangles of blocks, from the one at `first`, across their mean normal, and their box.
+ */
+static void fill_layer(const qmat_triangle_blocks *blocks, size_t first, size_t count, layer *layer) {
+  *layer = (struct layer){.low = INFINITY,
+                          .high = -INFINITY,
+                          .least = {INFINITY, INFINITY, INFINITY},
+                          .most = {-INFINITY, -INFINITY, -INFINITY}};
+  if (count > blocks->count - first) count = blocks->count - first;
   const double *corners[3];
-  for (size_t lane = 0; lane < count; lane++) {
+  for (size_t t = first; t < first + count; t++) {
     double normal[3], square;
-    corners_of(blocks, blocks->blocks[number].triangles[lane], corners);
+    corners_of(blocks, blocks->blocks[t / LANES].triangles[t % LANES], corners);
     find_normal(corners, normal, &square);
-    for (int k = 0; k < 3; k++) layer.normal[k] += normal[k];
+    for (int k = 0; k < 3; k++) layer->normal[k] += normal[k];
   }
-  const double length = sqrt(qmat_dot(layer.normal, layer.normal));
-  for (int k = 0; k < 3; k++) layer.normal[k] = length > 0 ? layer.normal[k] / length : 0;
-  for (size_t lane = 0; lane < count; lane++) {
-    corners_of(blocks, blocks->blocks[number].triangles[lane], corners);
+  const double length = sqrt(qmat_dot(layer->normal, layer->normal));
+  for (int k = 0; k < 3; k++) layer->normal[k] = length > 0 ? layer->normal[k] / length : 0;
+  for (size_t t = first; t < first + count; t++) {
+    corners_of(blocks, blocks->blocks[t / LANES].triangles[t % LANES], corners);
     for (int i = 0; i < 3; i++) {
-      const double height = qmat_dot(corners[i], layer.normal);
-      layer.low = fmin(layer.low, height);
-      layer.high = fmax(layer.high, height);
+      const double height = qmat_dot(corners[i], layer->normal);
+      layer->low = fmin(layer->low, height);
+      layer->high = fmax(layer->high, height);
+      for (int k = 0; k < 3; k++) {
+        layer->least[k] = fmin(layer->least[k], corners[i][k]);
+        layer->most[k] = fmax(layer->most[k], corners[i][k]);
+      }
     }
   }
-  blocks->layers[number] = layer;
 }
 
-/* The box of a block, rounded outwards. */
+/* A box, rounded outwards. */
 static void bound_for_embree(const struct RTCBoundsFunctionArguments *args) {
-  const qmat_triangle_blocks *blocks = args->geometryUserPtr;
-  const size_t first = LANES * (size_t)args->primID, left = blocks->count - first;
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (size_t lane = 0; lane < left && lane < LANES; lane++) {
-    const double *corners[3];
-    corners_of(blocks, blocks->blocks[args->primID].triangles[lane], corners);
-    for (int i = 0; i < 3; i++)
-      for (int k = 0; k < 3; k++) {
-        low[k] = fmin(low[k], corners[i][k]);
-        high[k] = fmax(high[k], corners[i][k]);
-      }
-  }
-  float *out = &args->bounds_o->lower_x;
-  for (int k = 0; k < 3; k++) out[k] = nextafterf((float)low[k], -INFINITY);
-  out = &args->bounds_o->upper_x;
-  for (int k = 0; k < 3; k++) out[k] = nextafterf((float)high[k], INFINITY);
+  const layer *layers = args->geometryUserPtr, *own = &layers[args->primID];
+  args->bounds_o->lower_x = nextafterf((float)own->least[0], -INFINITY);
+  args->bounds_o->lower_y = nextafterf((float)own->least[1], -INFINITY);
+  args->bounds_o->lower_z = nextafterf((float)own->least[2], -INFINITY);
+  args->bounds_o->upper_x = nextafterf((float)own->most[0], INFINITY);
+  args->bounds_o->upper_y = nextafterf((float)own->most[1], INFINITY);
+  args->bounds_o->upper_z = nextafterf((float)own->most[2], INFINITY);
 }
 
-/* Reports no failure: it is in the device's error state. */
-static void build_scene(qmat_triangle_blocks *blocks, RTCDevice device) {
-  blocks->scene = rtcNewScene(device);
+/* The boxes of `count` layers. Reports no failure: it is in the device's error state. */
+static RTCScene build_scene(RTCDevice device, layer *layers, size_t count) {
+  RTCScene scene = rtcNewScene(device);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  if (blocks->scene && geometry) {
-    rtcSetSceneFlags(blocks->scene, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(blocks->scene, RTC_BUILD_QUALITY_MEDIUM);
-    rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)blocks->block_count);
-    rtcSetGeometryUserData(geometry, blocks);
+  if (scene && geometry) {
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+    rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)count);
+    rtcSetGeometryUserData(geometry, layers);
     rtcSetGeometryBoundsFunction(geometry, bound_for_embree, NULL);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(blocks->scene, geometry);
-    rtcCommitScene(blocks->scene);
+    rtcAttachGeometry(scene, geometry);
+    rtcCommitScene(scene);
   }
   if (geometry) rtcReleaseGeometry(geometry);
+  return scene;
 }
 
 /* A triangle that is to be assigned to a block. */
@@ -449,10 +485,11 @@ static int widest_axis(const item *items, size_t count) {
 /* Larger halves are divided in a task of their own. */
 enum { WORTH_A_THREAD = 1 << 13 };
 
-/* Splits the items in half along their widest axis, at a multiple of the block size, until each block has its items. */
+/* Splits the items in half along their widest axis, at a multiple of the size of a group or block, until each block has
+ * its items. */
 static void divide(item *items, size_t count) {
   if (count <= LANES) return;
-  const size_t few = LANES * (((count + LANES - 1) / LANES) / 2);
+  const size_t unit = count > LANES * GROUP ? LANES * GROUP : LANES, few = unit * (((count + unit - 1) / unit) / 2);
   select_first(items, count, few, widest_axis(items, count));
 #pragma omp task if (few > WORTH_A_THREAD)
   divide(items, few);
@@ -464,7 +501,8 @@ static qmat_status fill_blocks(qmat_context *context, qmat_triangle_blocks *bloc
   item *items = qmat_alloc(count, sizeof *items);
   blocks->blocks = qmat_calloc(blocks->block_count, sizeof *blocks->blocks);
   blocks->layers = qmat_calloc(blocks->block_count, sizeof *blocks->layers);
-  const bool made = items && blocks->blocks && blocks->layers;
+  blocks->group_layers = qmat_calloc(blocks->group_count, sizeof *blocks->group_layers);
+  const bool made = items && blocks->blocks && blocks->layers && blocks->group_layers;
   if (made) {
     const int threads = qmat_threads(context);
 #pragma omp parallel num_threads(threads)
@@ -481,7 +519,10 @@ static qmat_status fill_blocks(qmat_context *context, qmat_triangle_blocks *bloc
 #pragma omp for schedule(static)
       for (size_t t = 0; t < count; t++) fill_lane(blocks, &blocks->blocks[t / LANES], t % LANES, items[t].triangle);
 #pragma omp for schedule(static)
-      for (size_t b = 0; b < blocks->block_count; b++) fill_layer(blocks, b);
+      for (size_t b = 0; b < blocks->block_count; b++) fill_layer(blocks, LANES * b, LANES, &blocks->layers[b]);
+#pragma omp for schedule(static)
+      for (size_t g = 0; g < blocks->group_count; g++)
+        fill_layer(blocks, LANES * GROUP * g, LANES * GROUP, &blocks->group_layers[g]);
     }
   }
   qmat_free(items);
@@ -493,17 +534,25 @@ qmat_status qmat_triangle_blocks_new(qmat_context *context, struct RTCDeviceTy *
   qmat_triangle_blocks *made = qmat_calloc(1, sizeof *made);
   *blocks = made;
   if (!made) return qmat_fail_memory(context, "the triangles");
-  *made = (qmat_triangle_blocks){
-      .positions = positions, .triangles = triangles, .count = count, .block_count = (count + LANES - 1) / LANES};
+  *made = (qmat_triangle_blocks){.positions = positions,
+                                 .triangles = triangles,
+                                 .count = count,
+                                 .block_count = (count + LANES - 1) / LANES,
+                                 .group_count = (count + LANES * GROUP - 1) / (LANES * GROUP)};
   const qmat_status status = fill_blocks(context, made);
-  if (status == QMAT_OK) build_scene(made, device);
+  if (status == QMAT_OK) {
+    made->scene = build_scene(device, made->layers, made->block_count);
+    made->group_scene = build_scene(device, made->group_layers, made->group_count);
+  }
   return status;
 }
 
 void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks) {
   if (!blocks) return;
   if (blocks->scene) rtcReleaseScene(blocks->scene);
+  if (blocks->group_scene) rtcReleaseScene(blocks->group_scene);
   qmat_free(blocks->blocks);
   qmat_free(blocks->layers);
+  qmat_free(blocks->group_layers);
   qmat_free(blocks);
 }

@@ -34,9 +34,11 @@ double qmat_triangle_blocks_distance_to(const qmat_triangle_blocks *blocks, uint
 /* An upper bound of r - d over a simplex of `count` (1 to 3) spheres (4 doubles each), where d is the distance to the
  * triangles and r the radius between the spheres: at least `lowest`. INFINITY where it is above `limit` or hard to
  * find. It is exact, up to `lowest`, where the triangles nearby lie on the boundary of a convex set: r less the
- * distance to a plane is linear. Cost: a visit to each block within reach of the spheres; a failure costs few visits.
+ * distance to a plane is linear. `*failed` is UINT32_MAX, or what a failed search left there: its triangle is tried
+ * first, and the answer is the same. Cost: a visit to each 64 triangles within reach of the spheres; a failure costs
+ * few visits.
  */
 double qmat_triangle_blocks_excess(const qmat_triangle_blocks *blocks, const double *const spheres[], int count,
-                                   double lowest, double limit);
+                                   double lowest, double limit, uint32_t *failed);
 
 #endif

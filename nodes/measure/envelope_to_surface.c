@@ -76,6 +76,7 @@ typedef struct search {
   double found;     /* the largest h found */
   double bound;     /* the largest bound of a finished piece */
   double place[4];  /* the centre of the piece evaluated last */
+  uint32_t failed;  /* of the newest closed formula */
   double tolerance; /* a piece whose bound exceeds `found` by less is finished too */
 } search;
 
@@ -94,7 +95,7 @@ static const double flat_size = 1, flat_share = 0.25;
 static bool is_flat(search *s, const piece *p) {
   const double *const spheres[3] = {p->spheres[0], p->spheres[1], p->spheres[2]};
   const double bound =
-      qmat_surface_excess_bound(s->lattice->surface, spheres, p->count, flat_share * s->limit, s->accepted);
+      qmat_surface_excess_bound(s->lattice->surface, spheres, p->count, flat_share * s->limit, s->accepted, &s->failed);
   if (!(bound <= s->accepted)) return false;
   s->bound = qmat_larger(s->bound, bound);
   return true;
@@ -159,6 +160,7 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
               .accepted = enough,
               .limit = INFINITY,
               .smallest = 0.01 * tolerance,
+              .failed = QMAT_NONE,
               .found = -INFINITY,
               .bound = enough,
               .tolerance = tolerance};
@@ -289,6 +291,7 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
               .accepted = accepted_share * tracker->limit,
               .limit = tracker->limit,
               .smallest = smallest_share * tracker->limit,
+              .failed = QMAT_NONE,
               .tolerance = 0};
   piece p;
   memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);

@@ -18,6 +18,7 @@ static void link_slot(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t
   if (head != QMAT_NONE) tracker->previous[head] = slot;
   tracker->heads[vertex] = slot;
   tracker->slot_counts[vertex]++;
+  tracker->copy_starts[vertex] = SIZE_MAX;
 }
 
 static void unlink_slot(qmat_surface_to_envelope *tracker, uint32_t slot, uint32_t vertex) {
@@ -28,6 +29,7 @@ static void unlink_slot(qmat_surface_to_envelope *tracker, uint32_t slot, uint32
   else
     tracker->heads[vertex] = next;
   tracker->slot_counts[vertex]--;
+  tracker->copy_starts[vertex] = SIZE_MAX;
 }
 
 qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to_envelope *tracker, size_t point_count,
@@ -42,14 +44,19 @@ qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to
   tracker->heads = qmat_alloc(vertex_count, sizeof(uint32_t));
   tracker->slot_counts = qmat_calloc(vertex_count, sizeof(uint32_t));
   tracker->marks = qmat_calloc(point_count, sizeof(uint32_t));
+  tracker->copy_starts = qmat_alloc(vertex_count, sizeof *tracker->copy_starts);
   if (!tracker->witnesses || !tracker->weights || !tracker->next || !tracker->previous || !tracker->heads ||
-      !tracker->slot_counts || !tracker->marks)
+      !tracker->slot_counts || !tracker->marks || !tracker->copy_starts)
     return qmat_fail_memory(context, "constraint points");
   if (point_count > 0) {
     memcpy(tracker->witnesses, witnesses, 3 * point_count * sizeof *witnesses);
     memcpy(tracker->weights, weights, 3 * point_count * sizeof *weights);
   }
-  for (size_t v = 0; v < vertex_count; v++) tracker->heads[v] = QMAT_NONE;
+  tracker->vertex_count = vertex_count;
+  for (size_t v = 0; v < vertex_count; v++) {
+    tracker->heads[v] = QMAT_NONE;
+    tracker->copy_starts[v] = SIZE_MAX;
+  }
   for (size_t slot = 0; slot < 3 * point_count; slot++)
     if (witnesses[slot] != QMAT_NONE) link_slot(tracker, (uint32_t)slot, witnesses[slot]);
   return QMAT_OK;
@@ -63,12 +70,32 @@ void qmat_surface_to_envelope_uninit(qmat_surface_to_envelope *tracker) {
   qmat_free(tracker->heads);
   qmat_free(tracker->slot_counts);
   qmat_free(tracker->marks);
+  qmat_free(tracker->copies);
+  qmat_free(tracker->copy_starts);
   qmat_free(tracker->found);
   qmat_free(tracker->star.items);
   qmat_free(tracker->star.balls);
   qmat_free(tracker->link.items);
   qmat_free(tracker->link.balls);
   *tracker = (qmat_surface_to_envelope){0};
+}
+
+qmat_status qmat_surface_to_envelope_slots(qmat_context *context, qmat_surface_to_envelope *tracker, uint32_t vertex,
+                                           const uint32_t **slots) {
+  const size_t count = tracker->slot_counts[vertex], room = 6 * tracker->point_count;
+  if (!tracker->copies && !(tracker->copies = qmat_alloc(room, sizeof *tracker->copies)))
+    return qmat_fail_memory(context, "constraint points");
+  if (tracker->copy_starts[vertex] == SIZE_MAX) {
+    if (tracker->copied + count > room) { /* mostly copies of lists that have changed */
+      for (size_t v = 0; v < tracker->vertex_count; v++) tracker->copy_starts[v] = SIZE_MAX;
+      tracker->copied = 0;
+    }
+    tracker->copy_starts[vertex] = tracker->copied;
+    for (uint32_t slot = tracker->heads[vertex]; slot != QMAT_NONE; slot = tracker->next[slot])
+      tracker->copies[tracker->copied++] = slot;
+  }
+  *slots = tracker->copies + tracker->copy_starts[vertex];
+  return QMAT_OK;
 }
 
 /* F at the witness after the collapse: an upper bound of F there. */
@@ -308,6 +335,9 @@ static inline void fetch_ahead(const qmat_surface_to_envelope *tracker, uint32_t
   __builtin_prefetch(&tracker->points[3 * point]);
 }
 
+/* The slots of a copied list that are fetched early. */
+enum { AHEAD = 4 };
+
 static bool touches(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t point) {
   for (size_t k = 0; k < 3; k++) {
     const uint32_t vertex = tracker->witnesses[3 * (size_t)point + k];
@@ -327,12 +357,22 @@ qmat_status qmat_surface_to_envelope_test(qmat_context *context, qmat_surface_to
   if (first != QMAT_NONE && touches(tracker, collapse, first))
     status = test_point(context, tracker, complex, collapse, sphere, first, kept);
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) {
+    if (tracker->copy_starts[ends[e]] != SIZE_MAX) {
+      const uint32_t *list = tracker->copies + tracker->copy_starts[ends[e]];
+      const size_t count = tracker->slot_counts[ends[e]];
+      for (size_t i = 0; i < count && status == QMAT_OK && *kept; i++) {
+        if (i + AHEAD < count) fetch_ahead(tracker, list[i + AHEAD]);
+        status = test_point(context, tracker, complex, collapse, sphere, list[i] / 3, kept);
+      }
+      continue;
+    }
     for (uint32_t slot = tracker->heads[ends[e]], next; slot != QMAT_NONE && status == QMAT_OK && *kept; slot = next) {
       next = tracker->next[slot];
       fetch_ahead(tracker, next);
       status = test_point(context, tracker, complex, collapse, sphere, slot / 3, kept);
     }
+  }
   return status;
 }
 
@@ -376,6 +416,7 @@ static void merge_lists(qmat_surface_to_envelope *tracker, uint32_t kept, uint32
   tracker->slot_counts[kept] += tracker->slot_counts[removed];
   tracker->heads[removed] = QMAT_NONE;
   tracker->slot_counts[removed] = 0;
+  tracker->copy_starts[kept] = tracker->copy_starts[removed] = SIZE_MAX;
 }
 
 void qmat_surface_to_envelope_commit(qmat_surface_to_envelope *tracker, const qmat_collapse *collapse) {

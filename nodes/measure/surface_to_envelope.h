@@ -20,7 +20,7 @@ typedef struct qmat_star_primitives {
  * is still within the limit proves the new complex good at its point; otherwise the primitives around are searched for
  * another witness. The points whose witnesses are at a vertex are its responsible region. */
 typedef struct qmat_surface_to_envelope {
-  size_t point_count;
+  size_t point_count, vertex_count;
   const double *points;      /* 3 per point */
   double *limits;            /* per point: the largest F allowed */
   uint32_t *witnesses;       /* 3 per point: live vertices, QMAT_NONE where fewer */
@@ -29,6 +29,11 @@ typedef struct qmat_surface_to_envelope {
   uint32_t *heads;           /* per vertex: its first slot, or QMAT_NONE */
   uint32_t *slot_counts;     /* per vertex */
   uint32_t *marks, stamp;    /* per point */
+  /* Copies of lists, in order, for fits that walk them often: a walk through memory at random takes longer than the
+   * work. */
+  uint32_t *copies;    /* 6 per point */
+  size_t *copy_starts; /* per vertex: SIZE_MAX where there is no copy, or the list has changed */
+  size_t copied;
   /* Witnesses found by the newest test; a commit accepts them. */
   struct qmat_new_witness *found;
   size_t found_count, found_capacity;
@@ -46,6 +51,11 @@ qmat_status qmat_surface_to_envelope_init(qmat_context *context, qmat_surface_to
                                           const double *points, double *limits, const uint32_t *witnesses,
                                           const double *weights, size_t vertex_count);
 void qmat_surface_to_envelope_uninit(qmat_surface_to_envelope *tracker);
+
+/* The list of a vertex as an array of its `slot_counts` slots, which the next call or commit may overwrite.
+ * QMAT_ERROR_MEMORY. */
+qmat_status qmat_surface_to_envelope_slots(qmat_context *context, qmat_surface_to_envelope *tracker, uint32_t vertex,
+                                           const uint32_t **slots);
 
 /* Whether every constraint point is within its limit (`*kept`) when `collapse` makes `sphere` (4 doubles) of its edge.
  * `first` is a point to test first (QMAT_NONE: none): a point that failed before is likely to fail again. Changes only

@@ -95,7 +95,7 @@ static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_
 }
 
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
-                                         const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
+                                         qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                          const qmat_collapse *collapse, const double sphere[4],
                                          const uint32_t *vertices, size_t count, size_t surface_count,
                                          double threshold) {
@@ -113,17 +113,23 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
   for (int corners = 3; corners >= 2; corners--)
     for (int i = -1; i < fit->count && status == QMAT_OK; i++)
       status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
-  size_t slots = tracker->slot_counts[collapse->removed], at = 0;
+  size_t slots = tracker->slot_counts[collapse->removed], first = 0;
   for (int i = 0; i < fit->count; i++) slots += tracker->slot_counts[fit->vertices[i]];
   const size_t stride = (slots + QMAT_FITTED_TARGETS - 1) / QMAT_FITTED_TARGETS;
-  for (int i = -1; i < fit->count && status == QMAT_OK; i++)
-    for (uint32_t slot = qmat_surface_to_envelope_first(tracker, i < 0 ? collapse->removed : fit->vertices[i]);
-         slot != QMAT_NONE && status == QMAT_OK; slot = tracker->next[slot], at++) {
-      const size_t point = slot / 3;
-      if (at % stride == 0 && point < surface_count && is_first_slot(fit, tracker, collapse->removed, slot))
+  for (int i = -1; i < fit->count && status == QMAT_OK; i++) {
+    const uint32_t vertex = i < 0 ? collapse->removed : fit->vertices[i];
+    const size_t length = tracker->slot_counts[vertex];
+    const uint32_t *list;
+    status = qmat_surface_to_envelope_slots(context, tracker, vertex, &list);
+    size_t k = first;
+    for (; k < length && status == QMAT_OK; k += stride) {
+      const size_t point = list[k] / 3;
+      if (point < surface_count && is_first_slot(fit, tracker, collapse->removed, list[k]))
         status = qmat_neighbourhood_fit_add(context, fit, &tracker->points[3 * point], QMAT_TARGET_SURFACE,
                                             tracker->limits[point]);
     }
+    first = k - length;
+  }
   return status;
 }
 

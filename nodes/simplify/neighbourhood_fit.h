@@ -29,7 +29,7 @@ void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit);
  * their constraint points, among the first `surface_count`, become targets, evenly spread over the lists.
  * QMAT_ERROR_MEMORY. */
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
-                                         const qmat_surface_to_envelope *tracker, const qmat_complex *complex,
+                                         qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                          const qmat_collapse *collapse, const double sphere[4],
                                          const uint32_t *vertices, size_t count, size_t surface_count,
                                          double threshold);

@@ -97,7 +97,7 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
   const double epsilon = s->params.epsilon;
   const qmat_decimation *round = &s->rounds[s->newest];
   qmat_status status = qmat_decimation_extract(round, a->medial);
-  if (status == QMAT_OK) status = qmat_simplification_measure(s, a->medial, found);
+  if (status == QMAT_OK) status = qmat_simplification_measure(s, a->medial, false, found);
   qmat_medial_errors after = *found;
   size_t filled = 0;
   if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);

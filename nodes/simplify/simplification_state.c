@@ -6,7 +6,7 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/measure/envelope_to_surface.h"
 
-qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat_medial *unit,
+qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat_medial *unit, bool only_within,
                                         qmat_medial_errors *errors) {
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : QMAT_DEFAULT_EPSILON;
   const double tolerance = qmat_error_tolerance * epsilon, enough = qmat_least_reported * epsilon;
@@ -14,7 +14,7 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
   qmat_status status =
       qmat_medial_surface_bound_measure(s->context, s->surface, unit, constraints->points, constraints->surface_count,
                                         tolerance, enough, epsilon - tolerance, errors);
-  if (status != QMAT_OK) return status;
+  if (status != QMAT_OK || (only_within && errors->surface_to_envelope > epsilon)) return status;
   const bool two_sided = s->params.epsilon > 0 && s->params.error == QMAT_ERROR_TWO_SIDED;
   const qmat_decimation *round = &s->rounds[s->newest];
   if (two_sided)

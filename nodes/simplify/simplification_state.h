@@ -37,9 +37,10 @@ typedef struct qmat_simplified {
 
 /* Measures both errors of a medial mesh (unit frame) that differs from the newest round at most by added spheres or
  * removed slabs. `errors` gets them and the places beyond epsilon; free with qmat_medial_errors_uninit, also after a
- * failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+ * failure. With `only_within` nothing is measured after a surface-to-envelope error above epsilon. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
-                                        qmat_medial_errors *errors);
+                                        bool only_within, qmat_medial_errors *errors);
 
 /* Whether `a` has the smaller fault, or the same with fewer spheres. */
 bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b);

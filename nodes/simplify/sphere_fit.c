@@ -20,26 +20,27 @@ static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_co
   return true;
 }
 
-qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                    const qmat_collapse *collapse, size_t surface_count, size_t most) {
   if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points) ||
       qmat_grow((void **)&fit->nearest, &fit->nearest_capacity, most, sizeof *fit->nearest))
     return qmat_fail_memory(context, "the fit of a sphere");
   const uint32_t ends[2] = {collapse->kept, collapse->removed};
-  size_t slots = 0, skip = 0;
+  size_t slots = 0, first = 0;
   for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) slots += tracker->slot_counts[ends[e]];
   const size_t stride = (slots + most - 1) / most;
   fit->count = 0;
-  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++)
-    for (uint32_t slot = qmat_surface_to_envelope_first(tracker, ends[e]); slot != QMAT_NONE;
-         slot = tracker->next[slot]) {
-      if (skip > 0) {
-        skip--;
-        continue;
-      }
-      skip = stride - 1;
-      if (slot / 3 < surface_count && is_first_slot(tracker, collapse, slot)) fit->points[fit->count++] = slot / 3;
-    }
+  for (int e = 0; e < 2 && ends[e] != QMAT_NONE; e++) {
+    const size_t count = tracker->slot_counts[ends[e]];
+    const uint32_t *list;
+    const qmat_status status = qmat_surface_to_envelope_slots(context, tracker, ends[e], &list);
+    if (status != QMAT_OK) return status;
+    size_t i = first;
+    for (; i < count; i += stride)
+      if (list[i] / 3 < surface_count && is_first_slot(tracker, collapse, list[i]))
+        fit->points[fit->count++] = list[i] / 3;
+    first = i - count;
+  }
   for (size_t i = 0; i < fit->count; i++) fit->nearest[i] = QMAT_NONE;
   return QMAT_OK;
 }

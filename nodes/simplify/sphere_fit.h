@@ -18,7 +18,7 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit);
 
 /* Chooses the constraint points of a collapse or move: those of its vertices among the first `surface_count`, at most
  * `most` (> 0), evenly spread over the lists. QMAT_ERROR_MEMORY. */
-qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, const qmat_surface_to_envelope *tracker,
+qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                    const qmat_collapse *collapse, size_t surface_count, size_t most);
 
 /* The largest |F| at the chosen points, F being the distance to the star of `collapse` with `sphere`; above `enough`

@@ -30,7 +30,7 @@ static qmat_status open_void(const qmat_simplification *s, qmat_medial *unit, bo
     memcpy(corners, &unit->triangles[3 * (size_t)walls[i]], sizeof corners);
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     remove_triangle(unit, walls[i]);
-    status = qmat_simplification_measure(s, unit, &errors);
+    status = qmat_simplification_measure(s, unit, true, &errors);
     *error = errors.surface_to_envelope;
     *opened = status == QMAT_OK && *error <= epsilon && errors.boundary_to_surface <= epsilon;
     qmat_medial_errors_uninit(&errors);
