@@ -31,6 +31,7 @@ static qmat_status run_in_order(qmat_context *context, const medial_simplify_par
   if (status == QMAT_OK)
     status = qmat_medial_envelope_bound_measure(context, o->surface, medial, tolerance, enough, &errors);
   *figures = (qmat_simplify_figures){.in_order = true,
+                                     .wanted_spheres = (size_t)params->vertices,
                                      .initial_spheres = o->decimation.complex.vertex_count,
                                      .threshold = log->count > 0 ? log->errors[log->count - 1] : 0,
                                      .surface_to_envelope = errors.surface_to_envelope,
@@ -98,7 +99,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   if (status == QMAT_OK)
     status = searches_epsilon(&own) ? qmat_simplification_run_to_count(&s, &best, &kept)
                                     : qmat_simplification_run_starts(&s, &own, &best);
-  best.figures.wanted_spheres = searches_epsilon(&own) ? (size_t)own.vertices : 0;
+  best.figures.wanted_spheres = (size_t)own.vertices;
   if (status == QMAT_OK)
     status = make_outputs(context, &best.figures, mesh, s.surface, kept > 0 ? kept + deviation : 0, deviation,
                           &best.medial, outputs);

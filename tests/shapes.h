@@ -252,4 +252,23 @@ static inline qmat_mesh *shape_seal(qmat_mesh *mesh) {
   return mesh;
 }
 
+/* A sealed square plate of size 10 and thickness 1 around the origin with a square hole through its middle. Corner k of
+ * ring i (outer below, inner below, outer above, inner above) is vertex 4 i + k, counted around the hole. */
+static inline qmat_mesh *shape_frame(double hole) {
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < 4; i++) {
+    const double size = i % 2 ? hole / 2 : 5, z = i < 2 ? -0.5 : 0.5;
+    for (int k = 0; k < 4; k++) shape_vertex(mesh, k == 0 || k == 3 ? -size : size, k < 2 ? -size : size, z);
+  }
+  for (uint32_t k = 0; k < 4; k++) {
+    const uint32_t n = (k + 1) % 4;
+    shape_quad(mesh, k, 4 + k, 4 + n, n);
+    shape_quad(mesh, 8 + k, 8 + n, 12 + n, 12 + k);
+    shape_quad(mesh, k, n, 8 + n, 8 + k);
+    shape_quad(mesh, 4 + k, 12 + k, 12 + n, 4 + n);
+  }
+  shape_seal(mesh);
+  return mesh;
+}
+
 #endif

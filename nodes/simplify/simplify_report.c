@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/simplify/simplify_report.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "core/json_text.h"
+#include "nodes/measure/lost_handles.h"
 #include "nodes/measure/topology_report.h"
 
 void qmat_simplify_figures_of(const qmat_decimation *run, qmat_simplify_figures *figures) {
@@ -14,11 +16,67 @@ void qmat_simplify_figures_of(const qmat_decimation *run, qmat_simplify_figures 
   figures->moves = run->moves;
 }
 
-static int add_warning(json_t *root, const qmat_simplify_figures *f, const qmat_medial *unit, double epsilon) {
-  char text[160];
-  snprintf(text, sizeof text, "%zu spheres are left instead of %zu: fewer are farther than %.3g %% from the surface",
-           unit->sphere_count, f->wanted_spheres, 100 * epsilon);
-  return json_object_set_new(root, "warnings", json_pack("[s]", text));
+/* Loops around lost handles are at most this multiple of epsilon long: a square hole that epsilon closes has eight, and
+ * the edges of the mesh lengthen it. */
+static const double longest_loop = 12;
+
+/* So many lost handles are named. */
+enum { MOST_NAMED = 16 };
+
+static int add_warning(json_t *root, const char *text) {
+  json_t *warnings = json_object_get(root, "warnings");
+  if (!warnings && json_object_set_new(root, "warnings", warnings = json_array())) return -1;
+  return json_array_append_new(warnings, json_string(text));
+}
+
+static int warn_of_spheres(json_t *root, const qmat_simplify_figures *f, const qmat_medial *unit, double epsilon) {
+  char text[200];
+  int length =
+      snprintf(text, sizeof text, "%zu spheres are left instead of %zu", unit->sphere_count, f->wanted_spheres);
+  if (f->features >= f->wanted_spheres)
+    snprintf(text + length, sizeof text - (size_t)length, ": %zu sharp features are kept (features=none)", f->features);
+  else if (epsilon > 0)
+    snprintf(text + length, sizeof text - (size_t)length, ": fewer are farther than %.3g %% from the surface",
+             100 * epsilon);
+  return add_warning(root, text);
+}
+
+static size_t count_at(const json_t *root, const char *key) {
+  return (size_t)json_integer_value(json_object_get(root, key));
+}
+
+static int add_handle(json_t *root, json_t *list, const qmat_frame *frame, const qmat_lost_handle *handle) {
+  double at[3];
+  char text[200];
+  qmat_frame_to_model(frame, handle->place, 1, at);
+  snprintf(text, sizeof text, "a %s at (%.5g, %.5g, %.5g), %.2g %% of the diagonal across, is not in the result",
+           handle->is_hole ? "hole" : "handle", at[0], at[1], at[2], 100 * handle->size);
+  return add_warning(root, text) |
+         json_array_append_new(list, json_pack("{s:s, s:[fff], s:f}", "kind", handle->is_hole ? "hole" : "handle",
+                                               "place", at[0], at[1], at[2], "size", handle->size));
+}
+
+/* Names the handles of the solid that the result has lost, where their numbers differ. */
+static qmat_status name_lost_handles(qmat_context *context, const qmat_medial *unit, const qmat_surface *surface,
+                                     double error, json_t *root) {
+  const size_t loops = count_at(root, "loops"), wanted = count_at(root, "loops_of_solid");
+  qmat_lost_handle *handles;
+  size_t count;
+  if (!json_object_get(root, "loops") || loops >= wanted || !(error < INFINITY)) return QMAT_OK;
+  const size_t most = wanted - loops < MOST_NAMED ? wanted - loops : MOST_NAMED;
+  const qmat_status status =
+      qmat_lost_handles_find(context, surface, unit, longest_loop * error, most, &handles, &count);
+  if (status != QMAT_OK) return status;
+  json_t *list = json_array();
+  int bad = json_object_set_new(root, "lost_handles", list);
+  for (size_t i = 0; i < count && !bad; i++) bad |= add_handle(root, list, qmat_surface_frame(surface), &handles[i]);
+  if (count < wanted - loops && !bad) {
+    char text[120];
+    snprintf(text, sizeof text, "%zu of %zu handles of the solid that are not in the result were not located",
+             wanted - loops - count, wanted - loops);
+    bad |= add_warning(root, text);
+  }
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figures *f, const qmat_medial *unit,
@@ -58,6 +116,9 @@ qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figu
     if (counts[i].shown) bad |= qmat_json_set_count(root, counts[i].key, counts[i].count);
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     if (numbers[i].shown) bad |= json_object_set_new(root, numbers[i].key, json_real(numbers[i].value));
-  if (f->wanted_spheres > 0 && unit->sphere_count > f->wanted_spheres) bad |= add_warning(root, f, unit, epsilon);
-  return bad ? qmat_fail_memory(context, "the report") : qmat_topology_report(context, unit, surface, root);
+  if (f->wanted_spheres > 0 && unit->sphere_count > f->wanted_spheres) bad |= warn_of_spheres(root, f, unit, epsilon);
+  if (bad) return qmat_fail_memory(context, "the report");
+  const qmat_status status = qmat_topology_report(context, unit, surface, root);
+  const double error = fmax(epsilon, fmax(f->surface_to_envelope, f->envelope_to_surface));
+  return status == QMAT_OK ? name_lost_handles(context, unit, surface, error, root) : status;
 }

@@ -19,8 +19,9 @@ typedef struct qmat_simplify_figures {
 /* Takes over what a decimation tells. */
 void qmat_simplify_figures_of(const qmat_decimation *run, qmat_simplify_figures *figures);
 
-/* Makes the report: the figures, the counts of `unit` (a medial mesh in the unit frame) and its topology beside that of
- * the solid. `epsilon` (0: none) and the mesh's `deviation`, in diagonals, are as given. The report is not sealed.
+/* Makes the report: the figures, the counts of `unit` (a medial mesh in the unit frame), its topology beside that of
+ * the solid, and the handles that are lost. A number of spheres that is missed, and each lost handle, is a warning.
+ * `epsilon` (0: none) and the mesh's `deviation`, in diagonals, are as given. The report is not sealed.
  * QMAT_ERROR_MEMORY. */
 qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figures *figures, const qmat_medial *unit,
                                  const qmat_surface *surface, double epsilon, double deviation, qmat_report *report);

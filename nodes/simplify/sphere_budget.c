@@ -72,7 +72,8 @@ qmat_status qmat_simplification_run_to_count(const qmat_simplification *s, qmat_
   /* Fewer are left. As many as wanted are nearer still. */
   qmat_simplified result;
   const qmat_status status = run_at(s, high, s->params.vertices, &result);
-  if (status == QMAT_OK && result.within_epsilon) {
+  /* Spheres that fill cavities come on top of the number. */
+  if (status == QMAT_OK && result.within_epsilon && result.medial->sphere_count <= wanted) {
     qmat_simplified_uninit(best);
     *best = result;
   } else {

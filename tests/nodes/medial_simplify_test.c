@@ -638,6 +638,41 @@ static void test_medial_mesh_without_regions_works(void **state) {
   }
 }
 
+/* An epsilon that comes first is a warning too, with all rules. */
+static void test_a_number_of_vertices_that_epsilon_prevents_is_a_warning(void **state) {
+  (void)state;
+  static const char *const settings[] = {"epsilon=4% vertices=2", "epsilon=4% vertices=2 on_exceed=raise"};
+  for (size_t i = 0; i < COUNT(settings); i++) {
+    result r = simplify(model(RING), settings[i]);
+    assert_true(r.medial->sphere_count > 2);
+    assert_int_equal(json_array_size(json_object_get(r.report->root, "warnings")), 1);
+    release(&r);
+  }
+}
+
+/* A hole of 2 % of the diagonal is closed at 8 %. */
+static void test_a_lost_handle_is_named_with_its_size(void **state) {
+  (void)state;
+  const double hole = 0.3;
+  pipeline p;
+  pipeline_make(&p, shape_frame(hole), sampling, "");
+  result r = simplify(&p, "epsilon=8%");
+  assert_int_equal(pipeline_count(r.report, "loops"), 0);
+  assert_int_equal(pipeline_count(r.report, "loops_of_solid"), 1);
+  const json_t *handles = json_object_get(r.report->root, "lost_handles");
+  assert_int_equal(json_array_size(handles), 1);
+  assert_int_equal(json_array_size(json_object_get(r.report->root, "warnings")), 1);
+  const json_t *handle = json_array_get(handles, 0);
+  assert_string_equal(json_string_value(json_object_get(handle, "kind")), "hole");
+  const double size = json_real_value(json_object_get(handle, "size")) * pipeline_diagonal(p.mesh);
+  assert_near(size, 4 * hole / acos(-1), 1e-9);
+  release(&r);
+  pipeline_free(&p);
+  r = simplify(model(RING), "epsilon=4%");
+  assert_null(json_object_get(r.report->root, "lost_handles"));
+  release(&r);
+}
+
 static void test_a_number_of_vertices_that_is_not_reached_is_a_warning(void **state) {
   (void)state;
   const pipeline *p = model(SMALL);
@@ -902,6 +937,8 @@ int main(void) {
       cmocka_unit_test(test_number_of_vertices_within_epsilon_is_met_exactly),
       cmocka_unit_test(test_number_of_vertices_alone_finds_the_least_error),
       cmocka_unit_test(test_a_number_of_vertices_that_is_not_reached_is_a_warning),
+      cmocka_unit_test(test_a_number_of_vertices_that_epsilon_prevents_is_a_warning),
+      cmocka_unit_test(test_a_lost_handle_is_named_with_its_size),
       cmocka_unit_test(test_more_vertices_than_there_are_change_nothing),
       cmocka_unit_test(test_cost_stops_before_dear_collapses),
       cmocka_unit_test(test_one_sided_holds_the_surface_alone),
