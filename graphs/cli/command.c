@@ -11,10 +11,10 @@
 #include "graphs/graph_names.h"
 
 const qmat_command *const qmat_commands[] = {
-    &qmat_command_mat,      &qmat_command_run,     &qmat_command_batch, &qmat_command_watch, &qmat_command_why,
-    &qmat_command_cache,    &qmat_command_check,   &qmat_command_dot,   &qmat_command_info,  &qmat_command_extract,
-    &qmat_command_graphs,   &qmat_command_nodes,   &qmat_command_node,  &qmat_command_man,   &qmat_command_completion,
-    &qmat_command_complete, &qmat_command_version, &qmat_command_help,
+    &qmat_command_mat,        &qmat_command_run,      &qmat_command_batch,   &qmat_command_watch, &qmat_command_why,
+    &qmat_command_cache,      &qmat_command_check,    &qmat_command_fmt,     &qmat_command_dot,   &qmat_command_info,
+    &qmat_command_extract,    &qmat_command_graphs,   &qmat_command_nodes,   &qmat_command_node,  &qmat_command_man,
+    &qmat_command_completion, &qmat_command_complete, &qmat_command_version, &qmat_command_help,
 };
 const size_t qmat_command_count = sizeof qmat_commands / sizeof *qmat_commands;
 
@@ -72,6 +72,10 @@ static qmat_status fail_unknown(qmat_context *context, const qmat_invocation *in
   size_t count = 1;
   for (size_t i = 0; i < invocation->option_count; i++) names[count++] = invocation->options[i].name;
   const char *nearest = qmat_nearest_name(name, names, count);
+  /* `qmat mat` has options of its inputs' names; other commands set them. */
+  static const char *const inputs[] = {"epsilon", "vertices", "features", "effort", "require"};
+  for (size_t i = 0; i < sizeof inputs / sizeof *inputs && find_option(invocation, "set", 3); i++)
+    if (strcmp(name, inputs[i]) == 0) return qmat_fail_hint(context, "did you mean '--set %s=...'?", name);
   return nearest ? qmat_fail_hint(context, "did you mean '--%s'?", nearest)
                  : qmat_fail_hint(context, "'qmat help %s' lists them", invocation->command->name);
 }

@@ -54,7 +54,7 @@ struct qmat_command {
 extern const qmat_command qmat_command_mat, qmat_command_run, qmat_command_batch, qmat_command_watch, qmat_command_why,
     qmat_command_cache, qmat_command_check, qmat_command_dot, qmat_command_nodes, qmat_command_node,
     qmat_command_version, qmat_command_help, qmat_command_info, qmat_command_extract, qmat_command_graphs,
-    qmat_command_man, qmat_command_completion, qmat_command_complete;
+    qmat_command_fmt, qmat_command_man, qmat_command_completion, qmat_command_complete;
 
 /* All commands, in the order of the help. */
 extern const qmat_command *const qmat_commands[];

@@ -68,6 +68,7 @@ expect 2 "-o results/" "$qmat" mat models -o x.glb
 expect 2 "there are no models in this folder" "$qmat" mat temporary -o none
 expect 2 "no file matches" "$qmat" mat 'models/**/*.obj' -o none
 expect 2 "qmat batch models --out results" "$qmat" batch models
+expect 2 "'--set epsilon=...'" "$qmat" batch models --out none --epsilon 1%
 expect 2 "qmat batch models --out results" "$qmat" batch qmat_plus --out results
 
 # Options: short ones, and the later of two.
@@ -89,6 +90,27 @@ cp "$source/graphs/lod.yaml" qmat_plus
 expect 0 "9 nodes" sh -c '"$0" check qmat_plus | sed "s/: [0-9]* nodes/: 9 nodes/"' "$qmat"
 holds "a file comes before a built-in graph" sh -c '"$0" dot qmat_plus | grep -q medial.lod' "$qmat"
 rm qmat_plus
+
+# The layout of graph files.
+for graph in "$source"/graphs/*.yaml "$source"/graphs/paper/*.yaml "$source"/examples/game/*.yaml; do
+  expect 0 "" "$qmat" fmt --check "$graph"
+done
+printf 'qmat: 1 # one\nnodes:\n    a: {type: scene.read}\n' >loose.yaml
+printf 'qmat: 1  # one\nnodes:\n  a: { type: scene.read }\n' >laid_out.yaml
+cp loose.yaml before.yaml
+expect 1 "loose.yaml:1: the layout differs from here ('qmat fmt loose.yaml' mends it)" "$qmat" fmt --check loose.yaml
+holds "--check writes nothing" cmp loose.yaml before.yaml
+"$qmat" fmt - <loose.yaml >out.txt 2>err.txt
+holds "the standard input to the standard output" cmp out.txt laid_out.yaml
+expect 1 "2 of 3 files" "$qmat" fmt nothere.yaml --check laid_out.yaml loose.yaml
+expect 0 "loose.yaml: laid out" "$qmat" fmt loose.yaml laid_out.yaml
+holds "a file is laid out" cmp loose.yaml laid_out.yaml
+printf 'qmat: 1\nnodes: [a]\n' >loose.yaml
+expect 2 "loose.yaml:2:8: lists are not" "$qmat" fmt loose.yaml
+ln -s before.yaml link.yaml
+expect 0 "" "$qmat" fmt -q link.yaml
+holds "a link stays a link" test -L link.yaml
+holds "what a link names is laid out" cmp before.yaml laid_out.yaml
 
 # Colliders.
 expect 0 "box.xml (" "$qmat" mat box.off -o box.xml --colliders --kind spheres --epsilon 10% --set samples.spacing=10%
