@@ -431,6 +431,10 @@ qmat_status qmat_graph_format(qmat_context *context, const char *file, const cha
   qmat_arena arena = {0};
   const qmat_tree *tree;
   qmat_status status = qmat_tree_read(context, &arena, file, text, size, &tree);
+  if (status == QMAT_OK && !tree->is_mapping) { /* almost any text is a YAML document of one value */
+    qmat_fail(context, QMAT_ERROR_USAGE, "this is not a graph file; one starts with 'qmat: 1'");
+    status = qmat_fail_at(context, file, tree->mark.line, tree->mark.column);
+  }
   formatter f = {.text = text, .size = size};
   if (status == QMAT_OK) {
     if (read_tokens(&f)) lay_out(&f);

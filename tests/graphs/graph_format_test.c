@@ -101,6 +101,7 @@ static void test_what_is_no_graph_is_refused_with_its_place(void **state) {
   assert_int_equal(context.error.line, 1);
   assert_int_equal(context.error.column, 4);
   assert_null(layout(&context, ""));
+  assert_null(layout(&context, "OFF\n3 1 0\n0 0 0\n"));
   assert_null(layout(&context, "a: {\n"));
   assert_null(layout(&context, "a: 1\na: 2\n"));
   qmat_context_uninit(&context);

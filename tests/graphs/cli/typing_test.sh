@@ -107,6 +107,7 @@ expect 0 "loose.yaml: laid out" "$qmat" fmt loose.yaml laid_out.yaml
 holds "a file is laid out" cmp loose.yaml laid_out.yaml
 printf 'qmat: 1\nnodes: [a]\n' >loose.yaml
 expect 2 "loose.yaml:2:8: lists are not" "$qmat" fmt loose.yaml
+expect 2 "this is not a graph file" "$qmat" fmt box.off
 ln -s before.yaml link.yaml
 expect 0 "" "$qmat" fmt -q link.yaml
 holds "a link stays a link" test -L link.yaml
