@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 // Reads the colliders in glTF files (KHR_implicit_shapes and KHR_physics_rigid_bodies), as qmat and others write them, and
-// gives them to a physics engine: Rapier or Jolt. Nothing is imported. Lengths are those of the file
+// gives them to a physics engine: Rapier, Jolt or Bullet (ammo.js). Nothing is imported. Lengths are those of the file
 // times `scale`, masses those of the file.
 
 // ---- matrices, by columns ----
@@ -124,11 +124,20 @@ const grown = (shape, s) => (shape.points ? { points: shape.points.map((p) => p.
   shape.ends ? { ends: shape.ends.map((p) => p.map((v) => s * v)) } :
     { center: shape.center.map((v) => s * v), radius: s * shape.radius });
 
-/** Mass, centre and inertia about it for a body in other units of length. */
+/** Mass, centre and inertia about it for a body in other units of length. A body whose file states no mass has mass 1 and
+ * the inertia of the box around its shapes. */
 function motionOf(body, s) {
-  const m = body.motion, mass = m?.mass ?? 1;
-  const inertia = m?.inertiaDiagonal?.map((v) => v * s * s) ?? [1, 1, 1].map(() => 0.1 * mass * s * s);
-  return { mass, inertia, centre: (m?.centerOfMass ?? [0, 0, 0]).map((v) => s * v), frame: m?.inertiaOrientation ?? [0, 0, 0, 1] };
+  const m = body.motion, mass = m?.mass ?? 1, low = [Infinity, Infinity, Infinity], high = low.map((v) => -v);
+  const reach = (p, r) => p.forEach((v, k) => { low[k] = Math.min(low[k], v - r); high[k] = Math.max(high[k], v + r); });
+  for (const { points = [], ends = [], center, radius } of body.shapes) {
+    for (const p of points) reach(p, 0);
+    for (const [x, y, z, r] of ends) reach([x, y, z], r);
+    if (center) reach(center, radius);
+  }
+  const sides = high.map((v, k) => (v - low[k]) ** 2), total = sides[0] + sides[1] + sides[2];
+  const inertia = (m?.inertiaDiagonal ?? sides.map((v) => (mass * (total - v)) / 12)).map((v) => v * s * s);
+  const centre = m?.centerOfMass ?? (m?.mass === undefined ? high.map((v, k) => (v + low[k]) / 2) : [0, 0, 0]);
+  return { mass, inertia, centre: centre.map((v) => s * v), frame: m?.inertiaOrientation ?? [0, 0, 0, 1] };
 }
 
 // ---- Rapier ----
@@ -195,4 +204,45 @@ export function addToJolt(Jolt, system, body, { at = [0, 0, 0], rotation = [0, 0
   const made = system.GetBodyInterface().CreateBody(settings);
   system.GetBodyInterface().AddBody(made.GetID(), Jolt.EActivation_Activate);
   return made;
+}
+
+// ---- Bullet ----
+
+const times = ([ax, ay, az, aw], [bx, by, bz, bw]) => [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+  aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz];
+const opposite = ([x, y, z, w]) => [-x, -y, -z, w];
+const rotated = (q, p) => moved(local({ rotation: q }), p);
+
+/** Adds a body to a btDiscreteDynamicsWorld of ammo.js at a place. Bullet's frame of a body is that of its inertia:
+ * `pose()` gives the position and rotation of the file's frame, each as an array. */
+export function addToBullet(Ammo, world, body, { at = [0, 0, 0], rotation = [0, 0, 0, 1], scale = 1, friction = 0.7 } = {}) {
+  const { mass, inertia, centre, frame } = motionOf(body, scale), back = opposite(frame), compound = new Ammo.btCompoundShape(true);
+  const vec = (p) => new Ammo.btVector3(...p), margin = 1e-4 * scale * Math.max(...body.shapes.flatMap(({ points, ends, radius }) =>
+    points?.flat().map(Math.abs) ?? ends?.flat().map(Math.abs) ?? [radius]));
+  const transform = (p, q) => new Ammo.btTransform(new Ammo.btQuaternion(...q), vec(p));
+  const inner = (p) => rotated(back, p.map((v, k) => v - centre[k]));
+  for (const shape of body.shapes.map((one) => grown(one, scale))) {
+    if (shape.radius) compound.addChildShape(transform(inner(shape.center), [0, 0, 0, 1]), new Ammo.btSphereShape(shape.radius));
+    else if (shape.ends && isCapsule(shape.ends)) {
+      const of = new Ammo.btCapsuleShape(shape.ends[0][3], Math.hypot(...axisOf(shape.ends)));
+      compound.addChildShape(transform(inner(middle(shape.ends)), times(back, turn(axisOf(shape.ends)))), of);
+    } else {
+      const hull = new Ammo.btConvexHullShape(), points = shape.points ?? shape.ends.flatMap(around);
+      points.forEach((p, i) => hull.addPoint(vec(inner(p)), i === points.length - 1));
+      hull.setMargin(margin);
+      compound.addChildShape(transform([0, 0, 0], [0, 0, 0, 1]), hull);
+    }
+  }
+  const turned = times(rotation, frame), start = rotated(rotation, centre).map((v, k) => v + at[k]);
+  const info = new Ammo.btRigidBodyConstructionInfo(body.motion ? mass : 0, new Ammo.btDefaultMotionState(transform(start, turned)),
+    compound, vec(body.motion ? inertia : [0, 0, 0]));
+  info.set_m_friction(friction);
+  const made = new Ammo.btRigidBody(info);
+  world.addRigidBody(made);
+  const pose = () => {
+    const of = made.getWorldTransform(), p = of.getOrigin(), q = of.getRotation();
+    const whole = times([q.x(), q.y(), q.z(), q.w()], back), away = rotated(whole, centre);
+    return [[p.x() - away[0], p.y() - away[1], p.z() - away[2]], whole];
+  };
+  return { body: made, pose };
 }

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Drops the colliders of models (OFF, OBJ, STL) on a plane and down a staircase, in Rapier and Jolt, for ten seconds:
+# Drops the colliders of models (OFF, OBJ, STL) on a plane and down a staircase, in Rapier, Jolt and Bullet, for ten
+# seconds:
 #   engines.sh [--epsilon E] [MODEL...]      default: all of ../shared/data/surfaces at 0.5 %
 # A line a model: how far its surface ends from what it lies on, in percent of the diagonal, or what went wrong. Needs
 # node and npm, which fetches the engines.

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drops the colliders of glTF files on a plane and down a staircase, in Rapier and Jolt, for ten seconds each:
+// Drops the colliders of glTF files on a plane and down a staircase, in Rapier, Jolt and Bullet, for ten seconds each:
 //   node drop.mjs READERS FILE.glb SURFACE [FILE.glb SURFACE...]
 // A line a file; exit 1 unless every body stays finite and slow enough, no vertex of the surface gets below what is under
 // it, and the surface ends within 1 % of its diagonal of what it lies on.
 import { readFileSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import RAPIER from '@dimforge/rapier3d-compat';
+import initAmmo from 'ammojs-typed';
 import initJolt from 'jolt-physics';
 
 const [readers, ...files] = process.argv.slice(2);
-const { openGlb, bodiesOf, moved, addToRapier, addToJolt } = await import(pathToFileURL(`${readers}/qmat_physics.mjs`));
+const { openGlb, bodiesOf, moved, addToRapier, addToJolt, addToBullet } = await import(pathToFileURL(`${readers}/qmat_physics.mjs`));
 await RAPIER.init();
 const Jolt = await initJolt();
+const Ammo = await initAmmo.call({});
 
 const STEP = 1 / 120, SECONDS = 10, GRAVITY = 9.81;
 const TREADS = 5, DEPTH = 0.5, RISE = 0.2;
@@ -62,21 +64,31 @@ function surfaceOf(path) {
   return { points, rows };
 }
 
-/** The distance from triangles to boxes, to 1e-4, by branch and bound: edges of boxes meet triangles far from a vertex. */
+/** The gradient of toBox. */
+function awayFrom(p, { at, half }) {
+  const d = p.map((v, k) => Math.abs(v - at[k]) - half[k]), most = Math.max(...d), sign = p.map((v, k) => (v < at[k] ? -1 : 1));
+  if (most <= 0) return d.map((v, k) => (k === d.indexOf(most) ? sign[k] : 0));
+  const length = Math.hypot(...d.map((v) => Math.max(v, 0)));
+  return d.map((v, k) => (sign[k] * Math.max(v, 0)) / length);
+}
+
+/** The distance from triangles to boxes, to 1e-4: edges of boxes may meet triangles far from a vertex. The distance to a
+ * box is convex, so a triangle is halved until the tangent at its middle shows that no point of it is nearer. */
 function gapOf({ points, rows }, boxes) {
-  const near = (p) => boxes.reduce((least, box) => Math.min(least, toBox(p, box)), Infinity);
-  const middle = (p, q) => [0, 1, 2].map((k) => (p[k] + q[k]) / 2);
-  const all = points.map(near), stack = [];
-  let best = rows.reduce((least, row) => Math.min(least, all[row[0]], all[row[1]], all[row[2]]), Infinity);
-  for (const row of rows) {
-    stack.push(row.map((id) => points[id]));
+  const minus = (p, q) => [0, 1, 2].map((k) => p[k] - q[k]), middle = (p, q) => [0, 1, 2].map((k) => (p[k] + q[k]) / 2);
+  const dot = (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+  let best = Infinity;
+  for (const box of boxes) {
+    for (const row of rows) for (const id of row) best = Math.min(best, toBox(points[id], box));
+    const stack = rows.map((row) => row.map((id) => points[id]));
     while (stack.length > 0) {
-      const [a, b, c] = stack.pop(), at = [0, 1, 2].map((k) => (a[k] + b[k] + c[k]) / 3), value = near(at);
-      const reach = Math.max(...[a, b, c].map((p) => Math.hypot(...[0, 1, 2].map((k) => p[k] - at[k]))));
+      const corners = stack.pop(), at = [0, 1, 2].map((k) => (corners[0][k] + corners[1][k] + corners[2][k]) / 3);
+      const value = toBox(at, box), slope = awayFrom(at, box);
       best = Math.min(best, value);
-      if (!(value - reach < best - 1e-4)) continue;
-      const [d, e, f] = [middle(a, b), middle(b, c), middle(c, a)];
-      stack.push([a, d, f], [d, b, e], [f, e, c], [d, e, f]);
+      if (value + Math.min(...corners.map((p) => dot(slope, minus(p, at)))) >= best - 1e-4) continue;
+      const sides = [0, 1, 2].map((k) => minus(corners[(k + 1) % 3], corners[k])).map((d) => dot(d, d));
+      const k = sides.indexOf(Math.max(...sides)), [a, b, c] = [0, 1, 2].map((i) => corners[(k + i) % 3]), m = middle(a, b);
+      stack.push([a, m, c], [m, b, c]);
     }
   }
   return best;
@@ -128,6 +140,30 @@ const engines = {
       pose: () => [three(made.GetPosition()), { ...three(made.GetRotation()), w: made.GetRotation().GetW() }],
       speed: () => made.GetLinearVelocity().Length(),
       free: () => Jolt.destroy(jolt),
+    };
+  },
+  bullet(scene, body, scale, at) {
+    const config = new Ammo.btDefaultCollisionConfiguration();
+    const world = new Ammo.btDiscreteDynamicsWorld(new Ammo.btCollisionDispatcher(config), new Ammo.btDbvtBroadphase(),
+      new Ammo.btSequentialImpulseConstraintSolver(), config);
+    world.setGravity(new Ammo.btVector3(0, -GRAVITY, 0));
+    for (const { at: p, half } of scene.boxes) {
+      const place = new Ammo.btTransform(new Ammo.btQuaternion(0, 0, 0, 1), new Ammo.btVector3(...p));
+      const box = new Ammo.btBoxShape(new Ammo.btVector3(...half));
+      box.setMargin(0.001);
+      const info = new Ammo.btRigidBodyConstructionInfo(0, new Ammo.btDefaultMotionState(place), box, new Ammo.btVector3(0, 0, 0));
+      info.set_m_friction(0.7);
+      world.addRigidBody(new Ammo.btRigidBody(info));
+    }
+    const { body: made, pose } = addToBullet(Ammo, world, body, { at, scale });
+    made.setDamping(0, 0.8);
+    made.setSleepingThresholds(0.03, 0.03); // its default, 0.8 m/s, stops bodies of a metre that still roll
+    made.setLinearVelocity(new Ammo.btVector3(scene.push, 0, 0));
+    return {
+      step: () => world.stepSimulation(STEP, 0),
+      pose: () => pose().map(([x, y, z, w]) => ({ x, y, z, w })),
+      speed: () => made.getLinearVelocity().length(),
+      free: () => Ammo.destroy(world),
     };
   },
 };

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Colliders in Rapier and Jolt: engines_test.sh SOURCE_FOLDER BUILD_FOLDER. Where npm cannot install the engines, the test
+# Colliders in Rapier, Jolt and Bullet: engines_test.sh SOURCE_FOLDER BUILD_FOLDER. Where npm cannot install the engines, the test
 # counts as skipped.
 . "$1/tests/lib.sh"
 if ! command -v node >/dev/null 2>&1; then
