@@ -31,6 +31,10 @@ typedef struct qmat_dual_complex {
   size_t sphere_count;
   uint32_t *edges, *triangles; /* of medial vertices */
   size_t edge_count, triangle_count;
+  /* What edges and triangles are dual to, if `keep_duals` is set: 3 corners of a facet, 2 ends of a Delaunay edge. The
+   * owner frees both. */
+  bool keep_duals;
+  uint32_t *edge_duals, *triangle_duals;
 } qmat_dual_complex;
 
 /* The surface component of a sample. */

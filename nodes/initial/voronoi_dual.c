@@ -54,28 +54,49 @@ static size_t fan(const uint32_t *polygon, size_t count, uint32_t *triangles) {
   return made;
 }
 
+typedef struct {
+  size_t edges, triangles, edge_duals, triangle_duals;
+} dual_capacity;
+
+/* Room for `edges` and `triangles` more. */
+static int reserve(qmat_dual_complex *d, dual_capacity *room, size_t edges, size_t triangles) {
+  const size_t e = d->edge_count + edges, t = d->triangle_count + triangles;
+  int bad = qmat_grow((void **)&d->edges, &room->edges, 2 * e, sizeof *d->edges) ||
+            qmat_grow((void **)&d->triangles, &room->triangles, 3 * t, sizeof *d->triangles);
+  if (!bad && d->keep_duals)
+    bad = qmat_grow((void **)&d->edge_duals, &room->edge_duals, 3 * e, sizeof *d->edge_duals) ||
+          qmat_grow((void **)&d->triangle_duals, &room->triangle_duals, 2 * t, sizeof *d->triangle_duals);
+  return bad;
+}
+
+static void add_edges(qmat_dual_complex *d, size_t i) {
+  const uint32_t *corners = &d->cells.corners[4 * i];
+  for (size_t k = 0; k < 4; k++) {
+    const uint32_t j = d->cells.neighbours[4 * i + k];
+    if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j] || d->sphere_of[j] == d->sphere_of[i]) continue;
+    for (size_t c = 0, n = 0; d->keep_duals && c < 4; c++)
+      if (c != k) d->edge_duals[3 * d->edge_count + n++] = corners[c];
+    d->edges[2 * d->edge_count] = d->sphere_of[i];
+    d->edges[2 * d->edge_count + 1] = d->sphere_of[j];
+    d->edge_count++;
+  }
+}
+
 qmat_status qmat_dual_connect(qmat_dual_complex *d) {
   qmat_context *context = d->context;
   const size_t count = d->cells.count;
-  size_t edge_capacity = 0, triangle_capacity = 0;
+  dual_capacity room = {0};
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < count; i++) {
     if (i % 65536 == 0 && (status = qmat_progress(context, i, count, "dual cells")) != QMAT_OK) return status;
     if (!d->kinds[i]) continue;
-    if (qmat_grow((void **)&d->edges, &edge_capacity, 2 * d->edge_count + 8, sizeof *d->edges))
-      return qmat_fail_memory(context, "medial edges");
-    for (int k = 0; k < 4; k++) {
-      const uint32_t j = d->cells.neighbours[4 * i + (size_t)k];
-      if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j] || d->sphere_of[j] == d->sphere_of[i]) continue;
-      d->edges[2 * d->edge_count] = d->sphere_of[i];
-      d->edges[2 * d->edge_count + 1] = d->sphere_of[j];
-      d->edge_count++;
-    }
+    if (reserve(d, &room, 4, 0)) return qmat_fail_memory(context, "medial edges");
+    add_edges(d, i);
     for (int e = 0; e < 6; e++) {
       uint32_t ring[RING_CAPACITY];
       const uint32_t *corners = &d->cells.corners[4 * i];
-      const size_t n =
-          walk_ring(d, (uint32_t)i, corners[edge_corners[e][0]], corners[edge_corners[e][1]], ring, RING_CAPACITY);
+      const uint32_t a = corners[edge_corners[e][0]], b = corners[edge_corners[e][1]];
+      const size_t n = walk_ring(d, (uint32_t)i, a, b, ring, RING_CAPACITY);
       size_t polygon = 0;
       for (size_t k = 0; k < n; k++) {
         const uint32_t sphere = d->sphere_of[ring[k]];
@@ -83,10 +104,13 @@ qmat_status qmat_dual_connect(qmat_dual_complex *d) {
       }
       while (polygon > 1 && ring[polygon - 1] == ring[0]) polygon--;
       if (polygon < 3) continue;
-      if (qmat_grow((void **)&d->triangles, &triangle_capacity, 3 * (d->triangle_count + polygon),
-                    sizeof *d->triangles))
-        return qmat_fail_memory(context, "medial slabs");
-      d->triangle_count += fan(ring, polygon, &d->triangles[3 * d->triangle_count]);
+      if (reserve(d, &room, 0, polygon)) return qmat_fail_memory(context, "medial slabs");
+      const size_t made = fan(ring, polygon, &d->triangles[3 * d->triangle_count]);
+      for (size_t k = d->triangle_count; d->keep_duals && k < d->triangle_count + made; k++) {
+        d->triangle_duals[2 * k] = a;
+        d->triangle_duals[2 * k + 1] = b;
+      }
+      d->triangle_count += made;
     }
   }
   return QMAT_OK;

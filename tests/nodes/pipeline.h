@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "core/geometry/frame.h"
 #include "core/node.h"
@@ -50,6 +51,41 @@ static inline void pipeline_must_run(int threads, const char *name, const char *
     fail_msg("%s", message);
   }
   qmat_context_uninit(&context);
+}
+
+/* The processor time between the calls of a progress function. */
+typedef struct pipeline_gaps {
+  double last, longest;
+} pipeline_gaps;
+
+static inline void pipeline_note_gap(pipeline_gaps *gaps) {
+  struct timespec time;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  const double now = (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+  if (gaps->last > 0 && now - gaps->last > gaps->longest) gaps->longest = now - gaps->last;
+  gaps->last = now;
+}
+
+static inline bool pipeline_on_progress(void *user, const char *node_id, const char *node_type, uint64_t done,
+                                        uint64_t total, const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  pipeline_note_gap(user);
+  return true;
+}
+
+/* Runs a node on one thread and checks that it could have been cancelled within `limit` processor seconds at any
+ * time. */
+static inline void pipeline_must_stop_within(double limit, const char *name, const char *text,
+                                             const qmat_value *const inputs[]) {
+  pipeline_gaps gaps = {0};
+  qmat_context context = {.threads = 1, .progress = pipeline_on_progress, .progress_user = &gaps};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_note_gap(&gaps);
+  assert_int_equal(pipeline_run(&context, name, text, inputs, outputs), QMAT_OK);
+  pipeline_note_gap(&gaps);
+  for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
+  qmat_context_uninit(&context);
+  if (!(gaps.longest <= limit)) fail_msg("%s cannot be cancelled for %.2f s", name, gaps.longest);
 }
 
 /* An unsealed mesh of a model's surface. */
