@@ -93,7 +93,7 @@ typedef struct qmat_mesh {
 
 typedef enum qmat_domain { QMAT_PER_FACET, QMAT_PER_VERTEX } qmat_domain;
 
-/* One number per facet or vertex of a mesh. */
+/* One number per facet or vertex of a mesh, or per sphere of a medial mesh (its vertices). */
 typedef struct qmat_field {
   qmat_value base;
   size_t count;

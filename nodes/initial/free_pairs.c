@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "nodes/initial/item_queue.h"
+
 static const size_t steps_per_report = 65536;
 
 /* The simplices around a sphere or an edge: how many there are, and the exclusive or of their ids, which is the id of
@@ -10,11 +12,6 @@ static const size_t steps_per_report = 65536;
 typedef struct {
   uint32_t count, ids;
 } incident;
-
-typedef struct {
-  double measure;
-  size_t item;
-} queued;
 
 /* An item is a triangle, or an edge with the number triangle_count + its id. */
 typedef struct thinning {
@@ -27,8 +24,8 @@ typedef struct thinning {
   incident *around_sphere; /* edges */
   uint8_t *is_queued;      /* per item */
   uint8_t *edge_gone, *triangle_gone, *sphere_gone;
-  queued *heap;
-  size_t heap_count;
+  qmat_item_queue queue;
+  bool is_short; /* memory was */
 } thinning;
 
 size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row) {
@@ -49,30 +46,10 @@ size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const
 
 /* --- the queue --------------------------------------------------------------------------------------------------- */
 
-static bool comes_before(queued a, queued b) {
-  return a.measure < b.measure || (a.measure == b.measure && a.item < b.item);
-}
-
 static void push(thinning *t, size_t item, double measure) {
   if (t->is_queued[item] || !(measure < t->threshold)) return;
   t->is_queued[item] = 1;
-  const queued added = {measure, item};
-  size_t i = t->heap_count++;
-  for (; i > 0 && comes_before(added, t->heap[(i - 1) / 2]); i = (i - 1) / 2) t->heap[i] = t->heap[(i - 1) / 2];
-  t->heap[i] = added;
-}
-
-static size_t pop(thinning *t) {
-  const size_t first = t->heap[0].item;
-  const queued last = t->heap[--t->heap_count];
-  size_t i = 0;
-  for (size_t child; (child = 2 * i + 1) < t->heap_count; i = child) {
-    if (child + 1 < t->heap_count && comes_before(t->heap[child + 1], t->heap[child])) child++;
-    if (!comes_before(t->heap[child], last)) break;
-    t->heap[i] = t->heap[child];
-  }
-  t->heap[i] = last;
-  return first;
+  t->is_short = qmat_queue_push(&t->queue, measure, item) || t->is_short;
 }
 
 /* Queues the edge if it has no triangle and is the last one at an end, the triangle that is the last one at the edge.
@@ -204,7 +181,7 @@ qmat_status qmat_free_pairs_remove(qmat_context *context, qmat_medial *medial, c
                                    const double *triangle_measures, double threshold) {
   qmat_arena *arena = &context->arena;
   const size_t edges = medial->edge_count, triangles = medial->triangle_count, spheres = medial->sphere_count;
-  thinning t = {context, medial, edge_measures, triangle_measures, threshold, .heap_count = 0};
+  thinning t = {context, medial, edge_measures, triangle_measures, threshold, .is_short = false};
   t.sides = qmat_arena_alloc(arena, triangles, 3 * sizeof *t.sides);
   t.around_edge = qmat_arena_calloc(arena, edges, sizeof *t.around_edge);
   t.around_sphere = qmat_arena_calloc(arena, spheres, sizeof *t.around_sphere);
@@ -212,18 +189,19 @@ qmat_status qmat_free_pairs_remove(qmat_context *context, qmat_medial *medial, c
   t.edge_gone = qmat_arena_calloc(arena, edges, 1);
   t.triangle_gone = qmat_arena_calloc(arena, triangles, 1);
   t.sphere_gone = qmat_arena_calloc(arena, spheres, 1);
-  t.heap = qmat_arena_alloc(arena, edges + triangles, sizeof *t.heap);
   uint32_t *numbers = qmat_arena_alloc(arena, spheres, sizeof *numbers);
   if (!t.sides || !t.around_edge || !t.around_sphere || !t.is_queued || !t.edge_gone || !t.triangle_gone ||
-      !t.sphere_gone || !t.heap || !numbers)
+      !t.sphere_gone || !numbers)
     return qmat_fail_memory(context, "the thinning of the medial mesh");
   qmat_status status = find_incidences(&t);
   if (status != QMAT_OK) return status;
   for (size_t e = 0; e < edges; e++) queue_at_edge(&t, (uint32_t)e);
-  for (size_t steps = 0; t.heap_count > 0; steps++) {
-    if (steps % steps_per_report == 0 && (status = qmat_progress(context, 0, 0, "pairs")) != QMAT_OK) return status;
-    remove_item(&t, pop(&t));
+  for (size_t steps = 0; status == QMAT_OK && t.queue.count > 0; steps++) {
+    if (steps % steps_per_report == 0) status = qmat_progress(context, 0, 0, "pairs");
+    remove_item(&t, qmat_queue_pop(&t.queue).item);
   }
-  leave_out(&t, medial, numbers);
-  return QMAT_OK;
+  qmat_free(t.queue.items);
+  if (status == QMAT_OK && t.is_short) status = qmat_fail_memory(context, "the thinning of the medial mesh");
+  if (status == QMAT_OK) leave_out(&t, medial, numbers);
+  return status;
 }

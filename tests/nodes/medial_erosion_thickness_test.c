@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/geometry/medial_build.h"
+#include "tests/nodes/pipeline.h"
+
+/* The mesh is a box with a diagonal of 10: its size is all that counts. */
+static qmat_mesh *box_of_ten(void) {
+  return shape_seal(shape_box(6, 8, 0));
+}
+
+static qmat_medial *new_medial(size_t spheres) {
+  qmat_medial *m = qmat_medial_new();
+  assert_non_null(m);
+  m->spheres = qmat_calloc(spheres, 4 * sizeof *m->spheres);
+  m->sphere_count = spheres;
+  assert_non_null(m->spheres);
+  return m;
+}
+
+static void finish(qmat_medial *m, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
+                   size_t triangle_count) {
+  qmat_context context = {0};
+  assert_int_equal(qmat_medial_set_simplices(&context, m, edges, edge_count, triangles, triangle_count), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &m->base), QMAT_OK);
+  qmat_context_uninit(&context);
+}
+
+typedef struct burnt {
+  qmat_medial *medial;
+  qmat_field *thickness;
+  qmat_report *report;
+} burnt;
+
+static burnt burn(const qmat_mesh *mesh, const qmat_medial *medial, int threads, const char *params) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(threads, "medial.erosion_thickness", params, (const qmat_value *[]){&mesh->base, &medial->base},
+                    outputs);
+  return (burnt){(qmat_medial *)outputs[0], (qmat_field *)outputs[1], (qmat_report *)outputs[2]};
+}
+
+static void free_burnt(burnt *b) {
+  qmat_value_release(&b->medial->base);
+  qmat_value_release(&b->thickness->base);
+  qmat_value_release(&b->report->base);
+}
+
+/* Triangles of a grid of nx by ny spheres that starts at sphere `first`; returns how many. */
+static size_t grid(uint32_t first, uint32_t nx, uint32_t ny, uint32_t *triangles) {
+  size_t count = 0;
+  for (uint32_t y = 0; y + 1 < ny; y++) {
+    for (uint32_t x = 0; x + 1 < nx; x++) {
+      const uint32_t a = first + y * nx + x, b = a + 1, c = a + nx, d = c + 1;
+      const uint32_t two[6] = {a, b, d, a, d, c};
+      memcpy(&triangles[3 * count], two, sizeof two);
+      count += 2;
+    }
+  }
+  return count;
+}
+
+/* --- by hand ----------------------------------------------------------------------------------------------------- */
+
+/* A sheet of 8 by 4 of constant radius: the thickness is the distance to its border. */
+static void test_thickness_of_a_rectangle_is_the_distance_to_its_border(void **state) {
+  (void)state;
+  enum { NX = 33, NY = 17 };
+  static uint32_t triangles[6 * NX * NY];
+  qmat_mesh *mesh = box_of_ten();
+  qmat_medial *m = new_medial(NX * NY);
+  for (uint32_t i = 0; i < NX * NY; i++) {
+    const double sphere[4] = {i % NX * 0.25, i / NX * 0.25, 0, 0.3};
+    memcpy(&m->spheres[4 * i], sphere, sizeof sphere);
+  }
+  finish(m, NULL, 0, triangles, grid(0, NX, NY, triangles));
+  burnt b = burn(mesh, m, 0, "");
+  assert_int_equal(b.thickness->count, NX * NY);
+  for (uint32_t i = 0; i < NX * NY; i++) {
+    const double *s = &m->spheres[4 * i];
+    const double expected = fmin(fmin(s[0], 8 - s[0]), fmin(s[1], 4 - s[1]));
+    assert_near(b.thickness->values[i], expected, 1e-9);
+  }
+  assert_near(pipeline_number(b.report, "largest"), 0.2, 1e-9);
+  assert_int_equal(pipeline_count(b.report, "spheres_that_never_burn"), 0);
+  assert_memory_equal(&b.medial->base.digest, &m->base.digest, sizeof(qmat_digest)); /* nothing is pruned */
+  free_burnt(&b);
+  /* What has a corner at 1 or farther inside stays: 0.75 .. 7.25 by 0.75 .. 3.25. */
+  b = burn(mesh, m, 0, "prune=9.9%");
+  double low = INFINITY, high = 0;
+  for (size_t i = 0; i < b.medial->sphere_count; i++) {
+    low = fmin(low, b.medial->spheres[4 * i]);
+    high = fmax(high, b.medial->spheres[4 * i]);
+  }
+  assert_near(low, 0.75, 1e-12);
+  assert_near(high, 7.25, 1e-12);
+  assert_int_equal(pipeline_euler(b.medial), 1);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* The fires of a regular hexagon's sides reach its centre at their distance, which no edge has. */
+static void test_front_is_straight_within_a_triangle(void **state) {
+  (void)state;
+  qmat_mesh *mesh = box_of_ten();
+  qmat_medial *m = new_medial(7);
+  uint32_t triangles[18];
+  for (uint32_t i = 0; i < 6; i++) {
+    m->spheres[4 * i] = cos(acos(-1) / 3 * i);
+    m->spheres[4 * i + 1] = sin(acos(-1) / 3 * i);
+    const uint32_t triangle[3] = {i, (i + 1) % 6, 6};
+    memcpy(&triangles[3 * i], triangle, sizeof triangle);
+  }
+  for (uint32_t i = 0; i < 7; i++) m->spheres[4 * i + 3] = 0.2;
+  finish(m, NULL, 0, triangles, 6);
+  burnt b = burn(mesh, m, 0, "");
+  for (int i = 0; i < 6; i++) assert_near(b.thickness->values[i], 0, 1e-12);
+  assert_near(b.thickness->values[6], sqrt(0.75), 1e-12);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* The ends burn at their radius, the middle of a curve when both fires meet. */
+static void test_curve_burns_from_its_ends(void **state) {
+  (void)state;
+  qmat_mesh *mesh = box_of_ten();
+  qmat_medial *m = new_medial(6);
+  for (int i = 0; i < 5; i++) {
+    m->spheres[4 * i] = i;
+    m->spheres[4 * i + 3] = i == 0 ? 0.5 : 1;
+  }
+  m->spheres[4 * 5 + 1] = 9; /* a sphere alone */
+  m->spheres[4 * 5 + 3] = 2;
+  finish(m, (const uint32_t[]){0, 1, 1, 2, 2, 3, 3, 4}, 4, NULL, 0);
+  burnt b = burn(mesh, m, 0, "");
+  const double expected[6] = {0, 0.5, 1.5, 1, 0, 0};
+  for (int i = 0; i < 6; i++) assert_near(b.thickness->values[i], expected[i], 1e-12);
+  free_burnt(&b);
+  b = burn(mesh, m, 0, "prune=12%"); /* the edges at the ends have 0.5 and 1, the others 1.5 */
+  assert_int_equal(b.medial->sphere_count, 4);
+  assert_int_equal(b.medial->edge_count, 2);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* A fin of height 1 or 3 on the middle line of a sheet of width 4. A low fin burns down first and the seam burns when
+ * the sheet does; a high one is burnt from the seam, too. */
+static void test_fire_waits_at_a_seam_until_one_sheet_is_left(void **state) {
+  (void)state;
+  enum { N = 41, ACROSS = 9, SPHERES = N * (ACROSS + 12) };
+  for (int high = 0; high < 2; high++) {
+    const uint32_t up = high ? 12 : 4;
+    static uint32_t triangles[6 * SPHERES];
+    qmat_mesh *mesh = box_of_ten();
+    qmat_medial *m = new_medial(N * (ACROSS + up));
+    size_t count = 0;
+    for (uint32_t i = 0; i < N * ACROSS; i++) {
+      const double sphere[4] = {i % N * 0.5, i / N * 0.5 - 2, 0, 0.1};
+      memcpy(&m->spheres[4 * i], sphere, sizeof sphere);
+    }
+    for (uint32_t i = 0; i < N * up; i++) {
+      const double sphere[4] = {i % N * 0.5, 0, (i / N + 1) * 0.25, 0.1};
+      memcpy(&m->spheres[4 * (N * ACROSS + i)], sphere, sizeof sphere);
+    }
+    count = grid(0, N, ACROSS, triangles);
+    count += grid(N * ACROSS, N, up, &triangles[3 * count]);
+    for (uint32_t x = 0; x + 1 < N; x++) { /* the foot */
+      const uint32_t a = N * (ACROSS / 2) + x, c = N * ACROSS + x;
+      const uint32_t two[6] = {a, a + 1, c + 1, a, c + 1, c};
+      memcpy(&triangles[3 * count], two, sizeof two);
+      count += 2;
+    }
+    finish(m, NULL, 0, triangles, count);
+    burnt b = burn(mesh, m, 0, "");
+    const uint32_t middle = N / 2;
+    assert_near(b.thickness->values[N * (ACROSS / 2) + middle], 2, 1e-9); /* the seam */
+    assert_near(b.thickness->values[N * (ACROSS / 2 - 2) + middle], 1, 1e-9);
+    for (uint32_t z = 0; z < up; z++) {
+      const double height = (z + 1) * 0.25;
+      const double expected = fmin(up * 0.25 - height, 2 + height);
+      assert_near(b.thickness->values[N * (ACROSS + z) + middle], expected, 1e-9);
+    }
+    free_burnt(&b);
+    if (!high) { /* the fin goes down to its foot, the sheet stays around it */
+      b = burn(mesh, m, 0, "prune=12%");
+      double top = 0;
+      for (size_t i = 0; i < b.medial->sphere_count; i++) top = fmax(top, b.medial->spheres[4 * i + 2]);
+      assert_near(top, 0, 0);
+      assert_true(b.medial->sphere_count > N);
+      assert_int_equal(pipeline_euler(b.medial), 1);
+      free_burnt(&b);
+    }
+    qmat_value_release(&m->base);
+    qmat_value_release(&mesh->base);
+  }
+}
+
+static void test_closed_pocket_and_loop_never_burn(void **state) {
+  (void)state;
+  qmat_mesh *mesh = box_of_ten();
+  qmat_medial *m = new_medial(8);
+  for (int i = 0; i < 8; i++) {
+    m->spheres[4 * i] = i % 2;
+    m->spheres[4 * i + 1] = i / 2 % 2;
+    m->spheres[4 * i + 2] = i / 4;
+    m->spheres[4 * i + 3] = 0.1;
+  }
+  /* A tetrahedron's surface, a ring of three, and a tail on the pocket. */
+  finish(m, (const uint32_t[]){4, 5, 5, 6, 4, 6, 0, 7}, 4, (const uint32_t[]){0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3}, 4);
+  burnt b = burn(mesh, m, 0, "");
+  assert_int_equal(pipeline_count(b.report, "spheres_that_never_burn"), 7);
+  for (int i = 0; i < 7; i++) assert_near(b.thickness->values[i], 10, 1e-12);
+  assert_near(b.thickness->values[7], 0, 1e-12);
+  free_burnt(&b);
+  b = burn(mesh, m, 0, "prune=100%");
+  assert_int_equal(b.medial->sphere_count, 7); /* only the tail went */
+  assert_int_equal(b.medial->triangle_count, 4);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* --- models ------------------------------------------------------------------------------------------------------ */
+
+/* Spikes of the initial medial mesh go, its topology stays, and what is left has its samples. */
+static void test_pruning_keeps_topology_and_regions(void **state) {
+  (void)state;
+  static const char *const params[] = {"prune=0.1%", "prune=0.5%", "prune=3%"};
+  pipeline p;
+  pipeline_make(&p, pipeline_model("torus", 16), "spacing=4%", "");
+  size_t before = p.medial->sphere_count;
+  for (int i = 0; i < 3; i++) {
+    burnt b = burn(p.mesh, p.medial, 0, params[i]);
+    assert_int_equal(pipeline_euler(b.medial), pipeline_euler(p.medial));
+    assert_int_equal(pipeline_components(b.medial), pipeline_components(p.medial));
+    assert_true(b.medial->sphere_count < before);
+    before = b.medial->sphere_count;
+    assert_int_equal(b.medial->region_offset_count, b.medial->sphere_count + 1);
+    for (size_t k = 0, old = 0; k < b.medial->sphere_count; k++) { /* the order is kept */
+      while (memcmp(&p.medial->spheres[4 * old], &b.medial->spheres[4 * k], 4 * sizeof(double)) != 0) old++;
+      assert_true(old < p.medial->sphere_count);
+      const uint32_t length = b.medial->region_offsets[k + 1] - b.medial->region_offsets[k];
+      assert_int_equal(length, p.medial->region_offsets[old + 1] - p.medial->region_offsets[old]);
+      assert_memory_equal(&b.medial->region_samples[b.medial->region_offsets[k]],
+                          &p.medial->region_samples[p.medial->region_offsets[old]], length * sizeof(uint32_t));
+      old++;
+    }
+    free_burnt(&b);
+  }
+  pipeline_free(&p);
+}
+
+static void test_threads_do_not_change_a_byte(void **state) {
+  (void)state;
+  static const int threads[] = {1, 2, 8};
+  pipeline p;
+  pipeline_make(&p, pipeline_model("octopus", 8), "spacing=4%", "");
+  qmat_digest first[2] = {{{0}}, {{0}}};
+  for (int i = 0; i < 3; i++) {
+    burnt b = burn(p.mesh, p.medial, threads[i], "prune=1%");
+    if (i == 0) first[0] = b.medial->base.digest, first[1] = b.thickness->base.digest;
+    assert_memory_equal(&b.medial->base.digest, &first[0], sizeof *first);
+    assert_memory_equal(&b.thickness->base.digest, &first[1], sizeof *first);
+    free_burnt(&b);
+  }
+  pipeline_free(&p);
+}
+
+static void test_sheets_of_the_model_stay(void **state) {
+  (void)state;
+  qmat_mesh *mesh = box_of_ten();
+  qmat_medial *m = new_medial(6);
+  for (int i = 0; i < 6; i++) m->spheres[4 * i] = i % 2, m->spheres[4 * i + 1] = i / 2;
+  m->sheet_sphere_count = 4;
+  finish(m, (const uint32_t[]){4, 5}, 1, (const uint32_t[]){0, 1, 2, 1, 2, 3}, 2);
+  burnt b = burn(mesh, m, 0, "prune=100%");
+  assert_int_equal(b.medial->triangle_count, 2);
+  assert_int_equal(b.medial->sheet_sphere_count, 4);
+  assert_int_equal(b.medial->sphere_count, 5);
+  assert_int_equal(b.medial->edge_count, 5);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                   const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return --*(int *)user >= 0;
+}
+
+static void test_progress_function_cancels(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("torus", 8), "spacing=0", "");
+  int calls = 1; /* the first call is before the node starts */
+  qmat_context context = {.progress = refuse, .progress_user = &calls};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  const qmat_value *inputs[] = {&p.mesh->base, &p.medial->base};
+  assert_int_equal(pipeline_run(&context, "medial.erosion_thickness", "", inputs, outputs), QMAT_CANCELLED);
+  qmat_context_uninit(&context);
+  pipeline_free(&p);
+}
+
+static void test_it_can_be_cancelled_within_half_a_second(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("octopus", 24), "spacing=0.5%", "thinning_tolerance=0");
+  pipeline_must_stop_within(0.5, "medial.erosion_thickness", "prune=1%",
+                            (const qmat_value *[]){&p.mesh->base, &p.medial->base});
+  pipeline_free(&p);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_thickness_of_a_rectangle_is_the_distance_to_its_border),
+      cmocka_unit_test(test_front_is_straight_within_a_triangle),
+      cmocka_unit_test(test_curve_burns_from_its_ends),
+      cmocka_unit_test(test_fire_waits_at_a_seam_until_one_sheet_is_left),
+      cmocka_unit_test(test_closed_pocket_and_loop_never_burn),
+      cmocka_unit_test(test_pruning_keeps_topology_and_regions),
+      cmocka_unit_test(test_threads_do_not_change_a_byte),
+      cmocka_unit_test(test_sheets_of_the_model_stay),
+      cmocka_unit_test(test_progress_function_cancels),
+      cmocka_unit_test(test_it_can_be_cancelled_within_half_a_second),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
