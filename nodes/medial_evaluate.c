@@ -12,6 +12,7 @@
 #include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
+#include "nodes/measure/sphere_errors.h"
 #include "nodes/measure/storage_share.h"
 #include "nodes/measure/topology_report.h"
 #include "nodes/measure/unit_spheres.h"
@@ -41,6 +42,7 @@ typedef struct evaluation {
   double largest_gap, mean_gap; /* max(0, F) over the samples of the surface */
   double deepest, mean_offset;  /* -F and |F| over the same samples */
   qmat_boundary_distance boundary;
+  double *sphere_errors; /* per sphere: what bounds F where it answers for the surface; in the arena */
   size_t spheres_outside, degenerate_cones, degenerate_slabs, duplicate_spheres;
 } evaluation;
 
@@ -107,6 +109,21 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
     known = bound.found;
     if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
   }
+  return status;
+}
+
+/* The gap between the bounds of a sphere's error, as a share of epsilon or of the largest error. */
+static const double SPHERE_TOLERANCE = 0.1;
+
+/* The same for the part of the surface that each sphere answers for. */
+static qmat_status bound_spheres(evaluation *e) {
+  const size_t count = e->unit.sphere_count;
+  const double most = e->surface_to_envelope.hi, tolerance = SPHERE_TOLERANCE * fmax(e->epsilon, most);
+  e->sphere_errors = qmat_arena_alloc(&e->context->arena, count, sizeof *e->sphere_errors);
+  if (!e->sphere_errors) return qmat_fail_memory(e->context, "the errors of spheres");
+  const qmat_status status = qmat_sphere_errors_measure(e->context, e->surface, e->envelope, e->unit.spheres, count,
+                                                        most, tolerance, e->sphere_errors);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) e->sphere_errors[i] += e->deviation;
   return status;
 }
 
@@ -207,6 +224,10 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
     bad |= json_object_set_new(report->root, "envelope_to_surface_meters", json_real(meters * envelope_to_surface));
   }
   if (e->deviation > 0) bad |= json_object_set_new(report->root, "deviation", json_real(e->deviation));
+  json_t *errors = json_array();
+  for (size_t i = 0; i < e->unit.sphere_count; i++)
+    bad |= json_array_append_new(errors, json_real(e->sphere_errors[i]));
+  bad |= json_object_set_new(report->root, "sphere_errors", errors);
   if (bad) return qmat_fail_memory(e->context, "the report");
   const qmat_status status = qmat_topology_report(e->context, &e->unit, e->surface, report->root);
   return status == QMAT_OK ? qmat_value_seal(e->context, &report->base) : status;
@@ -222,6 +243,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = prepare(&e, (const qmat_mesh *)inputs[0], (const qmat_medial *)inputs[1]);
   if (status == QMAT_OK) status = sample_surface(&e);
   if (status == QMAT_OK) status = bound_surface_to_envelope(&e);
+  if (status == QMAT_OK) status = bound_spheres(&e);
   if (status == QMAT_OK)
     status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance, true,
                                             (size_t)params->samples, &e.boundary);
@@ -263,7 +285,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 8,
+    .version = 9,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "
@@ -275,7 +297,9 @@ const qmat_node qmat_node_medial_evaluate = {
         "errors may reach five tolerances where the truth is less, and more for ten thousand simplices.\n\n"
         "certified means: the surface is closed and oriented, sheets aside, and both errors are at most epsilon. For "
         "an open surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope "
-        "fills, is not bounded; surface_depth_in_envelope_sampled shows it.\n\n"
+        "fills, is not bounded; surface_depth_in_envelope_sampled shows it. sphere_errors bounds surface_to_envelope "
+        "for "
+        "each sphere, over the part of the surface that it answers for.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
         "are Betti numbers over Z/2; those of the solid and its sheets (_of_solid) are missing where the surface is "
         "open or has an edge of more than two triangles.",

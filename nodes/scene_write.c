@@ -89,6 +89,20 @@ static qmat_stated_errors errors_of(const qmat_medial *medial, const qmat_report
                               .certified = certificate_of(report)};
 }
 
+/* The errors of the spheres that the report has, in model units and in the arena; NULL: none. */
+static const double *sphere_errors_of(qmat_context *context, const qmat_medial *medial, const qmat_report *report,
+                                      double diagonal) {
+  const json_t *list = report ? json_object_get(report->root, "sphere_errors") : NULL;
+  if (!medial || json_array_size(list) != medial->sphere_count) return NULL;
+  double *errors = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *errors);
+  for (size_t i = 0; errors && i < medial->sphere_count; i++) {
+    const double error = json_number_value(json_array_get(list, i));
+    errors[i] = diagonal * error;
+    if (!(error >= 0) || !isfinite(errors[i])) return NULL;
+  }
+  return errors;
+}
+
 /* How far storage may move the solid, in model units. What is certified stays so where that is possible. */
 static double storage_of(const qmat_stated_errors *errors) {
   const double allowed = QMAT_STORAGE_SHARE / 2 * (errors->epsilon > 0 ? errors->epsilon : DEFAULT_EPSILON);
@@ -98,7 +112,7 @@ static double storage_of(const qmat_stated_errors *errors) {
 }
 
 /* What is written of one medial mesh; NULL: none. */
-static qmat_gltf_addition addition_of(const scene_write_params *params, const qmat_scene *scene,
+static qmat_gltf_addition addition_of(qmat_context *context, const scene_write_params *params, const qmat_scene *scene,
                                       const qmat_medial *medial, const qmat_mesh *skin, const qmat_report *report,
                                       const char *name, qmat_stated_errors *stated) {
   const qmat_stated_errors errors = errors_of(medial, report);
@@ -114,6 +128,7 @@ static qmat_gltf_addition addition_of(const scene_write_params *params, const qm
                                           .name = name,
                                           .meters_per_unit = scene ? scene->meters_per_unit : 0,
                                           .is_z_up = scene && scene->is_z_up,
+                                          .sphere_errors = sphere_errors_of(context, medial, report, errors.diagonal),
                                           .errors = errors,
                                           .stated = stated}};
 }
@@ -155,7 +170,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   if (!additions) return qmat_fail_memory(context, "a glTF file");
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
-    additions[i] = addition_of(params, scene, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
+    additions[i] = addition_of(context, params, scene, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
                                shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
                                (const qmat_report *)given_for(inputs[IN_REPORT], i),
                                name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);

@@ -52,14 +52,15 @@ static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *
 }
 
 /* Encodes the plain form, decodes it again, and measures the loss. */
-static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial, medial_text *text) {
+static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial, const double *errors,
+                               medial_text *text) {
   uint8_t *bytes = NULL;
   size_t size = 0;
   qmat_medial *decoded = NULL;
   uint16_t *joints = text->has_joints ? qmat_alloc(4 * medial->sphere_count, sizeof *joints) : NULL;
   if (text->has_joints && !joints) return qmat_fail_memory(context, "the medial mesh as text");
   for (size_t i = 0; joints && i < 4 * medial->sphere_count; i++) joints[i] = (uint16_t)medial->joints[i];
-  const qmat_sphere_data data = {.joints = joints, .weights = medial->weights};
+  const qmat_sphere_data data = {.errors = errors, .joints = joints, .weights = medial->weights};
   qmat_status status = qmat_flat_encode(context, medial, &data, text->origin, text->flat_floats, &bytes, &size);
   if (status == QMAT_OK) status = qmat_flat_decode(context, bytes, size, text->origin, &decoded);
   if (status == QMAT_OK) {
@@ -78,10 +79,10 @@ static qmat_status make_flat_text(qmat_context *context, const qmat_medial *medi
                                   medial_text *text) {
   if (options->flat == QMAT_FLAT_NONE) return QMAT_OK;
   text->flat_floats = options->flat == QMAT_FLAT_FLOAT;
-  qmat_status status = encode_flat(context, medial, text);
+  qmat_status status = encode_flat(context, medial, options->sphere_errors, text);
   if (status == QMAT_OK && options->flat == QMAT_FLAT_AUTO && text->flat_loss > options->quantisation) {
     text->flat_floats = true;
-    status = encode_flat(context, medial, text);
+    status = encode_flat(context, medial, options->sphere_errors, text);
   }
   return status;
 }

@@ -140,6 +140,61 @@ static void test_the_report_goes_into_the_extras_with_what_quantisation_adds(voi
   qmat_value_release(&medial->base);
 }
 
+/* The errors in qmat_flat, in model units. */
+static void flat_errors(json_t *root, bool has_any, double errors[3]) {
+  qmat_context context = {0};
+  const json_t *text = extra(root, "qmat_flat");
+  uint8_t *bytes;
+  size_t size;
+  assert_int_equal(qmat_base64_decode(&context, json_string_value(text), json_string_length(text), &bytes, &size),
+                   QMAT_OK);
+  assert_int_equal(bytes[6] & 1, 0);
+  assert_int_equal(bytes[6] >> 2 & 1, has_any);
+  float scale;
+  memcpy(&scale, bytes + 56, sizeof scale);
+  for (size_t i = 0; i < 3 && has_any; i++) {
+    const uint8_t *stored = bytes + 64 + 3 * 8 + 2 * i;
+    errors[i] = (double)scale * (stored[0] | stored[1] << 8);
+  }
+  qmat_free(bytes);
+}
+
+static void test_the_errors_of_spheres_go_into_the_plain_form(void **state) {
+  (void)state;
+  static const char *const settings[][2] = {{"flat", "short"}, {NULL, NULL}};
+  static const double expected[] = {0.011, 0.002, 0};
+  qmat_medial *medial = make_medial();
+  assert_int_equal(medial->sphere_count, 3);
+  qmat_report *report = make_report(
+      json_pack("{s:f, s:[f, f, f], s:f}", "epsilon", 0.02, "sphere_errors", 0.011, 0.002, 0.0, "diagonal", 8.0));
+  qmat_file *file = must_write(medial, (wiring){.report = report}, settings);
+  json_t *root = glb_root(file);
+  double errors[3];
+  flat_errors(root, true, errors);
+  const double moved = json_real_value(extra(root, "qmat_flat_quantisation"));
+  for (size_t i = 0; i < 3; i++) {
+    assert_true(errors[i] >= 8 * expected[i] + moved);
+    assert_near(errors[i], 8 * expected[i] + moved, 2e-6);
+  }
+  json_decref(root);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  /* A list of another length, or of something else, is none. */
+  json_t *const others[] = {json_pack("{s:[f, f]}", "sphere_errors", 0.011, 0.002),
+                            json_pack("{s:[f, f, f]}", "sphere_errors", 0.011, -0.002, 0.0),
+                            json_pack("{s:s}", "sphere_errors", "small"), json_object()};
+  for (size_t i = 0; i < 4; i++) {
+    report = make_report(others[i]);
+    file = must_write(medial, (wiring){.report = report}, settings);
+    root = glb_root(file);
+    flat_errors(root, false, errors);
+    json_decref(root);
+    qmat_value_release(&file->base);
+    qmat_value_release(&report->base);
+  }
+  qmat_value_release(&medial->base);
+}
+
 static void test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough(void **state) {
   (void)state;
   static const struct {
@@ -354,6 +409,7 @@ static void test_the_same_inputs_give_the_same_bytes(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_report_goes_into_the_extras_with_what_quantisation_adds),
+      cmocka_unit_test(test_the_errors_of_spheres_go_into_the_plain_form),
       cmocka_unit_test(test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough),
       cmocka_unit_test(test_quantisation_takes_half_of_the_share_of_storage_at_most),
       cmocka_unit_test(test_scene_and_skin_name_and_show_the_node),

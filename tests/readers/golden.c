@@ -209,8 +209,12 @@ static void save_json(const char *folder, const char *name, const char *ending, 
   qmat_free(text);
 }
 
-/* Puts errors, joints and weights of the spheres into the plain form, which the writer leaves out so far, and their
- * expected values into `expected`. */
+static double error_of(size_t sphere) {
+  return random_number(4, sphere, 0, 0.01);
+}
+
+/* Puts errors, joints and weights of the spheres into the plain form, without the skin that the writer asks for, and
+ * their expected values into `expected`. */
 static void add_sphere_data(const qmat_medial *medial, bool floats, json_t *root, json_t *expected) {
   const size_t count = medial->sphere_count;
   qmat_context context = {0};
@@ -218,7 +222,7 @@ static void add_sphere_data(const qmat_medial *medial, bool floats, json_t *root
   uint16_t *joints = qmat_alloc(count, 4 * sizeof *joints);
   REQUIRE(errors && weights && joints);
   for (size_t i = 0; i < count; i++) {
-    errors[i] = random_number(4, i, 0, 0.01);
+    errors[i] = error_of(i);
     for (size_t k = 0; k < 4; k++) {
       joints[4 * i + k] = (uint16_t)((i + 300 * k) % 1000);
       weights[4 * i + k] = k > i % 4 ? 0 : random_number(5, 4 * i + k, 0.1, 1);
@@ -255,11 +259,15 @@ static void make(const char *folder, const char *name, qmat_medial *medial, qmat
                  bool has_data) {
   qmat_context context = {0};
   qmat_mesh *box = binary ? make_box() : NULL;
+  double errors[64];
+  REQUIRE(medial->sphere_count <= sizeof errors / sizeof *errors);
+  for (size_t i = 0; i < medial->sphere_count; i++) errors[i] = error_of(i);
   const qmat_gltf_options options = {
       .binary = binary,
       .flat = form,
       .quantisation = 1e-3,
       .name = name,
+      .sphere_errors = binary ? errors : NULL,
       .errors = {
           .diagonal = 4, .epsilon = 0.01, .error_out = 0.005, .error_in = 0.0075, .certified = QMAT_CERTIFICATE_YES}};
   qmat_file *file;
@@ -268,6 +276,7 @@ static void make(const char *folder, const char *name, qmat_medial *medial, qmat
   json_t *expected = json_object(), *root = NULL;
   if (binary) {
     save(folder, name, "glb", part->bytes, part->size);
+    REQUIRE(json_object_set_new(expected, "errors", numbers(errors, medial->sphere_count)) == 0);
     root = json_loadb((const char *)part->bytes + 20, part->bytes[12] | (size_t)part->bytes[13] << 8, 0, NULL);
   } else {
     root = json_loadb((const char *)part->bytes, part->size, 0, NULL);
