@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 
 /* Below this volume, in cubic diagonals, rounding decides. */
@@ -17,7 +18,7 @@ bool qmat_rigid_body_of_surface(const qmat_surface *surface, double density, dou
   *volume = 0;
   if (!mesh->closed || !mesh->oriented) return false;
   /* Each triangle spans a tetrahedron with the origin, whose volume has a sign. */
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
+  for (size_t t = 0; t < qmat_solid_triangle_count(mesh); t++) { /* sheets have no volume */
     const double *corners[3];
     double cross[3], s[3];
     for (int k = 0; k < 3; k++) corners[k] = &positions[3 * (size_t)mesh->triangles[3 * t + (size_t)k]];

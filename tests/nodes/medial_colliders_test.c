@@ -126,6 +126,20 @@ static void test_mass_properties_of_a_box_by_hand(void **state) {
   result_free(&r);
 }
 
+static void test_sheets_have_no_mass(void **state) {
+  (void)state;
+  static const double ball[] = {0, 0, 0, 0.5};
+  qmat_mesh *box = box_around(1, 2, 3);
+  shape_triangle(box, 0, 1, shape_vertex(box, 5, 6, 7));
+  box->sheet_triangle_count = 1;
+  box->closed = box->oriented = true;
+  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "", 0);
+  const double expected[10] = {48, 0, 0, 0, 4 * 52, 4 * 40, 4 * 20};
+  assert_int_equal(r.colliders->body_count, 1);
+  for (int k = 0; k < 10; k++) assert_near(r.colliders->body[k], expected[k], 1e-6);
+  result_free(&r);
+}
+
 static void test_inertia_turns_with_the_solid(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 0.5};
@@ -330,6 +344,7 @@ int main(void) {
       cmocka_unit_test(test_two_joined_spheres_are_one_capsule),
       cmocka_unit_test(test_a_ball_that_leaves_a_cube_protrudes_by_hand),
       cmocka_unit_test(test_mass_properties_of_a_box_by_hand),
+      cmocka_unit_test(test_sheets_have_no_mass),
       cmocka_unit_test(test_inertia_turns_with_the_solid),
       cmocka_unit_test(test_nested_and_degenerate_shapes_are_left_out),
       cmocka_unit_test(test_contain_leaves_none_of_a_million_points_outside),
