@@ -85,6 +85,7 @@ static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *spher
 qmat_status qmat_decimation_test_sphere(qmat_decimation *s, const double *sphere, uint32_t first,
                                         qmat_collapse_outcome *result, double *needed) {
   bool kept;
+  s->tested_first = first;
   s->surface_tracker.found_count = 0;
   *result = test_inside(s, sphere);
   *needed = sphere[3] - s->envelope_tracker.sphere_depth;

@@ -5,10 +5,9 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
-#include "core/hash.h"
-#include "nodes/simplify/collapse_test.h"
+#include "nodes/simplify/collapse_attempt.h"
 #include "nodes/simplify/cost_rows.h"
-#include "nodes/simplify/fitted_collapse.h"
+#include "nodes/simplify/lookahead.h"
 #include "nodes/simplify/rising_threshold.h"
 
 /* Progress interval, in cost evaluations and in attempts. The last attempts test thousands of points each. */
@@ -17,32 +16,6 @@ enum { COSTS_A_REPORT = 256, ATTEMPTS_A_REPORT = 16 };
 /* Late protection starts at this number of spheres (section 3.4, "a later stage"). */
 static size_t late_stage(size_t initial) {
   return initial / 50 > 100 ? initial / 50 : 100;
-}
-
-/* Restricts the candidates of an edge at sharp features, for any threshold. Unchanged if none would remain. */
-static void prefer_features(const qmat_decimation *s, uint32_t edge, qmat_candidates *c) {
-  qmat_candidates allowed;
-  double needed;
-  if (qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, INFINITY, &allowed, &needed) &&
-      allowed.count > 0)
-    *c = allowed;
-}
-
-/* The cost of the best candidate. */
-static qmat_status set_cost(qmat_decimation *s, uint32_t edge) {
-  const qmat_cost_row *row = qmat_cost_row_of(&s->rules);
-  qmat_candidates c;
-  const qmat_status status = row->find(s, edge, &c);
-  if (status != QMAT_OK) return status;
-  if (row->by_quadrics) prefer_features(s, edge, &c);
-  const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
-  const double *a = &s->complex.spheres[4 * (size_t)ends[0]], *b = &s->complex.spheres[4 * (size_t)ends[1]];
-  s->heap.errors[edge] = row->by_quadrics ? c.errors[0] : qmat_point_distance(a, b);
-  s->heap.costs[edge] = row->cost(s, &c, a, b);
-  if (s->rules.seed > 0)
-    s->heap.costs[edge] *= pow(qmat_most_cost_factor, qmat_hash_unit(qmat_hash3(s->rules.seed, edge, 0)));
-  s->stale[edge] = 0;
-  return QMAT_OK;
 }
 
 static qmat_status fill_heap(qmat_decimation *s) {
@@ -63,12 +36,12 @@ static qmat_status fill_heap(qmat_decimation *s) {
   if (qmat_cost_row_of(&s->rules)->takes_preview) { /* serial: all costs use the same preview */
     for (size_t e = 0; e < count && status == QMAT_OK; e++) {
       if (e % COSTS_A_REPORT == 0) status = qmat_progress(s->context, e, count, "costs");
-      if (status == QMAT_OK) status = set_cost(s, (uint32_t)e);
+      if (status == QMAT_OK) status = qmat_decimation_set_cost(s, (uint32_t)e);
     }
   } else {
     const int threads = qmat_threads(s->context);
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (size_t e = 0; e < count; e++) set_cost(s, (uint32_t)e);
+    for (size_t e = 0; e < count; e++) qmat_decimation_set_cost(s, (uint32_t)e);
   }
   qmat_edge_heap_fill(&s->heap, s->locked);
   return status;
@@ -121,60 +94,6 @@ void qmat_decimation_uninit(qmat_decimation *s) {
   qmat_surface_to_envelope_uninit(&s->surface_tracker);
   qmat_envelope_to_surface_uninit(&s->envelope_tracker);
   qmat_complex_uninit(&s->complex);
-}
-
-/* Tries the candidates of an edge, best first, and does the collapse with the first that passes all tests. */
-static qmat_status try_collapse(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
-  qmat_candidates c;
-  *result = QMAT_COLLAPSE_REFUSED;
-  s->neighbourhood.count = 0; /* drops the neighbourhood of the edge tried before */
-  qmat_status status = qmat_cost_row_of(&s->rules)->find(s, edge, &c);
-  if (status != QMAT_OK) return status;
-  double needed;
-  const double share = s->rules.crease_share;
-  bool bound =
-      qmat_crease_guard_restrict(&s->creases, &s->complex, s->quadrics, edge, share * s->threshold, &c, &needed);
-  needed /= share;
-  if (bound && c.count == 0) {
-    s->counts.refused_by_protection++;
-    s->needed[edge] = needed;
-    if (needed < INFINITY) *result = QMAT_COLLAPSE_EXCEEDS;
-    return QMAT_OK;
-  }
-  if (!bound && s->protecting && !qmat_decimation_apply_protection(s, edge, &c, &bound)) {
-    s->counts.refused_by_protection++;
-    return QMAT_OK;
-  }
-  status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
-  if (status != QMAT_OK) return status;
-  if (!qmat_decimation_keeps_topology(s)) {
-    s->counts.refused_by_topology++;
-    return QMAT_OK;
-  }
-  bool exceeded = false;
-  s->needed[edge] = bound ? needed : INFINITY;
-  const double *sphere = NULL;
-  const bool fits = s->fitting && !bound;
-  for (int i = 0; !fits && i < c.count && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
-    sphere = c.spheres[i];
-    const size_t refused = s->counts.refused_by_surface_to_envelope;
-    status = qmat_decimation_test_sphere(s, sphere, s->failed_points[edge], result, &needed);
-    if (s->counts.refused_by_surface_to_envelope > refused) s->failed_points[edge] = s->surface_tracker.failed_point;
-    if (*result == QMAT_COLLAPSE_EXCEEDS) s->needed[edge] = fmin(s->needed[edge], needed);
-    exceeded |= *result == QMAT_COLLAPSE_EXCEEDS;
-  }
-  double fitted[4];
-  if (status == QMAT_OK && fits) {
-    status = qmat_decimation_try_fitted(s, edge, &c, fitted, result);
-    sphere = fitted;
-    if (s->rules.neighbourhoods && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED) {
-      status = qmat_decimation_try_neighbourhoods(s, edge, result);
-      sphere = s->neighbourhood.spheres[0];
-    }
-  }
-  if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) return qmat_decimation_commit(s, sphere);
-  if (exceeded) *result = QMAT_COLLAPSE_EXCEEDS;
-  return status;
 }
 
 static bool is_locked(const qmat_decimation *s, uint32_t edge) {
@@ -241,9 +160,9 @@ qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
     qmat_status status = s->rules.neighbourhoods || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
     if (status != QMAT_OK) return status;
-    const uint32_t edge = qmat_edge_heap_first(&s->heap);
+    uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
-      if ((status = set_cost(s, edge)) != QMAT_OK) return status;
+      if ((status = qmat_decimation_set_cost(s, edge)) != QMAT_OK) return status;
       qmat_edge_heap_update(&s->heap, edge);
       continue;
     }
@@ -253,8 +172,12 @@ qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
                     (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= late_stage(initial));
     qmat_edge_heap_remove(&s->heap, edge);
     qmat_collapse_outcome result;
-    status = try_collapse(s, edge, &result);
+    double sphere[4];
+    status = s->copy && s->copy->ahead > 0 ? qmat_lookahead_next(s, &edge, sphere, &result)
+                                           : qmat_decimation_attempt(s, edge, sphere, &result);
+    if (status == QMAT_OK && result == QMAT_COLLAPSE_ALLOWED) status = qmat_decimation_commit(s, sphere);
     if (status != QMAT_OK) return status;
+    if (s->copy) qmat_copy_note(s->copy, result == QMAT_COLLAPSE_ALLOWED);
     if (result == QMAT_COLLAPSE_ALLOWED) {
       s->counts.collapses++;
       update_neighbourhood(s);

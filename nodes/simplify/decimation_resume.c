@@ -75,7 +75,7 @@ static void carry_bounds(const qmat_decimation *from, const uint32_t *ids, qmat_
 
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints, qmat_decimation *to) {
-  qmat_context *context = from->context;
+  qmat_context *context = to->context;
   qmat_arena *arena = &context->arena;
   const qmat_complex *c = &from->complex;
   uint32_t *ids = qmat_arena_alloc(arena, c->vertex_count, sizeof *ids);

@@ -11,7 +11,8 @@ qmat_status qmat_decimation_extract(const qmat_decimation *decimation, qmat_medi
 /* Sets up `to` to continue from `from`. `left` is the result of qmat_decimation_extract; spheres may have been
  * appended, joined to it by edges. The quadrics, bounds and witnesses of `from` are carried over. `extra` are
  * additional constraint points. The caller has given `to` its context, surface and rules. `constraints` gets all
- * constraint points and has to outlive `to`. `from` is unchanged. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: linear. */
+ * constraint points and has to outlive `to`. `from` is unchanged; several threads may resume it. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. Cost: linear. */
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints, qmat_decimation *to);
 

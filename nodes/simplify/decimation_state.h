@@ -84,7 +84,9 @@ typedef struct qmat_decimation {
   uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
   const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
   bool protecting, fitting;
-  int refusal; /* why the newest test of a sphere failed */
+  int refusal;            /* why the newest test of a sphere failed */
+  uint32_t tested_first;  /* the constraint point that it tested first, or QMAT_NONE */
+  struct qmat_copy *copy; /* NULL: the decimation is alone */
   size_t moves;
   qmat_collapse_counts counts;
 } qmat_decimation;

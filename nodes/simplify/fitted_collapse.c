@@ -62,7 +62,7 @@ static qmat_status save_star(qmat_decimation *s, uint32_t vertex) {
   return status;
 }
 
-static void restore(qmat_decimation *s) {
+void qmat_decimation_restore_neighbourhood(qmat_decimation *s) {
   for (size_t i = 0; i < s->saved_count; i++) *s->saved[i].at = s->saved[i].value;
 }
 
@@ -166,7 +166,7 @@ static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alo
       status = save_star(s, s->neighbourhood.vertices[k]);
     if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &last_refused, result, &again);
     if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) return status;
-    restore(s);
+    qmat_decimation_restore_neighbourhood(s);
     if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
   }
   return status;

@@ -16,4 +16,7 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *decimation, uint32_t edg
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *decimation, uint32_t edge,
                                                qmat_collapse_outcome *result);
 
+/* Takes the neighbourhood of the newest qmat_decimation_try_neighbourhoods back that was allowed. */
+void qmat_decimation_restore_neighbourhood(qmat_decimation *decimation);
+
 #endif

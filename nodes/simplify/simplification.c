@@ -145,12 +145,6 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;
 }
 
-static void swap_lattices(qmat_decimation *a, qmat_decimation *b) {
-  const qmat_depth_lattice lattice = a->envelope_tracker.lattice;
-  a->envelope_tracker.lattice = b->envelope_tracker.lattice;
-  b->envelope_tracker.lattice = lattice;
-}
-
 /* Continues the collapses of `from`, whose extract is `left`, and judges the result. `neighbourhoods` and `final_refit`
  * are as in the rules; `a` and `found` are new, and `a->figures.filled` is 0 or as in `left`. */
 static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from, const qmat_medial *left,
@@ -165,11 +159,8 @@ static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from
   if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
   round->rules.neighbourhoods = neighbourhoods;
   round->rules.final_refit = final_refit;
-  qmat_status status = qmat_decimation_resume(from, left, extra, &s->round_constraints[s->newest], round);
-  if (status != QMAT_OK) return status;
-  swap_lattices(&s->dense, round); /* known depths hold in every round */
-  status = qmat_decimation_run(round);
-  swap_lattices(&s->dense, round);
+  const qmat_status status = qmat_decimation_run_copies(from, left, extra, &s->dense.envelope_tracker.lattice,
+                                                        &s->depths, &s->round_constraints[s->newest], round);
   return status == QMAT_OK ? judge_round(s, a, found) : status;
 }
 

@@ -4,6 +4,7 @@
 
 #include "nodes/measure/medial_errors.h"
 #include "nodes/measure/topology.h"
+#include "nodes/simplify/copies.h"
 #include "nodes/simplify/simplify_report.h"
 #include "nodes/simplify/simplify_setup.h"
 #include "nodes/simplify/thresholds.h"
@@ -24,6 +25,7 @@ typedef struct qmat_simplification {
   qmat_constraint_points round_constraints[2];
   qmat_decimation rounds[2];
   int newest;
+  qmat_copy_depths depths; /* of the copies of rounds */
 } qmat_simplification;
 
 /* A result so far, in the unit frame. `fault` is its largest error, at least epsilon, plus a share of epsilon where its
