@@ -8,6 +8,7 @@
 #include "core/node.h"
 #include "nodes/initial/erosion.h"
 #include "nodes/initial/free_pairs.h"
+#include "nodes/measure/unit_spheres.h"
 
 typedef struct medial_erosion_thickness_params {
   double prune;
@@ -110,13 +111,12 @@ static qmat_status make(qmat_context *context, double threshold, const qmat_mesh
   if (status != QMAT_OK) return qmat_fail_field(context, "mesh");
   qmat_medial unit = *given;
   erosion e = {context, &unit, NULL, NULL, NULL};
-  unit.spheres = qmat_arena_alloc(&context->arena, given->sphere_count, 4 * sizeof *unit.spheres);
+  status = qmat_unit_spheres(context, &frame, given, &unit.spheres);
+  if (status != QMAT_OK) return status;
   e.spheres = qmat_arena_alloc(&context->arena, given->sphere_count, sizeof *e.spheres);
   e.edges = qmat_arena_alloc(&context->arena, given->edge_count, sizeof *e.edges);
   e.triangles = qmat_arena_alloc(&context->arena, given->triangle_count, sizeof *e.triangles);
-  if (!unit.spheres || !e.spheres || !e.edges || !e.triangles)
-    return qmat_fail_memory(context, "the erosion thickness");
-  qmat_frame_spheres_to_unit(&frame, given->spheres, given->sphere_count, unit.spheres);
+  if (!e.spheres || !e.edges || !e.triangles) return qmat_fail_memory(context, "the erosion thickness");
   status = qmat_burn(context, &unit, &times);
   if (status != QMAT_OK) return status;
   measure(&e, &times);

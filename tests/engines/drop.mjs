@@ -157,7 +157,9 @@ const engines = {
     }
     const { body: made, pose } = addToBullet(Ammo, world, body, { at, scale });
     made.setDamping(0, 0.8);
-    made.setSleepingThresholds(0.03, 0.03); // its default, 0.8 m/s, stops bodies of a metre that still roll
+    // Its default, 0.8 m/s and 1 rad/s, stops bodies of a metre that still roll. Below 0.2 m/s a capsule that touches a
+    // riser rolls along it without end: Bullet's friction has one direction for each contact.
+    made.setSleepingThresholds(0.2, 1);
     made.setLinearVelocity(new Ammo.btVector3(scene.push, 0, 0));
     return {
       step: () => world.stepSimulation(STEP, 0),
