@@ -22,8 +22,9 @@ static const double floor_tolerances = 5;
 
 static const double least_tolerance = 1e-5;
 
-/* The smallest pieces that are beyond epsilon, as a share of the others. */
-static const double denying_share = 1.0 / 64;
+/* Points deeper in the envelope than this are off its boundary where a certificate depends on it: far more than
+ * rounding. */
+static const double certain_skin = 1e-6;
 
 /* Cells of space are searched instead of features where fewer than this share of the samples lie on the boundary, or
  * where there are more features than that. */
@@ -102,7 +103,7 @@ typedef struct search {
   const qmat_surface *surface;
   const qmat_envelope *envelope;
   double epsilon;
-  double lo[BOUND_COUNT], target[BOUND_COUNT], smallest;
+  double lo[BOUND_COUNT], target[BOUND_COUNT], smallest, skin;
   uint8_t wanted;
   bool last; /* pieces are not split any more */
 } search;
@@ -134,11 +135,11 @@ static hull hull_of(const search *s, const qmat_boundary_piece *p) {
  * envelope. */
 static bool is_off_boundary(const search *s, const hull *h, const double middle[3], double reach) {
   if (h->count == 0)
-    return qmat_envelope_holds(s->envelope, middle, reach + QMAT_BOUNDARY_SKIN) ||
+    return qmat_envelope_holds(s->envelope, middle, reach + s->skin) ||
            qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
   double bound;
   const double f = qmat_envelope_bound(s->envelope, middle, (const double(*)[3])h->points, h->count, &bound);
-  return qmat_smaller(f + reach, bound + h->bulge) < -QMAT_BOUNDARY_SKIN;
+  return qmat_smaller(f + reach, bound + h->bulge) < -s->skin;
 }
 
 /* Moves a cell's middle to the surface of its nearest medial sphere. */
@@ -204,9 +205,7 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   if (inside && d > reach) *wanted &= WANT_EITHER_SIDE;
   if (d > qmat_smaller(s->lo[0], s->epsilon) || ((*wanted & WANT_OUTSIDE) && !inside && d > s->lo[1]))
     raise_lower_bound(s, is_cell, middle, *wanted, &result);
-  /* Where the bound of a piece alone would deny the certificate, it goes on: most such places are buried. */
-  const bool denies = (s->wanted & WANT_OUTSIDE) && s->lo[0] <= s->epsilon && d + reach > s->epsilon;
-  if (!s->last && reach > (denies ? denying_share * s->smallest : s->smallest)) return result;
+  if (!s->last && reach > s->smallest) return result;
   for (int i = 0; i < BOUND_COUNT; i++)
     if (*wanted >> i & 1) result.bound[i] = d + reach;
   *wanted = 0;
@@ -344,6 +343,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
               .surface = surface,
               .envelope = envelope,
               .epsilon = epsilon,
+              .skin = outside ? certain_skin : QMAT_BOUNDARY_SKIN,
               .wanted = outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
   if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, sample_count, result);
   result->either_side = raised(result->either_side);

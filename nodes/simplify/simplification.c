@@ -178,7 +178,9 @@ static qmat_status collapse_and_fit(qmat_simplification *s, const qmat_extra_poi
 /* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
  * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
  * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
-static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
+static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best,
+                              bool *fewer) {
+  *fewer = false;
   if (s->params.refits == 0 || best->medial->sphere_count <= (size_t)s->params.vertices) return QMAT_OK;
   qmat_extra_points extra = no_extra_points(s);
   const int base = s->newest;
@@ -194,12 +196,22 @@ static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_error
     if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status == QMAT_OK && !qmat_simplified_is_better(best, &a)) {
+      *fewer = a.medial->sphere_count < best->medial->sphere_count;
       replace(&a, best);
       return QMAT_OK;
     }
     qmat_simplified_uninit(&a);
   }
   s->newest = base;
+  return status;
+}
+
+/* Repeats joint refits while they remove spheres: refitted spheres make room for others to disappear. */
+static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
+  qmat_status status = QMAT_OK;
+  bool fewer = true;
+  for (int i = 0; i < QMAT_MOST_REFIT_REPEATS && fewer && status == QMAT_OK; i++)
+    status = refit_once(s, found, best, &fewer);
   return status;
 }
 

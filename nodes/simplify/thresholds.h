@@ -23,11 +23,12 @@ static const double qmat_topology_fault = 0.05;
 /* ---- repetitions: none was reached on a model that ended within epsilon ---- */
 
 enum {
-  QMAT_MOST_ROUNDS = 8,       /* of collapses, each with the points found in the one before */
-  QMAT_MOST_JOINT_REFITS = 3, /* the same for joint refits */
-  QMAT_MOST_FILLINGS = 6,     /* of cavities: filling one can expose another */
-  QMAT_MOST_WALLS = 12,       /* tried per void */
-  QMAT_MOST_FITS = 6          /* of a neighbourhood, each with the newest failure as a target */
+  QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
+  QMAT_MOST_JOINT_REFITS = 3,  /* the same for joint refits */
+  QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
+  QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
+  QMAT_MOST_WALLS = 12,        /* tried per void */
+  QMAT_MOST_FITS = 6           /* of a neighbourhood, each with the newest failure as a target */
 };
 
 /* ---- points of a fit: the tests use all of them, so that a fit may use fewer ---- */
