@@ -73,6 +73,18 @@ static inline bool pipeline_on_progress(void *user, const char *node_id, const c
   return true;
 }
 
+/* How much longer a sanitizer makes code take. */
+#if defined __has_feature
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define PIPELINE_SLOWDOWN 20
+#endif
+#elif defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
+#define PIPELINE_SLOWDOWN 20
+#endif
+#ifndef PIPELINE_SLOWDOWN
+#define PIPELINE_SLOWDOWN 1
+#endif
+
 /* Runs a node on one thread and checks that it could have been cancelled within `limit` processor seconds at any
  * time. */
 static inline void pipeline_must_stop_within(double limit, const char *name, const char *text,
@@ -85,7 +97,7 @@ static inline void pipeline_must_stop_within(double limit, const char *name, con
   pipeline_note_gap(&gaps);
   for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
   qmat_context_uninit(&context);
-  if (!(gaps.longest <= limit)) fail_msg("%s cannot be cancelled for %.2f s", name, gaps.longest);
+  if (!(gaps.longest <= PIPELINE_SLOWDOWN * limit)) fail_msg("%s cannot be cancelled for %.2f s", name, gaps.longest);
 }
 
 /* An unsealed mesh of a model's surface. */
