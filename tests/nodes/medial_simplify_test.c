@@ -906,6 +906,7 @@ static void test_moving_scaling_and_shuffling_change_little(void **state) {
 static void test_threads_do_not_change_a_byte(void **state) {
   (void)state;
   static const model_name names[] = {OCTOPUS, BRACKET};
+  static const char *const params[] = {"epsilon=6%", "epsilon=2%"};
   static const int threads[] = {1, 2, 8};
   for (size_t m = 0; m < COUNT(names); m++) {
     const pipeline *p = model(names[m]);
@@ -913,7 +914,7 @@ static void test_threads_do_not_change_a_byte(void **state) {
     for (size_t i = 0; i < COUNT(threads); i++) {
       qmat_context context = {.threads = threads[i]};
       result r;
-      assert_int_equal(try_simplify(&context, p, p->medial, "epsilon=6%", &r), QMAT_OK);
+      assert_int_equal(try_simplify(&context, p, p->medial, params[m], &r), QMAT_OK);
       if (i == 0) {
         medial = r.medial->base.digest;
         report = r.report->base.digest;
