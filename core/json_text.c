@@ -46,3 +46,9 @@ json_t *qmat_json_string(const char *text) {
 int qmat_json_set_count(json_t *object, const char *key, size_t count) {
   return json_object_set_new(object, key, json_integer((json_int_t)count));
 }
+
+int qmat_json_set_counts(json_t *object, const qmat_json_count *rows, size_t row_count) {
+  int bad = 0;
+  for (size_t i = 0; i < row_count; i++) bad |= qmat_json_set_count(object, rows[i].key, rows[i].count);
+  return bad;
+}

@@ -18,4 +18,13 @@ json_t *qmat_json_string(const char *text);
  * json_object_set_new. */
 int qmat_json_set_count(json_t *object, const char *key, size_t count);
 
+/* A whole number of an object. */
+typedef struct qmat_json_count {
+  const char *key;
+  size_t count;
+} qmat_json_count;
+
+/* Sets `row_count` whole numbers, in their order. Returns as qmat_json_set_count. */
+int qmat_json_set_counts(json_t *object, const qmat_json_count *rows, size_t row_count);
+
 #endif

@@ -370,6 +370,19 @@ static qmat_status run_resolved(qmat_context *context, const qmat_node *node, co
   return status;
 }
 
+qmat_status qmat_hand_over(qmat_context *context, qmat_status status, qmat_value *const values[], size_t count,
+                           qmat_value *outputs[]) {
+  for (size_t i = 0; i < count && status == QMAT_OK; i++)
+    if (!values[i]->sealed) status = qmat_value_seal(context, values[i]);
+  for (size_t i = 0; i < count; i++) {
+    if (status == QMAT_OK)
+      outputs[i] = values[i];
+    else
+      qmat_value_release(values[i]);
+  }
+  return status;
+}
+
 qmat_status qmat_node_run(qmat_context *context, const qmat_node *node, const void *params,
                           const qmat_value *const inputs[], qmat_value *outputs[]) {
   const char *outer = context->node_type;

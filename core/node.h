@@ -161,6 +161,12 @@ void qmat_params_default(const qmat_node *node, void *params);
 qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
                              void *params);
 
+/* Ends `run` of a node. Seals `values` (`count`, in the order of its outputs) that are not sealed yet, and hands them
+ * over as `outputs`. Where `status` is an error, or sealing fails, it releases them instead (NULL: none) and sets no
+ * output. Returns the status. */
+qmat_status qmat_hand_over(qmat_context *context, qmat_status status, qmat_value *const values[], size_t count,
+                           qmat_value *outputs[]);
+
 /* Runs a node whose parameters have been checked. Lengths with a unit become shares of the diagonal of the first input
  * that is a mesh or a chain; where that has no unit, QMAT_ERROR_USAGE. `inputs` and `outputs` hold one pointer per
  * port. Both are checked against the descriptor. An input that is missing, not sealed or of another type, or a list of

@@ -39,7 +39,7 @@ static qmat_status fill_chain(qmat_context *context, const qmat_ordered_collapse
   /* Mapped from the unit frame as in medial.simplify, for the same bytes. */
   qmat_frame_spheres_to_model(frame, o->initial.spheres, medial->sphere_count, chain->spheres);
   qmat_frame_spheres_to_model(frame, log->merged, log->count, chain->merged);
-  return qmat_value_seal(context, &chain->base);
+  return QMAT_OK;
 }
 
 /* The number of spheres at a few errors. */
@@ -57,7 +57,7 @@ static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, q
   for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)
     bad |= qmat_json_set_count(report->root, levels[i].key,
                                chain->sphere_count - qmat_chain_length(chain, 0, levels[i].epsilon));
-  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -74,15 +74,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, &params, inputs, &o);
   if (status == QMAT_OK) status = fill_chain(context, &o, deviation, (const qmat_medial *)inputs[3], chain);
   if (status == QMAT_OK) status = fill_report(context, chain, report);
-  if (status == QMAT_OK) {
-    outputs[0] = &chain->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(chain ? &chain->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
   qmat_ordered_collapses_uninit(&o);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)chain, (qmat_value *)report}, 2, outputs);
 }
 
 static const char *const exceed_choices[] = {"stop", "raise", NULL};

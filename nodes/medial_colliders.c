@@ -75,7 +75,7 @@ static qmat_status fill_colliders(work *w) {
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
   const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, side);
-  return status == QMAT_OK ? qmat_value_seal(w->context, &c->base) : status;
+  return status;
 }
 
 static const char *const fits[] = {"both", "contain", "inside", NULL};
@@ -100,16 +100,12 @@ static qmat_status make_report(const work *w, qmat_report *report) {
   };
   size_t widths[4] = {0};
   for (size_t i = 0; i < w->set.shape_count; i++) widths[qmat_shape_width(&w->set.shapes[3 * i])]++;
-  const struct {
-    const char *key;
-    size_t value;
-  } counts[] = {{"shapes", w->set.shape_count},   {"single_spheres", widths[1]},
-                {"capsules", widths[2]},          {"hulls_of_three", widths[3]},
-                {"spheres", w->set.sphere_count}, {"hull_points", w->colliders->point_count}};
+  const qmat_json_count counts[] = {{"shapes", w->set.shape_count},   {"single_spheres", widths[1]},
+                                    {"capsules", widths[2]},          {"hulls_of_three", widths[3]},
+                                    {"spheres", w->set.sphere_count}, {"hull_points", w->colliders->point_count}};
   int bad = json_object_set_new(report->root, "fit", json_string(fits[w->params->fit]));
   bad |= json_object_set_new(report->root, "proved", json_boolean(w->proved));
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
+  bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     bad |= json_object_set_new(report->root, numbers[i].key, json_real(numbers[i].value));
   if (w->colliders->body_count > 0) {
@@ -119,7 +115,7 @@ static qmat_status make_report(const work *w, qmat_report *report) {
     bad |= json_object_set_new(report->root, "inertia",
                                json_pack("[f, f, f, f, f, f]", b[4], b[5], b[6], b[7], b[8], b[9]));
   }
-  return bad ? qmat_fail_memory(w->context, "the report") : qmat_value_seal(w->context, &report->base);
+  return bad ? qmat_fail_memory(w->context, "the report") : QMAT_OK;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -137,14 +133,9 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = make_report(&w, report);
   qmat_envelope_free(w.envelope);
   qmat_surface_free(w.surface);
-  if (status == QMAT_OK) {
-    outputs[0] = &w.colliders->base;
-    outputs[1] = &report->base;
-    return QMAT_OK;
-  }
-  qmat_value_release(w.colliders ? &w.colliders->base : NULL);
-  qmat_value_release(report ? &report->base : NULL);
-  return status;
+  return qmat_hand_over(context, status,
+                        (qmat_value *const[]){w.colliders ? &w.colliders->base : NULL, report ? &report->base : NULL},
+                        2, outputs);
 }
 
 static const qmat_param params[] = {

@@ -19,16 +19,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   if (status == QMAT_OK && !(report = qmat_report_new())) status = qmat_fail_memory(context, "the report");
   if (status == QMAT_OK)
     status = qmat_voronoi_dual_make(context, params, mesh, solids, thickness, samples, NULL, &medial, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
   qmat_surface_free(solids);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)medial, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

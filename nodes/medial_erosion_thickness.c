@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/geometry/frame.h"
+#include "core/geometry/medial_build.h"
 #include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/initial/erosion.h"
@@ -49,35 +50,6 @@ static void measure(const erosion *e, const qmat_burn_times *times) {
     e->edges[i] = ids[0] < m->sheet_sphere_count ? INFINITY : 0;
     for (size_t k = 0; k < 2; k++) e->edges[i] = larger(e, e->edges[i], times->ends[2 * i + k], ids[k]);
   }
-}
-
-/* An unsealed copy. */
-static qmat_status copy_medial(qmat_context *context, const qmat_medial *from, qmat_medial **copy) {
-  qmat_medial *m = *copy = qmat_medial_new();
-  if (!m) return qmat_fail_memory(context, "the medial mesh");
-  const qmat_value base = m->base;
-  *m = *from;
-  m->base = base;
-  const struct {
-    void **to;
-    const void *from;
-    size_t bytes;
-  } arrays[] = {
-      {(void **)&m->spheres, from->spheres, from->sphere_count * 4 * sizeof *m->spheres},
-      {(void **)&m->edges, from->edges, from->edge_count * 2 * sizeof *m->edges},
-      {(void **)&m->triangles, from->triangles, from->triangle_count * 3 * sizeof *m->triangles},
-      {(void **)&m->region_offsets, from->region_offsets, from->region_offset_count * sizeof *m->region_offsets},
-      {(void **)&m->region_samples, from->region_samples, from->region_sample_count * sizeof *m->region_samples},
-      {(void **)&m->joints, from->joints, from->skinned_count * 4 * sizeof *m->joints},
-      {(void **)&m->weights, from->weights, from->skinned_count * 4 * sizeof *m->weights},
-  };
-  bool bad = false;
-  for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
-    *arrays[i].to = arrays[i].from ? qmat_alloc(arrays[i].bytes, 1) : NULL;
-    bad = bad || (arrays[i].from && !*arrays[i].to);
-    if (*arrays[i].to && arrays[i].bytes > 0) memcpy(*arrays[i].to, arrays[i].from, arrays[i].bytes);
-  }
-  return bad ? qmat_fail_memory(context, "the medial mesh") : QMAT_OK;
 }
 
 /* The thickness of spheres in model units, and what the report says of it. */
@@ -133,26 +105,14 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
                        qmat_value *outputs[]) {
   const medial_erosion_thickness_params *params = data;
   const qmat_medial *given = (const qmat_medial *)inputs[1];
-  qmat_medial *pruned = NULL;
+  qmat_medial *pruned = qmat_medial_copy(given);
   qmat_field *field = qmat_field_new();
   qmat_report *report = qmat_report_new();
-  qmat_status status = field && report ? QMAT_OK : qmat_fail_memory(context, "the erosion thickness");
-  if (status == QMAT_OK) status = copy_medial(context, given, &pruned);
+  qmat_status status = pruned && field && report ? QMAT_OK : qmat_fail_memory(context, "the erosion thickness");
   if (status == QMAT_OK)
     status = make(context, params->prune, (const qmat_mesh *)inputs[0], given, pruned, field, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &pruned->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &field->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status == QMAT_OK) {
-    outputs[0] = &pruned->base;
-    outputs[1] = &field->base;
-    outputs[2] = &report->base;
-  } else {
-    qmat_value_release(pruned ? &pruned->base : NULL);
-    qmat_value_release(field ? &field->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
-  return status;
+  return qmat_hand_over(context, status,
+                        (qmat_value *[]){(qmat_value *)pruned, (qmat_value *)field, (qmat_value *)report}, 3, outputs);
 }
 
 static const qmat_param params[] = {

@@ -199,10 +199,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
       {"envelope_out_of_solid", b->outside.hi + e->deviation},
       {"envelope_out_of_solid_at_least", fmax(b->outside.lo - e->deviation, 0)},
   };
-  const struct {
-    const char *key;
-    size_t value;
-  } counts[] = {
+  const qmat_json_count counts[] = {
       {"spheres", e->unit.sphere_count},           {"edges", e->unit.edge_count},
       {"triangles", e->unit.triangle_count},       {"spheres_outside", e->spheres_outside},
       {"degenerate_cones", e->degenerate_cones},   {"degenerate_slabs", e->degenerate_slabs},
@@ -215,8 +212,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
   bad |= json_object_set_new(report->root, "estimate", json_boolean(!solid));
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
     bad |= json_object_set_new(report->root, lengths[i].key, json_real(lengths[i].value));
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].value);
+  bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   const double meters = mesh->meters_per_unit * lengths[0].value; /* of the diagonal */
   if (meters > 0) {
     bad |= json_object_set_new(report->root, "meters_per_unit", json_real(mesh->meters_per_unit));
@@ -229,8 +225,7 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
     bad |= json_array_append_new(errors, json_real(e->sphere_errors[i]));
   bad |= json_object_set_new(report->root, "sphere_errors", errors);
   if (bad) return qmat_fail_memory(e->context, "the report");
-  const qmat_status status = qmat_topology_report(e->context, &e->unit, e->surface, report->root);
-  return status == QMAT_OK ? qmat_value_seal(e->context, &report->base) : status;
+  return qmat_topology_report(e->context, &e->unit, e->surface, report->root);
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -251,13 +246,9 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = count_degenerate(&e);
   if (status == QMAT_OK) status = make_report(&e, report);
   qmat_boundary_distance_uninit(&e.boundary);
-  if (status == QMAT_OK)
-    outputs[0] = &report->base;
-  else
-    qmat_value_release(report ? &report->base : NULL);
   qmat_envelope_free(e.envelope);
   qmat_surface_free(e.surface);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *const[]){report ? &report->base : NULL}, 1, outputs);
 }
 
 static const qmat_param params[] = {

@@ -353,21 +353,17 @@ static qmat_status make_medial(feature_builder *b, qmat_medial *medial) {
   if (status == QMAT_OK)
     status = qmat_medial_set_simplices(b->context, medial, b->edges, b->edge_count, b->triangles, b->triangle_count);
   if (status == QMAT_OK) status = set_regions(b, medial);
-  return status == QMAT_OK ? qmat_value_seal(b->context, &medial->base) : status;
+  return status;
 }
 
 static qmat_status make_report(const feature_builder *b, qmat_report *report) {
   size_t corners = 0;
   for (size_t v = 0; b->creases.count && v < b->mesh->vertex_count; v++) corners += b->creases.is_corner[v];
-  const struct {
-    const char *name;
-    size_t value;
-  } counts[] = {{"creases", b->creases.count}, {"corners", corners}, {"spheres", b->feature_count}, {"gaps", b->gaps}};
-  int bad = 0;
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].name, counts[i].value);
+  const qmat_json_count counts[] = {
+      {"creases", b->creases.count}, {"corners", corners}, {"spheres", b->feature_count}, {"gaps", b->gaps}};
+  int bad = qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   bad |= json_object_set_new(report->root, "longest_link", json_real(b->longest_link));
-  return bad ? qmat_fail_memory(b->context, "the report") : qmat_value_seal(b->context, &report->base);
+  return bad ? qmat_fail_memory(b->context, "the report") : QMAT_OK;
 }
 
 static qmat_status build(feature_builder *b) {
@@ -412,18 +408,14 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     status = medial ? make_medial(&b, medial) : qmat_fail_memory(context, "the medial mesh");
   }
   if (status == QMAT_OK) status = make_report(&b, report);
-  if (status == QMAT_OK) {
-    outputs[0] = medial ? &medial->base : qmat_value_retain(inputs[1]);
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
   qmat_free(b.features);
   qmat_free(b.segments);
   qmat_free(b.edges);
   qmat_free(b.triangles);
-  return status;
+  return qmat_hand_over(
+      context, status,
+      (qmat_value *const[]){medial ? &medial->base : qmat_value_retain(inputs[1]), report ? &report->base : NULL}, 2,
+      outputs);
 }
 
 static const char *const feature_kinds[] = {"none", "sharp", "auto", NULL};

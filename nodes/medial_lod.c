@@ -11,18 +11,14 @@ typedef struct medial_lod_params {
 
 static qmat_status fill_report(qmat_context *context, const medial_lod_params *params, const qmat_chain *chain,
                                size_t collapses, const qmat_medial *medial, qmat_report *report) {
-  const struct {
-    const char *key;
-    size_t count;
-  } counts[] = {{"spheres", medial->sphere_count},
-                {"edges", medial->edge_count},
-                {"triangles", medial->triangle_count},
-                {"collapses", collapses}};
+  const qmat_json_count counts[] = {{"spheres", medial->sphere_count},
+                                    {"edges", medial->edge_count},
+                                    {"triangles", medial->triangle_count},
+                                    {"collapses", collapses}};
   int bad = json_object_set_new(report->root, "epsilon", json_real(params->epsilon));
   bad |= json_object_set_new(report->root, "threshold", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].key, counts[i].count);
-  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+  bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -38,16 +34,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   const size_t collapses = qmat_chain_length(chain, (size_t)params->vertices, params->epsilon);
   qmat_status status = medial && report ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");
   if (status == QMAT_OK) status = qmat_chain_extract(context, chain, collapses, medial);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
   if (status == QMAT_OK) status = fill_report(context, params, chain, collapses, medial, report);
-  if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)medial, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

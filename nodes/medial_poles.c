@@ -141,10 +141,7 @@ static qmat_status make_report(const power_crust *p, const qmat_medial *medial, 
   const qmat_status status =
       qmat_sets_count(p->context, medial->sphere_count, medial->edges, medial->edge_count, &components);
   if (status != QMAT_OK) return status;
-  const struct {
-    const char *name;
-    size_t value;
-  } counts[] = {
+  const qmat_json_count counts[] = {
       {"samples_triangulated", p->sites.count},
       {"tetrahedra", p->cells.count},
       {"poles", p->poles.count},
@@ -159,9 +156,7 @@ static qmat_status make_report(const power_crust *p, const qmat_medial *medial, 
       {"triangles", medial->triangle_count},
       {"components", components},
   };
-  int bad = 0;
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].name, counts[i].value);
+  const int bad = qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   return bad ? qmat_fail_memory(p->context, "the report") : QMAT_OK;
 }
 
@@ -182,16 +177,7 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   }
   if (status == QMAT_OK && mesh->sheet_triangle_count > 0) status = qmat_sheet_slabs_prepend(context, mesh, medial);
   if (status == QMAT_OK) status = make_report(&p, medial, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)medial, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

@@ -255,7 +255,7 @@ static qmat_status make_report(qmat_context *context, const refinement *rounds, 
   bad |= qmat_json_set_count(root, "far_places_left", after->far_count);
   bad |= json_object_set_new(root, "farthest_place", json_real(before->farthest));
   bad |= json_object_set_new(root, "farthest_place_left", json_real(after->farthest));
-  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
@@ -278,14 +278,11 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   if (status == QMAT_OK) status = qmat_frame_of_mesh(context, r.mesh, &r.frame);
   if (status == QMAT_OK) status = refine_where_far(&r, rounds, &best);
   if (status == QMAT_OK) status = make_report(context, rounds, best, report);
-  if (status == QMAT_OK && best > 0) status = qmat_value_seal(context, &rounds[best].samples->base);
-  if (status == QMAT_OK) {
-    outputs[0] = qmat_value_retain(&rounds[best].samples->base);
-    outputs[1] = qmat_value_retain(&rounds[best].medial->base);
-    outputs[2] = &report->base;
-  } else {
-    qmat_value_release(report ? &report->base : NULL);
-  }
+  status = qmat_hand_over(
+      context, status,
+      (qmat_value *const[]){qmat_value_retain(&rounds[best].samples->base),
+                            qmat_value_retain(&rounds[best].medial->base), report ? &report->base : NULL},
+      3, outputs);
   for (size_t i = 0; i <= MOST_ROUNDS; i++) refinement_uninit(&rounds[i]);
   return status;
 }

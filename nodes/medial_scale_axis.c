@@ -88,10 +88,7 @@ static qmat_status make_report(qmat_context *context, const scale_axis_counts *c
   const qmat_status status =
       qmat_sets_count(context, medial->sphere_count, medial->edges, medial->edge_count, &components);
   if (status != QMAT_OK) return status;
-  const struct {
-    const char *name;
-    size_t value;
-  } rows[] = {
+  const qmat_json_count rows[] = {
       {"samples_triangulated", counts->samples},
       {"tetrahedra", counts->tetrahedra},
       {"balls", counts->balls},
@@ -104,9 +101,7 @@ static qmat_status make_report(qmat_context *context, const scale_axis_counts *c
       {"triangles", medial->triangle_count},
       {"components", components},
   };
-  int bad = 0;
-  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-    bad |= qmat_json_set_count(report->root, rows[i].name, rows[i].value);
+  const int bad = qmat_json_set_counts(report->root, rows, sizeof rows / sizeof *rows);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
@@ -127,17 +122,8 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   }
   if (status == QMAT_OK && mesh->sheet_triangle_count > 0) status = qmat_sheet_slabs_prepend(context, mesh, medial);
   if (status == QMAT_OK) status = make_report(context, &counts, medial, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
   qmat_surface_free(solids);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)medial, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

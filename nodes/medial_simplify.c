@@ -53,16 +53,9 @@ static qmat_status make_outputs(qmat_context *context, const qmat_simplify_figur
     qmat_frame_spheres_to_model(qmat_surface_frame(surface), spheres, (*medial)->sphere_count, spheres);
     status = qmat_skin_spheres(context, mesh, *medial);
   }
-  if (status == QMAT_OK) status = qmat_value_seal(context, &(*medial)->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status != QMAT_OK) {
-    qmat_value_release(report ? &report->base : NULL);
-    return status;
-  }
-  outputs[0] = &(*medial)->base;
-  outputs[1] = &report->base;
+  qmat_value *const values[] = {&(*medial)->base, report ? &report->base : NULL};
   *medial = NULL;
-  return QMAT_OK;
+  return qmat_hand_over(context, status, values, 2, outputs);
 }
 
 /* Whether only the number of spheres is given, for the cost that bounds both errors. The others end at the number, as

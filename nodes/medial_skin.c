@@ -358,20 +358,11 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     mesh->closed = s.flat.triangle_count == 0;
     mesh->oriented = true;
     s.surface = (qmat_skin_triangles){0};
-    status = qmat_value_seal(context, &mesh->base);
   }
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(s.surface.positions);
   qmat_free(s.surface.triangles);
   qmat_envelope_free(s.envelope);
-  if (status != QMAT_OK) {
-    if (mesh) qmat_value_release(&mesh->base);
-    if (report) qmat_value_release(&report->base);
-    return status;
-  }
-  outputs[0] = &mesh->base;
-  outputs[1] = &report->base;
-  return QMAT_OK;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)mesh, (qmat_value *)report}, 2, outputs);
 }
 
 static const char *const methods[] = {"envelope", "skin_surface", NULL};

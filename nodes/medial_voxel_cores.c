@@ -190,10 +190,7 @@ static qmat_status make_report(const voxel_core *v, const qmat_medial *medial, q
   const qmat_status status =
       qmat_sets_count(v->context, medial->sphere_count, medial->edges, medial->edge_count, &components);
   if (status != QMAT_OK) return status;
-  const struct {
-    const char *name;
-    size_t value;
-  } rows[] = {
+  const qmat_json_count rows[] = {
       {"voxels", v->shape.count},
       {"boundary_vertices", v->point_count},
       {"tetrahedra", v->dual.cells.count},
@@ -207,8 +204,7 @@ static qmat_status make_report(const voxel_core *v, const qmat_medial *medial, q
       {"components", components},
   };
   int bad = json_object_set_new(report->root, "voxel", json_real(v->shape.voxel));
-  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-    bad |= qmat_json_set_count(report->root, rows[i].name, rows[i].value);
+  bad |= qmat_json_set_counts(report->root, rows, sizeof rows / sizeof *rows);
   return bad ? qmat_fail_memory(v->context, "the report") : QMAT_OK;
 }
 
@@ -228,21 +224,12 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   }
   if (status == QMAT_OK && mesh->sheet_triangle_count > 0) status = qmat_sheet_slabs_prepend(context, mesh, medial);
   if (status == QMAT_OK) status = make_report(&v, medial, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &medial->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
-  if (status == QMAT_OK) {
-    outputs[0] = &medial->base;
-    outputs[1] = &report->base;
-  } else {
-    qmat_value_release(medial ? &medial->base : NULL);
-    qmat_value_release(report ? &report->base : NULL);
-  }
   qmat_free(v.dual.edges);
   qmat_free(v.dual.triangles);
   qmat_free(v.dual.edge_duals);
   qmat_free(v.dual.triangle_duals);
   qmat_surface_free(solids);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)medial, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

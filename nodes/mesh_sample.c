@@ -355,17 +355,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   status = sample_vertices(context, mesh, samples);
   if (status == QMAT_OK) status = sample_facets(context, params, &solids, unit_positions, offsets, &spaced, samples);
   if (status == QMAT_OK) status = fill_report(context, mesh, &counts, report);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &samples->base);
-  if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
 done:
-  if (status == QMAT_OK) {
-    outputs[0] = &samples->base;
-    outputs[1] = &report->base;
-    return QMAT_OK;
-  }
-  if (samples) qmat_value_release(&samples->base);
-  if (report) qmat_value_release(&report->base);
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)samples, (qmat_value *)report}, 2, outputs);
 }
 
 static const qmat_param params[] = {

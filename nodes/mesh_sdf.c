@@ -318,23 +318,16 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
     field->values = qmat_alloc(mesh->triangle_count, sizeof *field->values);
     field->unit = qmat_strdup("model unit");
   }
-  if (!field || !field->values || field->unit == NULL) {
+  if (field && field->values && field->unit) {
+    field->count = mesh->triangle_count;
+    field->domain = QMAT_PER_FACET;
+    if (qmat_has_solids(mesh)) status = measure_solids(context, params, mesh, field->values);
+    for (size_t i = qmat_solid_triangle_count(mesh); i < field->count && status == QMAT_OK; i++)
+      field->values[i] = mesh->sheet_thickness;
+  } else {
     status = qmat_fail_memory(context, "the thickness");
-    goto done;
   }
-  field->count = mesh->triangle_count;
-  field->domain = QMAT_PER_FACET;
-  if (qmat_has_solids(mesh)) status = measure_solids(context, params, mesh, field->values);
-  if (status != QMAT_OK) goto done;
-  for (size_t i = qmat_solid_triangle_count(mesh); i < field->count; i++) field->values[i] = mesh->sheet_thickness;
-  status = qmat_value_seal(context, &field->base);
-done:
-  if (status == QMAT_OK) {
-    outputs[0] = &field->base;
-  } else if (field) {
-    qmat_value_release(&field->base);
-  }
-  return status;
+  return qmat_hand_over(context, status, (qmat_value *const[]){field ? &field->base : NULL}, 1, outputs);
 }
 
 static const qmat_param params[] = {

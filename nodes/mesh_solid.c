@@ -327,7 +327,6 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
   qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
   if (status == QMAT_OK && s->wrap.triangles) mesh->deviation += wrap_distance(s);
   if (status == QMAT_OK) status = qmat_lend_joints(s->context, s->mesh, mesh);
-  if (status == QMAT_OK) status = qmat_value_seal(s->context, &mesh->base);
   if (status == QMAT_OK)
     *made = mesh;
   else
@@ -427,27 +426,22 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
     kinds[s->parts.parts[i].kind]++;
     open += s->parts.parts[i].loop_count > 0;
   }
-  const struct {
-    const char *key;
-    size_t count;
-  } counts[] = {{"vertices_welded", s->weld.merged},
-                {"parts", s->parts.part_count},
-                {"parts_open", open},
-                {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
-                {"solids_with_holes", kinds[QMAT_PART_HOLES]},
-                {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
-                {"sheet_triangles", s->sheets.count},
-                {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
-                {"inner_triangles", s->inner_triangles},
-                {"parts_turned", s->turned_parts},
-                {"triangles_turned", s->parts.turned},
-                {"caps", s->caps},
-                {"cap_sides", s->cap_sides},
-                {"parts_united", s->united.shells_united},
-                {"triangles_cut", s->united.cut_triangles}};
-  int bad = 0;
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(root, counts[i].key, counts[i].count);
+  const qmat_json_count counts[] = {{"vertices_welded", s->weld.merged},
+                                    {"parts", s->parts.part_count},
+                                    {"parts_open", open},
+                                    {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
+                                    {"solids_with_holes", kinds[QMAT_PART_HOLES]},
+                                    {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
+                                    {"sheet_triangles", s->sheets.count},
+                                    {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
+                                    {"inner_triangles", s->inner_triangles},
+                                    {"parts_turned", s->turned_parts},
+                                    {"triangles_turned", s->parts.turned},
+                                    {"caps", s->caps},
+                                    {"cap_sides", s->cap_sides},
+                                    {"parts_united", s->united.shells_united},
+                                    {"triangles_cut", s->united.cut_triangles}};
+  int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
   if (s->caps > 0) {
     bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
     bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
@@ -463,7 +457,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
     snprintf(text, sizeof text, "the solids are wrapped: those that intersect cannot be united: %s", s->united.why_not);
     bad |= json_object_set_new(root, "warnings", json_pack("[s]", text));
   }
-  return bad ? qmat_fail_memory(s->context, "the report") : qmat_value_seal(s->context, &report->base);
+  return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 
 /* ---- the node ---- */
@@ -510,14 +504,10 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_free(s.wrap.triangles);
   qmat_free(s.solids.corners);
   qmat_free(s.sheets.corners);
-  if (status == QMAT_OK) {
-    outputs[0] = made ? &made->base : qmat_value_retain(&s.mesh->base);
-    outputs[1] = &report->base;
-    return QMAT_OK;
-  }
-  qmat_value_release(made ? &made->base : NULL);
-  qmat_value_release(report ? &report->base : NULL);
-  return status;
+  return qmat_hand_over(
+      context, status,
+      (qmat_value *const[]){made ? &made->base : qmat_value_retain(&s.mesh->base), report ? &report->base : NULL}, 2,
+      outputs);
 }
 
 static const char *const choices[] = {[SOLID_AUTO] = "auto", [SOLID_AS_IS] = "as_is", [SOLID_CLOSE] = "close",

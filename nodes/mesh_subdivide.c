@@ -413,7 +413,7 @@ static qmat_status fill_report(qmat_context *context, const subdivision *s, int 
       bad |= json_object_set(root, kept[i], json_object_get(facts, kept[i]));
     if (a->creases_without_edge > 0) bad |= add_warning(root, a->creases_without_edge);
   }
-  return bad ? qmat_fail_memory(context, "the report") : qmat_value_seal(context, &report->base);
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 static qmat_status subdivide(subdivision *s, const qmat_mesh *mesh, attempt *best, qmat_report *report) {
@@ -446,14 +446,10 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
   if (status == QMAT_OK) status = subdivide(&s, mesh, &best, report);
-  if (status == QMAT_OK) {
-    outputs[0] = best.mesh ? &best.mesh->base : qmat_value_retain(&mesh->base);
-    outputs[1] = &report->base;
-    return QMAT_OK;
-  }
-  qmat_value_release(best.mesh ? &best.mesh->base : NULL);
-  qmat_value_release(report ? &report->base : NULL);
-  return status;
+  return qmat_hand_over(context, status,
+                        (qmat_value *const[]){best.mesh ? &best.mesh->base : qmat_value_retain(&mesh->base),
+                                              report ? &report->base : NULL},
+                        2, outputs);
 }
 
 static const char *const schemes[] = {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/value_check.h"
+#include "core/value_table.h"
 
 #define MOST_ROWS ((size_t)1 << 40) /* keeps 3 * count and count * 12 bytes far from overflow */
 
@@ -111,4 +112,41 @@ done:
   qmat_free(new_edges);
   qmat_free(new_triangles);
   return status;
+}
+
+size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row) {
+  size_t low = 0, high = count;
+  while (low < high) {
+    const size_t middle = low + (high - low) / 2;
+    const uint32_t *at = &rows[width * middle];
+    size_t k = 0;
+    while (k < width && at[k] == row[k]) k++;
+    if (k == width) return middle;
+    if (at[k] < row[k])
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return SIZE_MAX;
+}
+
+qmat_medial *qmat_medial_copy(const qmat_medial *medial) {
+  qmat_medial *copy = qmat_medial_new();
+  if (!copy) return NULL;
+  const qmat_value base = copy->base;
+  bool bad = false;
+  *copy = *medial;
+  copy->base = base;
+  for (const qmat_value_row *row = qmat_value_rows(&medial->base); row->name; row++) {
+    if (!qmat_row_is_array(row)) continue;
+    const void *from = qmat_row_pointer(&medial->base, row);
+    const size_t count = qmat_row_count(&medial->base, row) * row->components;
+    void *to = from ? qmat_alloc(count, qmat_row_element_size(row)) : NULL;
+    bad |= from && !to;
+    if (to && count > 0) memcpy(to, from, count * qmat_row_element_size(row));
+    memcpy((char *)copy + row->offset, &to, sizeof to);
+  }
+  if (!bad) return copy;
+  qmat_value_release(&copy->base);
+  return NULL;
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "core/json_text.h"
+#include "graphs/built_in.h"
 #include "graphs/cli/terminal.h"
 #include "graphs/graph_names.h"
 
@@ -62,20 +63,28 @@ static const qmat_option *find_option(const qmat_invocation *invocation, const c
   return NULL;
 }
 
+/* Is it an option of `qmat mat` alone, which other commands set as an input of their graph? */
+static bool is_input_of_mat(qmat_context *context, const qmat_registry *registry, const char *name) {
+  qmat_graph graph = {0};
+  bool found = false;
+  if (qmat_graph_read_built_in(context, registry, &qmat_built_in_graphs[0], &graph) == QMAT_OK)
+    for (size_t i = 1; i < graph.input_count; i++) found |= strcmp(graph.inputs[i].name, name) == 0;
+  qmat_graph_uninit(&graph);
+  return found;
+}
+
 static qmat_status fail_unknown(qmat_context *context, const qmat_invocation *invocation, const char *word,
                                 size_t length) {
   char name[64];
   snprintf(name, sizeof name, "%.*s", (int)(length < sizeof name ? length : sizeof name - 1), word);
+  const bool is_input = find_option(invocation, "set", 3) && is_input_of_mat(context, &invocation->registry, name);
   qmat_fail(context, QMAT_ERROR_USAGE, "'qmat %s' has no option '--%s'", invocation->command->name,
             qmat_show(name).text);
+  if (is_input) return qmat_fail_hint(context, "did you mean '--set %s=...'?", name);
   const char *names[QMAT_MAX_OPTIONS + 1] = {"help"};
   size_t count = 1;
   for (size_t i = 0; i < invocation->option_count; i++) names[count++] = invocation->options[i].name;
   const char *nearest = qmat_nearest_name(name, names, count);
-  /* `qmat mat` has options of its inputs' names; other commands set them. */
-  static const char *const inputs[] = {"epsilon", "vertices", "features", "effort", "require"};
-  for (size_t i = 0; i < sizeof inputs / sizeof *inputs && find_option(invocation, "set", 3); i++)
-    if (strcmp(name, inputs[i]) == 0) return qmat_fail_hint(context, "did you mean '--set %s=...'?", name);
   return nearest ? qmat_fail_hint(context, "did you mean '--%s'?", nearest)
                  : qmat_fail_hint(context, "'qmat help %s' lists them", invocation->command->name);
 }

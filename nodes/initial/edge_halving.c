@@ -28,19 +28,10 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   return true;
 }
 
-/* The vertex that halves an edge, or NONE. The edges are sorted. */
-static uint32_t middle_of(const qmat_medial *medial, const size_t *row_starts, const uint32_t *middles, uint32_t a,
-                          uint32_t b) {
-  const uint32_t low = a < b ? a : b, high = a < b ? b : a;
-  size_t first = row_starts[low], last = row_starts[low + 1];
-  while (first < last) {
-    const size_t half = first + (last - first) / 2;
-    if (medial->edges[2 * half + 1] < high)
-      first = half + 1;
-    else
-      last = half;
-  }
-  return middles[first];
+/* The vertex that halves an edge, or NONE. */
+static uint32_t middle_of(const qmat_medial *medial, const uint32_t *middles, uint32_t a, uint32_t b) {
+  const uint32_t ends[2] = {a < b ? a : b, a < b ? b : a};
+  return middles[qmat_simplex_find(medial->edges, medial->edge_count, 2, ends)];
 }
 
 /* One round; adds the number of halved edges to `*added`. */
@@ -50,8 +41,7 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   const size_t spheres = medial->sphere_count, edges = medial->edge_count, triangles = medial->triangle_count;
   double *middle_spheres = qmat_arena_alloc(arena, edges, 4 * sizeof *middle_spheres);
   uint32_t *middles = qmat_arena_alloc(arena, edges, sizeof *middles);
-  size_t *row_starts = qmat_arena_calloc(arena, spheres + 1, sizeof *row_starts);
-  if (!middle_spheres || !middles || !row_starts) return qmat_fail_memory(context, "medial edges");
+  if (!middle_spheres || !middles) return qmat_fail_memory(context, "medial edges");
   const int threads = qmat_threads(context);
   const size_t slice = 1 << 10; /* inside tests of an open surface are slow */
   for (size_t first = 0; first < edges; first += slice) {
@@ -67,13 +57,10 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
               : NONE;
   }
   size_t count = 0;
-  for (size_t e = 0; e < edges; e++) {
-    row_starts[medial->edges[2 * e] + 1]++;
+  for (size_t e = 0; e < edges; e++)
     if (middles[e] != NONE) middles[e] = (uint32_t)(spheres + count++);
-  }
   *added += count;
   if (count == 0) return QMAT_OK;
-  for (size_t v = 0; v < spheres; v++) row_starts[v + 1] += row_starts[v];
   double *all = qmat_alloc(spheres + count, 4 * sizeof *all);
   uint32_t *new_edges = qmat_arena_alloc(arena, edges + count, 2 * sizeof *new_edges);
   uint32_t *new_triangles = qmat_arena_alloc(arena, 4 * triangles, 3 * sizeof *new_triangles);
@@ -94,7 +81,7 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   for (size_t t = 0; t < triangles; t++) {
     const uint32_t *corners = &medial->triangles[3 * t];
     uint32_t sides[3], pieces[12];
-    for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, row_starts, middles, corners[k], corners[(k + 1) % 3]);
+    for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, middles, corners[k], corners[(k + 1) % 3]);
     const size_t made = qmat_triangle_divide(corners, sides, pieces);
     memcpy(&new_triangles[3 * triangle_count], pieces, 3 * made * sizeof *pieces);
     triangle_count += made;

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "core/geometry/medial_build.h"
 #include "nodes/initial/item_queue.h"
 
 static const size_t steps_per_report = 65536;
@@ -27,22 +28,6 @@ typedef struct thinning {
   qmat_item_queue queue;
   bool is_short; /* memory was */
 } thinning;
-
-size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row) {
-  size_t low = 0, high = count;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    const uint32_t *at = &rows[width * middle];
-    size_t k = 0;
-    while (k < width && at[k] == row[k]) k++;
-    if (k == width) return middle;
-    if (at[k] < row[k])
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return SIZE_MAX;
-}
 
 /* --- the queue --------------------------------------------------------------------------------------------------- */
 

@@ -8,10 +8,6 @@
  * has, or an edge without triangles and an end of it that no other edge has. Its removal is an elementary collapse: the
  * rest is homotopy equivalent. */
 
-/* The position of an edge or a triangle (`width` 2 or 3 ids) among `count` sorted rows, SIZE_MAX if it is not there.
- * Cost: logarithmic. */
-size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row);
-
 /* Removes free pairs whose triangle or edge has a measure below `threshold`, the smallest measure first, a smaller id
  * first where measures are equal, until none is left. Of several free sides the one with the smallest measure goes.
  * `edge_measures` and `triangle_measures` have one number per edge and triangle of the unsealed `medial`, INFINITY for

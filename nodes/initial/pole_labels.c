@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/initial/item_queue.h"
 #include "nodes/initial/poles.h"
 
 /* A pole that another one gives a label to. */
@@ -24,8 +25,8 @@ typedef struct {
   influence_table opposite, neighbours;
   double *inside, *outside; /* per pole: how certain either label is, 0 to 1 */
   uint8_t *labels;
-  uint32_t *heap, *places; /* the queue, and the place of each pole in it, from 1; 0: not in it */
-  size_t length;
+  qmat_item_queue queue; /* poles, the most certain first; those whose certainty changed since are passed over */
+  bool is_short;         /* memory was */
 } labelling;
 
 /* --- influences -------------------------------------------------------------------------------------------------- */
@@ -60,55 +61,27 @@ static double certainty(const labelling *l, uint32_t pole) {
   return fabs(inside - outside) - 1;
 }
 
-static bool comes_first(const labelling *l, uint32_t a, uint32_t b) {
-  const double x = certainty(l, a), y = certainty(l, b);
-  return x > y || (x == y && a < b);
-}
-
-static void put(labelling *l, size_t place, uint32_t pole) {
-  l->heap[place - 1] = pole;
-  l->places[pole] = (uint32_t)place;
-}
-
-static void sift(labelling *l, uint32_t pole) {
-  size_t place = l->places[pole];
-  for (; place > 1 && comes_first(l, pole, l->heap[place / 2 - 1]); place /= 2) put(l, place, l->heap[place / 2 - 1]);
-  for (size_t child; (child = 2 * place) <= l->length; place = child) {
-    if (child < l->length && comes_first(l, l->heap[child], l->heap[child - 1])) child++;
-    if (!comes_first(l, l->heap[child - 1], pole)) break;
-    put(l, place, l->heap[child - 1]);
-  }
-  put(l, place, pole);
-}
-
-static uint32_t take_first(labelling *l) {
-  const uint32_t first = l->heap[0], last = l->heap[--l->length];
-  l->places[first] = 0;
-  if (l->length > 0) {
-    put(l, 1, last);
-    sift(l, last);
-  }
-  return first;
-}
-
 /* A label is given to a pole, more or less certainly. */
 static void give(labelling *l, uint32_t pole, bool inside, double strength) {
   double *value = inside ? &l->inside[pole] : &l->outside[pole];
   if (l->labels[pole] || !(strength > *value)) return;
   *value = strength;
-  if (l->places[pole] == 0) put(l, ++l->length, pole);
-  sift(l, pole);
+  if (qmat_queue_push(&l->queue, -certainty(l, pole), pole)) l->is_short = true;
 }
 
 /* --- labels ------------------------------------------------------------------------------------------------------ */
 
 static qmat_status spread(labelling *l, double propagation) {
-  for (size_t done = 0; l->length > 0; done++) {
-    if (done % 4096 == 0) {
-      const qmat_status status = qmat_progress(l->context, done < l->count ? done : l->count, l->count, "poles");
+  size_t labelled = 0;
+  for (size_t taken = 0; l->queue.count > 0 && !l->is_short; taken++) {
+    if (taken % 4096 == 0) {
+      const qmat_status status = qmat_progress(l->context, labelled, l->count, "poles");
       if (status != QMAT_OK) return status;
     }
-    const uint32_t pole = take_first(l);
+    const qmat_queued first = qmat_queue_pop(&l->queue);
+    const uint32_t pole = (uint32_t)first.item;
+    if (l->labels[pole] || first.key != -certainty(l, pole)) continue;
+    labelled++;
     const bool inside = l->inside[pole] > l->outside[pole];
     const double value = inside ? l->inside[pole] : l->outside[pole];
     l->labels[pole] = inside ? QMAT_POLE_INSIDE : QMAT_POLE_OUTSIDE;
@@ -118,7 +91,7 @@ static qmat_status spread(labelling *l, double propagation) {
       if (l->neighbours.items[i].strength > propagation)
         give(l, l->neighbours.items[i].pole, inside, value * l->neighbours.items[i].strength);
   }
-  return QMAT_OK;
+  return l->is_short ? qmat_fail_memory(l->context, "the labels of poles") : QMAT_OK;
 }
 
 /* The label of a pole that none reached: that of the neighbours that it intersects, or else the one that its opposite
@@ -148,13 +121,10 @@ qmat_status qmat_poles_label(qmat_context *context, const qmat_poles *poles, con
                  .count = count,
                  .inside = qmat_arena_calloc(arena, count, sizeof *l.inside),
                  .outside = qmat_arena_calloc(arena, count, sizeof *l.outside),
-                 .labels = labels,
-                 .heap = qmat_arena_alloc(arena, count, sizeof *l.heap),
-                 .places = qmat_arena_calloc(arena, count, sizeof *l.places)};
+                 .labels = labels};
   double *opposite = qmat_arena_alloc(arena, poles->pair_count, sizeof *opposite);
   double *depths = qmat_arena_alloc(arena, edge_count, sizeof *depths);
-  if (!l.inside || !l.outside || !l.heap || !l.places || !opposite || !depths)
-    return qmat_fail_memory(context, "the labels of poles");
+  if (!l.inside || !l.outside || !opposite || !depths) return qmat_fail_memory(context, "the labels of poles");
   for (size_t i = 0; i < poles->pair_count; i++) opposite[i] = -poles->cosines[i];
   for (size_t i = 0; i < edge_count; i++)
     depths[i] =
@@ -165,7 +135,9 @@ qmat_status qmat_poles_label(qmat_context *context, const qmat_poles *poles, con
   memset(labels, QMAT_POLE_UNLABELLED, count);
   for (uint32_t i = 0; i < count; i++)
     if (poles->at_box[i]) give(&l, i, false, 1);
-  if ((status = spread(&l, propagation)) != QMAT_OK) return status;
+  status = spread(&l, propagation);
+  qmat_free(l.queue.items);
+  if (status != QMAT_OK) return status;
   for (uint32_t i = 0; i < count; i++)
     if (!labels[i]) labels[i] = (uint8_t)guess(&l, i);
   return QMAT_OK;

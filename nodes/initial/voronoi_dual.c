@@ -251,10 +251,7 @@ typedef struct {
 
 static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *medial, const dual_counts *made,
                                qmat_report *report) {
-  const struct {
-    const char *name;
-    size_t value;
-  } counts[] = {
+  const qmat_json_count counts[] = {
       {"samples", d->samples->count},
       {"sheet_spheres", medial->sheet_sphere_count},
       {"samples_triangulated", d->site_count},
@@ -270,9 +267,7 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
       {"specks_dropped", made->joined.specks},
       {"speck_spheres_dropped", made->joined.speck_spheres},
   };
-  int bad = 0;
-  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-    bad |= qmat_json_set_count(report->root, counts[i].name, counts[i].value);
+  const int bad = qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   return bad ? qmat_fail_memory(d->context, "the report") : QMAT_OK;
 }
 

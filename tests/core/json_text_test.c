@@ -78,8 +78,14 @@ static void test_a_count_is_a_whole_number_and_no_object_takes_none(void **state
   json_t *object = json_object();
   assert_int_equal(qmat_json_set_count(object, "spheres", (size_t)1 << 40), 0);
   assert_int_equal(json_integer_value(json_object_get(object, "spheres")), (json_int_t)1 << 40);
-  json_decref(object);
   assert_int_equal(qmat_json_set_count(NULL, "spheres", 1), -1); /* of an object for which memory was short */
+  const qmat_json_count rows[] = {{"edges", 3}, {"cones", 0}};
+  assert_int_equal(qmat_json_set_counts(object, rows, 2), 0);
+  char *text = json_dumps(object, JSON_COMPACT);
+  assert_string_equal(text, "{\"spheres\":1099511627776,\"edges\":3,\"cones\":0}");
+  free(text);
+  json_decref(object);
+  assert_int_not_equal(qmat_json_set_counts(NULL, rows, 2), 0);
 }
 
 int main(void) {

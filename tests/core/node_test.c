@@ -417,6 +417,36 @@ static void test_numbers_do_not_depend_on_the_locale(void **state) {
   assert_string_equal(context.error.message, "epsilon must be between 0 and 1 (diagonal), not 1.5");
 }
 
+static void test_values_are_sealed_and_handed_over_all_or_none(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_report *first = qmat_report_new(), *second = qmat_report_new();
+  qmat_value *outputs[2] = {NULL, NULL};
+  assert_int_equal(qmat_value_seal(&context, &second->base), QMAT_OK);
+  qmat_value_retain(&second->base);
+  assert_int_equal(qmat_hand_over(&context, QMAT_OK, (qmat_value *const[]){&first->base, &second->base}, 2, outputs),
+                   QMAT_OK);
+  assert_ptr_equal(outputs[0], first);
+  assert_ptr_equal(outputs[1], second);
+  assert_true(first->base.sealed);
+  /* An error passes through: both are released (the sanitizer says if not), the second once. */
+  qmat_value *none[3] = {NULL, NULL, NULL};
+  assert_int_equal(
+      qmat_hand_over(&context, QMAT_CANCELLED, (qmat_value *const[]){&first->base, &second->base, NULL}, 3, none),
+      QMAT_CANCELLED);
+  assert_null(none[0]);
+  assert_true(second->base.sealed);
+  qmat_value_release(&second->base);
+  /* What cannot be sealed is released with what was. */
+  qmat_field *field = qmat_field_new();
+  qmat_report *report = qmat_report_new();
+  field->count = 1; /* and no values */
+  assert_int_not_equal(qmat_hand_over(&context, QMAT_OK, (qmat_value *const[]){&report->base, &field->base}, 2, none),
+                       QMAT_OK);
+  assert_null(none[0]);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_rows_are_counted_and_found_by_name),
@@ -431,6 +461,7 @@ int main(void) {
       cmocka_unit_test(test_formatted_values_read_back_to_themselves),
       cmocka_unit_test(test_formatting_cuts_at_the_size_given),
       cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),
+      cmocka_unit_test(test_values_are_sealed_and_handed_over_all_or_none),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

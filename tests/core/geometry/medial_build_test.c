@@ -114,12 +114,59 @@ static void test_random_rows_agree_with_a_table_and_setting_them_again_changes_n
   }
 }
 
+static void test_a_simplex_is_found_where_it_is_and_nowhere_else(void **state) {
+  (void)state;
+  const uint32_t rows[] = {0, 1, 2, 0, 1, 5, 0, 3, 4, 2, 3, 4};
+  assert_int_equal(qmat_simplex_find(rows, 0, 3, rows), SIZE_MAX);
+  for (uint32_t a = 0; a < 6; a++) {
+    for (uint32_t b = a + 1; b < 6; b++) {
+      for (uint32_t c = b + 1; c < 6; c++) {
+        const uint32_t row[] = {a, b, c};
+        size_t expected = SIZE_MAX;
+        for (size_t i = 0; i < 4; i++)
+          if (memcmp(&rows[3 * i], row, sizeof row) == 0) expected = i;
+        assert_int_equal(qmat_simplex_find(rows, 4, 3, row), expected);
+      }
+    }
+  }
+}
+
+static void test_a_copy_has_the_same_digest_and_arrays_of_its_own(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = spheres(4);
+  const uint32_t edges[] = {2, 3}, triangles[] = {0, 1, 2};
+  for (size_t i = 0; i < 16; i++) medial->spheres[i] = 1 + (double)i;
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, 1, triangles, 1), QMAT_OK);
+  const uint32_t offsets[] = {0, 1, 1, 2, 2};
+  medial->region_offset_count = 5;
+  medial->region_sample_count = 2;
+  medial->region_offsets = qmat_alloc(5, sizeof *offsets);
+  medial->region_samples = qmat_calloc(2, sizeof *medial->region_samples);
+  memcpy(medial->region_offsets, offsets, sizeof offsets);
+  qmat_medial *copy = qmat_medial_copy(medial);
+  assert_non_null(copy);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_medial *late = qmat_medial_copy(medial);
+  assert_false(late->base.sealed);
+  assert_int_equal(qmat_value_seal(&context, &copy->base), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &late->base), QMAT_OK);
+  assert_memory_equal(&copy->base.digest, &medial->base.digest, sizeof medial->base.digest);
+  assert_memory_equal(&late->base.digest, &medial->base.digest, sizeof medial->base.digest);
+  assert_ptr_not_equal(copy->spheres, medial->spheres);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&copy->base);
+  qmat_value_release(&late->base);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_rows_come_out_sorted_once_and_with_the_edges_of_triangles),
       cmocka_unit_test(test_nothing_gives_empty_arrays_that_can_be_sealed),
       cmocka_unit_test(test_ids_out_of_range_are_named_and_change_nothing),
       cmocka_unit_test(test_random_rows_agree_with_a_table_and_setting_them_again_changes_nothing),
+      cmocka_unit_test(test_a_simplex_is_found_where_it_is_and_nowhere_else),
+      cmocka_unit_test(test_a_copy_has_the_same_digest_and_arrays_of_its_own),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

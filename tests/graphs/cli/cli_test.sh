@@ -69,6 +69,7 @@ sed 's/^qmat: mistakes.yaml:\([0-9]*:[0-9]*\): .*/\1/' err.txt | tr '\n' ' ' >pl
 holds "all mistakes, and nothing that follows from them: $(cat places.txt)" grep -qx \
   '2:1 4:14 5:56 5:65 5:77 6:44 6:3 8:29 7:31 ' places.txt
 expect 2 "did you mean '--set'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --sat model=box.off
+expect 2 "did you mean '--set features=...'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --features auto
 expect 2 "did you mean 'epsilon'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --set simple.epsilom=1
 expect 2 "path must be given (--set model=FILE)" "$qmat" run "$source/graphs/qmat_plus.yaml" -o a.glb
 # Without a model the plan is known all the same.
