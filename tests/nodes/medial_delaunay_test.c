@@ -599,21 +599,12 @@ static void test_inputs_that_do_not_fit_are_named(void **state) {
   pipeline_free(&other);
 }
 
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
-}
-
 static void test_progress_function_cancels(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("torus", 8), "spacing=0");
-  qmat_context context = {.progress = refuse};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.delaunay", "", inputs, outputs), QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  pipeline_must_be_cancelled("medial.delaunay", "",
+                             (const qmat_value *[]){&p.mesh->base, &p.thickness->base, &p.samples->base});
   pipeline_free(&p);
 }
 

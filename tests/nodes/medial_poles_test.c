@@ -152,31 +152,22 @@ static void test_box_reaches_into_its_corners_and_stays_inside(void **state) {
   pipeline_free(&p);
 }
 
-/* The surface's largest distance from the envelope, as a share of the diagonal. */
-static double surface_to_envelope(const qmat_mesh *mesh, const qmat_medial *medial) {
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.evaluate", "", (const qmat_value *[]){&mesh->base, &medial->base}, outputs);
-  const double error = pipeline_number((const qmat_report *)outputs[0], "surface_to_envelope_at_least");
-  qmat_value_release(outputs[0]);
-  return error;
-}
-
 /* Figure 3: samples that are sparse for the thickness leave holes in the poles, and none in medial.delaunay. */
 static void test_thin_sheet_is_torn_where_samples_are_sparse_and_whole_where_they_are_dense(void **state) {
   (void)state;
   pipeline p;
   pipeline_make(&p, pipeline_model("sheet", 24), "spacing=5%", "");
-  const double ours = surface_to_envelope(p.mesh, p.medial);
+  const double ours = pipeline_error(p.mesh, p.medial, "surface_to_envelope_at_least");
   pipeline_free(&p);
   pipeline_sample(&p, pipeline_model("sheet", 24), VERTICES);
   poles sparse = make_poles(&p, 0, "");
-  const double torn = surface_to_envelope(p.mesh, sparse.medial);
+  const double torn = pipeline_error(p.mesh, sparse.medial, "surface_to_envelope_at_least");
   assert_true(torn > 2 * ours);
   free_poles(&sparse);
   pipeline_free(&p);
   pipeline_sample(&p, pipeline_model("sheet", 24), "spacing=1.5%");
   poles dense = make_poles(&p, 0, "");
-  const double whole = surface_to_envelope(p.mesh, dense.medial);
+  const double whole = pipeline_error(p.mesh, dense.medial, "surface_to_envelope_at_least");
   if (!(whole < 0.7 * torn))
     fail_msg("%g with dense samples, %g with sparse ones, %g by medial.delaunay", whole, torn, ours);
   free_poles(&dense);
@@ -232,49 +223,29 @@ static void test_result_is_an_initial_medial_mesh_for_simplification(void **stat
   (void)state;
   pipeline p;
   poles found = make_sampled(&p, pipeline_model("tapered-capsule", 24));
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.simplify", "epsilon=3%",
-                    (const qmat_value *[]){&p.mesh->base, &p.thickness->base, &p.samples->base, &found.medial->base},
-                    outputs);
-  const qmat_medial *simple = (const qmat_medial *)outputs[0];
-  assert_true(simple->sphere_count >= 2 && simple->sphere_count <= 6);
-  assert_true(surface_to_envelope(p.mesh, simple) <= 0.03);
-  for (size_t i = 0; i < qmat_output_count(qmat_node_find("medial.simplify")); i++) qmat_value_release(outputs[i]);
+  qmat_medial *simple = pipeline_simplify(&p, found.medial, "epsilon=3%");
+  assert_in_range(simple->sphere_count, 2, 6);
+  assert_true(pipeline_error(p.mesh, simple, "surface_to_envelope") <= 0.03);
+  qmat_value_release(&simple->base);
   free_poles(&found);
   pipeline_free(&p);
 }
 
 static void test_threads_do_not_change_a_byte(void **state) {
   (void)state;
-  pipeline s;
-  pipeline_sample(&s, pipeline_model("octopus", 10), VERTICES);
-  qmat_digest first = {{0}};
-  static const int threads[] = {1, 2, 8};
-  for (int i = 0; i < 3; i++) {
-    poles p = make_poles(&s, threads[i], "");
-    if (i == 0) first = p.medial->base.digest;
-    assert_memory_equal(&p.medial->base.digest, &first, sizeof first);
-    free_poles(&p);
-  }
-  pipeline_free(&s);
+  pipeline p;
+  pipeline_sample(&p, pipeline_model("octopus", 10), VERTICES);
+  pipeline_must_ignore_threads("medial.poles", "", (const qmat_value *[]){&p.mesh->base, &p.samples->base});
+  pipeline_free(&p);
 }
 
 /* --- errors ------------------------------------------------------------------------------------------------------ */
-
-static void expect_error(const qmat_mesh *mesh, const qmat_samples *samples, const char *params, const char *field) {
-  qmat_context context = {0};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  const qmat_value *inputs[] = {&mesh->base, &samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.poles", params, inputs, outputs), QMAT_ERROR_GEOMETRY);
-  assert_string_equal(context.error.field, field);
-  qmat_context_uninit(&context);
-}
 
 static void test_eight_corners_are_too_few_samples(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, shape_box(1, 1, 1), VERTICES);
-  expect_error(p.mesh, p.samples, "sampling=1", "samples");
+  pipeline_must_fail("medial.poles", "sampling=1", (const qmat_value *[]){&p.mesh->base, &p.samples->base}, "samples");
   pipeline_free(&p);
 }
 
@@ -282,7 +253,8 @@ static void test_constant_that_rejects_every_inner_pole_is_named(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, shape_two_balls(AROUND), VERTICES);
-  expect_error(p.mesh, p.samples, "sampling=0.01", "sampling");
+  pipeline_must_fail("medial.poles", "sampling=0.01", (const qmat_value *[]){&p.mesh->base, &p.samples->base},
+                     "sampling");
   pipeline_free(&p);
 }
 
@@ -291,26 +263,16 @@ static void test_samples_of_another_mesh_are_named(void **state) {
   pipeline p;
   pipeline_sample(&p, pipeline_model("torus", 8), "spacing=0");
   qmat_mesh *box = shape_seal(shape_box(1, 1, 1));
-  expect_error(box, p.samples, "", "samples");
+  pipeline_must_fail("medial.poles", "", (const qmat_value *[]){&box->base, &p.samples->base}, "samples");
   qmat_value_release(&box->base);
   pipeline_free(&p);
-}
-
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
 }
 
 static void test_progress_function_cancels(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("torus", 8), VERTICES);
-  qmat_context context = {.progress = refuse};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  const qmat_value *inputs[] = {&p.mesh->base, &p.samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.poles", "", inputs, outputs), QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  pipeline_must_be_cancelled("medial.poles", "", (const qmat_value *[]){&p.mesh->base, &p.samples->base});
   pipeline_free(&p);
 }
 

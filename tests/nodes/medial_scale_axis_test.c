@@ -33,15 +33,6 @@ static axis make_sampled(pipeline *p, qmat_mesh *mesh, const char *params) {
   return make_axis(p, 0, params);
 }
 
-/* A bound of medial.evaluate, as a share of the diagonal. */
-static double error_of(const qmat_mesh *mesh, const qmat_medial *medial, const char *name) {
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.evaluate", "epsilon=3%", (const qmat_value *[]){&mesh->base, &medial->base}, outputs);
-  const double error = pipeline_number((const qmat_report *)outputs[0], name);
-  qmat_value_release(outputs[0]);
-  return error;
-}
-
 /* --- by hand and models whose medial axis is known --------------------------------------------------------------- */
 
 /* Two inscribed balls, which touch the sides between the rings. Scaled and scaled back they are the same balls. */
@@ -99,8 +90,8 @@ static void test_envelope_of_a_box_is_near_its_surface(void **state) {
   pipeline p;
   axis a = make_sampled(&p, shape_box(3, 2, 1), "");
   assert_int_equal(pipeline_components(a.medial), 1);
-  const double missing = error_of(p.mesh, a.medial, "surface_to_envelope");
-  const double beyond = error_of(p.mesh, a.medial, "envelope_out_of_solid");
+  const double missing = pipeline_error(p.mesh, a.medial, "surface_to_envelope");
+  const double beyond = pipeline_error(p.mesh, a.medial, "envelope_out_of_solid");
   if (!(missing < 0.06 && beyond < 0.04)) fail_msg("%g and %g", missing, beyond);
   free_axis(&a);
   pipeline_free(&p);
@@ -115,7 +106,7 @@ static void test_thin_sheet_is_lost_where_samples_are_sparse_and_found_where_the
     pipeline p;
     pipeline_sample(&p, pipeline_model("sheet", i ? 24 : 6), samplings[i]);
     axis a = make_axis(&p, 0, "");
-    errors[i] = error_of(p.mesh, a.medial, "surface_to_envelope_at_least");
+    errors[i] = pipeline_error(p.mesh, a.medial, "surface_to_envelope_at_least");
     free_axis(&a);
     pipeline_free(&p);
   }
@@ -144,14 +135,10 @@ static void test_result_is_an_initial_medial_mesh_for_simplification(void **stat
   (void)state;
   pipeline p;
   axis a = make_sampled(&p, pipeline_model("tapered-capsule", 24), "");
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.simplify", "epsilon=3%",
-                    (const qmat_value *[]){&p.mesh->base, &p.thickness->base, &p.samples->base, &a.medial->base},
-                    outputs);
-  const qmat_medial *simple = (const qmat_medial *)outputs[0];
-  assert_true(simple->sphere_count >= 2 && simple->sphere_count <= 6);
-  assert_true(error_of(p.mesh, simple, "surface_to_envelope") <= 0.03);
-  for (size_t i = 0; i < qmat_output_count(qmat_node_find("medial.simplify")); i++) qmat_value_release(outputs[i]);
+  qmat_medial *simple = pipeline_simplify(&p, a.medial, "epsilon=3%");
+  assert_in_range(simple->sphere_count, 2, 6);
+  assert_true(pipeline_error(p.mesh, simple, "surface_to_envelope") <= 0.03);
+  qmat_value_release(&simple->base);
   free_axis(&a);
   pipeline_free(&p);
 }
@@ -160,34 +147,18 @@ static void test_threads_do_not_change_a_byte(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("octopus", 8), "spacing=4%");
-  qmat_digest first = {{0}};
-  static const int threads[] = {1, 2, 8};
-  for (int i = 0; i < 3; i++) {
-    axis a = make_axis(&p, threads[i], "");
-    if (i == 0) first = a.medial->base.digest;
-    assert_memory_equal(&a.medial->base.digest, &first, sizeof first);
-    free_axis(&a);
-  }
+  pipeline_must_ignore_threads("medial.scale_axis", "", (const qmat_value *[]){&p.mesh->base, &p.samples->base});
   pipeline_free(&p);
 }
 
 /* --- errors ------------------------------------------------------------------------------------------------------ */
-
-static void expect_error(const qmat_mesh *mesh, const qmat_samples *samples, const char *field) {
-  qmat_context context = {0};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  const qmat_value *inputs[] = {&mesh->base, &samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.scale_axis", "", inputs, outputs), QMAT_ERROR_GEOMETRY);
-  assert_string_equal(context.error.field, field);
-  qmat_context_uninit(&context);
-}
 
 static void test_samples_of_another_mesh_are_named(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("torus", 8), "spacing=0");
   qmat_mesh *box = shape_seal(shape_box(1, 1, 1));
-  expect_error(box, p.samples, "samples");
+  pipeline_must_fail("medial.scale_axis", "", (const qmat_value *[]){&box->base, &p.samples->base}, "samples");
   qmat_value_release(&box->base);
   pipeline_free(&p);
 }
@@ -199,26 +170,16 @@ static void test_mesh_without_an_inside_is_named(void **state) {
   qmat_mesh *mesh = shape_new();
   shape_add_box(mesh, 0, 0, 0, 1, 2, 3, true); /* inside out */
   shape_seal(mesh);
-  expect_error(mesh, p.samples, "mesh");
+  pipeline_must_fail("medial.scale_axis", "", (const qmat_value *[]){&mesh->base, &p.samples->base}, "mesh");
   qmat_value_release(&mesh->base);
   pipeline_free(&p);
-}
-
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
 }
 
 static void test_progress_function_cancels(void **state) {
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("torus", 8), "spacing=0");
-  qmat_context context = {.progress = refuse};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  const qmat_value *inputs[] = {&p.mesh->base, &p.samples->base};
-  assert_int_equal(pipeline_run(&context, "medial.scale_axis", "", inputs, outputs), QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  pipeline_must_be_cancelled("medial.scale_axis", "", (const qmat_value *[]){&p.mesh->base, &p.samples->base});
   pipeline_free(&p);
 }
 

@@ -31,15 +31,6 @@ static void free_core(core *c) {
   qmat_value_release(&c->report->base);
 }
 
-static double error_of(const core *c, const char *name) {
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.evaluate", "epsilon=3%", (const qmat_value *[]){&c->mesh->base, &c->medial->base},
-                    outputs);
-  const double error = pipeline_number((const qmat_report *)outputs[0], name);
-  qmat_value_release(outputs[0]);
-  return error;
-}
-
 /* --- by hand ----------------------------------------------------------------------------------------------------- */
 
 /* At depth 2 the longest side has 3.6 voxels, here of side 1: their centres are the spheres, and the squares between
@@ -144,7 +135,8 @@ static void test_envelope_of_a_box_is_within_some_voxels_of_it(void **state) {
   core c = make_core(shape_box(3, 2, 1), 0, "depth=6 lambda=0");
   const double voxel = pipeline_number(c.report, "voxel");
   assert_near(voxel, 3 / (0.9 * 64) / sqrt(14), 1e-12);
-  const double missing = error_of(&c, "surface_to_envelope"), beyond = error_of(&c, "envelope_out_of_solid");
+  const double missing = pipeline_error(c.mesh, c.medial, "surface_to_envelope"),
+               beyond = pipeline_error(c.mesh, c.medial, "envelope_out_of_solid");
   if (!(missing < voxel && beyond < 2 * voxel)) fail_msg("%g and %g with voxels of %g", missing, beyond, voxel);
   free_core(&c);
 }
@@ -155,8 +147,8 @@ static void test_thin_sheet_is_lost_with_a_large_lambda_and_found_with_a_small_o
   core lost = make_core(pipeline_model("sheet", 12), 0, "depth=7 lambda=3%");
   core found = make_core(pipeline_model("sheet", 12), 0, "depth=7 lambda=0.2%");
   assert_int_equal(pipeline_euler(lost.medial), pipeline_euler(found.medial));
-  const double without = error_of(&lost, "surface_to_envelope_at_least");
-  const double with = error_of(&found, "surface_to_envelope");
+  const double without = pipeline_error(lost.mesh, lost.medial, "surface_to_envelope_at_least");
+  const double with = pipeline_error(found.mesh, found.medial, "surface_to_envelope");
   if (!(without > 0.1 && with < 0.02)) fail_msg("%g and %g", without, with);
   free_core(&lost);
   free_core(&found);
@@ -168,27 +160,20 @@ static void test_result_is_an_initial_medial_mesh_for_simplification(void **stat
   (void)state;
   pipeline p;
   pipeline_sample(&p, pipeline_model("tapered-capsule", 24), "spacing=4%");
-  qmat_value *cores[PIPELINE_MOST_PORTS], *outputs[PIPELINE_MOST_PORTS];
+  qmat_value *cores[PIPELINE_MOST_PORTS];
   pipeline_must_run(0, "medial.voxel_cores", "depth=6", (const qmat_value *[]){&p.mesh->base}, cores);
-  pipeline_must_run(0, "medial.simplify", "epsilon=4%",
-                    (const qmat_value *[]){&p.mesh->base, &p.thickness->base, &p.samples->base, cores[0]}, outputs);
-  const qmat_medial *simple = (const qmat_medial *)outputs[0];
+  qmat_medial *simple = pipeline_simplify(&p, (const qmat_medial *)cores[0], "epsilon=4%");
   assert_in_range(simple->sphere_count, 2, 6);
-  for (size_t i = 0; i < qmat_output_count(qmat_node_find("medial.simplify")); i++) qmat_value_release(outputs[i]);
-  for (size_t i = 0; i < 2; i++) qmat_value_release(cores[i]);
+  qmat_value_release(&simple->base);
+  pipeline_release("medial.voxel_cores", cores);
   pipeline_free(&p);
 }
 
 static void test_threads_do_not_change_a_byte(void **state) {
   (void)state;
-  static const int threads[] = {1, 2, 8};
-  qmat_digest first = {{0}};
-  for (int i = 0; i < 3; i++) {
-    core c = make_core(pipeline_model("octopus", 8), threads[i], "depth=6 lambda=1%");
-    if (i == 0) first = c.medial->base.digest;
-    assert_memory_equal(&c.medial->base.digest, &first, sizeof first);
-    free_core(&c);
-  }
+  qmat_mesh *mesh = shape_seal(pipeline_model("octopus", 8));
+  pipeline_must_ignore_threads("medial.voxel_cores", "depth=6 lambda=1%", (const qmat_value *[]){&mesh->base});
+  qmat_value_release(&mesh->base);
 }
 
 /* Integers and real numbers give one triangulation. */
@@ -215,15 +200,10 @@ static void test_lattice_points_are_triangulated_as_other_points_are(void **stat
 
 /* --- errors ------------------------------------------------------------------------------------------------------ */
 
+/* Takes the mesh over. */
 static void expect_error(qmat_mesh *mesh, const char *params, const char *field) {
-  qmat_context context = {0};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  if (!mesh->base.sealed) shape_seal(mesh);
-  assert_int_equal(pipeline_run(&context, "medial.voxel_cores", params, (const qmat_value *[]){&mesh->base}, outputs),
-                   QMAT_ERROR_GEOMETRY);
-  assert_string_equal(context.error.field, field);
-  assert_string_not_equal(context.error.hint, "");
-  qmat_context_uninit(&context);
+  shape_seal(mesh);
+  assert_true(pipeline_must_fail("medial.voxel_cores", params, (const qmat_value *[]){&mesh->base}, field));
   qmat_value_release(&mesh->base);
 }
 
@@ -243,21 +223,10 @@ static void test_mesh_without_an_inside_is_named(void **state) {
   expect_error(mesh, "depth=9", "mesh");
 }
 
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
-}
-
 static void test_progress_function_cancels(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_seal(shape_box(1, 1, 1));
-  qmat_context context = {.progress = refuse};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  assert_int_equal(
-      pipeline_run(&context, "medial.voxel_cores", "depth=4", (const qmat_value *[]){&mesh->base}, outputs),
-      QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  pipeline_must_be_cancelled("medial.voxel_cores", "depth=4", (const qmat_value *[]){&mesh->base});
   qmat_value_release(&mesh->base);
 }
 

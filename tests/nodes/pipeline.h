@@ -85,6 +85,10 @@ static inline bool pipeline_on_progress(void *user, const char *node_id, const c
 #define PIPELINE_SLOWDOWN 1
 #endif
 
+static inline void pipeline_release(const char *name, qmat_value *outputs[]) {
+  for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
+}
+
 /* Runs a node on one thread and checks that it could have been cancelled within `limit` processor seconds at any
  * time. */
 static inline void pipeline_must_stop_within(double limit, const char *name, const char *text,
@@ -95,9 +99,60 @@ static inline void pipeline_must_stop_within(double limit, const char *name, con
   pipeline_note_gap(&gaps);
   assert_int_equal(pipeline_run(&context, name, text, inputs, outputs), QMAT_OK);
   pipeline_note_gap(&gaps);
-  for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
+  pipeline_release(name, outputs);
   qmat_context_uninit(&context);
   if (!(gaps.longest <= PIPELINE_SLOWDOWN * limit)) fail_msg("%s cannot be cancelled for %.2f s", name, gaps.longest);
+}
+
+/* A progress function that cancels after `*user` calls. */
+static inline bool pipeline_refuse(void *user, const char *node_id, const char *node_type, uint64_t done,
+                                   uint64_t total, const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return --*(int64_t *)user >= 0;
+}
+
+/* Cancels a node on one thread after 0, 1, 3, 7, ... calls of the progress function, until it comes to its end. The
+ * first call is before the node starts. */
+static inline void pipeline_must_be_cancelled(const char *name, const char *text, const qmat_value *const inputs[]) {
+  int64_t calls = 0;
+  for (;; calls = 2 * calls + 1) {
+    int64_t left = calls;
+    qmat_context context = {.threads = 1, .progress = pipeline_refuse, .progress_user = &left};
+    qmat_value *outputs[PIPELINE_MOST_PORTS];
+    const qmat_status status = pipeline_run(&context, name, text, inputs, outputs);
+    qmat_context_uninit(&context);
+    if (status == QMAT_OK) {
+      pipeline_release(name, outputs);
+      break;
+    }
+    assert_int_equal(status, QMAT_CANCELLED);
+  }
+  assert_true(calls > 1);
+}
+
+/* The node must fail because of the geometry in `field`. Returns whether it gives a hint. */
+static inline bool pipeline_must_fail(const char *name, const char *text, const qmat_value *const inputs[],
+                                      const char *field) {
+  qmat_context context = {0};
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  assert_int_equal(pipeline_run(&context, name, text, inputs, outputs), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.field, field);
+  const bool has_hint = context.error.hint[0] != '\0';
+  qmat_context_uninit(&context);
+  return has_hint;
+}
+
+/* The first output has the same digest with 1, 2 and 8 threads. */
+static inline void pipeline_must_ignore_threads(const char *name, const char *text, const qmat_value *const inputs[]) {
+  static const int threads[] = {1, 2, 8};
+  qmat_digest first = {{0}};
+  for (int i = 0; i < 3; i++) {
+    qmat_value *outputs[PIPELINE_MOST_PORTS];
+    pipeline_must_run(threads[i], name, text, inputs, outputs);
+    if (i == 0) first = outputs[0]->digest;
+    assert_memory_equal(&outputs[0]->digest, &first, sizeof first);
+    pipeline_release(name, outputs);
+  }
 }
 
 /* An unsealed mesh of a model's surface. */
@@ -219,6 +274,25 @@ static inline double pipeline_number(const qmat_report *report, const char *name
   const json_t *number = json_object_get(report->root, name);
   if (!json_is_number(number)) fail_msg("the report has no number %s", name);
   return json_number_value(number);
+}
+
+/* A bound of medial.evaluate for an epsilon of 3 %, as a share of the diagonal. */
+static inline double pipeline_error(const qmat_mesh *mesh, const qmat_medial *medial, const char *name) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "medial.evaluate", "epsilon=3%", (const qmat_value *[]){&mesh->base, &medial->base}, outputs);
+  const double error = pipeline_number((const qmat_report *)outputs[0], name);
+  pipeline_release("medial.evaluate", outputs);
+  return error;
+}
+
+/* What medial.simplify makes of an initial medial mesh; the caller releases it. */
+static inline qmat_medial *pipeline_simplify(const pipeline *p, const qmat_medial *initial, const char *params) {
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "medial.simplify", params,
+                    (const qmat_value *[]){&p->mesh->base, &p->thickness->base, &p->samples->base, &initial->base},
+                    outputs);
+  for (size_t i = 1; i < qmat_output_count(qmat_node_find("medial.simplify")); i++) qmat_value_release(outputs[i]);
+  return (qmat_medial *)outputs[0];
 }
 
 /* Vertices - edges + triangles. */
