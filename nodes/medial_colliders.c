@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.colliders: a medial mesh as shapes for collision detection, with the mass properties of the solid. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/json_text.h"
@@ -18,8 +19,12 @@ typedef enum fit_side { FIT_BOTH, FIT_CONTAIN, FIT_INSIDE } fit_side;
 typedef struct medial_colliders_params {
   int fit, kind;
   int64_t shapes, hull_points, samples;
-  double least_radius, dent, density;
+  double least_radius, dent, hull_error, density;
 } medial_colliders_params;
+
+/* Rows of more shapes than this would cost engines more than they gain; their dents are deeper instead. */
+enum { MOST_IN_ROWS = 256 };
+static const double deepest_dent = 0.1;
 
 typedef struct work {
   qmat_context *context;
@@ -29,9 +34,38 @@ typedef struct work {
   qmat_shape_set set;
   qmat_colliders *colliders;
   double volume; /* of the solid, in the unit frame; 0: not known */
+  double dent;   /* of rows of capsules or spheres */
   bool proved;
   qmat_shape_measures measures;
 } work;
+
+static int compare_numbers(const void *left, const void *right) {
+  const double a = *(const double *)left, b = *(const double *)right;
+  return (a > b) - (a < b);
+}
+
+/* Fitted shapes may have come apart into more than the budget. Joint shapes contain both, so that containing is still
+ * proved; capsules do not come apart. Of shapes inside the solid the largest stay. */
+static qmat_status keep_budget(work *w, double growth) {
+  const medial_colliders_params *p = w->params;
+  qmat_shape_set *set = &w->set;
+  const size_t most = (size_t)p->shapes, count = set->shape_count;
+  if (most == 0 || count <= most) return QMAT_OK;
+  if (p->fit != FIT_INSIDE)
+    return qmat_shape_set_merge(
+        w->context, set, p->kind == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : (qmat_shape_kind)p->kind, growth, most);
+  double *volumes = qmat_arena_alloc(&w->context->arena, 2 * count, sizeof *volumes), *sorted = volumes + count;
+  if (!volumes) return qmat_fail_memory(w->context, "the colliders");
+  for (size_t i = 0; i < count; i++) volumes[i] = qmat_shape_volume(set->spheres, &set->shapes[3 * i]);
+  memcpy(sorted, volumes, count * sizeof *sorted);
+  qsort(sorted, count, sizeof *sorted, compare_numbers);
+  size_t kept = 0;
+  for (size_t i = 0; i < count && kept < most; i++)
+    if (volumes[i] >= sorted[count - most])
+      memmove(&set->shapes[3 * kept++], &set->shapes[3 * i], 3 * sizeof *set->shapes);
+  set->shape_count = kept;
+  return qmat_shape_set_reduce(w->context, set);
+}
 
 static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial *medial) {
   const medial_colliders_params *p = w->params;
@@ -41,7 +75,12 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
   qmat_medial unit = *medial;
   status = qmat_unit_spheres(context, qmat_surface_frame(w->surface), medial, &unit.spheres);
   if (status != QMAT_OK) return status;
-  status = qmat_shape_set_make(context, &unit, p->least_radius, (qmat_shape_kind)p->kind, p->dent, &w->set);
+  for (w->dent = p->dent; status == QMAT_OK; w->dent *= 1.25) {
+    const bool may_deepen = p->kind != QMAT_SHAPES_ANY && w->dent < deepest_dent;
+    status = qmat_shape_set_make(context, &unit, p->least_radius, (qmat_shape_kind)p->kind, w->dent,
+                                 may_deepen ? 4 * MOST_IN_ROWS : SIZE_MAX, &w->set);
+    if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
+  }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
   if (status == QMAT_OK && p->shapes > 0)
     status = qmat_shape_set_merge(context, &w->set, (qmat_shape_kind)p->kind, growth[p->fit], (size_t)p->shapes);
@@ -55,6 +94,7 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
     status = qmat_inside_fit(context, w->surface, &w->set, p->least_radius + deviation, &w->proved);
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] -= deviation;
   }
+  if (status == QMAT_OK) status = keep_budget(w, growth[p->fit]);
   if (status != QMAT_OK || w->set.shape_count > 0) return status;
   qmat_fail(context, QMAT_ERROR_GEOMETRY, "no shape is left");
   qmat_fail_field(context, "medial");
@@ -74,8 +114,8 @@ static qmat_status fill_colliders(work *w) {
   memcpy(c->shapes, w->set.shapes, 3 * c->shape_count * sizeof *c->shapes);
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
-  const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, side);
-  return status;
+  const double error = w->params->hull_error * qmat_surface_frame(w->surface)->diagonal;
+  return qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side);
 }
 
 static const char *const fits[] = {"both", "contain", "inside", NULL};
@@ -97,6 +137,7 @@ static qmat_status make_report(const work *w, qmat_report *report) {
       {"max_uncovered_gap", m->max_uncovered_gap},
       {"volume_ratio", m->volume_ratio},
       {"iou", m->iou},
+      {"dent", w->dent},
   };
   size_t widths[4] = {0};
   for (size_t i = 0; i < w->set.shape_count; i++) widths[qmat_shape_width(&w->set.shapes[3 * i])]++;
@@ -146,12 +187,16 @@ static const qmat_param params[] = {
              "The largest number of shapes; pairs become one until it is reached; 0: any number"),
     QMAT_ENUM(medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
               "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only"),
-    QMAT_LENGTH(medial_colliders_params, dent, 0.01, 1e-4, 1,
-                "How deep the dents between the capsules or spheres may be that replace a cone or slab"),
+    QMAT_LENGTH(
+        medial_colliders_params, dent, 0.01, 1e-4, 1,
+        "How deep the dents between the capsules or spheres may be that replace a cone or slab; deeper where that "
+        "takes more than 256 shapes"),
     QMAT_LENGTH(medial_colliders_params, least_radius, 0.0005, 1e-6, 1,
                 "The smallest radius; engines refuse 0, which sharp features have"),
-    QMAT_INT(medial_colliders_params, hull_points, "points", 64, QMAT_LEAST_HULL_POINTS, 1024,
-             "The largest number of vertices of a hull: PhysX takes 64, Jolt 256"),
+    QMAT_INT(medial_colliders_params, hull_points, "points", 128, QMAT_LEAST_HULL_POINTS, 1024,
+             "The largest number of vertices of a hull: PhysX takes 255 (64 on graphics cards), Jolt 256"),
+    QMAT_LENGTH(medial_colliders_params, hull_error, 0.003, 1e-6, 1,
+                "How far a hull may be from its shape where hull_points allows"),
     QMAT_FLOAT(medial_colliders_params, density, "mass per cubic model unit", 1, 1e-12, 1e12,
                "The density of the solid, which its mass and inertia follow from"),
     QMAT_INT(medial_colliders_params, samples, "points", 20000, 1, 1e8,
@@ -175,7 +220,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 3,
+    .version = 4,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "

@@ -29,14 +29,15 @@ static void direction(size_t i, size_t n, double point[3]) {
 }
 
 /* The hull of `width` spheres, each replaced by n points on the sphere of `factor` times its radius. */
-static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids, int width, size_t n, double factor) {
+static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids, int width, const size_t *n,
+                             const double *factor) {
   h->point_count = 0;
   for (int s = 0; s < width; s++) {
     const double *sphere = &spheres[4 * (size_t)ids[s]];
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n[s]; i++) {
       double unit[3], *point = &h->points[3 * h->point_count++];
-      direction(i, n, unit);
-      for (int k = 0; k < 3; k++) point[k] = sphere[k] + factor * sphere[3] * unit[k];
+      direction(i, n[s], unit);
+      for (int k = 0; k < 3; k++) point[k] = sphere[k] + factor[s] * sphere[3] * unit[k];
     }
   }
   const qmat_status status = qmat_convex_hull(h->points, h->point_count, h->triangles, &h->triangle_count);
@@ -53,7 +54,8 @@ static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids
 static qmat_status circumscribe(hull *h, size_t n, double *factor) {
   static const double unit[4] = {0, 0, 0, 1};
   static const uint32_t id = 0;
-  const qmat_status status = make_hull(h, unit, &id, 1, n, 1);
+  static const double one = 1;
+  const qmat_status status = make_hull(h, unit, &id, 1, &n, &one);
   double nearest = 1;
   for (size_t t = 0; t < h->triangle_count && status == QMAT_OK; t++) {
     const uint32_t *row = &h->triangles[3 * t];
@@ -69,15 +71,32 @@ static qmat_status circumscribe(hull *h, size_t n, double *factor) {
   return status;
 }
 
-/* The finest hull of a shape within the limit. */
-static qmat_status fit_hull(hull *h, const double *spheres, const uint32_t ids[3], size_t most, const double *factors) {
+/* As many directions, of at most `most`, as put their hull within about `error` of a sphere of this radius: n
+ * directions leave it by 3.6 / n of the radius. */
+static size_t directions_for(double radius, double error, size_t most) {
+  const double n = ceil(3.6 * radius / error);
+  return n > (double)most ? most : n > LEAST_DIRECTIONS ? (size_t)n : LEAST_DIRECTIONS;
+}
+
+/* The hull of a shape within the error, or the finest within the limit. Each sphere's points surround it, so that their
+ * hull contains the shape. */
+static qmat_status fit_hull(hull *h, const double *spheres, const uint32_t ids[3], size_t most, double error,
+                            qmat_hull_side side, double *factors) {
   const int width = qmat_shape_width(ids);
-  size_t n = most;
-  for (;;) {
-    const qmat_status status = make_hull(h, spheres, ids, width, n, factors ? factors[n] : 1);
-    if (status != QMAT_OK || h->used <= most || n <= LEAST_DIRECTIONS) return status;
-    const size_t fewer = n * most / h->used;
-    n = fewer < LEAST_DIRECTIONS ? LEAST_DIRECTIONS : fewer < n ? fewer : n - 1;
+  for (;; error *= 1.15) {
+    size_t n[3], points = 0;
+    double factor[3] = {1, 1, 1};
+    for (int s = 0; s < width; s++) {
+      n[s] = directions_for(spheres[4 * (size_t)ids[s] + 3], error, most);
+      if (side == QMAT_HULL_OUTSIDE && factors[n[s]] == 0) {
+        const qmat_status status = circumscribe(h, n[s], &factors[n[s]]);
+        if (status != QMAT_OK) return status;
+      }
+      if (side == QMAT_HULL_OUTSIDE) factor[s] = factors[n[s]];
+      points += n[s];
+    }
+    const qmat_status status = make_hull(h, spheres, ids, width, n, factor);
+    if (status != QMAT_OK || h->used <= most || points <= LEAST_DIRECTIONS * (size_t)width) return status;
   }
 }
 
@@ -95,13 +114,13 @@ static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
   colliders->hull_ends[2 * shape + 1] = (uint32_t)colliders->triangle_count;
 }
 
-qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points,
+qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points, double error,
                              qmat_hull_side side) {
   const size_t room = 3 * most_points, count = colliders->shape_count;
   hull h = {.points = qmat_arena_alloc(&context->arena, room, 3 * sizeof *h.points),
             .triangles = qmat_arena_alloc(&context->arena, room, 6 * sizeof *h.triangles),
             .names = qmat_arena_alloc(&context->arena, room, sizeof *h.names)};
-  double *factors = qmat_arena_alloc(&context->arena, most_points + 1, sizeof *factors);
+  double *factors = qmat_arena_calloc(&context->arena, most_points + 1, sizeof *factors); /* 0: not known */
   colliders->points = qmat_alloc(count * most_points, 3 * sizeof *colliders->points);
   colliders->triangles = qmat_alloc(count * most_points, 6 * sizeof *colliders->triangles);
   colliders->hull_ends = qmat_alloc(count, 2 * sizeof *colliders->hull_ends);
@@ -109,15 +128,10 @@ qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, s
       !colliders->hull_ends)
     return qmat_fail_memory(context, "the hulls");
   qmat_status status = QMAT_OK;
-  for (size_t n = LEAST_DIRECTIONS; n <= most_points && side == QMAT_HULL_OUTSIDE && status == QMAT_OK; n++) {
-    status = qmat_progress(context, n, most_points, "directions");
-    if (status == QMAT_OK) status = circumscribe(&h, n, &factors[n]);
-  }
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     status = qmat_progress(context, i, count, "hulls");
     if (status != QMAT_OK) return status;
-    status = fit_hull(&h, colliders->spheres, &colliders->shapes[3 * i], most_points,
-                      side == QMAT_HULL_OUTSIDE ? factors : NULL);
+    status = fit_hull(&h, colliders->spheres, &colliders->shapes[3 * i], most_points, error, side, factors);
     if (status == QMAT_OK) append(colliders, i, &h);
     if (status == QMAT_ERROR_GEOMETRY) {
       qmat_fail(context, status, "it has no hull");

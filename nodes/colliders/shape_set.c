@@ -109,21 +109,36 @@ static void interpolate(const double *a, const double *b, double t, double spher
   for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * a[k] + t * b[k];
 }
 
-/* The number of steps along `length` so that neighbours of radius `radius` leave dents of at most `dent`. */
-static int steps_along(double length, double radius, double dent) {
-  const double gap = dent < radius ? 2 * sqrt(dent * (2 * radius - dent)) : 2 * radius;
-  const double steps = ceil(length / gap);
-  return steps < 1 ? 1 : steps < MOST_ROWS ? (int)steps : MOST_ROWS;
+/* Where neighbours of a row from sphere s to t are, as shares of the way, so that the dents between them are at most
+ * `dent` deep: at[0] = 0 to at[n] = 1. Where the row is thin they are closer; thinner than a dent does not count. The
+ * number of steps n. */
+static int place_along(const double s[4], const double t[4], double dent, double at[MOST_ROWS + 1]) {
+  const double length = qmat_point_distance(s, t);
+  int count = 0;
+  at[0] = 0;
+  while (at[count] < 1 && count < MOST_ROWS) {
+    double step = 1;
+    for (int k = 0; k < 2; k++) { /* at the nearer end, then at the thinner one */
+      const double next = fmin(at[count] + step, 1), here = s[3] + at[count] * (t[3] - s[3]);
+      const double radius = fmax(k == 0 ? here : fmin(here, s[3] + next * (t[3] - s[3])), dent);
+      step = length > 0 ? 2 * sqrt(dent * (2 * radius - dent)) / length : 1;
+    }
+    at[count + 1] = at[count] + step;
+    count++;
+  }
+  for (int i = 1; i < count; i++) at[i] /= at[count];
+  at[count] = 1;
+  return count;
 }
 
 /* Spheres along the cone of two, without those at its ends. */
 static void add_spheres_between(builder *b, const double *s, const double *t, double dent) {
-  double first[4], last[4], sphere[4];
+  double first[4], last[4], sphere[4], at[MOST_ROWS + 1];
   memcpy(first, s, sizeof first); /* the array may move */
   memcpy(last, t, sizeof last);
-  const int steps = steps_along(qmat_point_distance(first, last), fmin(first[3], last[3]), dent);
+  const int steps = place_along(first, last, dent, at);
   for (int i = 1; i < steps && !b->failed; i++) {
-    interpolate(first, last, (double)i / steps, sphere);
+    interpolate(first, last, at[i], sphere);
     const uint32_t id = add_sphere(b, sphere);
     add_shape(b, id, id, id);
   }
@@ -142,12 +157,14 @@ static void add_rows(builder *b, const uint32_t ids[3], qmat_shape_kind kind, do
   qmat_subtract(apex, p, v);
   qmat_cross(u, v, normal);
   const double side = sqrt(qmat_dot(u, u)), height = side > 0 ? sqrt(qmat_dot(normal, normal)) / side : 0;
-  const int rows = steps_along(height, fmin(apex[3], fmin(p[3], q[3])), dent);
+  const double base[4] = {0, 0, 0, fmin(p[3], q[3])}, top[4] = {height, 0, 0, apex[3]};
+  double at[MOST_ROWS + 1];
+  const int rows = place_along(base, top, dent, at);
   for (int i = 0; i <= rows && !b->failed; i++) {
     const bool first = i == 0;
     double left[4], right[4];
-    interpolate(p, apex, (double)i / rows, left);
-    interpolate(q, apex, (double)i / rows, right);
+    interpolate(p, apex, at[i], left);
+    interpolate(q, apex, at[i], right);
     const uint32_t l = first ? ids[longest] : i == rows ? ids[(longest + 2) % 3] : add_sphere(b, left);
     const uint32_t r = first ? ids[(longest + 1) % 3] : i == rows ? l : add_sphere(b, right);
     if (kind == QMAT_SHAPES_CAPSULES) {
@@ -260,7 +277,7 @@ static void add_simplex(builder *b, uint32_t x, uint32_t y, uint32_t z, qmat_sha
 }
 
 qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
-                                qmat_shape_kind kind, double dent, qmat_shape_set *set) {
+                                qmat_shape_kind kind, double dent, size_t most, qmat_shape_set *set) {
   builder b = {.context = context};
   uint8_t *used = qmat_arena_calloc(&context->arena, unit->sphere_count, 1);
   b.failed = !used;
@@ -284,7 +301,7 @@ qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, 
     if (!used[i]) add_shape(&b, (uint32_t)i, (uint32_t)i, (uint32_t)i);
   if (b.failed) return qmat_fail_memory(context, "the colliders");
   *set = b.set;
-  return qmat_shape_set_reduce(context, set);
+  return b.set.shape_count > most ? QMAT_OK : qmat_shape_set_reduce(context, set);
 }
 
 qmat_status qmat_shape_set_envelope(qmat_context *context, const qmat_shape_set *set, qmat_envelope **envelope) {

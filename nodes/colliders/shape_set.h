@@ -40,10 +40,11 @@ double qmat_shape_volume(const double *spheres, const uint32_t ids[3]);
 
 /* Makes the shapes of a medial mesh: its maximal simplices. Radii below `least_radius` (above 0) become that. A simplex
  * whose spheres contain each other becomes those that count, and a shape inside another one is left out. With `kind`,
- * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep.
+ * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep. Of more than
+ * `most` shapes none is left out, which saves time: the caller tries again with deeper dents.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the shapes. */
 qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
-                                qmat_shape_kind kind, double dent, qmat_shape_set *set);
+                                qmat_shape_kind kind, double dent, size_t most, qmat_shape_set *set);
 
 /* Leaves out what changed spheres have made redundant: simplices whose spheres contain each other, shapes inside
  * others, unused spheres. Errors and cost as above. */
