@@ -55,7 +55,7 @@ typedef struct solidifier {
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
-  size_t caps, cap_sides, turned_parts, inner_triangles;
+  size_t caps, cap_sides, folded, turned_parts, inner_triangles;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -92,10 +92,9 @@ static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
 
 /* Finds pairs of triangles with the same corners and opposite sides: a card of two sides, or a wall between two solids
  * that touch. They cancel in every winding number. `classes` becomes 1 for the first of a pair and 2 for the second. */
-static qmat_status find_pairs(const solidifier *s, uint8_t *classes) {
+static qmat_status find_pairs(const solidifier *s, const uint32_t *triangles, size_t count, uint8_t *classes) {
   qmat_half_edges e;
-  const qmat_status status =
-      qmat_half_edges_sort(s->context, s->mesh->vertex_count, s->triangle_count, s->triangles, &e);
+  const qmat_status status = qmat_half_edges_sort(s->context, s->mesh->vertex_count, count, triangles, &e);
   for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
     last = qmat_edge_last(&e, first);
     const uint32_t high = qmat_half_edge_high(&e, e.order[first]);
@@ -124,7 +123,7 @@ static qmat_status split_pairs(solidifier *s) {
   s->plain = qmat_arena_alloc(arena, 3 * s->triangle_count, sizeof *s->plain);
   s->pairs = qmat_arena_alloc(arena, 3 * (s->triangle_count + sheet_count), sizeof *s->pairs);
   if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
-  const qmat_status status = find_pairs(s, classes);
+  const qmat_status status = find_pairs(s, s->triangles, s->triangle_count, classes);
   for (size_t t = 0; status == QMAT_OK && t < s->triangle_count; t++) {
     if (classes[t] == 2) continue;
     uint32_t *to = classes[t] == 1 ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
@@ -229,6 +228,26 @@ static qmat_status add_cap(solidifier *s, size_t number) {
   return status;
 }
 
+/* A cap over a tooth of the border folds back on the tooth's own triangle. The two enclose nothing, and no sphere comes
+ * near the tip, so the given triangle becomes one of a sheet. `given`: the solids' triangles before the caps. */
+static qmat_status split_folds(solidifier *s, size_t given) {
+  const size_t count = s->solids.count;
+  uint8_t *classes = qmat_arena_calloc(&s->context->arena, count, 1);
+  if (!classes) return fail_shortage(s);
+  qmat_status status = find_pairs(s, s->solids.corners, count, classes);
+  s->solids.count = 0;
+  for (size_t t = 0; status == QMAT_OK && t < count; t++) {
+    const uint32_t *c = s->solids.corners + 3 * t;
+    if (!classes[t]) {
+      memmove(s->solids.corners + 3 * s->solids.count++, c, 3 * sizeof *c);
+    } else if (t < given) {
+      status = append(s, &s->sheets, c[0], c[1], c[2]);
+      s->folded++;
+    }
+  }
+  return status;
+}
+
 /* The triangles of solid parts, then their caps; those of sheets, then one of each pair. */
 static qmat_status sort_triangles(solidifier *s) {
   const qmat_parts *parts = &s->parts;
@@ -241,11 +260,13 @@ static qmat_status sort_triangles(solidifier *s) {
     triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
   }
+  const size_t given = s->solids.count;
   for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
     if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
     status = add_cap(s, i);
     if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
   }
+  if (status == QMAT_OK && s->caps > 0) status = split_folds(s, given);
   for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
     status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
   return status;
@@ -439,6 +460,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"triangles_turned", s->parts.turned},
                                     {"caps", s->caps},
                                     {"cap_sides", s->cap_sides},
+                                    {"triangles_folded", s->folded},
                                     {"parts_united", s->united.shells_united},
                                     {"triangles_cut", s->united.cut_triangles}};
   int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
@@ -538,13 +560,14 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 2,
+    .version = 3,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
         "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
         "are closed by caps if the generalised winding "
-        "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. Of triangles that "
+        "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. A tooth of a border "
+        "that its cap folds back on is a sheet, too. Of triangles that "
         "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "

@@ -694,6 +694,48 @@ static void test_a_cut_neck_is_one_cap_of_known_size(void **state) {
   release(&r);
 }
 
+/* One triangle leans outwards from the rim of a cut. Its cap folds back on it, so it is a sheet, and the solid is the
+ * one below.
+ */
+static void test_a_tooth_on_a_rim_is_a_sheet(void **state) {
+  (void)state;
+  const double height = cos(3.14159265358979323846 / 4);
+  qmat_mesh *sphere = shape_sphere(1, 16);
+  size_t tooth = 0;
+  for (size_t t = 0, on_rim = 0; on_rim != 2; tooth = t++) {
+    double top = 0;
+    on_rim = 0;
+    for (size_t k = 0; k < 3; k++) {
+      const double z = sphere->positions[3 * (size_t)sphere->triangles[3 * t + k] + 2];
+      on_rim += fabs(z - height) < 1e-9;
+      top = fmax(top, z);
+    }
+    if (top < height + 1e-9) on_rim = 0;
+  }
+  const uint32_t *c = sphere->triangles + 3 * tooth, corners[3] = {c[0], c[1], c[2]};
+  for (size_t k = 0; k < 3; k++) { /* it leans outwards */
+    double *p = sphere->positions + 3 * (size_t)corners[k];
+    if (p[2] > height + 1e-9) p[0] *= 3, p[1] *= 3;
+  }
+  cut_above(sphere, height + 1e-9);
+  memcpy(sphere->triangles + 3 * sphere->triangle_count++, corners, sizeof corners); /* in the place of one cut off */
+  result r = unite(sphere);
+  assert_string_equal(taken_for(&r, 0), "solid with holes");
+  assert_int_equal(pipeline_count(r.report, "caps"), 1);
+  assert_int_equal(pipeline_count(r.report, "cap_sides"), 33);
+  assert_int_equal(pipeline_count(r.report, "triangles_folded"), 1);
+  assert_int_equal(r.mesh->sheet_triangle_count, 1);
+  double highest[2] = {-1, -1};
+  for (size_t i = 0; i < 3 * r.mesh->triangle_count; i++) {
+    double *top = highest + (i >= 3 * (r.mesh->triangle_count - 1));
+    *top = fmax(*top, r.mesh->positions[3 * (size_t)r.mesh->triangles[i] + 2]);
+  }
+  assert_near(highest[0], height, 1e-12);
+  assert_true(highest[1] > height + 0.1);
+  assert_int_equal(r.mesh->triangle_count - 1, sphere->triangle_count - 1 + 30);
+  release(&r);
+}
+
 /* Facets that are missed here and there come back exactly. */
 static void test_ten_holes_are_ten_caps_and_the_same_solid(void **state) {
   (void)state;
@@ -971,6 +1013,7 @@ int main(void) {
       cmocka_unit_test(test_hundreds_of_parts),
       cmocka_unit_test(test_a_union_passes),
       cmocka_unit_test(test_a_cut_neck_is_one_cap_of_known_size),
+      cmocka_unit_test(test_a_tooth_on_a_rim_is_a_sheet),
       cmocka_unit_test(test_ten_holes_are_ten_caps_and_the_same_solid),
       cmocka_unit_test(test_a_soup_of_triangles_that_face_anywhere_is_the_solid),
       cmocka_unit_test(test_seams_that_rounding_opened_are_welded_and_their_width_is_part_of_the_deviation),
