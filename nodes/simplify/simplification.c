@@ -244,8 +244,12 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
  * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. */
 static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *best) {
   if (s->params.topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
-  const qmat_status status = qmat_simplification_open_voids(s, best);
-  return status == QMAT_OK ? qmat_simplification_close_loops(s, best) : status;
+  bool right = false;
+  qmat_status status = qmat_simplification_open_voids(s, best);
+  if (status == QMAT_OK) status = qmat_simplification_close_loops(s, best);
+  if (status == QMAT_OK && best->within_epsilon) status = judge_topology(s, best->medial, &right);
+  if (right) best->fault = s->params.epsilon;
+  return status;
 }
 
 qmat_status qmat_simplification_prepare(qmat_simplification *s, const qmat_value *const inputs[]) {

@@ -99,6 +99,7 @@ qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figu
                 {"features", f->features, f->features > 0},
                 {"rounds", f->rounds, !f->in_order},
                 {"cavity_filling_spheres", f->filled, !f->in_order},
+                {"topology_spheres", f->divided, f->divided > 0},
                 {"sphere_moves", f->moves, !f->in_order}};
   /* Errors with respect to the surface that the mesh approximates. */
   const struct {

@@ -14,6 +14,7 @@ typedef struct qmat_simplify_figures {
   bool in_order;    /* then only the next member applies, else only those after it */
   double threshold; /* of the last collapse */
   size_t rounds, filled, moves;
+  size_t divided; /* spheres that divide walls and edges, so that part of them could be removed */
 } qmat_simplify_figures;
 
 /* Takes over what a decimation tells. */

@@ -12,6 +12,7 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_build.h"
 #include "core/geometry/surface.h"
+#include "core/geometry/vector.h"
 #include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
@@ -73,8 +74,9 @@ static void check_report(const pipeline *p, const qmat_medial *initial, const re
   assert_int_equal(pipeline_count(r->report, "triangles"), r->medial->triangle_count);
   const bool fills =
       json_object_get(r->report->root, "cavity_filling_spheres") != NULL; /* not where collapses come in order */
+  const int64_t divided = json_integer_value(json_object_get(r->report->root, "topology_spheres"));
   const int64_t spheres =
-      (int64_t)initial->sphere_count + (fills ? pipeline_count(r->report, "cavity_filling_spheres") : 0);
+      (int64_t)initial->sphere_count + (fills ? pipeline_count(r->report, "cavity_filling_spheres") : 0) + divided;
   assert_int_equal(pipeline_count(r->report, "collapses"), spheres - (int64_t)r->medial->sphere_count);
 }
 
@@ -726,10 +728,8 @@ static void test_isolated_spheres_stay_beside_what_collapses(void **state) {
   qmat_context_uninit(&context);
 }
 
-/* Four overlapping spheres in the capsule, whose ends are at 0 and 3; of `count` the first. */
-static qmat_medial *spheres_in_capsule(size_t count, const uint32_t *edges, size_t edge_count,
-                                       const uint32_t *triangles, size_t triangle_count) {
-  static const double spheres[] = {0, 0, 0, 0.95, 3, 0, 0, 0.95, 1.5, 0.1, 0, 0.9, 1.5, -0.1, 0.1, 0.9};
+static qmat_medial *spheres_of(const double *spheres, size_t count, const uint32_t *edges, size_t edge_count,
+                               const uint32_t *triangles, size_t triangle_count) {
   qmat_context context = {0};
   qmat_medial *medial = qmat_medial_new();
   assert_non_null(medial);
@@ -741,6 +741,13 @@ static qmat_medial *spheres_in_capsule(size_t count, const uint32_t *edges, size
   assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
   qmat_context_uninit(&context);
   return medial;
+}
+
+/* Four overlapping spheres in the capsule, whose ends are at 0 and 3; of `count` the first. */
+static qmat_medial *spheres_in_capsule(size_t count, const uint32_t *edges, size_t edge_count,
+                                       const uint32_t *triangles, size_t triangle_count) {
+  static const double spheres[] = {0, 0, 0, 0.95, 3, 0, 0, 0.95, 1.5, 0.1, 0, 0.9, 1.5, -0.1, 0.1, 0.9};
+  return spheres_of(spheres, count, edges, edge_count, triangles, triangle_count);
 }
 
 static void test_a_void_that_the_solid_does_not_have_is_opened(void **state) {
@@ -772,6 +779,113 @@ static void test_a_loop_that_the_solid_does_not_have_is_closed(void **state) {
   assert_int_equal(guarded.medial->sphere_count, 3);
   assert_int_equal(guarded.medial->triangle_count, 1);
   check_topology(p, &guarded);
+  assert_int_equal(pipeline_count(guarded.report, "loops"), 0);
+  check_errors(p, &guarded, 0.08, true);
+  release(&any);
+  release(&guarded);
+  qmat_value_release(&ring->base);
+}
+
+/* The corners of a regular tetrahedron with edges of 4, and spheres there whose slabs meet in its middle. */
+static const double tetrahedron[] = {1.4142135623730951,  1.4142135623730951,  1.4142135623730951,  0.85,
+                                     1.4142135623730951,  -1.4142135623730951, -1.4142135623730951, 0.85,
+                                     -1.4142135623730951, 1.4142135623730951,  -1.4142135623730951, 0.85,
+                                     -1.4142135623730951, -1.4142135623730951, 1.4142135623730951,  0.85};
+
+/* The convex hull of these spheres: the vertices of a ball, moved to the corner that is farthest their way. */
+static qmat_mesh *round_tetrahedron(void) {
+  qmat_mesh *mesh = shape_sphere(0.85, 24);
+  for (size_t v = 0; v < mesh->vertex_count; v++) {
+    double *p = &mesh->positions[3 * v];
+    const double *farthest = tetrahedron;
+    for (const double *c = tetrahedron; c < tetrahedron + COUNT(tetrahedron); c += 4)
+      if (qmat_dot(p, c) > qmat_dot(p, farthest)) farthest = c;
+    for (int k = 0; k < 3; k++) p[k] += farthest[k];
+  }
+  return shape_seal(mesh);
+}
+
+/* No wall of the tetrahedron can be spared. */
+static void test_part_of_a_wall_opens_a_void_that_needs_all_walls(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, round_tetrahedron(), sampling, "");
+  static const uint32_t edges[] = {0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3}, walls[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
+  qmat_medial *closed = spheres_of(tetrahedron, 4, edges, 6, walls, 4);
+  result any = simplify_medial(&p, closed, "epsilon=4% topology=free");
+  result guarded = simplify_medial(&p, closed, "epsilon=4%");
+  assert_int_equal(any.medial->sphere_count, 4);
+  assert_int_equal(pipeline_count(any.report, "voids"), 1);
+  assert_int_equal(guarded.medial->sphere_count, 5);
+  assert_int_equal(guarded.medial->triangle_count, 5);
+  assert_int_equal(pipeline_count(guarded.report, "topology_spheres"), 1);
+  check_topology(&p, &guarded);
+  assert_int_equal(pipeline_count(guarded.report, "voids"), 0);
+  check_errors(&p, &guarded, 0.04, true);
+  release(&guarded);
+  guarded = simplify_medial(&p, closed, "epsilon=4% vertices=4"); /* no fifth one */
+  assert_int_equal(guarded.medial->sphere_count, 4);
+  assert_int_equal(guarded.medial->triangle_count, 4);
+  release(&any);
+  release(&guarded);
+  qmat_value_release(&closed->base);
+  pipeline_free(&p);
+}
+
+/* A square ring of size 4 and profile 1 around the origin, with a slit through its side at y = -1.5. */
+static qmat_mesh *slit_ring(double slit) {
+  qmat_mesh *mesh = shape_new();
+  const double x[6] = {slit / 2, 2, 2, -2, -2, -slit / 2}, y[6] = {-2, -2, 2, 2, -2, -2};
+  uint32_t v[6][4]; /* outer and inner below, outer and inner above */
+  for (int k = 0; k < 6; k++)
+    for (int i = 0; i < 4; i++)
+      v[k][i] = shape_vertex(mesh, i % 2 == 0 ? x[k] : fmax(-1, fmin(1, x[k])), i % 2 == 0 ? y[k] : y[k] / 2,
+                             i < 2 ? -0.5 : 0.5);
+  for (int k = 0; k < 5; k++) {
+    shape_quad(mesh, v[k][2], v[k + 1][2], v[k + 1][3], v[k][3]);
+    shape_quad(mesh, v[k][1], v[k + 1][1], v[k + 1][0], v[k][0]);
+    shape_quad(mesh, v[k][0], v[k + 1][0], v[k + 1][2], v[k][2]);
+    shape_quad(mesh, v[k][3], v[k + 1][3], v[k + 1][1], v[k][1]);
+  }
+  shape_quad(mesh, v[0][1], v[0][0], v[0][2], v[0][3]);
+  shape_quad(mesh, v[5][3], v[5][2], v[5][0], v[5][1]);
+  return shape_seal(mesh);
+}
+
+/* No edge of the ring can be spared, and no three edges can be filled. */
+static void test_part_of_an_edge_opens_a_loop_that_needs_all_edges(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, slit_ring(0.02), sampling, "");
+  static const double corners[] = {-1.5, -1.5, 0, 0.5, 1.5, -1.5, 0, 0.5, 1.5, 1.5, 0, 0.5, -1.5, 1.5, 0, 0.5};
+  static const uint32_t edges[] = {0, 1, 0, 3, 1, 2, 2, 3};
+  qmat_medial *ring = spheres_of(corners, 4, edges, 4, NULL, 0);
+  result guarded = simplify_medial(&p, ring, "epsilon=9.5%");
+  result any = simplify_medial(&p, ring, "epsilon=9.5% topology=free");
+  assert_int_equal(any.medial->sphere_count, 4);
+  assert_int_equal(pipeline_count(any.report, "loops"), 1);
+  assert_int_equal(guarded.medial->sphere_count, 5);
+  assert_int_equal(guarded.medial->edge_count, 4);
+  check_topology(&p, &guarded);
+  assert_int_equal(pipeline_count(guarded.report, "loops"), 0);
+  check_errors(&p, &guarded, 0.095, true);
+  release(&any);
+  release(&guarded);
+  qmat_value_release(&ring->base);
+  pipeline_free(&p);
+}
+
+/* Two edges join the same spheres the long way round: one can be spared. */
+static void test_an_edge_that_is_not_needed_opens_a_loop(void **state) {
+  (void)state;
+  const pipeline *p = model(SMALL);
+  static const uint32_t edges[] = {0, 2, 0, 3, 1, 2, 1, 3};
+  qmat_medial *ring = spheres_in_capsule(4, edges, 4, NULL, 0);
+  result guarded = simplify_medial(p, ring, "epsilon=8% vertices=4");
+  result any = simplify_medial(p, ring, "epsilon=8% vertices=4 topology=free");
+  assert_int_equal(pipeline_count(any.report, "loops"), 1);
+  assert_int_equal(guarded.medial->sphere_count, 4);
+  assert_int_equal(guarded.medial->edge_count, 3);
   assert_int_equal(pipeline_count(guarded.report, "loops"), 0);
   check_errors(p, &guarded, 0.08, true);
   release(&any);
@@ -954,6 +1068,9 @@ int main(void) {
       cmocka_unit_test(test_isolated_spheres_stay_beside_what_collapses),
       cmocka_unit_test(test_a_void_that_the_solid_does_not_have_is_opened),
       cmocka_unit_test(test_a_loop_that_the_solid_does_not_have_is_closed),
+      cmocka_unit_test(test_part_of_a_wall_opens_a_void_that_needs_all_walls),
+      cmocka_unit_test(test_part_of_an_edge_opens_a_loop_that_needs_all_edges),
+      cmocka_unit_test(test_an_edge_that_is_not_needed_opens_a_loop),
       cmocka_unit_test(test_inputs_of_another_mesh_are_named),
       cmocka_unit_test(test_progress_function_cancels),
       cmocka_unit_test(test_it_asks_whether_to_go_on_at_every_few_points_and_collapses),
