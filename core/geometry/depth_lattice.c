@@ -58,6 +58,42 @@ static double compute_node(qmat_depth_lattice *lattice, uint64_t key, const doub
   return qmat_depth_lattice_exact(lattice, node);
 }
 
+/* The depth at a node, which is kept when memory allows. */
+static double depth_of_node(qmat_depth_lattice *lattice, uint64_t key, const double node[3]) {
+  qmat_key_slot *slot = qmat_key_table_find(&lattice->nodes, key);
+  if (slot->key == key) return slot->number;
+  const double depth = compute_node(lattice, key, node);
+  slot = qmat_key_table_add(&lattice->nodes, key);
+  if (slot) slot->number = depth;
+  return depth;
+}
+
+double qmat_depth_lattice_least(qmat_depth_lattice *lattice, const double point[3]) {
+  double low[3], share[3], square = 0;
+  int64_t steps[3];
+  for (int k = 0; k < 3; k++) {
+    if (!(fabs(point[k]) < reach)) return -INFINITY;
+    steps[k] = (int64_t)floor(point[k] / lattice->spacing);
+    low[k] = (double)steps[k] * lattice->spacing;
+    share[k] = qmat_smaller(qmat_larger((point[k] - low[k]) / lattice->spacing, 0), 1);
+    square -= share[k] * (1 - share[k]) * lattice->spacing * lattice->spacing;
+  }
+  for (int corner = 0; corner < 8; corner++) {
+    uint64_t key = 0;
+    double node[3], weight = 1;
+    for (int k = 0; k < 3; k++) {
+      const int high = corner >> k & 1;
+      key = key << 21 | (uint64_t)(steps[k] + high + key_offset);
+      node[k] = (double)(steps[k] + high) * lattice->spacing;
+      weight *= high ? share[k] : 1 - share[k];
+    }
+    const double depth = depth_of_node(lattice, key, node);
+    if (!(depth > 0)) return -INFINITY;
+    square += weight * depth * depth;
+  }
+  return square > 0 ? sqrt(square) * (1 - 1e-9) : -INFINITY;
+}
+
 double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3], double *distance) {
   uint64_t key = 0;
   double node[3], square = 0;
@@ -72,10 +108,5 @@ double qmat_depth_lattice_near(qmat_depth_lattice *lattice, const double point[3
     square += (point[k] - node[k]) * (point[k] - node[k]);
   }
   *distance = sqrt(square);
-  qmat_key_slot *slot = qmat_key_table_find(&lattice->nodes, key);
-  if (slot->key == key) return slot->number;
-  const double depth = compute_node(lattice, key, node);
-  slot = qmat_key_table_add(&lattice->nodes, key);
-  if (slot) slot->number = depth; /* when memory is short, the node is computed again next time */
-  return depth;
+  return depth_of_node(lattice, key, node);
 }

@@ -36,4 +36,9 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth);
 
+/* A lower bound of the depth of a point inside a watertight surface (qmat_surface_is_watertight), by the depths of the
+ * eight nodes around it; -INFINITY where they do not give one. The square of a distance is |x|^2 less a convex
+ * function: the bound is of second order in the spacing over the depth. */
+double qmat_depth_lattice_least(qmat_depth_lattice *lattice, const double point[3]);
+
 #endif

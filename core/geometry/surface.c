@@ -320,6 +320,10 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
   return depth <= limit ? depth : INFINITY;
 }
 
+bool qmat_surface_is_watertight(const qmat_surface *surface) {
+  return surface->blocks && surface->leaf_count == 0 && !surface->sheet_blocks;
+}
+
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
                                  double limit, uint32_t *failed) {
   if (!surface->blocks || surface->leaf_count > 0) return INFINITY;

@@ -37,30 +37,52 @@ static double bound_from_corners(const piece *p) {
   return bound;
 }
 
-/* Halves a piece across its longest side. The depths at the corners are not carried on: the centres of the halves give
- * better bounds. */
-static void split(const piece *p, piece *low, piece *high) {
-  int a = 0, b = 1;
-  if (p->count == 3) {
-    double longest = -1;
-    for (int i = 0; i < 3; i++) {
-      double square = 0;
-      for (int k = 0; k < 3; k++) {
-        const double d = p->spheres[i][k] - p->spheres[(i + 1) % 3][k];
-        square += d * d;
-      }
-      if (square > longest) {
-        longest = square;
-        a = i;
-        b = (i + 1) % 3;
-      }
-    }
+/* The least of a l + b m - l m w over l + m = 1, l and m >= 0. */
+static double least_on_side(double a, double b, double w) {
+  const double l = w > 0 ? (w + b - a) / (2 * w) : 0;
+  return l > 0 && l < 1 ? b - w * l * l : qmat_smaller(a, b);
+}
+
+/* The normal equations of a triangle are solved where their determinant is above this share of its largest value. */
+static const double least_determinant = 1e-6;
+
+/* Whether h <= level over the piece, by its `depths`. The square of the distance d to any set is |x|^2 less a convex
+ * function. At the point with the weights l_i of the corners x_i, then, d^2 >= sum l_i d_i^2 - sum l_i l_j |x_i -
+ * x_j|^2: a bound of second order. With the radius r_i = level + t_i it is at least the square of sum l_i t_i where
+ * sum l_i (d_i^2 - t_i^2) - sum l_i l_j (|x_i - x_j|^2 - (t_i - t_j)^2) >= 0, a convex function of the weights. A
+ * positive distance keeps the piece on the side of its corners. */
+static bool is_below_by_squares(const piece *p, double level) {
+  double t[3], g[3], w[3]; /* w: each between corners k and k + 1 */
+  for (int k = 0; k < p->count; k++) {
+    t[k] = qmat_larger(p->spheres[k][3] - level, 0);
+    g[k] = p->depths[k] * p->depths[k] - t[k] * t[k];
+    if (!(p->depths[k] > 0 && g[k] > 0)) return false;
   }
-  double middle[4];
-  for (int k = 0; k < 4; k++) middle[k] = 0.5 * (p->spheres[a][k] + p->spheres[b][k]);
-  *low = *high = *p;
-  memcpy(low->spheres[b], middle, sizeof middle);
-  memcpy(high->spheres[a], middle, sizeof middle);
+  double widest = 0;
+  for (int k = 0; k < p->count; k++) {
+    const int j = (k + 1) % p->count;
+    double square = -(t[k] - t[j]) * (t[k] - t[j]);
+    for (int i = 0; i < 3; i++) square += (p->spheres[k][i] - p->spheres[j][i]) * (p->spheres[k][i] - p->spheres[j][i]);
+    w[k] = qmat_larger(square, 0);
+    widest = qmat_larger(widest, w[k]);
+    if (!(least_on_side(g[k], g[j], w[k]) > 0)) return false;
+  }
+  if (p->count < 3) return true;
+  const double s = w[0] + w[2] - w[1], a = w[0] + g[0] - g[1], b = w[2] + g[0] - g[2];
+  const double determinant = 4 * w[0] * w[2] - s * s;
+  if (!(determinant > least_determinant * widest * widest)) /* a thin triangle */
+    return qmat_smaller(g[0], qmat_smaller(g[1], g[2])) > widest / 3;
+  const double u = (2 * w[2] * a - s * b) / determinant, v = (2 * w[0] * b - s * a) / determinant;
+  return !(u > 0 && v > 0 && u + v < 1) || g[0] - 0.5 * (u * a + v * b) > 0;
+}
+
+/* The least of some levels up to `most` that the bound of second order proves; INFINITY if it proves none. */
+static double bound_by_squares(const piece *p, double most) {
+  static const double shares[] = {0.25, 0.5, 0.65, 0.8, 0.9};
+  if (!is_below_by_squares(p, most)) return INFINITY;
+  for (size_t i = 0; i < sizeof shares / sizeof *shares; i++)
+    if (is_below_by_squares(p, shares[i] * most)) return shares[i] * most;
+  return most;
 }
 
 /* Branch and bound over one primitive, depth first, to at most this level. */
@@ -69,6 +91,7 @@ enum { DEEPEST = 40 };
 typedef struct search {
   const qmat_surface *surface;
   qmat_depth_lattice *lattice; /* NULL: every depth is a query to the surface */
+  bool by_squares;             /* whether bounds of second order hold */
   double accepted;             /* a piece with a bound up to this is finished */
   double limit;                /* an h above this ends the search */
   double smallest;  /* pieces up to this size are not split for a better bound; with a lattice, larger pieces are not
@@ -88,8 +111,9 @@ static bool is_done(search *s, double bound, double size, bool last) {
   return true;
 }
 
-/* Larger pieces, in limits, are worth a bound of the whole piece. It need not be lower than this share of the limit. */
-static const double flat_size = 1, flat_share = 0.25;
+/* Larger pieces, in limits, are worth a bound of the whole piece: of second order where the depth is a distance, else a
+ * closed formula, which need not be lower than the third share of the limit. */
+static const double squares_size = 0.3, flat_size = 1, flat_share = 0.25;
 
 /* Whether a closed formula accepts a piece with a point inside the solid. */
 static bool is_flat(search *s, const piece *p) {
@@ -97,6 +121,53 @@ static bool is_flat(search *s, const piece *p) {
   const double bound =
       qmat_surface_excess_bound(s->lattice->surface, spheres, p->count, flat_share * s->limit, s->accepted, &s->failed);
   if (!(bound <= s->accepted)) return false;
+  s->bound = qmat_larger(s->bound, bound);
+  return true;
+}
+
+/* A lower bound of the depth at a point: of second order where the lattice proves the point inside. */
+static double least_depth(qmat_depth_lattice *lattice, const double *point) {
+  double gap;
+  const double near = qmat_depth_lattice_near(lattice, point, &gap);
+  return near > gap ? qmat_larger(near - gap, qmat_depth_lattice_least(lattice, point)) : near - gap;
+}
+
+/* Halves a piece across its longest side. The depth at the new corner is bounded where it will be used. */
+static void split(search *s, const piece *p, bool is_large, piece *low, piece *high) {
+  int a = 0, b = 1;
+  if (p->count == 3) {
+    double longest = -1;
+    for (int i = 0; i < 3; i++) {
+      double square = 0;
+      for (int k = 0; k < 3; k++) {
+        const double d = p->spheres[i][k] - p->spheres[(i + 1) % 3][k];
+        square += d * d;
+      }
+      if (square > longest) {
+        longest = square;
+        a = i;
+        b = (i + 1) % 3;
+      }
+    }
+  }
+  double middle[4];
+  for (int k = 0; k < 4; k++) middle[k] = 0.5 * (p->spheres[a][k] + p->spheres[b][k]);
+  *low = *high = *p;
+  memcpy(low->spheres[b], middle, sizeof low->spheres[b]);
+  memcpy(high->spheres[a], middle, sizeof high->spheres[a]);
+  low->depths[b] = high->depths[a] = is_large && s->by_squares ? least_depth(s->lattice, middle) : -INFINITY;
+}
+
+/* Bounds of second order are used up to this share of the limit: what is nearer is searched finely. A piece with a
+ * corner above the second share, in spite of its depth, gains nothing from a lower aim. */
+static const double squares_share = 0.97, high_share = 0.6;
+
+/* Whether the bound of second order accepts a piece. */
+static bool is_below(search *s, const piece *p) {
+  double highest = -INFINITY;
+  for (int k = 0; k < p->count; k++) highest = qmat_larger(highest, p->spheres[k][3] - p->depths[k]);
+  const double bound = bound_by_squares(p, highest > high_share * s->limit ? squares_share * s->limit : s->accepted);
+  if (!(bound < INFINITY)) return false;
   s->bound = qmat_larger(s->bound, bound);
   return true;
 }
@@ -113,7 +184,7 @@ static bool search_piece(search *s, const piece *p, int level) {
   }
   /* h over the piece is at most `farthest` less the depth at the centre: convex, so largest at a corner. */
   const bool last = p->count == 1 || level == DEEPEST;
-  bool ask = true;
+  bool ask = true, is_large = false;
   double near = 0, gap = 0;
   if (s->lattice) {
     near = qmat_depth_lattice_near(s->lattice, centre, &gap);
@@ -123,7 +194,10 @@ static bool search_piece(search *s, const piece *p, int level) {
       return false;
     }
     if (is_done(s, farthest - near + gap, size, last)) return true;
-    if (size > flat_size * s->limit && near > gap && is_flat(s, p)) return true;
+    is_large = size > squares_size * s->limit && near > gap;
+    if (is_large && s->by_squares && is_below(s, p)) return true;
+    /* Where bounds of second order hold, a second formula per piece takes longer than it saves. */
+    if (size > flat_size * s->limit && (level == 0 || !s->by_squares) && near > gap && is_flat(s, p)) return true;
     ask = size <= s->smallest || last;
   }
   if (ask) {
@@ -145,7 +219,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     }
   }
   piece low, high;
-  split(p, &low, &high);
+  split(s, p, is_large, &low, &high);
   return search_piece(s, &low, level + 1) && search_piece(s, &high, level + 1);
 }
 
@@ -180,7 +254,8 @@ static const double lattice_share = 0.5, widest_spacing = 0.005;
 qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_to_surface *tracker,
                                           const qmat_surface *surface, const qmat_complex *complex,
                                           const double *depths, double limit) {
-  *tracker = (qmat_envelope_to_surface){.limit = limit};
+  *tracker =
+      (qmat_envelope_to_surface){.limit = limit, .by_squares = limit < INFINITY && qmat_surface_is_watertight(surface)};
   const double spacing = limit < INFINITY ? lattice_share * limit : widest_spacing;
   const qmat_status status =
       qmat_depth_lattice_init(context, &tracker->lattice, surface, spacing < widest_spacing ? spacing : widest_spacing);
@@ -202,7 +277,8 @@ qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_t
       memcpy(p.spheres[k], &complex->spheres[4 * v], sizeof p.spheres[k]);
       p.depths[k] = depths[v];
     }
-    *(is_edge ? &tracker->edge_bounds[id] : &tracker->triangle_bounds[id]) = bound_from_corners(&p);
+    *(is_edge ? &tracker->edge_bounds[id] : &tracker->triangle_bounds[id]) =
+        qmat_smaller(bound_from_corners(&p), tracker->by_squares ? bound_by_squares(&p, limit) : INFINITY);
   }
   return QMAT_OK;
 }
@@ -288,6 +364,7 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
   const double removed_growth =
       collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
   search s = {.lattice = &tracker->lattice,
+              .by_squares = tracker->by_squares,
               .accepted = accepted_share * tracker->limit,
               .limit = tracker->limit,
               .smallest = smallest_share * tracker->limit,
@@ -297,6 +374,7 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
   memcpy(p.spheres[0], sphere, sizeof p.spheres[0]);
   p.depths[0] = tracker->sphere_depth;
   *kept = true;
+  bool is_known = false; /* whether p.depths[0] is the best that the lattice gives */
   for (size_t t = 0; t < collapse->triangle_count + collapse->neighbour_count && *kept; t++) {
     const bool is_edge = t >= collapse->triangle_count;
     const size_t id = is_edge ? t - collapse->triangle_count : t;
@@ -318,6 +396,12 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
       for (size_t i = 0; i < 2 * collapse->triangle_count && bound > tracker->limit; i++)
         if (collapse->triangle_pairs[i] == collapse->neighbours[id])
           bound = qmat_smaller(bound, tracker->new_triangle_bounds[i / 2]);
+    if (bound > tracker->limit && tracker->by_squares) {
+      for (int k = 0; k < p.count; k++)
+        if (k > 0 || !is_known) p.depths[k] = qmat_larger(p.depths[k], least_depth(&tracker->lattice, p.spheres[k]));
+      is_known = true;
+      bound = qmat_smaller(bound, bound_by_squares(&p, squares_share * tracker->limit));
+    }
     if (bound > tracker->limit) {
       s.found = s.bound = -INFINITY;
       memcpy(s.place, sphere, sizeof s.place);

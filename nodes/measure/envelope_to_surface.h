@@ -10,11 +10,13 @@
  * A sphere with centre c and radius r leaves the solid by at most h = r - depth(c). The depth is the distance to the
  * surface, negative outside. It is 1-Lipschitz, so one query bounds h around it. Bounds of old primitives carry over to
  * their images: when a corner c of radius r moves to the sphere m, h of a primitive at it grows by at most |c_m - c| +
- * r_m - r. A primitive is searched piece by piece only where these bounds exceed the limit, first with the depths that
- * a lattice remembers, then by queries to the surface. */
+ * r_m - r. A primitive is searched piece by piece only where these bounds exceed the limit: with bounds of second order
+ * inside a watertight surface, which take pieces of about sqrt(limit * depth), with the depths that a lattice
+ * remembers, then by queries to the surface. */
 typedef struct qmat_envelope_to_surface {
   qmat_depth_lattice lattice;
   double limit;
+  bool by_squares;         /* whether the depth is the distance to a watertight surface */
   double *depths;          /* per vertex: a lower bound of its depth */
   size_t sheet_vertices;   /* the first so many vertices are of sheets, and need not lie inside */
   double *edge_bounds;     /* per edge: an upper bound of h over it */

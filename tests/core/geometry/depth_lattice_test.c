@@ -164,6 +164,30 @@ static void test_a_depth_is_exact_up_to_a_limit(void **state) {
   qmat_depth_lattice_uninit(&lattice);
 }
 
+static void test_least_depth_is_below_the_depth_by_at_most_the_second_order(void **state) {
+  const double spacing = 0.02;
+  qmat_depth_lattice lattice;
+  make_lattice(&lattice, state, spacing);
+  random_numbers random = {.seed = 4};
+  size_t known = 0;
+  for (int round = 0; round < 6000; round++) {
+    double point[3], gap;
+    random_point(&random, 0.4, point);
+    if (!(qmat_depth_lattice_near(&lattice, point, &gap) > gap)) continue;
+    const double depth = qmat_depth_lattice_exact(&lattice, point), least = qmat_depth_lattice_least(&lattice, point);
+    assert_true(least <= depth + 1e-12);
+    known += least > 0;
+    /* Away from the medial axis of a tube the depth is smooth: it differs from the mean of the nodes by their spread.
+     */
+    if (depth > 2 * spacing) assert_true(least > depth - 0.4 * spacing);
+  }
+  assert_true(known > 100);
+  const double outside[3] = {0, 0, 0}, beyond[3] = {2.5, 0, 0};
+  assert_true(qmat_depth_lattice_least(&lattice, outside) == -INFINITY);
+  assert_true(qmat_depth_lattice_least(&lattice, beyond) == -INFINITY);
+  qmat_depth_lattice_uninit(&lattice);
+}
+
 static void test_corners_of_the_lattice_have_different_keys(void **state) {
   /* The finest spacing that the keys can number, and the farthest nodes. */
   static const double spacings[] = {0, 1e-6, 0.01};
@@ -190,6 +214,7 @@ int main(void) {
       cmocka_unit_test(test_depths_do_not_depend_on_earlier_queries),
       cmocka_unit_test(test_points_beyond_the_lattice_get_the_exact_depth),
       cmocka_unit_test(test_a_depth_is_exact_up_to_a_limit),
+      cmocka_unit_test(test_least_depth_is_below_the_depth_by_at_most_the_second_order),
       cmocka_unit_test(test_corners_of_the_lattice_have_different_keys),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);

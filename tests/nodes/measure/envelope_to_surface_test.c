@@ -338,7 +338,8 @@ static void test_a_slab_between_flat_faces_takes_few_queries(void **unused) {
   bool kept;
   assert_true(qmat_envelope_to_surface_test_sphere(&tracker, &complex, &collapse, moved));
   assert_int_equal(qmat_envelope_to_surface_test(&s.context, &tracker, &complex, &collapse, moved, &kept), QMAT_OK);
-  assert_true(kept && tracker.lattice.queries < 20);
+  /* Nine nodes bound the depth at each corner; piece by piece it would take more than a thousand. */
+  assert_true(kept && tracker.lattice.queries < 40);
   assert_true(tracker.new_triangle_bounds[0] <= 0.5 * limit); /* 0 up to what is not resolved */
   qmat_collapse_uninit(&collapse);
   qmat_envelope_to_surface_uninit(&tracker);
