@@ -11,6 +11,7 @@
 #include "nodes/skin/envelope_surface.h"
 #include "nodes/skin/flat_primitives.h"
 #include "nodes/skin/skin_decimate.h"
+#include "nodes/skin/skin_distance.h"
 #include "nodes/skin/skin_surface_cgal.h"
 
 /* The limit of balls for CGAL: so many may take 45 seconds. */
@@ -39,6 +40,9 @@ typedef struct skin {
   qmat_envelope_grid grid;
   size_t contour_triangle_count; /* before decimation */
   qmat_skin_errors errors;
+  double to_envelope, from_envelope; /* upper bounds of the distances between the mesh and the envelope */
+  qmat_cell_mark *marks;             /* where cells are halved; freed at the end */
+  size_t mark_count, mark_capacity;
   size_t ball_count;
 } skin;
 
@@ -233,24 +237,114 @@ static qmat_status count_components(skin *s, size_t *components) {
 /* A contour above this number of triangles is made again with cells twice as large: the decimation would take minutes
  * for shells that are thin everywhere. */
 enum { MOST_CONTOUR_TRIANGLES = 200000 };
+/* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
+ */
+static const double CONTOUR_SHARE = 0.5;
+/* Where the decimated mesh exceeds the error and the contour does not, it is decimated again for this share. */
+static const double SECOND_SHARE = 0.6;
+
+static void drop_triangles(qmat_skin_triangles *surface) {
+  qmat_free(surface->positions);
+  qmat_free(surface->triangles);
+  *surface = (qmat_skin_triangles){.vertex_count = 0};
+}
+
+static qmat_status copy_triangles(skin *s, const qmat_skin_triangles *from, qmat_skin_triangles *to) {
+  *to = (qmat_skin_triangles){from->vertex_count, from->triangle_count,
+                              qmat_alloc(3 * from->vertex_count, sizeof *to->positions),
+                              qmat_alloc(3 * from->triangle_count, sizeof *to->triangles)};
+  if (!to->positions || !to->triangles) return qmat_fail_memory(s->context, "the skin");
+  memcpy(to->positions, from->positions, 3 * from->vertex_count * sizeof *to->positions);
+  memcpy(to->triangles, from->triangles, 3 * from->triangle_count * sizeof *to->triangles);
+  return QMAT_OK;
+}
+
+/* Bounds both distances between a surface and the envelope; `*far` (may be NULL) gets the places beyond `threshold`. */
+static qmat_status bound_distance(skin *s, const qmat_skin_triangles *surface, double threshold,
+                                  qmat_skin_distance *far) {
+  qmat_medial unit = s->solid;
+  unit.spheres = s->spheres;
+  qmat_skin_distance distance;
+  const qmat_status status = qmat_skin_distance_measure(s->context, &unit, surface, threshold, &distance);
+  s->to_envelope = distance.to_envelope;
+  s->from_envelope = distance.from_envelope;
+  if (far)
+    *far = distance;
+  else
+    qmat_skin_distance_uninit(&distance);
+  return status;
+}
+
+static double distance_of(const skin *s) {
+  return fmax(s->to_envelope, s->from_envelope);
+}
+
+static qmat_status make_contour(skin *s, int detail, qmat_skin_triangles *surface, qmat_envelope_grid *grid) {
+  return qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
+                               1 / (double)s->params->resolution, detail, s->marks, s->mark_count, surface, grid);
+}
+
+/* Halves cells where the contour is too far from the envelope, one step a round, and measures the result. */
+static qmat_status refine_contour(skin *s, int detail) {
+  for (int level = 1;; level++) {
+    qmat_skin_distance distance;
+    qmat_status status = bound_distance(s, &s->surface, CONTOUR_SHARE * s->params->error, &distance);
+    const size_t far = distance.far_count;
+    if (status == QMAT_OK && qmat_grow((void **)&s->marks, &s->mark_capacity, s->mark_count + far, sizeof *s->marks))
+      status = qmat_fail_memory(s->context, "places far from the skin");
+    for (size_t i = 0; i < far && status == QMAT_OK; i++) {
+      qmat_cell_mark *mark = &s->marks[s->mark_count++];
+      memcpy(mark->point, distance.far_points + 3 * i, sizeof mark->point);
+      mark->level = level;
+    }
+    qmat_skin_distance_uninit(&distance);
+    if (status != QMAT_OK || far == 0 || level > detail || 2 * s->surface.triangle_count > MOST_CONTOUR_TRIANGLES)
+      return status;
+    qmat_skin_triangles finer;
+    qmat_envelope_grid grid;
+    status = make_contour(s, detail, &finer, &grid);
+    if (status != QMAT_OK || finer.triangle_count > MOST_CONTOUR_TRIANGLES) {
+      drop_triangles(&finer);
+      return status;
+    }
+    drop_triangles(&s->surface);
+    s->surface = finer;
+    s->grid = grid;
+  }
+}
+
+/* Decimates the contour, which is `contour_error` from the envelope, and measures what is left. */
+static qmat_status decimate_contour(skin *s, double contour_error) {
+  const medial_skin_params *p = s->params;
+  qmat_skin_triangles contour = s->surface;
+  double error = p->error;
+  qmat_status status;
+  for (int attempt = 0;; attempt++) {
+    status = copy_triangles(s, &contour, &s->surface);
+    if (status == QMAT_OK)
+      status = qmat_skin_decimate(s->context, s->envelope, error, (size_t)p->triangles, &s->surface, &s->errors);
+    if (status == QMAT_OK) status = bound_distance(s, &s->surface, p->error, NULL);
+    if (status != QMAT_OK || attempt > 0 || p->triangles > 0 || distance_of(s) <= p->error || contour_error > p->error)
+      break;
+    error *= SECOND_SHARE;
+    drop_triangles(&s->surface);
+  }
+  drop_triangles(&contour);
+  return status;
+}
 
 static qmat_status make_envelope_surface(skin *s) {
   const medial_skin_params *p = s->params;
   qmat_status status = QMAT_OK;
-  for (int detail = (int)p->detail; status == QMAT_OK; detail--) {
-    status = qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
-                                   1 / (double)p->resolution, detail, &s->surface, &s->grid);
-    if (detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
-    if (status != QMAT_OK) return status;
-    qmat_free(s->surface.positions);
-    qmat_free(s->surface.triangles);
-    s->surface = (qmat_skin_triangles){.vertex_count = 0};
+  int detail = (int)p->detail;
+  for (;; detail--) {
+    status = make_contour(s, detail, &s->surface, &s->grid);
+    if (status != QMAT_OK || detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
+    drop_triangles(&s->surface);
   }
+  if (status == QMAT_OK && p->error > 0) status = refine_contour(s, detail);
   s->contour_triangle_count = s->surface.triangle_count;
-  if (status == QMAT_OK && p->error > 0) {
-    status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
-  }
-  return status;
+  return status == QMAT_OK && p->error > 0 ? decimate_contour(s, distance_of(s)) : status;
 }
 
 /* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
@@ -282,6 +376,17 @@ static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
   return QMAT_OK;
 }
 
+/* Says that the mesh is farther from the envelope than it should be. Nonzero when memory is short. */
+static int add_warning(const skin *s, json_t *root) {
+  if (s->params->triangles > 0 || distance_of(s) <= s->params->error) return 0;
+  char text[160];
+  snprintf(text, sizeof text,
+           "the visible mesh is up to %.2g %% of the diagonal from the envelope, not %.2g %%; a finer one: --set "
+           "skin.detail=%d",
+           100 * distance_of(s), 100 * s->params->error, (int)s->params->detail + 2);
+  return json_object_set_new(root, "warnings", json_pack("[s]", text));
+}
+
 static qmat_status fill_report(skin *s, qmat_report *report) {
   const qmat_skin_triangles *surface = &s->surface;
   size_t components = 0;
@@ -305,9 +410,11 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
                         : json_pack("{s:I}", "balls", (json_int_t)s->ball_count);
   if (details && envelope && s->params->error > 0) {
     json_t *decimated =
-        json_pack("{s:I, s:f, s:f}", "contour_triangles", (json_int_t)s->contour_triangle_count, "error_at_samples",
-                  s->errors.to_envelope, "error_from_contour", s->errors.from_original);
-    if (!decimated || json_object_update(details, decimated)) status = qmat_fail_memory(s->context, "the report");
+        json_pack("{s:I, s:f, s:f, s:f, s:f}", "contour_triangles", (json_int_t)s->contour_triangle_count,
+                  "error_at_samples", s->errors.to_envelope, "error_from_contour", s->errors.from_original,
+                  "mesh_to_envelope", s->to_envelope, "envelope_to_mesh", s->from_envelope);
+    if (!decimated || json_object_update(details, decimated) || add_warning(s, report->root))
+      status = qmat_fail_memory(s->context, "the report");
     json_decref(decimated);
   }
   if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details))
@@ -357,10 +464,11 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     mesh->triangles = s.surface.triangles;
     mesh->closed = s.flat.triangle_count == 0;
     mesh->oriented = true;
+    mesh->deviation = s.frame.diagonal * distance_of(&s);
     s.surface = (qmat_skin_triangles){0};
   }
-  qmat_free(s.surface.positions);
-  qmat_free(s.surface.triangles);
+  drop_triangles(&s.surface);
+  qmat_free(s.marks);
   qmat_envelope_free(s.envelope);
   return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)mesh, (qmat_value *)report}, 2, outputs);
 }
@@ -372,12 +480,13 @@ static const qmat_param params[] = {
               "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it"),
     QMAT_INT(medial_skin_params, resolution, "cells", 128, 8, 2048,
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
-    QMAT_INT(
-        medial_skin_params, detail, "halvings", 3, 0, 6,
-        "envelope: cells are halved up to this many times where medial radii are small; less often where that makes "
-        "more than 200,000 triangles to decimate"),
-    QMAT_LENGTH(medial_skin_params, error, 2e-3, 0, 0.1,
-                "envelope: the distance from the envelope that decimation may make; 0: no decimation"),
+    QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
+             "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
+             "often where that makes "
+             "more than 200,000 triangles to decimate"),
+    QMAT_LENGTH(
+        medial_skin_params, error, 2e-3, 0, 0.1,
+        "envelope: the distance from the envelope that the mesh may have; 0: no decimation, and nothing is measured"),
     QMAT_INT(medial_skin_params, triangles, "triangles", 0, 0, 100000000,
              "envelope: at most so many, though the distance then exceeds error; 0: as many as error needs"),
     QMAT_FLOAT(medial_skin_params, shrink, "1", 0.5, 0.05, 0.95,
@@ -404,15 +513,16 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 5,
+    .version = 6,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
         "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
-        "the report counts them. The mesh is a closed 2-manifold. Narrow crevices may fill, up to half a cell. Edges "
-        "are "
-        "then collapsed (CGAL) as far as `error` and the topology allow.\n\n"
+        "the report counts them. The mesh is a closed 2-manifold. Crevices narrower than a cell fill: cells are halved "
+        "where that makes more than half of `error`, up to `detail` times. Edges are then collapsed (CGAL) as far as "
+        "`error` and the topology allow. Both distances between the mesh and the envelope are bounded at the end "
+        "(mesh_to_envelope, envelope_to_mesh), files state the larger, and a warning says when it exceeds `error`.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
         "as prisms of three sides. The counts and distances of the report are without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "

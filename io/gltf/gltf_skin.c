@@ -120,6 +120,7 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
                                                     : qmat_fail_memory(context, "the skin");
   if (status == QMAT_OK) {
     area_normals(skin, sums, normals);
+    if (skin->deviation > 0) data->error = skin->deviation + moved;
     if (moved > 0) {
       status = put_draco_skin(context, skin, positions, normals, moved, data, buffer);
     } else {
@@ -186,6 +187,17 @@ static bool add_material(json_t *root, json_int_t *number) {
   return qmat_gltf_add(root, "materials", material, number);
 }
 
+static json_t *extras_of(const qmat_gltf_skin *data, bool mark) {
+  json_t *extras = json_object();
+  bool done = extras && (!mark || json_object_set_new(extras, QMAT_GLTF_SKIN_MARK, json_true()) == 0);
+  if (done && data->error > 0)
+    done = json_object_set_new(extras, "qmat_skin_error", json_real(data->error)) == 0 &&
+           json_object_set_new(extras, "qmat_skin_error_unit", json_string("model")) == 0;
+  if (done) return extras;
+  json_decref(extras);
+  return NULL;
+}
+
 bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset,
                         json_int_t *material, const char *name, bool mark, json_int_t *mesh_number) {
   json_int_t view = 0, accessor = 0;
@@ -202,6 +214,6 @@ bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *data, json_int_t buf
   }
   json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
   if (mesh && name) done = qmat_gltf_set(mesh, "name", json_string(name)) && done;
-  if (mesh && mark) done = qmat_gltf_set(mesh, "extras", json_pack("{s:b}", QMAT_GLTF_SKIN_MARK, 1)) && done;
+  if (mesh && (mark || data->error > 0)) done = qmat_gltf_set(mesh, "extras", extras_of(data, mark)) && done;
   return qmat_gltf_add(root, "meshes", mesh, mesh_number) && done;
 }

@@ -15,6 +15,7 @@ typedef struct qmat_gltf_skin {
   float min[3], max[3];
   bool compressed, wide;           /* wide: 32-bit indices */
   uint32_t position_id, normal_id; /* attribute ids of the Draco data */
+  double error;                    /* how far it is from the envelope at most, in model units; 0: not known */
   size_t sizes[3];                 /* of the buffer views: positions, normals, indices; or only the Draco data */
 } qmat_gltf_skin;
 
@@ -26,7 +27,8 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *mesh, con
                                qmat_gltf_skin *skin, qmat_writer *buffer);
 
 /* Adds the views, accessors and mesh of a skin whose data start at `offset` in buffer `buffer`. Adds a material too if
- * `*material` is below 0. `name` may be NULL. With `mark`, the mesh's extras mark it as a skin. `*mesh` gets the mesh's
+ * `*material` is below 0. `name` may be NULL. With `mark`, the mesh's extras mark it as a skin.
+ * They also have its error as qmat_skin_error, and qmat_skin_error_unit "model". `*mesh` gets the mesh's
  * number. False when out of memory. */
 bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *skin, json_int_t buffer, size_t offset,
                         json_int_t *material, const char *name, bool mark, json_int_t *mesh);

@@ -34,7 +34,8 @@ typedef struct qmat_gltf_options {
 /* Makes a glTF 2.0 file of a medial mesh: one scene with one node. glTF measures in metres and y is up; a medial mesh
  * in other units or with z up keeps its coordinates, and its node gets a parent that scales and turns it. The node has
  *  - the skin as an ordinary mesh (POSITION, area-weighted NORMAL, indices, one material), so that every client shows
- *    something; without a skin (NULL, or no triangles) the node has no mesh;
+ *    something, with its distance from the envelope in its extras (qmat_gltf_skin_add); without a skin (NULL, or no
+ *    triangles) the node has no mesh;
  *  - the medial mesh in its extras, which clients preserve better than extensions: flat strings, numbers and booleans.
  *      qmat_version      the program's version
  *      qmat_data         base64 of the output of qmat_draco_encode_medial

@@ -189,7 +189,13 @@ static void put_guide(qmat_writer *writer) {
 }
 
 static void put_skin(qmat_writer *writer, const qmat_mesh *skin) {
-  qmat_put_text(writer, "\n    def Mesh \"skin\"\n    {\n");
+  qmat_put_text(writer, "\n    def Mesh \"skin\"");
+  if (skin->deviation > 0) {
+    qmat_put_text(writer, " (\n        customData = {\n            double qmat_skin_error = ");
+    qmat_put_number(writer, skin->deviation);
+    qmat_put_text(writer, "\n            string qmat_skin_error_unit = \"model\"\n        }\n    )");
+  }
+  qmat_put_text(writer, "\n    {\n");
   put_extent(writer, skin->positions, skin->vertex_count, 3, false);
   put_triangles(writer, skin->triangles, skin->triangle_count);
   put_points(writer, skin->positions, skin->vertex_count, 3);

@@ -2,7 +2,6 @@
 #ifndef QMAT_NODES_SKIN_CONTOUR_H
 #define QMAT_NODES_SKIN_CONTOUR_H
 
-#include "core/key_table.h"
 #include "nodes/skin/envelope_cells.h"
 #include "nodes/skin/skin_triangles.h"
 
@@ -47,17 +46,8 @@ typedef struct qmat_contour {
   double *positions;
 } qmat_contour;
 
-/* Corners and cells as keys: 19 bits a coordinate, in finest cells, and the size of a cell as a power of two. */
-static inline uint64_t qmat_corner_key(const uint32_t at[3]) {
-  return (uint64_t)at[0] | (uint64_t)at[1] << 19 | (uint64_t)at[2] << 38;
-}
-
 static inline void qmat_corner_at(uint64_t key, uint32_t at[3]) {
   for (int k = 0; k < 3; k++) at[k] = (uint32_t)(key >> (19 * k)) & 0x7ffff;
-}
-
-static inline uint64_t qmat_contour_cell_key(const uint32_t at[3], uint32_t size) {
-  return qmat_corner_key(at) | (uint64_t)__builtin_ctz(size) << 57;
 }
 
 static inline void qmat_contour_point(const qmat_contour *c, const uint32_t at[3], double point[3]) {

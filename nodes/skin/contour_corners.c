@@ -30,7 +30,7 @@ static qmat_status add_halved_cells(qmat_contour *c) {
     const qmat_cell *cell = &c->cells.cells[i];
     for (uint32_t size = 2 * cell->size; size < c->cells.base; size *= 2) {
       uint32_t place[3] = {cell->at[0] & ~(size - 1), cell->at[1] & ~(size - 1), cell->at[2] & ~(size - 1)};
-      uint64_t key = qmat_contour_cell_key(place, size);
+      uint64_t key = qmat_cell_key(place, size);
       if (qmat_key_table_id(&seen, key) != QMAT_NO_ID) break;
       qmat_key_slot *slot = qmat_key_table_add(&seen, key);
       if (slot) slot->id = seen_count++;
@@ -69,7 +69,7 @@ qmat_status qmat_contour_number_corners(qmat_contour *c) {
       c->cell_corners[8 * i + k] = corner;
       if (c->owners[corner] == QMAT_NO_ID) c->owners[corner] = (uint32_t)i;
     }
-    uint64_t key = qmat_contour_cell_key(cell->at, cell->size);
+    uint64_t key = qmat_cell_key(cell->at, cell->size);
     qmat_key_slot *slot = qmat_key_table_add(&c->cell_table, key);
     if (!slot) return qmat_fail_memory(c->context, "surface cells");
     slot->id = (uint32_t)i;

@@ -11,7 +11,7 @@ enum { LONGEST_FACE = 4 * 64, CROSSING_STEPS = 24 };
 static uint32_t find_cell(const qmat_contour *c, const uint32_t at[3], uint32_t size) {
   for (; size <= c->cells.base; size *= 2) {
     uint32_t place[3] = {at[0] & ~(size - 1), at[1] & ~(size - 1), at[2] & ~(size - 1)};
-    uint32_t cell = qmat_key_table_id(&c->cell_table, qmat_contour_cell_key(place, size));
+    uint32_t cell = qmat_key_table_id(&c->cell_table, qmat_cell_key(place, size));
     if (cell != QMAT_NO_ID) return cell;
   }
   return QMAT_NO_ID;

@@ -28,6 +28,7 @@ void qmat_cells_uninit(qmat_cells *cells) {
   qmat_free(p->cone_centres);
   qmat_free(cells->cells);
   qmat_free(cells->lists);
+  qmat_key_table_uninit(&cells->marked);
   *cells = (qmat_cells){0};
 }
 
@@ -212,6 +213,42 @@ static size_t drop_hidden(candidate *list, size_t count, double reach) {
   return count;
 }
 
+static bool is_marked(const qmat_cells *cells, const uint32_t at[3], uint32_t size) {
+  return cells->marked.slots && qmat_key_table_id(&cells->marked, qmat_cell_key(at, size)) != QMAT_NO_ID;
+}
+
+/* Marks the cells of each size that are to be halved: those that contain the point of a mark, and their neighbours. */
+static qmat_status mark(qmat_context *context, qmat_cells *cells, uint32_t extent, const qmat_cell_mark *marks,
+                        size_t count) {
+  if (count == 0) return QMAT_OK;
+  if (qmat_key_table_init(&cells->marked, 64)) return qmat_fail_memory(context, "surface cells");
+  for (size_t i = 0; i < count; i++) {
+    if (i % 4096 == 0) {
+      const qmat_status status = qmat_progress(context, i, count, "places far from the skin");
+      if (status != QMAT_OK) return status;
+    }
+    for (int level = 0; level < marks[i].level && cells->base >> level > 1; level++) {
+      const uint32_t size = cells->base >> level;
+      for (int n = 0; n < 27; n++) {
+        const int steps[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+        uint32_t at[3];
+        bool is_in = true;
+        for (int k = 0; k < 3; k++) {
+          const double place = floor((marks[i].point[k] - cells->origin[k]) / (cells->finest * size)) + steps[k];
+          is_in = is_in && place >= 0 && place < extent / size;
+          at[k] = is_in ? (uint32_t)place * size : 0;
+        }
+        const uint64_t key = qmat_cell_key(at, size);
+        if (!is_in || qmat_key_table_id(&cells->marked, key) != QMAT_NO_ID) continue;
+        qmat_key_slot *slot = qmat_key_table_add(&cells->marked, key);
+        if (!slot) return qmat_fail_memory(context, "surface cells");
+        slot->id = 1;
+      }
+    }
+  }
+  return QMAT_OK;
+}
+
 /* Adds a cell to the batch unless the surface misses it. `list` contains the primitive that attains F wherever F is
  * negative in the cell. */
 static int add_cell(const qmat_cells *cells, cell_batch *batch, const uint32_t at[3], uint32_t size,
@@ -249,7 +286,8 @@ static int add_cell(const qmat_cells *cells, cell_batch *batch, const uint32_t a
   for (size_t i = 0; i < count; i++) batch->lists[batch->list_count + i] = found[i].primitive;
   batch->cells[batch->count] =
       (qmat_cell){.at = {at[0], at[1], at[2]}, .size = size, .list = batch->list_count, .list_count = (uint32_t)count};
-  batch->whole[batch->count++] = size == 1 || (size <= cells->base && fine_enough(found, count, length));
+  batch->whole[batch->count++] =
+      size == 1 || (size <= cells->base && !is_marked(cells, at, size) && fine_enough(found, count, length));
   batch->list_count += count;
   return 0;
 }
@@ -336,7 +374,8 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_
 }
 
 qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
-                            int detail, double floor, qmat_cells *cells) {
+                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count,
+                            qmat_cells *cells) {
   *cells = (qmat_cells){.finest = ldexp(base, -detail), .base = (uint32_t)1 << detail};
   qmat_status status = prepare_primitives(context, envelope, spheres, floor, &cells->primitives);
   if (status != QMAT_OK) return status;
@@ -371,6 +410,8 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
   for (int k = 0; k < 3; k++) cells->origin[k] = 0.5 * (low[k] + high[k]) - (0.5 * size + shift[k]) * cells->finest;
   if (size * cells->finest < extent + 3 * base) return too_many(context);
 
+  status = mark(context, cells, size, marks, mark_count);
+  if (status != QMAT_OK) return status;
   uint32_t *all = qmat_alloc(count, sizeof *all);
   chunks = qmat_calloc(MOST_CHUNKS, sizeof *chunks);
   if (!all || !chunks) {

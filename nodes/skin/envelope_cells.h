@@ -4,6 +4,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_distance.h"
+#include "core/key_table.h"
 
 /* The cells of an octree that the surface of an envelope crosses. A cell is halved down to the base size, and further
  * where the medial radii near it are small, down to the finest size. */
@@ -28,6 +29,15 @@ typedef struct qmat_cell {
   uint32_t list_count; /* one of them attains F wherever F is 0 or less in the cell */
 } qmat_cell;
 
+/* Corners and cells as keys: 19 bits a coordinate, in finest cells, and the size of a cell as a power of two. */
+static inline uint64_t qmat_corner_key(const uint32_t at[3]) {
+  return (uint64_t)at[0] | (uint64_t)at[1] << 19 | (uint64_t)at[2] << 38;
+}
+
+static inline uint64_t qmat_cell_key(const uint32_t at[3], uint32_t size) {
+  return qmat_corner_key(at) | (uint64_t)__builtin_ctz(size) << 57;
+}
+
 typedef struct qmat_cells {
   qmat_cell_primitives primitives;
   double origin[3], finest; /* the corner (0, 0, 0), and the size of the finest cells */
@@ -36,16 +46,24 @@ typedef struct qmat_cells {
   qmat_cell *cells;
   uint32_t *lists;
   size_t list_count;
-  size_t refined_count; /* cells smaller than the base size */
+  size_t refined_count;  /* cells smaller than the base size */
+  qmat_key_table marked; /* cells to be halved, by their keys */
 } qmat_cells;
 
+/* A place where cells are halved `level` times at least, with the cells around it. */
+typedef struct qmat_cell_mark {
+  double point[3];
+  int level; /* above 0 */
+} qmat_cell_mark;
+
 /* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of. `base` is the largest
- * size of a cell, halved up to `detail` times where radii are small; `floor` is the least radius. Free with
- * qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are too
- * many cells. The same cells in the same order for any number of threads. Cost: linear in the cells, times the
+ * size of a cell, halved up to `detail` times where radii are small and at the marks; `floor` is the least radius. Free
+ * with qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are
+ * too many cells. The same cells in the same order for any number of threads. Cost: linear in the cells, times the
  * primitives that meet in one. */
 qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
-                            int detail, double floor, qmat_cells *cells);
+                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count,
+                            qmat_cells *cells);
 void qmat_cells_uninit(qmat_cells *cells);
 
 /* F with raised radii, at a point of the cell. Where F is positive: a positive number that is at least F. */

@@ -29,14 +29,15 @@ static void contour_uninit(qmat_contour *c) {
 }
 
 qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
-                                  size_t sphere_count, double base, int detail, qmat_skin_triangles *surface,
-                                  qmat_envelope_grid *grid) {
+                                  size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
+                                  size_t mark_count, qmat_skin_triangles *surface, qmat_envelope_grid *grid) {
   *surface = (qmat_skin_triangles){0};
   qmat_contour c = {.context = context, .threads = qmat_threads(context)};
   *grid = (qmat_envelope_grid){.base = base, .finest = ldexp(base, -detail)};
   grid->smallest_radius = RADIUS_FLOOR * grid->finest;
   for (size_t i = 0; i < sphere_count; i++) grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
-  qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, &c.cells);
+  qmat_status status =
+      qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, marks, mark_count, &c.cells);
   if (status == QMAT_OK && c.cells.count == 0)
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
   grid->cell_count = c.cells.count;

@@ -3,6 +3,7 @@
 #define QMAT_NODES_SKIN_ENVELOPE_SURFACE_H
 
 #include "core/geometry/envelope.h"
+#include "nodes/skin/envelope_cells.h"
 #include "nodes/skin/skin_triangles.h"
 
 /* The grid that was used. */
@@ -20,14 +21,14 @@ typedef struct qmat_envelope_grid {
  * size), so that the surface is always a closed, oriented 2-manifold.
  *
  * `spheres` are those that `envelope` was made of, in a frame of about unit size. Cells are `base` wide, and halved up
- * to `detail` times where radii are small. Radii below 0.9 of the finest cell are raised to that, so that every
- * primitive gives a connected surface; single spheres of radius 0 are left out.
+ * to `detail` times where radii are small and at the marks. Radii below 0.9 of the finest cell are raised to that, so
+ * that every primitive gives a connected surface; single spheres of radius 0 are left out.
  *
  * `surface` gets new arrays that the caller frees, also after a failure, when they may be NULL. QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there is no primitive or there are too many cells. Uses all threads; the
  * same bytes for any number of them. */
 qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
-                                  size_t sphere_count, double base, int detail, qmat_skin_triangles *surface,
-                                  qmat_envelope_grid *grid);
+                                  size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
+                                  size_t mark_count, qmat_skin_triangles *surface, qmat_envelope_grid *grid);
 
 #endif

@@ -325,11 +325,15 @@ static void test_the_skin_is_a_plain_mesh_with_exact_bounds(void **state) {
   (void)state;
   qmat_medial *medial = example_medial(3);
   qmat_mesh *box = make_box();
+  box->deviation = 0.03125;
   qmat_gltf_options options = usual_options();
   written w = write_file(medial, box, &options);
   json_t *primitive = primitive_of(&w), *attributes = json_object_get(primitive, "attributes");
   assert_int_equal(json_integer_value(json_object_get(node_of(&w), "mesh")), 0);
   assert_null(json_object_get(w.root, "extensionsUsed"));
+  const json_t *mesh = json_array_get(json_object_get(w.root, "meshes"), 0), *extras = json_object_get(mesh, "extras");
+  assert_near(json_number_value(json_object_get(extras, "qmat_skin_error")), 0.03125, 0);
+  assert_string_equal(json_string_value(json_object_get(extras, "qmat_skin_error_unit")), "model");
   json_t *position = accessor_of(&w, count_of(attributes, "POSITION"));
   const double low[3] = {-1, 0, 2}, high[3] = {1, 4, 3};
   for (size_t k = 0; k < 3; k++) {
