@@ -105,6 +105,7 @@ function draw() {
 const seconds = Number(new URLSearchParams(location.search).get('seconds') ?? 0);
 for (let t = 0; t < seconds; t += STEP) world.step();
 draw();
+window.bodies = moving.map(({ rigid }) => rigid); // to look at in the console
 const heights = moving.map(({ rigid }) => rigid.translation().y);
 document.title = `${moving.length} bodies, the lowest at ${Math.min(...heights).toFixed(2)}`;
 if (!seconds) {
