@@ -247,7 +247,8 @@ static const qmat_value_row chain_rows[] = {
     ARRAY(qmat_chain, triangles, U32, triangle_count, 3), SCALAR(qmat_chain, sheet_sphere_count, SIZE),
     ARRAY(qmat_chain, owners, U32, sample_count, 1),      ARRAY(qmat_chain, ends, U32, collapse_count, 2),
     ARRAY(qmat_chain, merged, F64, collapse_count, 4),    ARRAY(qmat_chain, errors, F64, collapse_count, 1),
-    SCALAR(qmat_chain, meters_per_diagonal, NUMBER),      END};
+    SCALAR(qmat_chain, meters_per_diagonal, NUMBER),      ARRAY(qmat_chain, bounded, U32, bounded_count, 1),
+    ARRAY(qmat_chain, bounds, F64, bounded_count, 2),     END};
 
 /* Every collapse joins two different spheres that no earlier collapse has removed. */
 static qmat_status check_ends(qmat_context *context, const qmat_chain *chain) {
@@ -301,7 +302,15 @@ static qmat_status check_chain(qmat_context *context, const qmat_value *value) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the error is below that of the previous collapse, or negative");
     return qmat_fail_element(context, "collapse", (int64_t)i);
   }
-  return QMAT_OK;
+  for (size_t i = 0; i < chain->bounded_count; i++) {
+    const bool rises = i == 0 || chain->bounded[i] > chain->bounded[i - 1];
+    if (rises && chain->bounded[i] <= chain->collapse_count &&
+        fmin(chain->bounds[2 * i], chain->bounds[2 * i + 1]) >= 0)
+      continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its bounds are negative, or its number of collapses is out of order");
+    return qmat_fail_element(context, "bounded level", (int64_t)i);
+  }
+  return qmat_check_finite(context, chain->bounds, chain->bounded_count, 2, "bounded level", "bound");
 }
 
 static const qmat_value_row report_rows[] = {SCALAR(qmat_report, root, JSON), END};

@@ -148,6 +148,9 @@ typedef struct qmat_chain {
   double *merged;             /* 4 * collapse_count: the sphere that stays, after the collapse */
   double *errors;             /* collapse_count: the tolerance of each collapse, in diagonals; never decreases */
   double meters_per_diagonal; /* the length of the surface's diagonal in metres; 0: unknown */
+  size_t bounded_count;       /* levels with proved bounds */
+  uint32_t *bounded;          /* bounded_count: their numbers of collapses, rising */
+  double *bounds;             /* 2 * bounded_count: surface to envelope and envelope to surface at most, in diagonals */
 } qmat_chain;
 
 /* Shapes for collision detection and the rigid body that they stand for. A shape is the convex hull of one, two or

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_build.h"
@@ -126,8 +127,10 @@ qmat_result qmat_job_new(qmat_job **job) {
 qmat_result qmat_job_new_from_file(qmat_job **job, const char *path) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
-  return finish_new(*job, qmat_graph_read_file(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, path,
-                                               &(*job)->graph));
+  const qmat_registry registry = {qmat_nodes, qmat_node_count};
+  const qmat_built_in_graph *built_in = access(path, F_OK) == 0 ? NULL : qmat_built_in_graph_find(path);
+  return finish_new(*job, built_in ? qmat_graph_read_built_in(&(*job)->context, &registry, built_in, &(*job)->graph)
+                                   : qmat_graph_read_file(&(*job)->context, &registry, path, &(*job)->graph));
 }
 
 qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size) {

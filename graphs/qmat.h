@@ -59,7 +59,8 @@ QMAT_API void qmat_text_free(char *text);
  * outputs asset, page, picture. `*job` is NULL only when memory is short; after any other failure it has the error.
  * Free it with qmat_job_free. */
 QMAT_API qmat_result qmat_job_new(qmat_job **job);
-/* The same with a graph file. Its relative paths are relative to its folder. */
+/* The same with a graph file, or where there is none of that name a built-in graph: "qmat_plus", "colliders", "lod".
+ * Relative paths of a file are relative to its folder. */
 QMAT_API qmat_result qmat_job_new_from_file(qmat_job **job, const char *path);
 /* The same with `size` bytes of graph text, YAML or JSON. Its relative paths are relative to the working folder. */
 QMAT_API qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size);

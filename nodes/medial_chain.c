@@ -4,8 +4,14 @@
 
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/simplify/chain_bounds.h"
 #include "nodes/simplify/collapse_chain.h"
 #include "nodes/simplify/ordered_collapse.h"
+
+typedef struct medial_chain_params {
+  qmat_simplify_params simplify; /* first: the macros of its parameters say so */
+  int64_t bounds;
+} medial_chain_params;
 
 static void *copy_of(const void *array, size_t count, size_t size) {
   void *copy = qmat_alloc(count, size);
@@ -62,7 +68,8 @@ static qmat_status fill_report(qmat_context *context, const qmat_chain *chain, q
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
-  qmat_simplify_params params = *(const qmat_simplify_params *)data;
+  const medial_chain_params *given = data;
+  qmat_simplify_params params = given->simplify;
   qmat_ordered_collapses o = {.surface = NULL};
   qmat_chain *chain = qmat_chain_new();
   qmat_report *report = qmat_report_new();
@@ -73,6 +80,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
     status = qmat_simplify_leave_deviation(context, (const qmat_mesh *)inputs[0], &params, &deviation);
   if (status == QMAT_OK) status = qmat_ordered_collapses_run(context, &params, inputs, &o);
   if (status == QMAT_OK) status = fill_chain(context, &o, deviation, (const qmat_medial *)inputs[3], chain);
+  if (status == QMAT_OK && given->bounds > 0)
+    status = qmat_chain_set_bounds(context, o.surface, (size_t)given->bounds, params.finest, deviation, chain);
   if (status == QMAT_OK) status = fill_report(context, chain, report);
   qmat_ordered_collapses_uninit(&o);
   return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)chain, (qmat_value *)report}, 2, outputs);
@@ -86,6 +95,9 @@ static const qmat_param params[] = {
               "When the threshold rises: for the cheapest collapse that exceeds it (as in the paper), or when no other "
               "is left"),
     QMAT_COLLAPSE_PARAMS,
+    QMAT_INT(medial_chain_params, bounds, "spheres", 0, 0, 1000000,
+             "Prove bounds of both errors for levels of up to this many spheres: every level up to 32, above four in "
+             "each doubling; 0: none"),
     {0},
 };
 
@@ -101,7 +113,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_chain = {
     .name = "medial.chain",
-    .version = 6,
+    .version = 7,
     .summary = "Collapses all medial edges and records the collapses, for any level of detail",
     .doc =
         "Collapses as medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left. "
@@ -110,9 +122,11 @@ const qmat_node qmat_node_medial_chain = {
         "medial.lod extracts medial meshes of any number of spheres or any error from the chain in milliseconds. They "
         "are the ones that medial.simplify makes with that bound.\n\n"
         "With compat=qmat no threshold applies; the recorded errors are those that would have been needed. With "
-        "error=one_sided they are surface-to-envelope errors.",
+        "error=one_sided they are surface-to-envelope errors.\n\n"
+        "These errors hold at constraint points. With `bounds` both errors of some levels are proved between them, "
+        "too, as medial.evaluate does.",
     .citation = "Sections 3.1.2, 3.3 and 3.4, eq. 1-6 and 9-12",
-    .params_size = sizeof(qmat_simplify_params),
+    .params_size = sizeof(medial_chain_params),
     .params = params,
     .inputs = inputs,
     .outputs = outputs,

@@ -17,6 +17,11 @@ static qmat_status fill_report(qmat_context *context, const medial_lod_params *p
                                     {"collapses", collapses}};
   int bad = json_object_set_new(report->root, "epsilon", json_real(params->epsilon));
   bad |= json_object_set_new(report->root, "threshold", json_real(collapses > 0 ? chain->errors[collapses - 1] : 0));
+  for (size_t i = 0; i < chain->bounded_count; i++) {
+    if (chain->bounded[i] != collapses) continue;
+    bad |= json_object_set_new(report->root, "surface_to_envelope", json_real(chain->bounds[2 * i]));
+    bad |= json_object_set_new(report->root, "envelope_to_surface", json_real(chain->bounds[2 * i + 1]));
+  }
   bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
@@ -53,13 +58,15 @@ static const qmat_port inputs[] = {
 
 static const qmat_port outputs[] = {
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "The medial mesh of that level"},
-    {.name = "report", .type = QMAT_REPORT, .doc = "Its counts, and the threshold of both errors"},
+    {.name = "report",
+     .type = QMAT_REPORT,
+     .doc = "Its counts, the threshold of both errors, and their bounds where the chain has them"},
     {0},
 };
 
 const qmat_node qmat_node_medial_lod = {
     .name = "medial.lod",
-    .version = 3,
+    .version = 4,
     .summary = "Extracts a medial mesh of any number of spheres or any error from a chain",
     .doc =
         "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at the "

@@ -32,6 +32,18 @@ static const char *title_of(const qmat_value *const inputs[]) {
   return scene && *scene->name ? scene->name : name_of(inputs, 0);
 }
 
+/* The first mesh with the same values; `index` itself where there is none before it. */
+static size_t first_equal(const qmat_value *const inputs[], size_t index) {
+  for (size_t j = 0; j < index; j++) {
+    bool equal = true;
+    for (int i = QMAT_SHOWN_MESH; i <= QMAT_SHOWN_CHAIN && equal; i++)
+      equal = !inputs[i] ||
+              qmat_digest_equal(&qmat_value_at(inputs[i], j)->digest, &qmat_value_at(inputs[i], index)->digest);
+    if (equal) return j;
+  }
+  return index;
+}
+
 /* Adds one mesh to the page; the first makes the picture. A mesh that could not be described has only its reason. */
 static qmat_status add_mesh(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
                             size_t index, json_t *meshes, char **picture) {
@@ -43,6 +55,12 @@ static qmat_status add_mesh(qmat_context *context, const report_page_params *par
   if (!mesh || !medial) {
     const char *reason = qmat_value_failure(qmat_value_at(inputs[mesh ? QMAT_SHOWN_MEDIAL : QMAT_SHOWN_MESH], index));
     if (json_array_append_new(meshes, json_pack("{s:s, s:s}", "name", name, "failure", reason))) goto short_of_memory;
+    return QMAT_OK;
+  }
+  const size_t equal = first_equal(inputs, index);
+  if (equal < index) {
+    if (json_array_append_new(meshes, json_pack("{s:s, s:I}", "name", name, "same", (json_int_t)equal)))
+      goto short_of_memory;
     return QMAT_OK;
   }
   qmat_shown shown;
@@ -155,14 +173,15 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_report_page = {
     .name = "report.page",
-    .version = 2,
+    .version = 3,
     .summary = "Makes a page that shows a surface and its medial mesh in a browser",
     .doc =
         "One HTML file, which needs no server, no network and no other file. It shows the surface, coloured by its "
         "signed distance to the envelope, beside the spheres, cones and slabs or around them, with one camera; the "
         "places where either error is largest; the errors and the topology; and each mesh of a scene.\n\n"
-        "With a chain a slider goes through its levels of detail, from `levels` spheres down to one. The spheres and "
-        "the error of a level are those of medial.lod.\n\n"
+        "With a chain a slider goes through its levels of detail, from `levels` spheres down to one: through those "
+        "with proved bounds of both errors, where the chain has them (bounds of medial.chain). The spheres and errors "
+        "of a level are those of medial.lod.\n\n"
         "Primitives are intersected exactly for each pixel (WebGL 2). Browsers without it show a picture, as "
         "report.picture draws it.",
     .citation = "",

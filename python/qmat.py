@@ -411,7 +411,9 @@ def _assignment(name, value):
 
 
 class Graph:
-    """A graph of nodes: a file, a text, or without either the built-in one, that of `qmat mat`.
+    """A graph of nodes: a file, the name of a built-in graph ("qmat_plus", "colliders", "lod"), or a text.
+
+    Without any of them it is qmat_plus, the graph of `qmat mat`.
 
     A graph may be run many times; results stay as they are when the graph is changed or run again.
     `cache`: a folder, or True for that of the command line. Without it nothing is stored.

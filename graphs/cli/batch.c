@@ -87,6 +87,7 @@ qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, b
     qmat_asset *asset = wait_for_one(batch);
     if (!asset) continue;
     running--;
+    if (stopped && asset->state == QMAT_ASSET_FAILED) asset->state = QMAT_ASSET_WAITING; /* it was interrupted */
     observer(user, batch, asset);
   }
   return stopped ? qmat_fail(context, QMAT_CANCELLED, "cancelled") : QMAT_OK;

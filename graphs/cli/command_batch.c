@@ -424,6 +424,12 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   if (prints && call.verbose) print_table(&batch, &call.invocation->graph);
   if (prints) print_totals(&call, &batch);
   if (started && !call.json) print_failures(&batch, call.quiet ? stderr : stdout);
+  /* An interrupted batch has a page of what it did, too, and stays interrupted. */
+  if (started && call.pages && status == QMAT_CANCELLED) {
+    qmat_context own = {0};
+    qmat_batch_page_save(&own, &batch, summary_entries(&call.invocation->graph), call.folder);
+    qmat_context_uninit(&own);
+  }
   if (status == QMAT_OK && call.pages)
     status = qmat_batch_page_save(context, &batch, summary_entries(&call.invocation->graph), call.folder);
   if (status == QMAT_OK && failed > 0)

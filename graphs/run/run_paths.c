@@ -2,6 +2,8 @@
 #include "graphs/run/run_paths.h"
 
 #include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -56,6 +58,19 @@ qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run,
   return QMAT_OK;
 }
 
+/* Whether a file can be made in a folder. For root access() allows all, also where a file system has no files to make,
+ * such as /proc. */
+static bool can_make_file(const char *folder) {
+  char name[4200];
+  if (access(folder, W_OK | X_OK) != 0) return false;
+  if (snprintf(name, sizeof name, "%s/.qmat-XXXXXX", folder) >= (int)sizeof name) return true; /* writing will tell */
+  const int file = mkstemp(name);
+  if (file < 0) return false;
+  close(file);
+  unlink(name);
+  return true;
+}
+
 qmat_status qmat_check_can_write(qmat_context *context, const char *path) {
   struct stat info;
   qmat_status status = QMAT_OK;
@@ -65,7 +80,7 @@ qmat_status qmat_check_can_write(qmat_context *context, const char *path) {
     qmat_fail(context, status = QMAT_ERROR_IO, "cannot use the output folder: %s", strerror(errno));
   else if (!S_ISDIR(info.st_mode))
     qmat_fail(context, status = QMAT_ERROR_IO, "the output folder is a file");
-  else if (access(folder, W_OK | X_OK) != 0)
+  else if (!can_make_file(folder))
     qmat_fail(context, status = QMAT_ERROR_IO, "cannot write to the output folder: %s", strerror(errno));
   else if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
     qmat_fail(context, status = QMAT_ERROR_IO, "the output path is a folder");

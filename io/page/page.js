@@ -8,6 +8,7 @@ const page = JSON.parse(document.getElementById('data').textContent);
 const $ = (id) => document.getElementById(id);
 const HALF_VIEW = Math.tan(Math.PI / 12);
 const FILLED = 0.92;
+const canRead = 'DecompressionStream' in globalThis; // else the page shows its picture
 const KINDS = ['sphere', 'cone', 'slab'];
 const css = (colour) => `rgb(${colour.map((x) => Math.round(255 * x)).join(' ')})`;
 
@@ -38,10 +39,19 @@ function length(mesh, share) {
 
 // ---- data ----
 
-function arrayOf(text, Type) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  return new Type(bytes.buffer); // little-endian, as all browsers' machines are
+/** An array as io/page/page_array.h describes it; `row` is 0 where numbers are not differences. */
+async function arrayOf(text, Type, row) {
+  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate-raw'));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer()), width = Type.BYTES_PER_ELEMENT, count = planes.length / width;
+  const bytes = new Uint8Array(planes.length); // little-endian, as all browsers' machines are
+  for (let k = 0; k < width; k++) for (let i = 0; i < count; i++) bytes[width * i + k] = planes[k * count + i];
+  const numbers = new Type(bytes.buffer), parts = new { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[width](bytes.buffer);
+  for (let i = 0; row > 0 && i < count; i++) parts[i] = ((parts[i] >>> 1) ^ -(parts[i] & 1)) + (i < row ? 0 : parts[i - row]);
+  return numbers;
 }
+
+const medialOf = async (text) => complexOf(decode(new Uint8Array((await arrayOf(text, Uint32Array, 0)).buffer)));
 
 /** Spheres, edges and slabs of a decoded medial mesh; the edges are those of slabs too. */
 function complexOf(medial) {
@@ -77,13 +87,28 @@ function reduced(spheres, edges, slabs, idOf) {
 
 /** All levels of detail: level n is the medial mesh after n collapses, as medial.lod extracts it. */
 class Chain {
-  constructor(json) {
-    this.start = complexOf(decode(json.medial));
-    this.ends = arrayOf(json.ends, Uint32Array);
-    this.merged = arrayOf(json.merged, Float32Array);
-    this.errors = arrayOf(json.errors, Float32Array);
-    this.most = json.spheres;
-    this.least = json.spheres - this.ends.length / 2;
+  static async read(json) {
+    const chain = new Chain();
+    chain.start = await medialOf(json.medial);
+    chain.ends = await arrayOf(json.ends, Uint32Array, 0);
+    chain.merged = await arrayOf(json.merged, Float32Array, 0);
+    chain.errors = await arrayOf(json.errors, Float32Array, 1);
+    chain.most = json.spheres;
+    chain.least = json.spheres - chain.ends.length / 2;
+    chain.proved = new Map(json.bounds.map(([spheres, ...both]) => [spheres, both]));
+    chain.stops = [...chain.proved.keys()]; // of the slider
+    return chain;
+  }
+  /** Of the slider's ends, 0 is the finest level. */
+  place(spheres) {
+    if (this.stops.length > 1) return this.stops.reduce((best, n, i) => (Math.abs(Math.log(n / spheres)) < Math.abs(Math.log(this.stops[best] / spheres)) ? i : best), 0);
+    return Math.round((1000 * Math.log(this.most / spheres)) / Math.log(this.most / this.least || 1)) || 0;
+  }
+  levelAt(place) {
+    return this.stops.length > 1 ? this.stops[place] : this.most * (this.least / this.most) ** (place / 1000);
+  }
+  get places() {
+    return this.stops.length > 1 ? this.stops.length - 1 : 1000;
   }
   /** Both errors of the level are at most this at the constraint points. */
   error(spheres) {
@@ -107,16 +132,16 @@ class Chain {
 }
 
 class Mesh {
-  constructor(json) {
-    Object.assign(this, json);
-    if (this.failure) return;
-    this.result = complexOf(decode(json.medial));
-    this.chain = json.chain ? new Chain(json.chain) : null;
-    const s = json.surface;
-    this.positions = arrayOf(s.positions, Int16Array);
-    this.normals = arrayOf(s.normals, Int16Array);
-    this.errors = arrayOf(s.errors, Int16Array);
-    this.corners = arrayOf(s.corners, Uint32Array);
+  static async read(json) {
+    const mesh = Object.assign(new Mesh(), json), s = json.surface;
+    if (mesh.failure || !canRead) return mesh;
+    mesh.result = await medialOf(json.medial);
+    mesh.chain = json.chain ? await Chain.read(json.chain) : null;
+    mesh.positions = await arrayOf(s.positions, Int16Array, 3);
+    mesh.normals = await arrayOf(s.normals, Int8Array, 3);
+    mesh.errors = await arrayOf(s.errors, Int16Array, 1);
+    mesh.corners = await arrayOf(s.corners, Uint32Array, 1);
+    return mesh;
   }
 }
 
@@ -374,7 +399,7 @@ class Drawing {
   setSurface(mesh) {
     const gl = this.gl;
     this.fill(this.surface, this.buffers.positions, mesh.positions, [[0, 3, gl.SHORT, true, 6, 0, 0]]);
-    this.fill(this.surface, this.buffers.normals, mesh.normals, [[1, 3, gl.SHORT, true, 6, 0, 0]]);
+    this.fill(this.surface, this.buffers.normals, mesh.normals, [[1, 3, gl.BYTE, true, 3, 0, 0]]);
     this.fill(this.surface, this.buffers.errors, mesh.errors, [[2, 1, gl.SHORT, true, 2, 0, 0]]);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers.corners);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.corners, gl.STATIC_DRAW);
@@ -446,12 +471,12 @@ class Drawing {
 
 // ---- the page ----
 
-const meshes = page.meshes.map((json) => new Mesh(json));
+const meshes = await Promise.all(page.meshes.map((json) => Mesh.read(json.same === undefined ? json : { ...page.meshes[json.same], name: json.name })));
 const state = { mesh: meshes.find((mesh) => !mesh.failure), view: 'both', spheres: null, hidden: {}, turn: page.camera.turn, tilt: page.camera.tilt,
   zoom: 1, pan: [0, 0, 0], worst: -1 };
 let drawing = null;
 let waiting = false;
-let complex = state.mesh.result;
+let complex = null;
 
 function panelsOf(width, height) {
   if (state.view !== 'both') return [{ view: state.view, x: 0, y: 0, width, height }];
@@ -616,6 +641,7 @@ function showBar() {
 function showLevel() {
   const chain = state.mesh.chain;
   $('levels').hidden = !chain;
+  if (!canRead) return;
   complex = state.spheres === null ? state.mesh.result : chain.level(state.spheres);
   drawing?.setMedial(complex);
   $('result').disabled = state.spheres === null;
@@ -626,8 +652,11 @@ function showLevel() {
   [...$('kinds').children].forEach((button, k) => (button.lastChild.textContent = counted(numbers[k], KINDS[k])));
   if (chain) {
     const n = state.spheres ?? state.mesh.spheres;
-    $('slider').value = String(Math.round(1000 * Math.log(chain.most / Math.min(Math.max(n, chain.least), chain.most)) / Math.log(chain.most / chain.least || 1)) || 0);
+    $('slider').max = String(chain.places);
+    $('slider').value = String(chain.place(Math.min(Math.max(n, chain.least), chain.most)));
+    const proved = chain.proved.get(n);
     $('level').textContent = state.spheres === null ? `The result: ${counted(n, 'sphere')}` :
+      proved ? `${counted(n, 'sphere')}: surface to envelope at most ${percent(proved[0])}, ${length(state.mesh, proved[0])}; envelope to surface at most ${percent(proved[1])}, ${length(state.mesh, proved[1])}` :
       `${counted(n, 'sphere')}: both errors at most ${percent(chain.error(n))}, ${length(state.mesh, chain.error(n))}, at the constraint points`;
     $('slider').setAttribute('aria-valuetext', $('level').textContent);
   }
@@ -787,8 +816,7 @@ function listen() {
     $(id).addEventListener('click', act);
   for (const button of $('views').children) button.addEventListener('click', () => setView(button.dataset.view));
   $('slider').addEventListener('input', () => {
-    const chain = state.mesh.chain;
-    setLevel(chain.most * (chain.least / chain.most) ** ($('slider').value / 1000));
+    setLevel(state.mesh.chain.levelAt(Number($('slider').value)));
   });
   $('mesh').addEventListener('change', () => {
     state.mesh = meshes[$('mesh').value];
@@ -823,7 +851,7 @@ function start() {
     $('mesh').append(option);
   });
   $('mesh-choice').hidden = meshes.length < 2;
-  const made = new Drawing($('canvas'));
+  const made = canRead ? new Drawing($('canvas')) : {};
   const lost = () => {
     drawing = null;
     $('stage').classList.add('still');

@@ -4,14 +4,16 @@
 #include <math.h>
 
 #include "core/json_text.h"
-#include "io/base64.h"
 #include "io/bytes.h"
 #include "io/flat_medial.h"
+#include "io/page/page_array.h"
 #include "nodes/measure/unit_spheres.h"
 #include "nodes/page/worst_places.h"
 #include "nodes/simplify/collapse_chain.h"
 
-static const double one = 32767;
+static const double one = 32767, one_of_normals = 127;
+/* Spheres of the chain are rounded to this share of the diagonal, so that they take fewer bytes. */
+static const double chain_step = 1.0 / (1 << 18);
 /* Stored errors end at this many ranges. */
 static const double error_span = 4;
 
@@ -19,9 +21,9 @@ static void put_share(qmat_writer *writer, double share) {
   qmat_put_u16(writer, (uint16_t)(int16_t)lround(one * fmin(fmax(share, -1), 1)));
 }
 
-/* Sets the written bytes as base64; the writer is empty afterwards. */
-static bool set_bytes(json_t *object, const char *key, qmat_writer *writer) {
-  char *text = writer->failed ? NULL : qmat_base64_encode(writer->bytes, writer->size);
+/* Sets the written numbers of `width` bytes as a page's array, `row` numbers a row; the writer is empty afterwards. */
+static bool set_array(json_t *object, const char *key, size_t width, size_t row, qmat_writer *writer) {
+  char *text = writer->failed ? NULL : qmat_page_array_encode(writer->bytes, writer->size / width, width, row);
   const bool done = text && json_object_set_new(object, key, json_string(text)) == 0;
   qmat_free(text);
   qmat_writer_uninit(writer);
@@ -33,16 +35,16 @@ static json_t *surface_json(const qmat_shown *shown) {
   qmat_writer positions = {0}, normals = {0}, errors = {0}, corners = {0};
   for (size_t i = 0; i < 3 * display->vertex_count; i++) {
     put_share(&positions, display->positions[i]);
-    put_share(&normals, display->normals[i]);
+    qmat_put_u8(&normals, (uint8_t)(int8_t)lround(one_of_normals * display->normals[i]));
   }
   for (size_t i = 0; i < display->vertex_count; i++)
     put_share(&errors, display->errors[i] / (error_span * shown->range));
   for (size_t i = 0; i < 3 * display->triangle_count; i++) qmat_put_u32(&corners, display->triangles[i]);
   json_t *surface = json_object();
-  bool done = set_bytes(surface, "positions", &positions);
-  done = set_bytes(surface, "normals", &normals) && done;
-  done = set_bytes(surface, "errors", &errors) && done;
-  done = set_bytes(surface, "corners", &corners) && done;
+  bool done = set_array(surface, "positions", 2, 3, &positions);
+  done = set_array(surface, "normals", 1, 3, &normals) && done;
+  done = set_array(surface, "errors", 2, 1, &errors) && done;
+  done = set_array(surface, "corners", 4, 1, &corners) && done;
   done = qmat_json_set_count(surface, "vertices", shown->mesh->vertex_count) == 0 && done;
   done = qmat_json_set_count(surface, "triangles", shown->mesh->triangle_count) == 0 && done;
   if (done) return surface;
@@ -57,7 +59,7 @@ static qmat_status set_medial(qmat_context *context, json_t *object, const qmat_
   const qmat_sphere_data none = {0};
   const qmat_status status = qmat_flat_encode(context, unit, &none, NULL, true, &bytes, &size);
   if (status != QMAT_OK) return status;
-  char *text = qmat_base64_encode(bytes, size);
+  char *text = qmat_page_array_encode(bytes, size / 4, 4, 0); /* all parts of qmat_flat have multiples of 4 bytes */
   qmat_free(bytes);
   bool done = text && json_object_set_new(object, "medial", json_string(text)) == 0;
   qmat_free(text);
@@ -68,6 +70,23 @@ static qmat_status set_medial(qmat_context *context, json_t *object, const qmat_
 }
 
 /* ---- the chain ---- */
+
+static double rounded(double x) {
+  return chain_step * round(x / chain_step);
+}
+
+/* Proved bounds of levels: [spheres, surface to envelope, envelope to surface], the finest first. */
+static bool set_bounds(json_t *object, const qmat_chain *chain, size_t skipped) {
+  json_t *rows = json_array();
+  bool done = json_object_set_new(object, "bounds", rows) == 0;
+  for (size_t i = 0; i < chain->bounded_count; i++) {
+    if (chain->bounded[i] < skipped) continue;
+    json_t *row = json_pack("[I, f, f]", (json_int_t)(chain->sphere_count - chain->bounded[i]), chain->bounds[2 * i],
+                            chain->bounds[2 * i + 1]);
+    done = json_array_append_new(rows, row) == 0 && done;
+  }
+  return done;
+}
 
 /* The collapses after the first `skipped`, with the numbers that the spheres have after those. */
 static qmat_status set_collapses(qmat_context *context, json_t *object, const qmat_chain *chain, size_t skipped,
@@ -83,12 +102,12 @@ static qmat_status set_collapses(qmat_context *context, json_t *object, const qm
                (float)(skipped > 0 ? chain->errors[skipped - 1] : 0)); /* of the level that the chain starts at */
   for (size_t i = skipped; i < chain->collapse_count; i++) {
     for (size_t k = 0; k < 2; k++) qmat_put_u32(&ends, ids[chain->ends[2 * i + k]]);
-    for (size_t k = 0; k < 4; k++) qmat_put_f32(&placed, (float)merged[4 * i + k]);
+    for (size_t k = 0; k < 4; k++) qmat_put_f32(&placed, (float)rounded(merged[4 * i + k]));
     qmat_put_f32(&errors, (float)chain->errors[i]);
   }
-  bool done = set_bytes(object, "ends", &ends);
-  done = set_bytes(object, "merged", &placed) && done;
-  done = set_bytes(object, "errors", &errors) && done;
+  bool done = set_array(object, "ends", 4, 0, &ends);
+  done = set_array(object, "merged", 4, 0, &placed) && done;
+  done = set_array(object, "errors", 4, 1, &errors) && done;
   return done ? QMAT_OK : qmat_fail_memory(context, "the page");
 }
 
@@ -110,7 +129,9 @@ static qmat_status set_chain(qmat_context *context, const qmat_shown *shown, con
     status = qmat_unit_spheres(context, &shown->frame, start, &unit.spheres);
     if (status != QMAT_OK) qmat_fail_field(context, "chain");
   }
+  for (size_t i = 0; i < 4 * unit.sphere_count && status == QMAT_OK; i++) unit.spheres[i] = rounded(unit.spheres[i]);
   if (status == QMAT_OK) status = set_medial(context, object, &unit);
+  if (status == QMAT_OK && !set_bounds(object, chain, skipped)) status = qmat_fail_memory(context, "the page");
   if (status == QMAT_OK) {
     qmat_frame_spheres_to_unit(&shown->frame, chain->merged, chain->collapse_count, merged);
     status = set_collapses(context, object, chain, skipped, merged);

@@ -244,6 +244,93 @@ static void test_both_errors_of_a_level_are_within_its_epsilon(void **state) {
   }
 }
 
+/* A chain by hand whose levels of 3 spheres and 1 sphere have bounds. */
+static qmat_chain *bounded_chain(const uint32_t collapses[2], double least) {
+  qmat_chain *chain = qmat_chain_new();
+  chain->sphere_count = 3;
+  chain->collapse_count = chain->bounded_count = 2;
+  ASSIGN(chain->spheres, (double[]){0, 0, 0, 1, 1, 0, 0, 2, 0, 1, 0, 3});
+  ASSIGN(chain->ends, (uint32_t[]){0, 1, 0, 2});
+  ASSIGN(chain->merged, (double[]){0, 1.5, 0, 3.5, 0.5, 0, 0, 1.5});
+  ASSIGN(chain->errors, (double[]){0.01, 0.02});
+  chain->bounded = memcpy(qmat_alloc(2, sizeof(uint32_t)), collapses, 2 * sizeof(uint32_t));
+  ASSIGN(chain->bounds, (double[]){0.001, 0.002, 0.03, least});
+  return chain;
+}
+
+static void test_bounds_are_reported_where_the_chain_has_them(void **state) {
+  (void)state;
+  qmat_chain *chain = seal_chain(bounded_chain((const uint32_t[]){0, 2}, 0.04));
+  static const double expected[] = {0.001, NAN, 0.03};
+  for (int spheres = 3; spheres >= 1; spheres--) {
+    char params[64];
+    qmat_report *report;
+    snprintf(params, sizeof params, "epsilon=0 vertices=%d", spheres);
+    qmat_value_release(&take(chain, params, 1, &report)->base);
+    const json_t *bound = json_object_get(report->root, "surface_to_envelope");
+    assert_true(bound ? json_number_value(bound) == expected[3 - spheres] : isnan(expected[3 - spheres]));
+    qmat_value_release(&report->base);
+  }
+  qmat_value_release(&chain->base);
+}
+
+static void test_bounds_out_of_order_or_negative_are_refused(void **state) {
+  (void)state;
+  static const struct {
+    uint32_t collapses[2];
+    double least;
+  } cases[] = {{{1, 1}, 0.04}, {{2, 1}, 0.04}, {{0, 3}, 0.04}, {{0, 2}, -0.04}, {{0, 2}, INFINITY}};
+  for (size_t i = 0; i < COUNT(cases); i++) {
+    qmat_context context = {0};
+    qmat_chain *chain = bounded_chain(cases[i].collapses, cases[i].least);
+    assert_int_equal(qmat_value_seal(&context, &chain->base), QMAT_ERROR_GEOMETRY);
+    assert_string_equal(context.error.element_kind, "bounded level");
+    qmat_value_release(&chain->base);
+    qmat_context_uninit(&context);
+  }
+}
+
+/* Every level up to 32 spheres, above four in each doubling, and each bound is medial.evaluate's to within tolerances.
+ */
+static void test_bounds_are_those_of_an_evaluation(void **state) {
+  (void)state;
+  pipeline p = {0};
+  pipeline_make(&p, pipeline_model("octopus", 6), "spacing=8% n_f=0", "");
+  const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base, &p.medial->base};
+  qmat_value *outputs[PIPELINE_MOST_PORTS], *again[PIPELINE_MOST_PORTS], *evaluated[PIPELINE_MOST_PORTS];
+  pipeline_must_run(2, "medial.chain", "finest=3% bounds=64", inputs, outputs);
+  pipeline_must_run(8, "medial.chain", "finest=3% bounds=64", inputs, again);
+  const qmat_chain *chain = (const qmat_chain *)outputs[0];
+  assert_true(qmat_digest_equal(&chain->base.digest, &again[0]->digest));
+  const size_t least = chain->sphere_count - chain->collapse_count;
+  assert_int_equal(chain->bounded_count, 32 + 4 - (least - 1));
+  for (size_t i = 0; i < chain->bounded_count; i += 5) {
+    char params[64];
+    qmat_report *own;
+    const size_t spheres = chain->sphere_count - chain->bounded[i];
+    snprintf(params, sizeof params, "epsilon=0 vertices=%zu", spheres);
+    qmat_medial *m = take(chain, params, 0, &own);
+    assert_int_equal(m->sphere_count, spheres);
+    pipeline_must_run(0, "medial.evaluate", "epsilon=3%", (const qmat_value *[]){&p.mesh->base, &m->base}, evaluated);
+    static const char *const keys[][2] = {{"surface_to_envelope", "surface_to_envelope_at_least"},
+                                          {"envelope_to_surface", "envelope_to_surface_at_least"}};
+    for (size_t k = 0; k < 2; k++) {
+      const double bound = pipeline_number(own, keys[k][0]);
+      const double lo = pipeline_number((const qmat_report *)evaluated[0], keys[k][1]);
+      const double hi = pipeline_number((const qmat_report *)evaluated[0], keys[k][0]);
+      if (!(bound >= lo && bound <= 1.1 * hi + 0.003)) fail_msg("%zu spheres: %g of [%g, %g]", spheres, bound, lo, hi);
+    }
+    qmat_value_release(evaluated[0]);
+    qmat_value_release(&own->base);
+    qmat_value_release(&m->base);
+  }
+  for (size_t i = 0; i < 2; i++) {
+    qmat_value_release(outputs[i]);
+    qmat_value_release(again[i]);
+  }
+  pipeline_free(&p);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_chain_by_hand_at_every_level),
@@ -252,6 +339,9 @@ int main(void) {
       cmocka_unit_test(test_roots_are_where_a_walk_ends),
       cmocka_unit_test(test_every_level_is_what_a_run_of_its_own_makes),
       cmocka_unit_test(test_both_errors_of_a_level_are_within_its_epsilon),
+      cmocka_unit_test(test_bounds_are_reported_where_the_chain_has_them),
+      cmocka_unit_test(test_bounds_out_of_order_or_negative_are_refused),
+      cmocka_unit_test(test_bounds_are_those_of_an_evaluation),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,10 +5,12 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <zlib.h>
 
 #include "core/geometry/vector.h"
 #include "io/base64.h"
 #include "io/flat_medial.h"
+#include "io/page/page_array.h"
 #include "nodes/page/display_mesh.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
@@ -45,16 +47,59 @@ static const json_t *mesh_of(const json_t *data, size_t index) {
   return json_array_get(json_object_get(data, "meshes"), index);
 }
 
-static uint8_t *bytes_of(const json_t *object, const char *key, size_t expected) {
+/* The array of a page: numbers of `width` bytes, differences to the one `row` places before where row > 0. */
+static uint8_t *decode_array(const char *text, size_t width, size_t row, size_t *size) {
   qmat_context context = {0};
-  const char *text = json_string_value(json_object_get(object, key));
-  uint8_t *bytes;
-  size_t size;
+  uint8_t *packed, *planes = calloc(1 << 20, 1), *bytes = calloc(1 << 20, 1);
+  size_t packed_size;
   assert_non_null(text);
-  assert_int_equal(qmat_base64_decode(&context, text, strlen(text), &bytes, &size), QMAT_OK);
-  assert_int_equal(size, expected);
+  assert_int_equal(qmat_base64_decode(&context, text, strlen(text), &packed, &packed_size), QMAT_OK);
+  z_stream stream = {.next_in = packed, .avail_in = (uInt)packed_size, .next_out = planes, .avail_out = 1 << 20};
+  assert_int_equal(inflateInit2(&stream, -MAX_WBITS), Z_OK);
+  assert_int_equal(inflate(&stream, Z_FINISH), Z_STREAM_END);
+  *size = stream.total_out;
+  inflateEnd(&stream);
+  const uint64_t modulus = (uint64_t)1 << (8 * width);
+  uint64_t *numbers = calloc(*size + 1, sizeof *numbers);
+  const size_t count = *size / width;
+  for (size_t i = 0; i < count; i++) {
+    for (size_t k = 0; k < width; k++) numbers[i] |= (uint64_t)planes[k * count + i] << (8 * k);
+    if (row > 0) {
+      const uint64_t half = numbers[i] / 2, step = numbers[i] % 2 ? modulus - 1 - half : half;
+      numbers[i] = (step + (i < row ? 0 : numbers[i - row])) % modulus;
+    }
+    for (size_t k = 0; k < width; k++) bytes[width * i + k] = (uint8_t)(numbers[i] >> (8 * k));
+  }
+  free(numbers);
+  free(planes);
+  qmat_free(packed);
   qmat_context_uninit(&context);
   return bytes;
+}
+
+static uint8_t *bytes_of(const json_t *object, const char *key, size_t width, size_t row, size_t expected) {
+  size_t size;
+  uint8_t *bytes = decode_array(json_string_value(json_object_get(object, key)), width, row, &size);
+  assert_int_equal(size, expected);
+  return bytes;
+}
+
+/* Numbers that rise, fall, wrap and stay come back, whatever their width and rows. */
+static void test_arrays_come_back(void **state) {
+  (void)state;
+  uint8_t given[1200];
+  for (size_t i = 0; i < sizeof given; i++) given[i] = (uint8_t)(i % 7 == 0 ? 255 - i / 5 : i * i / 11);
+  for (size_t width = 1; width <= 4; width *= 2)
+    for (size_t row = 0; row <= 4; row++)
+      for (size_t count = 0; count <= sizeof given / width; count += 100) {
+        size_t size;
+        char *text = qmat_page_array_encode(given, count, width, row);
+        uint8_t *bytes = decode_array(text, width, row, &size);
+        assert_int_equal(size, width * count);
+        assert_memory_equal(bytes, given, size);
+        free(bytes);
+        qmat_free(text);
+      }
 }
 
 /* A ball of radius 1 with one vertex pulled out to 1.2: the mesh of a sphere of radius 1. */
@@ -94,11 +139,11 @@ static void test_the_data_of_a_ball_with_a_spike(void **state) {
   uint8_t *bytes;
   size_t size;
   qmat_medial *decoded;
-  assert_int_equal(qmat_base64_decode(&context, flat, strlen(flat), &bytes, &size), QMAT_OK);
+  bytes = decode_array(flat, 4, 0, &size);
   assert_int_equal(qmat_flat_decode(&context, bytes, size, NULL, &decoded), QMAT_OK);
   assert_near(decoded->spheres[3], 1 / diagonal, 1e-6);
   assert_near(decoded->spheres[2], -0.1 / diagonal, 1e-6);
-  qmat_free(bytes);
+  free(bytes);
   qmat_value_release(&decoded->base);
   qmat_context_uninit(&context);
   json_decref(data);
@@ -163,21 +208,21 @@ static void test_the_slider_starts_at_the_finest_level_that_is_wanted(void **sta
     assert_int_equal(json_integer_value(json_object_get(own, "spheres")), cases[i].spheres);
     assert_int_equal(json_integer_value(json_object_get(own, "cones")), left);
     if (left > 0) {
-      uint8_t *ends = bytes_of(own, "ends", 8 * left);
+      uint8_t *ends = bytes_of(own, "ends", 4, 0, 8 * left);
       assert_memory_equal(ends, cases[i].ends, 8 * left);
-      qmat_free(ends);
+      free(ends);
       float last[4]; /* a ball in the middle of the box, whose diagonal is sqrt(3) */
-      uint8_t *merged = bytes_of(own, "merged", 16 * left);
+      uint8_t *merged = bytes_of(own, "merged", 4, 0, 16 * left);
       memcpy(last, merged + 16 * (left - 1), sizeof last);
-      assert_near(last[0], 0, 1e-6);
-      assert_near(last[3], 0.5 / sqrt(3), 1e-6);
-      qmat_free(merged);
+      assert_near(last[0], 0, 4e-6);
+      assert_near(last[3], 0.5 / sqrt(3), 4e-6);
+      free(merged);
     }
     float first;
-    uint8_t *errors = bytes_of(own, "errors", 4 * (left + 1));
+    uint8_t *errors = bytes_of(own, "errors", 4, 1, 4 * (left + 1));
     memcpy(&first, errors, sizeof first);
     assert_near(first, cases[i].first, 0);
-    qmat_free(errors);
+    free(errors);
     json_decref(data);
     qmat_value_release(&file->base);
   }
@@ -251,6 +296,36 @@ static void test_a_mesh_that_failed_is_named_with_its_reason(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Equal meshes of a scene are stored once. */
+static void test_equal_meshes_are_shared(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *box = shape_seal(shape_box(1, 1, 1)), *other = shape_seal(shape_box(1, 1, 2));
+  qmat_medial *medial = sealed_medial_mesh((const double[]){0.5, 0.5, 0.5, 0.5}, 1, NULL, 0, NULL, 0);
+  const qmat_value *meshes[] = {&other->base, &box->base, &box->base};
+  static const char *const names[] = {"tower", "box", "box again"};
+  qmat_list *lists[] = {qmat_list_new(3), qmat_list_new(3)};
+  for (size_t k = 0; k < 3; k++)
+    for (size_t i = 0; i < 2; i++) {
+      lists[i]->items[k] = qmat_value_retain(i ? &medial->base : meshes[k]);
+      lists[i]->names[k] = qmat_strdup(names[k]);
+    }
+  for (size_t i = 0; i < 2; i++) assert_int_equal(qmat_value_seal(&context, &lists[i]->base), QMAT_OK);
+  qmat_file *file = make_page(1, "", (const qmat_value *[]){NULL, &lists[0]->base, &lists[1]->base, NULL, NULL});
+  json_t *data = data_of(file);
+  assert_null(json_object_get(mesh_of(data, 0), "same"));
+  assert_null(json_object_get(mesh_of(data, 1), "same"));
+  assert_int_equal(json_integer_value(json_object_get(mesh_of(data, 2), "same")), 1);
+  assert_string_equal(json_string_value(json_object_get(mesh_of(data, 2), "name")), "box again");
+  json_decref(data);
+  qmat_value_release(&file->base);
+  for (size_t i = 0; i < 2; i++) qmat_value_release(&lists[i]->base);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&box->base);
+  qmat_value_release(&other->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_the_same_bytes_for_any_number_of_threads(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_seal(shape_torus(2, 0.6, 32, 16));
@@ -272,11 +347,13 @@ static void test_the_same_bytes_for_any_number_of_threads(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_arrays_come_back),
       cmocka_unit_test(test_the_data_of_a_ball_with_a_spike),
       cmocka_unit_test(test_vertices_on_creases_have_a_normal_for_each_side),
       cmocka_unit_test(test_the_slider_starts_at_the_finest_level_that_is_wanted),
       cmocka_unit_test(test_no_name_leaves_its_place_in_the_page),
       cmocka_unit_test(test_a_mesh_that_failed_is_named_with_its_reason),
+      cmocka_unit_test(test_equal_meshes_are_shared),
       cmocka_unit_test(test_the_same_bytes_for_any_number_of_threads),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

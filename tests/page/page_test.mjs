@@ -58,6 +58,7 @@ class Browser {
     const loaded = new Promise((give) => this.listeners.push(({ method }) => method === 'Page.loadEventFired' && give()));
     await this.send('Page.navigate', { url: `file://${folder}/page.html` });
     await loaded;
+    for (let i = 0; i < 100 && !(await this.run('return Boolean(globalThis.qmatPage)')); i++) await new Promise((give) => setTimeout(give, 100));
   }
   async run(expression) {
     const { result, exceptionDetails } = await this.send('Runtime.evaluate', { expression: `(async () => { ${expression} })()`, awaitPromise: true, returnByValue: true });
@@ -108,7 +109,7 @@ async function testView(browser) {
   check('a turned view differs', turned.mean > 1.0 && turned.far > 0.01, JSON.stringify(turned));
 }
 
-/** The level of 40 spheres against medial.lod's file and report. */
+/** The level of 30 spheres against medial.lod's file and report. */
 async function testLevels(browser) {
   const lines = readFileSync(`${folder}/middle.ma`, 'utf8').trim().split('\n').map((line) => line.split(/\s+/));
   const wanted = { v: [], e: [], f: [] };
@@ -116,12 +117,16 @@ async function testLevels(browser) {
   const report = JSON.parse(readFileSync(`${folder}/middle.json`, 'utf8'));
   const level = await browser.run(`
     const { state, setLevel, level } = qmatPage, mesh = state.mesh;
-    setLevel(40);
+    setLevel(30);
     const c = level();
-    return { spheres: Array.from(c.spheres), edges: c.edges, slabs: c.slabs, error: mesh.chain.error(40), diagonal: mesh.diagonal, text: document.getElementById('level').textContent };`);
-  check('a level has the spheres of medial.lod', level.spheres.length / 4 === wanted.v.length && wanted.v.length === 40, level.spheres.length / 4);
+    return { spheres: Array.from(c.spheres), edges: c.edges, slabs: c.slabs, error: mesh.chain.error(30), proved: mesh.chain.proved.get(30), diagonal: mesh.diagonal, text: document.getElementById('level').textContent };`);
+  check('a level has the spheres of medial.lod', level.spheres.length / 4 === wanted.v.length && wanted.v.length === 30, level.spheres.length / 4);
   check('a level has the error of medial.lod', Math.abs(level.error - report.threshold) < 1e-6, `${level.error} ${report.threshold}`);
-  check('a level says its spheres', level.text.startsWith('40 spheres: both errors at most'), level.text);
+  check('a level has both bounds of medial.lod', level.proved && Math.abs(level.proved[0] - report.surface_to_envelope) < 1e-12 &&
+    Math.abs(level.proved[1] - report.envelope_to_surface) < 1e-12, JSON.stringify([level.proved, report]));
+  check('a level says its spheres and both bounds', /^30 spheres: surface to envelope at most [0-9.]+ %, .*; envelope to surface at most [0-9.]+ %/.test(level.text), level.text);
+  const between = await browser.run("qmatPage.setLevel(101); return document.getElementById('level').textContent");
+  check('a level without bounds says so', /^101 spheres: both errors at most [0-9.]+ %.* at the constraint points$/.test(between), between);
   const pairs = (ids, size) => Array.from({ length: ids.length / size }, (_, i) => ids.slice(size * i, size * i + size).sort((a, b) => a - b).join(' ')).sort().join();
   check('a level has the cones of medial.lod', pairs(level.edges, 2) === wanted.e.map((row) => row.join(' ')).sort().join());
   check('a level has the slabs of medial.lod', pairs(level.slabs, 3) === wanted.f.map((row) => row.join(' ')).sort().join());
@@ -131,13 +136,13 @@ async function testLevels(browser) {
   const moved = await browser.run(`
     const slider = document.getElementById('slider'), counts = [];
     for (const value of [0, 250, 500, 750, 1000]) {
-      slider.value = value;
+      slider.value = Math.round(value * slider.max / 1000);
       slider.dispatchEvent(new Event('input'));
       counts.push([qmatPage.state.spheres, qmatPage.level().spheres.length / 4, qmatPage.state.mesh.chain.error(qmatPage.state.spheres)]);
     }
     document.getElementById('result').click();
     return { counts, back: qmatPage.state.spheres };`);
-  check('the slider goes from the finest level to one sphere', moved.counts[0][0] === 300 && moved.counts[4][0] === 1, JSON.stringify(moved));
+  check('the slider goes from the finest proved level to one sphere', moved.counts[0][0] === 64 && moved.counts[4][0] === 1, JSON.stringify(moved));
   check('each level has as many spheres as it says', moved.counts.every(([n, own]) => n === own), JSON.stringify(moved));
   check('fewer spheres, a larger error', moved.counts.every(([n, , error], i, all) => i === 0 || (n < all[i - 1][0] && error >= all[i - 1][2])), JSON.stringify(moved));
   check('the result comes back', moved.back === null);

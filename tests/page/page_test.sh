@@ -40,9 +40,9 @@ nodes:
   chain:
     type: medial.chain
     in: { mesh: model.mesh, thickness: thickness.thickness, samples: samples.samples, medial: initial.medial }
-    params: { finest: 2% }
+    params: { finest: 2%, bounds: 70 }
   simple: { type: medial.lod, in: { chain: chain.chain }, params: { epsilon: 0, vertices: 12 } }
-  middle: { type: medial.lod, in: { chain: chain.chain }, params: { epsilon: 0, vertices: 40 } }
+  middle: { type: medial.lod, in: { chain: chain.chain }, params: { epsilon: 0, vertices: 30 } }
   errors: { type: medial.evaluate, in: { mesh: model.mesh, medial: simple.medial }, params: { epsilon: 5% } }
   page:
     type: report.page

@@ -239,6 +239,10 @@ class Mistakes(InAFolder):
         said = subprocess.run([program, "check", "bad.yaml"], capture_output=True, text=True).stderr
         self.assertIn(str(raised.exception), said)
         self.assertEqual((raised.exception.line, raised.exception.file), (3, "bad.yaml"))
+        self.assertEqual(qmat.Graph("qmat_plus").ports, qmat.Graph().ports)
+        self.assertIn("colliders", qmat.Graph("colliders").outputs)
+        with self.assertRaises(qmat.Error):
+            qmat.Graph("qmat_plu")
         with self.assertRaises(qmat.Error) as raised:
             qmat.mat("nowhere.off")
         self.assertEqual((raised.exception.status, raised.exception.node), ("io", "model"))
@@ -255,7 +259,7 @@ class Mistakes(InAFolder):
                             (BOX_V.astype(complex), BOX_F, TypeError), (BOX_V, None, TypeError)):
             with self.assertRaises(error):
                 qmat.mat(V, F)
-        graph = qmat.Graph()
+        graph = qmat.Graph("qmat_plus")
         with self.assertRaises(TypeError):
             graph.give("model.mesh", BOX_V)
         with self.assertRaises(qmat.UsageError):

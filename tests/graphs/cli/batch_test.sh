@@ -122,6 +122,21 @@ wait $running
 code=$?
 holds "exit code 3 after a signal, not $code" test $code -eq 3
 holds "nothing goes on after a signal" test ! -e rest/box9.glb
+cp models/aaa_torus.off several/c_torus.off
+"$qmat" batch pages.yaml --inputs 'several/*.off' --out half --pages --jobs 1 --set picture.width=4000 \
+  --set picture.height=4000 --no-cache >out.txt 2>err.txt &
+running=$!
+child_of $running
+for i in $(seq 100); do
+  [ -e half/b.html ] && break
+  sleep 0.1
+done
+kill -TERM $running
+wait $running
+code=$?
+holds "an interrupted batch has a page of what it did" sh -c '
+  [ "$1" -eq 3 ] && grep "^<tr>" half/index.html | grep "href=\"b.html\"" | grep -q ">done<" &&
+  grep "^<tr>" half/index.html | grep ">c_torus<" | grep -q "data-value=\"1\">not run<"' sh $code
 batch --inputs 'models/box*.off' --out rest --set samples.spacing=2%
 holds "it goes on" test $code -eq 0
 holds "no reports are left" test -z "$(ls -d qmat-batch-* 2>/dev/null)"

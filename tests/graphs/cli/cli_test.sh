@@ -90,6 +90,8 @@ expect 2 "between 0 and 1" "$qmat" mat box.off -o box.glb --epsilon 200%
 expect 2 "two outputs" "$qmat" mat box.off -o box.glb -o ./box.glb
 expect 2 "did you mean 'asset'?" "$qmat" mat box.off -o aset=box.glb
 expect 1 "output folder" "$qmat" mat box.off -o box.off/box.glb
+# No file can be made there, also by root, whom access() allows all; known before the run, so no time is lost.
+expect 1 "cannot write to the output folder" "$qmat" mat box.off -o /proc/box.glb
 expect 1 "nothere.off" "$qmat" mat nothere.off -o box.glb --report failed.json
 holds "the failure in the report" grep -q '"node": "model"' failed.json
 holds "no file after a failure" test ! -e box.glb
