@@ -55,7 +55,7 @@ export function positionsOf({ json, binary }, mesh) {
 }
 
 /** The bodies of a file that openGlb opened. Each has its `node`, its `matrix` into the scene, its `motion` (null: it does
- * not move; `mass`, `centerOfMass`, `inertiaDiagonal`, `inertiaOrientation`) and its `shapes` in the space of the node:
+ * not move; `isKinematic`, `mass`, `centerOfMass`, `inertiaDiagonal`, `inertiaOrientation`) and its `shapes` in the space of the node:
  * { center, radius }, a capsule { ends: [[x, y, z, radius], ...] }, or a convex hull { points }. */
 export function bodiesOf(file) {
   const { json } = file, nodes = json.nodes ?? [];
@@ -140,6 +140,9 @@ function motionOf(body, s) {
   return { mass, inertia, centre: centre.map((v) => s * v), frame: m?.inertiaOrientation ?? [0, 0, 0, 1] };
 }
 
+/** Whether forces move a body. The colliders of a skinned mesh are kinematic: their joints move them. */
+const isDynamic = ({ motion }) => Boolean(motion) && !motion.isKinematic;
+
 // ---- Rapier ----
 
 const xyz = ([x, y, z]) => ({ x, y, z });
@@ -147,9 +150,10 @@ const xyz = ([x, y, z]) => ({ x, y, z });
 /** Adds a body to a world of Rapier at a place. Tapered capsules become hulls. */
 export function addToRapier(RAPIER, world, body, { at = [0, 0, 0], rotation = [0, 0, 0, 1], scale = 1, friction = 0.7 } = {}) {
   const { mass, inertia, centre, frame } = motionOf(body, scale), quaternion = ([x, y, z, w]) => ({ x, y, z, w });
-  const desc = body.motion ? RAPIER.RigidBodyDesc.dynamic() : RAPIER.RigidBodyDesc.fixed();
+  const desc = isDynamic(body) ? RAPIER.RigidBodyDesc.dynamic() :
+    body.motion ? RAPIER.RigidBodyDesc.kinematicPositionBased() : RAPIER.RigidBodyDesc.fixed();
   desc.setTranslation(...at).setRotation(quaternion(rotation)).setCcdEnabled(true);
-  if (body.motion) desc.setAdditionalMassProperties(mass, xyz(centre), xyz(inertia), quaternion(frame));
+  if (isDynamic(body)) desc.setAdditionalMassProperties(mass, xyz(centre), xyz(inertia), quaternion(frame));
   const made = world.createRigidBody(desc);
   for (const shape of body.shapes.map((one) => grown(one, scale))) {
     let of;
@@ -186,10 +190,10 @@ export function addToJolt(Jolt, system, body, { at = [0, 0, 0], rotation = [0, 0
   const result = compound.Create();
   if (result.HasError()) throw new Error(`Jolt refuses a shape: ${result.GetError().c_str()}`);
   const inner = result.Get(), own = inner.GetCenterOfMass();
-  const shape = body.motion ? new Jolt.OffsetCenterOfMassShape(inner, vec([centre[0] - own.GetX(), centre[1] - own.GetY(), centre[2] - own.GetZ()])) : inner;
+  const shape = isDynamic(body) ? new Jolt.OffsetCenterOfMassShape(inner, vec([centre[0] - own.GetX(), centre[1] - own.GetY(), centre[2] - own.GetZ()])) : inner;
   const settings = new Jolt.BodyCreationSettings(shape, new Jolt.RVec3(...at), new Jolt.Quat(...rotation),
-    body.motion ? Jolt.EMotionType_Dynamic : Jolt.EMotionType_Static, body.motion ? layer : 0);
-  if (body.motion) {
+    isDynamic(body) ? Jolt.EMotionType_Dynamic : body.motion ? Jolt.EMotionType_Kinematic : Jolt.EMotionType_Static, body.motion ? layer : 0);
+  if (isDynamic(body)) {
     // The tensor R diag(inertia) R^T, by columns.
     const r = local({ rotation: frame }), column = (j) => [0, 1, 2].map((i) => [0, 1, 2].reduce((sum, k) => sum + r[4 * k + i] * inertia[k] * r[4 * k + j], 0));
     const tensor = Jolt.Mat44.prototype.sIdentity();
@@ -217,8 +221,9 @@ const rotated = (q, p) => moved(local({ rotation: q }), p);
  * `pose()` gives the position and rotation of the file's frame, each as an array. */
 export function addToBullet(Ammo, world, body, { at = [0, 0, 0], rotation = [0, 0, 0, 1], scale = 1, friction = 0.7 } = {}) {
   const { mass, inertia, centre, frame } = motionOf(body, scale), back = opposite(frame), compound = new Ammo.btCompoundShape(true);
-  const vec = (p) => new Ammo.btVector3(...p), margin = 1e-4 * scale * Math.max(...body.shapes.flatMap(({ points, ends, radius }) =>
-    points?.flat().map(Math.abs) ?? ends?.flat().map(Math.abs) ?? [radius]));
+  const vec = (p) => new Ammo.btVector3(...p);
+  const reaches = body.shapes.map(({ points, ends, radius }) => (points ?? ends ?? [[radius]]).flat().reduce((most, v) => Math.max(most, Math.abs(v)), 0));
+  const margin = 1e-4 * scale * reaches.reduce((most, v) => Math.max(most, v), 0);
   const transform = (p, q) => new Ammo.btTransform(new Ammo.btQuaternion(...q), vec(p));
   const inner = (p) => rotated(back, p.map((v, k) => v - centre[k]));
   for (const shape of body.shapes.map((one) => grown(one, scale))) {
@@ -234,8 +239,8 @@ export function addToBullet(Ammo, world, body, { at = [0, 0, 0], rotation = [0, 
     }
   }
   const turned = times(rotation, frame), start = rotated(rotation, centre).map((v, k) => v + at[k]);
-  const info = new Ammo.btRigidBodyConstructionInfo(body.motion ? mass : 0, new Ammo.btDefaultMotionState(transform(start, turned)),
-    compound, vec(body.motion ? inertia : [0, 0, 0]));
+  const info = new Ammo.btRigidBodyConstructionInfo(isDynamic(body) ? mass : 0, new Ammo.btDefaultMotionState(transform(start, turned)),
+    compound, vec(isDynamic(body) ? inertia : [0, 0, 0]));
   info.set_m_friction(friction);
   const made = new Ammo.btRigidBody(info);
   world.addRigidBody(made);

@@ -239,11 +239,13 @@ static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders 
   return done;
 }
 
-/* Takes the colliders of an earlier run off the node. They stay in the asset without a parent. */
-static void detach(json_t *root, json_t *body) {
+/* Takes the colliders of an earlier run, which are among the `given` first nodes, off the node. They stay in the asset
+ * without a parent. */
+static void detach(json_t *root, json_t *body, size_t given) {
   json_t *children = json_object_get(body, "children"), *nodes = json_object_get(root, "nodes");
   for (size_t i = json_array_size(children); i-- > 0;) {
-    const json_t *child = json_array_get(nodes, (size_t)json_number_value(json_array_get(children, i)));
+    const size_t id = (size_t)json_number_value(json_array_get(children, i));
+    const json_t *child = id < given ? json_array_get(nodes, id) : NULL;
     if (json_object_get(json_object_get(child, "extras"), MARK)) json_array_remove(children, i);
   }
   if (children && json_array_size(children) == 0) json_object_del(body, "children");
@@ -271,7 +273,7 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
                                 const double shift[3]) {
   json_t *body = json_array_get(json_object_get(root, "nodes"), (size_t)node);
   bool done = body != NULL;
-  if (done) detach(root, body);
+  if (done) detach(root, body, added->nodes_given);
   for (int form = 0; form < 2 && done && added->dynamic; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
     json_t *motion = motion_of(added, shift);
@@ -283,5 +285,76 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
     }
   }
   for (size_t i = 0; i < added->colliders->shape_count && done; i++) done = add_colliders(root, body, added, i, shift);
+  return done;
+}
+
+/* ---- joints ---- */
+
+/* The joint that has most of the weight at the spheres of a shape. */
+static uint32_t joint_of(const qmat_gltf_colliders *added, size_t shape, const qmat_medial *medial) {
+  const qmat_colliders *c = added->colliders;
+  uint32_t joints[12], best = 0;
+  double weights[12], most = -1;
+  for (size_t s = 0; s < 3; s++) {
+    const double *sphere = &c->spheres[4 * (size_t)c->shapes[3 * shape + s]];
+    double nearest = INFINITY;
+    for (size_t i = 0; i < medial->sphere_count; i++) {
+      const double away = qmat_point_distance(sphere, &medial->spheres[4 * i]);
+      if (!(away < nearest)) continue;
+      nearest = away;
+      memcpy(&joints[4 * s], &medial->joints[4 * i], 4 * sizeof *joints);
+      memcpy(&weights[4 * s], &medial->weights[4 * i], 4 * sizeof *weights);
+    }
+  }
+  for (size_t i = 0; i < 12; i++) {
+    double sum = 0;
+    for (size_t k = 0; k < 12; k++) sum += joints[k] == joints[i] ? weights[k] : 0;
+    if (sum > most + 1e-9) {
+      most = sum;
+      best = joints[i];
+    }
+  }
+  return best;
+}
+
+/* A node below a joint in whose space the mesh is as it was bound. NULL when out of memory. */
+static json_t *add_bound_node(json_t *root, json_t *joint, const qmat_gltf_colliders *added, const double *matrix) {
+  json_t *node = json_object();
+  bool done = node != NULL, moves = false;
+  for (size_t i = 0; i < 16; i++) moves = moves || matrix[i] != (i % 5 == 0);
+  json_t *numbers = moves ? json_array() : NULL;
+  for (size_t i = 0; i < 16 && numbers; i++) done = json_array_append_new(numbers, json_real(matrix[i])) == 0 && done;
+  if (moves) done = done && qmat_gltf_set(node, "matrix", numbers);
+  for (int form = 0; form < 2 && done && added->dynamic; form++) {
+    if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
+    done = set_extension(node, body_extensions[form],
+                         form == 0 ? json_pack("{s:{s:b}}", "motion", "isKinematic", 1)
+                                   : json_pack("{s:{s:s}}", "motion", "type", "kinematic"));
+  }
+  done = done && add_child(root, joint, node);
+  json_decref(node); /* the root's array holds it */
+  return done ? node : NULL;
+}
+
+bool qmat_gltf_colliders_attach_to_joints(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
+                                          const qmat_medial *medial, const double *matrices) {
+  static const double none[3] = {0, 0, 0};
+  json_t *nodes = json_object_get(root, "nodes"), *body = json_array_get(nodes, (size_t)node);
+  const json_t *skin =
+      json_array_get(json_object_get(root, "skins"), (size_t)json_number_value(json_object_get(body, "skin")));
+  const json_t *ids = json_object_get(skin, "joints");
+  const size_t count = json_array_size(ids);
+  json_t **bound = qmat_calloc(count, sizeof(json_t *));
+  bool done = bound && count > 0;
+  if (done) detach(root, body, added->nodes_given);
+  for (size_t i = 0; i < count && done; i++)
+    detach(root, json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, i))), added->nodes_given);
+  for (size_t i = 0; i < added->colliders->shape_count && done; i++) {
+    const uint32_t named = joint_of(added, i, medial), joint = named < count ? named : 0;
+    json_t *owner = json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, joint)));
+    if (!bound[joint]) bound[joint] = add_bound_node(root, owner, added, &matrices[16 * (size_t)joint]);
+    done = bound[joint] && add_colliders(root, bound[joint], added, i, none);
+  }
+  qmat_free(bound);
   return done;
 }

@@ -21,6 +21,7 @@ typedef struct qmat_gltf_colliders {
   unsigned forms;
   const char *name;   /* UTF-8, of the model; not empty */
   bool dynamic;       /* carriers are bodies that move: they get mass properties */
+  size_t nodes_given; /* the asset's nodes before anything was added: colliders among them are an earlier run's */
   double origin[3];   /* what hulls are relative to */
   json_int_t *shapes; /* 2 per shape, KHR and OMI: its number among the asset's; -1: none. Owned */
   json_int_t *hulls;  /* per shape: the mesh of its hull; -1: none. Owned */
@@ -38,5 +39,13 @@ void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added);
  * the origin of the node's space relative to that of the colliders, in the colliders' space. False when out of memory.
  */
 bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added, const double shift[3]);
+
+/* Makes the colliders of a skinned mesh follow its joints: each becomes a child of a node below the joint that moves
+ * most of it, by the joints and weights of the spheres of `medial` (which has them, in the colliders' space) that are
+ * nearest to its own. That node has the joint's inverse bind matrix (`matrices`, 16 numbers per joint by columns) and
+ * is a kinematic body where `dynamic` is set. `node` carries the mesh; colliders of an earlier run leave it and the
+ * joints. Joints that the skin does not have count as its first. False when out of memory. */
+bool qmat_gltf_colliders_attach_to_joints(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
+                                          const qmat_medial *medial, const double *matrices);
 
 #endif

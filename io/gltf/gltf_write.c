@@ -12,6 +12,7 @@
 #include "io/draco.h"
 #include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_bind.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
@@ -189,6 +190,7 @@ typedef struct document {
   json_int_t buffer;               /* number of the buffer that holds `data` */
   json_int_t material;             /* of the skins; -1: not created yet */
   const qmat_scene *places;        /* of a new asset: where the meshes are; NULL: one mesh, where it is */
+  size_t nodes_given;              /* of the asset that was read */
   json_t *converter;               /* of a new asset: the node that turns units and axes; NULL: none yet */
 } document;
 
@@ -367,6 +369,7 @@ static qmat_status open_document(qmat_context *context, const qmat_scene *scene,
     asset->chunk = document->embedded;
     asset->chunk_size = size;
   }
+  document->nodes_given = json_array_size(json_object_get(document->root, "nodes"));
   const json_t *buffers = json_object_get(document->root, "buffers");
   const bool has_chunk =
       asset->chunk && json_array_size(buffers) > 0 && !json_object_get(json_array_get(buffers, 0), "uri");
@@ -430,9 +433,34 @@ static qmat_gltf_options options_after(const qmat_gltf_options *options, double 
   return after;
 }
 
+/* Adds colliders to a node with the mesh, or to the joints of its skin. */
+static qmat_status attach_colliders(qmat_context *context, const qmat_scene *scene, const qmat_medial *medial,
+                                    document *document, const qmat_gltf_colliders *added, size_t id,
+                                    const double shift[3]) {
+  const json_t *nodes = json_object_get(document->root, "nodes"), *node = json_array_get(nodes, id);
+  const json_t *skin = json_object_get(node, "skin");
+  double *matrices = NULL;
+  bool done = true;
+  if (scene && skin && medial->skinned_count > 0) {
+    for (size_t i = 0; i < id; i++) { /* nodes that share mesh and skin are in one place */
+      const json_t *other = json_array_get(nodes, i);
+      if (qmat_gltf_mesh_of(other) == qmat_gltf_mesh_of(node) && json_equal(json_object_get(other, "skin"), skin))
+        return QMAT_OK;
+    }
+    const qmat_status status =
+        qmat_gltf_bind_matrices(context, scene, &document->asset, (size_t)json_number_value(skin), &matrices);
+    if (status != QMAT_OK) return status;
+  }
+  done = matrices ? qmat_gltf_colliders_attach_to_joints(document->root, (json_int_t)id, added, medial, matrices)
+                  : qmat_gltf_colliders_attach(document->root, (json_int_t)id, added, shift);
+  qmat_free(matrices);
+  return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+}
+
 /* Adds colliders to every node that references the mesh; without one (-1), to the new nodes with a medial mesh. */
-static qmat_status add_colliders(qmat_context *context, const qmat_gltf_addition *addition, document *document,
-                                 const double origin[3], const char *name, json_int_t mesh, size_t nodes_before) {
+static qmat_status add_colliders(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *addition,
+                                 document *document, const double origin[3], const char *name, json_int_t mesh,
+                                 size_t nodes_before) {
   static const double none[3] = {0, 0, 0};
   const json_t *nodes = json_object_get(document->root, "nodes");
   const size_t count = json_array_size(nodes);
@@ -440,18 +468,18 @@ static qmat_status add_colliders(qmat_context *context, const qmat_gltf_addition
                                .forms = addition->collider_forms,
                                .name = name ? name : "model",
                                .dynamic = addition->dynamic,
+                               .nodes_given = document->nodes_given,
                                .origin = {origin[0], origin[1], origin[2]}};
-  const qmat_status status = qmat_gltf_colliders_init(context, document->root, document->buffer, document->data_start,
-                                                      &document->data, &added);
-  bool done = status == QMAT_OK;
-  for (size_t i = mesh < 0 ? nodes_before : 0; i < count && done; i++) {
+  qmat_status status = qmat_gltf_colliders_init(context, document->root, document->buffer, document->data_start,
+                                                &document->data, &added);
+  for (size_t i = mesh < 0 ? nodes_before : 0; i < count && status == QMAT_OK; i++) {
     const json_t *node = json_array_get(nodes, i);
     const bool is_new = json_object_get(json_object_get(node, "extras"), "qmat_version") != NULL;
     if (mesh < 0 ? is_new : qmat_gltf_mesh_of(node) == mesh)
-      done = qmat_gltf_colliders_attach(document->root, (json_int_t)i, &added, mesh < 0 ? origin : none);
+      status = attach_colliders(context, scene, addition->medial, document, &added, i, mesh < 0 ? origin : none);
   }
   qmat_gltf_colliders_uninit(&added);
-  return status == QMAT_OK && !done ? qmat_fail_memory(context, "a glTF file") : status;
+  return status;
 }
 
 /* Adds one medial mesh and its skin. */
@@ -484,8 +512,8 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
                             : add_node(document, extras, origin, skin, name, &options, !scene);
   }
   if (done && addition->colliders)
-    status = add_colliders(context, addition, document, origin, name, of_mesh ? (json_int_t)scene->meshes[index] : -1,
-                           nodes_before);
+    status = add_colliders(context, scene, addition, document, origin, name,
+                           of_mesh ? (json_int_t)scene->meshes[index] : -1, nodes_before);
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;
   json_decref(extras);

@@ -6,6 +6,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/tangent_hull.h"
 
 /* Scratch of one hull: points in up to three copies of the directions. */
 typedef struct hull {
@@ -28,6 +29,18 @@ static void direction(size_t i, size_t n, double point[3]) {
   point[2] = z;
 }
 
+/* Finds the hull of the points. */
+static qmat_status close_hull(hull *h) {
+  const qmat_status status = qmat_convex_hull(h->points, h->point_count, h->triangles, &h->triangle_count);
+  if (status != QMAT_OK) return status;
+  memset(h->names, 0xff, h->point_count * sizeof *h->names);
+  for (size_t i = 0; i < 3 * h->triangle_count; i++) h->names[h->triangles[i]] = 0;
+  h->used = 0;
+  for (size_t i = 0; i < h->point_count; i++)
+    if (h->names[i] == 0) h->names[i] = (uint32_t)h->used++;
+  return QMAT_OK;
+}
+
 /* The hull of `width` spheres, each replaced by n points on the sphere of `factor` times its radius. */
 static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids, int width, const size_t *n,
                              const double *factor) {
@@ -40,14 +53,7 @@ static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids
       for (int k = 0; k < 3; k++) point[k] = sphere[k] + factor[s] * sphere[3] * unit[k];
     }
   }
-  const qmat_status status = qmat_convex_hull(h->points, h->point_count, h->triangles, &h->triangle_count);
-  if (status != QMAT_OK) return status;
-  memset(h->names, 0xff, h->point_count * sizeof *h->names);
-  for (size_t i = 0; i < 3 * h->triangle_count; i++) h->names[h->triangles[i]] = 0;
-  h->used = 0;
-  for (size_t i = 0; i < h->point_count; i++)
-    if (h->names[i] == 0) h->names[i] = (uint32_t)h->used++;
-  return QMAT_OK;
+  return close_hull(h);
 }
 
 /* What the radius of n directions must be multiplied by so that their hull contains the unit sphere. */
@@ -78,10 +84,10 @@ static size_t directions_for(double radius, double error, size_t most) {
   return n > (double)most ? most : n > LEAST_DIRECTIONS ? (size_t)n : LEAST_DIRECTIONS;
 }
 
-/* The hull of a shape within the error, or the finest within the limit. Each sphere's points surround it, so that their
- * hull contains the shape. */
-static qmat_status fit_hull(hull *h, const double *spheres, const uint32_t ids[3], size_t most, double error,
-                            qmat_hull_side side, double *factors) {
+/* The hull of a shape within the error, or the finest within the limit, of points on its spheres, or around them, so
+ * that their hull contains the shape. */
+static qmat_status fit_points(hull *h, const double *spheres, const uint32_t ids[3], size_t most, double error,
+                              qmat_hull_side side, double *factors) {
   const int width = qmat_shape_width(ids);
   for (;; error *= 1.15) {
     size_t n[3], points = 0;
@@ -98,6 +104,18 @@ static qmat_status fit_hull(hull *h, const double *spheres, const uint32_t ids[3
     const qmat_status status = make_hull(h, spheres, ids, width, n, factor);
     if (status != QMAT_OK || h->used <= most || points <= LEAST_DIRECTIONS * (size_t)width) return status;
   }
+}
+
+/* The hull outside of a shape: by half-spaces that touch it, or by points where rounding spoils those. */
+static qmat_status surround(hull *h, qmat_tangent_hull *tangent, const double *spheres, const uint32_t ids[3],
+                            double error, double *factors) {
+  qmat_status status = qmat_tangent_hull_fit(tangent, spheres, ids, error);
+  if (status == QMAT_ERROR_GEOMETRY)
+    return fit_points(h, spheres, ids, tangent->most, error, QMAT_HULL_OUTSIDE, factors);
+  if (status != QMAT_OK) return status;
+  h->point_count = tangent->point_count;
+  memcpy(h->points, tangent->points, 3 * h->point_count * sizeof *h->points);
+  return close_hull(h);
 }
 
 /* Appends the hull to the value's arrays, which have room for it. */
@@ -127,11 +145,14 @@ qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, s
   if (!h.points || !h.triangles || !h.names || !factors || !colliders->points || !colliders->triangles ||
       !colliders->hull_ends)
     return qmat_fail_memory(context, "the hulls");
-  qmat_status status = QMAT_OK;
+  qmat_tangent_hull tangent;
+  qmat_status status = qmat_tangent_hull_init(context, most_points, &tangent);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     status = qmat_progress(context, i, count, "hulls");
     if (status != QMAT_OK) return status;
-    status = fit_hull(&h, colliders->spheres, &colliders->shapes[3 * i], most_points, error, side, factors);
+    const uint32_t *ids = &colliders->shapes[3 * i];
+    status = side == QMAT_HULL_OUTSIDE ? surround(&h, &tangent, colliders->spheres, ids, error, factors)
+                                       : fit_points(&h, colliders->spheres, ids, most_points, error, side, factors);
     if (status == QMAT_OK) append(colliders, i, &h);
     if (status == QMAT_ERROR_GEOMETRY) {
       qmat_fail(context, status, "it has no hull");

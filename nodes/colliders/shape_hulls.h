@@ -12,9 +12,10 @@ enum { QMAT_LEAST_HULL_POINTS = 24 };
 
 /* Fills the hulls of `colliders` from its spheres and shapes: for each shape a convex polyhedron that is within about
  * `error` (a length of the model, above 0) of it, or the nearest of at most `most_points` (QMAT_LEAST_HULL_POINTS at
- * least) vertices. Its vertices are in directions that are spread evenly (a Fibonacci lattice), more of them on larger
- * spheres. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY names the shape, QMAT_CANCELLED. Cost: some hulls of `most_points`
- * points per shape. */
+ * least) vertices. Outside, its facets touch the shape (nodes/colliders/tangent_hull.h); inside, its vertices are on
+ * the spheres in directions that are spread evenly (a Fibonacci lattice), more of them on larger spheres.
+ * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY names the shape, QMAT_CANCELLED. Cost: some hulls of `most_points` points per
+ * shape. */
 qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points, double error,
                              qmat_hull_side side);
 

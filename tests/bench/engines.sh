@@ -13,7 +13,7 @@ if [ ! -e "$1" ]; then
   echo "no models: name some, or put them into ../shared/data/surfaces" >&2
   exit 2
 fi
-cp "$top/tests/engines/package.json" "$top/tests/engines/drop.mjs" "$work"
+cp "$top/tests/engines/package.json" "$top/tests/engines/drop.mjs" "$top/tests/engines/surface.mjs" "$work"
 (cd "$work" && npm install --no-audit --no-fund --no-package-lock >install.log 2>&1) || {
   cat "$work/install.log" >&2
   exit 1

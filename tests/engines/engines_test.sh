@@ -16,7 +16,7 @@ if ! cmp -s "$1/tests/engines/package.json" "$packages/package.json" || [ ! -e "
     exit 77
   fi
 fi
-cp "$1/tests/engines/drop.mjs" "$packages"
+cp "$1/tests/engines/drop.mjs" "$1/tests/engines/surface.mjs" "$packages"
 
 set -- "$1" "$2"
 for model in l-bracket capsule; do

@@ -12,12 +12,14 @@
 #include <cmocka.h>
 
 #include "examples/readers/qmat_reader.h"
+#include "io/gltf/gltf_asset.h"
 #include "tests/io/files.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/nodes/pipeline.h"
 
 static const double pi = 3.14159265358979323846;
 enum { RINGS = 41, AROUND = 20 };
+static const float joint_x = 0.25F, joint_y = -0.5F; /* of joint 1, where the arm is bound */
 
 /* An arm of two tubes with a ball at the elbow: along x from -2 to 2, of radius 0.3, at the elbow 0.6. */
 static double radius_at(double x) {
@@ -68,7 +70,10 @@ static qmat_writer arm_data(size_t sizes[5], uint32_t *triangle_count) {
     for (int k = 0; k < 4; k++) qmat_put_f32(&data, weights[k]);
   }
   sizes[3] = data.size - start, start = data.size;
-  for (int i = 0; i < 32; i++) qmat_put_f32(&data, i % 16 % 5 == 0);
+  for (int i = 0; i < 32; i++) { /* joint 1 is bound where its node is */
+    const float moved = i == 28 ? -joint_x : i == 29 ? -joint_y : 0;
+    qmat_put_f32(&data, moved + (float)(i % 16 % 5 == 0));
+  }
   sizes[4] = data.size - start;
   return data;
 }
@@ -89,7 +94,8 @@ static void write_arm(const char *path) {
       "5123,'count':%u,'type':'SCALAR'},{'bufferView':2,'componentType':5121,'count':%u,'type':'VEC4'},{'bufferView':3,"
       "'componentType':5126,'count':%u,'type':'VEC4'},{'bufferView':4,'componentType':5126,'count':2,'type':'MAT4'}],"
       "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'JOINTS_0':2,'WEIGHTS_0':3},'indices':1}]}],'skins':[{"
-      "'joints':[1,2],'inverseBindMatrices':4}],'nodes':[{'mesh':0,'skin':0},{'children':[2]},{}],'scene':0,'scenes':"
+      "'joints':[1,2],'inverseBindMatrices':4}],'nodes':[{'mesh':0,'skin':0},{'children':[2]},{'translation':[0.25,-0."
+      "5,0]}],'scene':0,'scenes':"
       "[{'nodes':[0,1]}]}",
       data.size, sizes[0], offsets[1], sizes[1], offsets[2], sizes[2], offsets[3], sizes[3], offsets[4], sizes[4],
       vertices, 3 * triangles, vertices, vertices);
@@ -100,8 +106,8 @@ static void write_arm(const char *path) {
   qmat_writer_uninit(&data);
 }
 
-/* Describes the arm at 2 % and reads what the written file says of its spheres. */
-static void describe_arm(qmr_medial *medial) {
+/* Describes the arm at 2 % and writes it, with colliders where their parameters are given; `*colliders` gets them. */
+static qmat_value *write_described(const char *params, const char *write_params, qmat_value **colliders) {
   char folder[64], path[96], setting[128];
   make_folder(folder);
   snprintf(path, sizeof path, "%s/arm.glb", folder);
@@ -122,16 +128,30 @@ static void describe_arm(qmr_medial *medial) {
   const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
   inputs[qmat_input_find(write, "medial")] = simple[0];
   inputs[qmat_input_find(write, "scene")] = read[0];
-  pipeline_must_run(1, "scene.write", "format=glb", inputs, written);
-  const qmat_file *file = (const qmat_file *)written[0];
+  qmat_value *shapes[PIPELINE_MOST_PORTS] = {NULL};
+  if (params) {
+    pipeline_must_run(1, "medial.colliders", params, (const qmat_value *[]){solid[0], simple[0]}, shapes);
+    inputs[qmat_input_find(write, "colliders")] = *colliders = shapes[0];
+    qmat_value_release(shapes[1]);
+  }
+  pipeline_must_run(1, "scene.write", write_params, inputs, written);
+  qmat_value_release(written[1]);
+  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]);
+  for (int i = 0; i < 2; i++) qmat_value_release(solid[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
+  pipeline_free(&p);
+  return written[0];
+}
+
+/* What the written file says of the arm's spheres. */
+static void describe_arm(qmr_medial *medial) {
+  qmat_value *written = write_described(NULL, "format=glb", NULL);
+  const qmat_file *file = (const qmat_file *)written;
   size_t length = 0;
   const char *text = qmr_find(file->parts[0].bytes, file->parts[0].size, NULL, &length);
   assert_non_null(text);
   assert_int_equal(qmr_decode_base64(text, length, medial), 0);
-  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
-  for (int i = 0; i < 2; i++) qmat_value_release(solid[i]);
-  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
-  pipeline_free(&p);
+  qmat_value_release(written);
 }
 
 static void test_spheres_of_a_skinned_model_follow_its_joints(void **state) {
@@ -165,6 +185,62 @@ static void test_spheres_of_a_skinned_model_follow_its_joints(void **state) {
   }
   assert_true(left > 0 && right > 0 && middle > 0);
   qmr_free(&medial);
+}
+
+static double number_at(const json_t *array, size_t i) {
+  return json_number_value(json_array_get(array, i));
+}
+
+/* Each collider is below the joint that moves its part of the arm: when joint 1 turns by 90 degrees about its own z
+ * axis, the matrices of the file take the colliders of the lower arm with it, and those of the upper arm stay. */
+static void colliders_must_follow(const char *write_params) {
+  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", write_params, &colliders);
+  const qmat_file *file = (const qmat_file *)written;
+  qmat_context context = {0};
+  qmat_gltf_asset asset;
+  assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "arm", &asset), QMAT_OK);
+  const json_t *nodes = json_object_get(asset.root, "nodes");
+  size_t count = 0, left = 0, right = 0;
+  for (size_t joint = 0; joint < 2; joint++) {
+    const json_t *children = json_object_get(json_array_get(nodes, joint + 1), "children");
+    for (size_t c = 0; c < json_array_size(children); c++) {
+      const json_t *bound = json_array_get(nodes, (size_t)number_at(children, c));
+      if (!json_object_get(json_object_get(bound, "extras"), "qmat_collider")) continue;
+      const json_t *matrix = json_object_get(bound, "matrix"), *shapes = json_object_get(bound, "children");
+      const json_t *body = json_object_get(json_object_get(bound, "extensions"), "KHR_physics_rigid_bodies");
+      assert_true(json_is_true(json_object_get(json_object_get(body, "motion"), "isKinematic")));
+      for (size_t i = 0; i < json_array_size(shapes); i++, count++) {
+        const json_t *at = json_object_get(json_array_get(nodes, (size_t)number_at(shapes, i)), "translation");
+        const double x = number_at(at, 0), y = number_at(at, 1);
+        double u = x, v = y; /* in the joint's space */
+        for (size_t k = 0; k < 2 && matrix; k++)
+          *(k == 0 ? &u : &v) = number_at(matrix, k) * x + number_at(matrix, 4 + k) * y + number_at(matrix, 12 + k);
+        /* Joint 1 is moved to its place and turned: (u, v) goes to (-v, u). */
+        const double px = joint == 1 ? joint_x - v : u, py = joint == 1 ? joint_y + u : v;
+        if (x < -0.7) {
+          left++;
+          assert_true(fabs(px - x) < 1e-9 && fabs(py - y) < 1e-9);
+        } else if (x > 0.7) {
+          right++;
+          assert_true(fabs(px - (joint_x - (y - joint_y))) < 1e-6 && fabs(py - (joint_y + x - joint_x)) < 1e-6);
+        }
+      }
+    }
+  }
+  assert_int_equal(count, ((const qmat_colliders *)colliders)->shape_count);
+  assert_true(left > 0 && right > 0);
+  const json_t *own = json_object_get(json_array_get(nodes, 0), "children"); /* the mesh's node has none */
+  assert_int_equal(json_array_size(own), 0);
+  qmat_gltf_asset_uninit(&asset);
+  qmat_context_uninit(&context);
+  qmat_value_release(written);
+  qmat_value_release(colliders);
+}
+
+static void test_colliders_of_a_skinned_model_follow_its_joints(void **state) {
+  (void)state;
+  colliders_must_follow("format=glb");
+  colliders_must_follow("format=gltf");
 }
 
 /* ---- USD ---- */
@@ -319,6 +395,7 @@ static void test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_alou
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints),
+      cmocka_unit_test(test_colliders_of_a_skinned_model_follow_its_joints),
       cmocka_unit_test(test_joints_of_usd_meshes_reach_their_spheres_and_the_layer),
       cmocka_unit_test(test_a_subdivided_cage_keeps_its_joints),
       cmocka_unit_test(test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_aloud),

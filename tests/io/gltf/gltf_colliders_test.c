@@ -108,6 +108,7 @@ static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *da
   static const double none[3] = {0, 0, 0};
   qmat_gltf_colliders added = {.colliders = c, .forms = forms, .name = "Mesh", .dynamic = dynamic};
   if (!root) root = json_pack("{s:[{}]}", "nodes");
+  added.nodes_given = json_array_size(json_object_get(root, "nodes"));
   assert_int_equal(qmat_gltf_colliders_init(&context, root, 0, 0, data, &added), QMAT_OK);
   assert_true(qmat_gltf_colliders_attach(root, 0, &added, none));
   qmat_gltf_colliders_uninit(&added);

@@ -1,0 +1,166 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/colliders/tangent_hull.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+#include "nodes/colliders/convex_hull_cgal.h"
+
+/* A round adds a plane at vertices that are farther out than this share of the farthest, unless its normal is within
+ * this cosine of one that the round has added: that plane may serve both. */
+static const double worth = 0.6, apart = 0.94;
+
+/* The shape that is being surrounded, and a point inside it. */
+typedef struct target {
+  const double *spheres;
+  const uint32_t *ids;
+  qmat_prepared_shape shape;
+  double centre[3];
+} target;
+
+qmat_status qmat_tangent_hull_init(qmat_context *context, size_t most, qmat_tangent_hull *hull) {
+  *hull = (qmat_tangent_hull){.most = most,
+                              .normals = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->normals),
+                              .duals = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->duals),
+                              .points = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->points),
+                              .triangles = qmat_arena_alloc(&context->arena, most, 6 * sizeof *hull->triangles)};
+  if (hull->normals && hull->duals && hull->points && hull->triangles) return QMAT_OK;
+  return qmat_fail_memory(context, "the hulls");
+}
+
+/* How far the shape reaches from its centre along a direction. */
+static double reach(const target *t, const double normal[3]) {
+  double most = 0;
+  for (int k = 0; k < t->shape.count; k++) {
+    const double *s = &t->spheres[4 * (size_t)t->ids[k]];
+    double to[3];
+    qmat_subtract(s, t->centre, to);
+    most = fmax(most, qmat_dot(normal, to) + s[3]);
+  }
+  return most;
+}
+
+/* Adds the plane that touches the shape, by its dual: the normal over the distance from the centre. */
+static void add_plane(qmat_tangent_hull *h, const target *t, const double normal[3]) {
+  const double distance = reach(t, normal);
+  memcpy(&h->normals[3 * h->plane_count], normal, 3 * sizeof *normal);
+  for (int k = 0; k < 3; k++) h->duals[3 * h->plane_count + (size_t)k] = normal[k] / distance;
+  h->plane_count++;
+}
+
+/* Six planes around the shape: along its axes, or for a slab the two that touch all of its spheres instead of those
+ * along its normal. */
+static void start(qmat_tangent_hull *h, target *t) {
+  double x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, z[3] = {0, 0, 1}, tilt[3] = {0};
+  const double *s[3];
+  for (int k = 0; k < 3; k++) s[k] = &t->spheres[4 * (size_t)t->ids[k]];
+  if (t->shape.count > 1) {
+    qmat_subtract(s[1], s[0], x);
+    qmat_normalize(x);
+    const int least = fabs(x[0]) <= fabs(x[1]) && fabs(x[0]) <= fabs(x[2]) ? 0 : fabs(x[1]) <= fabs(x[2]) ? 1 : 2;
+    double other[3] = {least == 0, least == 1, least == 2};
+    if (t->shape.count == 3) qmat_subtract(s[2], s[0], other);
+    qmat_cross(x, other, z);
+    qmat_normalize(z);
+    qmat_cross(z, x, y);
+    if (t->shape.count == 3) {
+      /* tilt . (s[k] - s[0]) = s[0].r - s[k].r in the plane of x and y */
+      tilt[0] = (s[0][3] - s[1][3]) / qmat_point_distance(s[0], s[1]);
+      tilt[1] = (s[0][3] - s[2][3] - tilt[0] * qmat_dot(x, other)) / qmat_dot(y, other);
+    }
+  }
+  const double square = 1 - tilt[0] * tilt[0] - tilt[1] * tilt[1], rise = sqrt(fmax(square, 0));
+  const double along[6][3] = {
+      {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {tilt[0], tilt[1], rise}, {tilt[0], tilt[1], -rise}};
+  h->plane_count = 0;
+  for (int i = 0; i < 6; i++) {
+    double normal[3];
+    for (int k = 0; k < 3; k++) normal[k] = along[i][0] * x[k] + along[i][1] * y[k] + along[i][2] * z[k];
+    qmat_normalize(normal);
+    add_plane(h, t, normal);
+  }
+}
+
+/* Fills the vertices from the facets of the hull of the duals; those of more than three planes once. */
+static qmat_status meet(qmat_tangent_hull *h) {
+  size_t count;
+  const qmat_status status = qmat_convex_hull(h->duals, h->plane_count, h->triangles, &count);
+  if (status != QMAT_OK) return status;
+  h->point_count = 0;
+  for (size_t i = 0; i < count; i++) {
+    const double *p = &h->duals[3 * (size_t)h->triangles[3 * i]];
+    double u[3], v[3], *point = &h->points[3 * h->point_count];
+    qmat_subtract(&h->duals[3 * (size_t)h->triangles[3 * i + 1]], p, u);
+    qmat_subtract(&h->duals[3 * (size_t)h->triangles[3 * i + 2]], p, v);
+    qmat_cross(u, v, point);
+    const double over = qmat_dot(p, point);
+    if (!(over > 0)) return QMAT_ERROR_GEOMETRY;
+    for (int k = 0; k < 3; k++) point[k] /= over;
+    const double near = 1e-9 * sqrt(qmat_dot(point, point));
+    bool known = false;
+    for (size_t j = 0; j < h->point_count && !known; j++) known = qmat_point_distance(&h->points[3 * j], point) < near;
+    if (!known) h->point_count++;
+  }
+  return QMAT_OK;
+}
+
+/* Adds planes where vertices are far out. How many. */
+static size_t refine(qmat_tangent_hull *h, const target *t, double error, size_t most_planes) {
+  const size_t before = h->plane_count;
+  double farthest = INFINITY;
+  while (h->plane_count < most_planes) {
+    double best = error, normal[3] = {0};
+    for (size_t i = 0; i < h->point_count; i++) {
+      double point[3], weights[3], way[3], medial[3] = {0};
+      for (int k = 0; k < 3; k++) point[k] = h->points[3 * i + (size_t)k] + t->centre[k];
+      const double away = qmat_shape_distance(&t->shape, point, weights);
+      if (!(away > best) || (isfinite(farthest) && away < worth * farthest)) continue;
+      for (int s = 0; s < t->shape.count; s++)
+        for (int k = 0; k < 3; k++) medial[k] += weights[s] * t->spheres[4 * (size_t)t->ids[s] + (size_t)k];
+      qmat_subtract(point, medial, way);
+      qmat_normalize(way);
+      bool served = false;
+      for (size_t j = before; j < h->plane_count && !served; j++) served = qmat_dot(way, &h->normals[3 * j]) > apart;
+      if (served) continue;
+      best = away;
+      memcpy(normal, way, sizeof normal);
+    }
+    if (best <= error) break;
+    if (!isfinite(farthest)) farthest = best;
+    add_plane(h, t, normal);
+  }
+  return h->plane_count - before;
+}
+
+/* Moves the vertices to their places, and out by what rounding leaves them inside of the shape. */
+static qmat_status finish(qmat_tangent_hull *h, const target *t) {
+  size_t count;
+  const qmat_status status = qmat_convex_hull(h->points, h->point_count, h->triangles, &count);
+  if (status != QMAT_OK) return status;
+  double factor = 1;
+  for (size_t i = 0; i < count; i++) {
+    const double *p = &h->points[3 * (size_t)h->triangles[3 * i]];
+    double u[3], v[3], normal[3];
+    qmat_subtract(&h->points[3 * (size_t)h->triangles[3 * i + 1]], p, u);
+    qmat_subtract(&h->points[3 * (size_t)h->triangles[3 * i + 2]], p, v);
+    qmat_cross(u, v, normal);
+    qmat_normalize(normal);
+    factor = fmax(factor, reach(t, normal) / qmat_dot(normal, p));
+  }
+  if (!(factor < 1.001)) return QMAT_ERROR_GEOMETRY;
+  for (size_t i = 0; i < 3 * h->point_count; i++) h->points[i] = t->centre[i % 3] + factor * (1 + 1e-12) * h->points[i];
+  return QMAT_OK;
+}
+
+qmat_status qmat_tangent_hull_fit(qmat_tangent_hull *hull, const double *spheres, const uint32_t ids[3], double error) {
+  target t = {.spheres = spheres, .ids = ids};
+  const size_t most_planes = hull->most / 2 + 2; /* they meet in 2 planes - 4 vertices at most */
+  qmat_shape_prepare(&t.shape, spheres, ids);
+  for (int s = 0; s < t.shape.count; s++)
+    for (int k = 0; k < 3; k++) t.centre[k] += spheres[4 * (size_t)ids[s] + (size_t)k] / t.shape.count;
+  start(hull, &t);
+  qmat_status status = meet(hull);
+  while (status == QMAT_OK && refine(hull, &t, error, most_planes) > 0) status = meet(hull);
+  return status == QMAT_OK ? finish(hull, &t) : status;
+}
