@@ -123,12 +123,12 @@ code=$?
 holds "exit code 3 after a signal, not $code" test $code -eq 3
 holds "nothing goes on after a signal" test ! -e rest/box9.glb
 cp models/aaa_torus.off several/c_torus.off
-"$qmat" batch pages.yaml --inputs 'several/*.off' --out half --pages --jobs 1 --set picture.width=4000 \
-  --set picture.height=4000 --no-cache >out.txt 2>err.txt &
+"$qmat" batch pages.yaml --inputs 'several/*.off' --out half --pages --jobs 1 --set picture.width=2000 \
+  --set picture.height=1000 --no-cache >out.txt 2>err.txt &
 running=$!
 child_of $running
-for i in $(seq 100); do
-  [ -e half/b.html ] && break
+for i in $(seq 600); do
+  grep -q '^.2/4.' err.txt && break
   sleep 0.1
 done
 kill -TERM $running
