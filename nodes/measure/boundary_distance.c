@@ -26,10 +26,8 @@ static const double least_tolerance = 1e-5;
  * rounding. */
 static const double certain_skin = 1e-6;
 
-/* Cells of space are searched instead of features where fewer than this share of the samples lie on the boundary, or
- * where there are more features than that. */
-static const double least_exposed = 0.05;
-enum { MANY_FEATURES = 10000 };
+/* Cells of space are searched instead of features where there are more features than this: most of these are buried. */
+enum { MANY_FEATURES = 20000 };
 
 /* After so many queries pieces are not split any more. F is slow where hundreds of primitives contain a point. */
 enum { MOST_QUERIES = 1 << 21, MOST_QUERIES_OF_MANY = 1 << 17 };
@@ -295,11 +293,10 @@ static void set_targets(search *s, double tolerance, const qmat_boundary_distanc
   s->smallest = smallest_share * qmat_smaller(tolerated(s->lo[0], s->epsilon, tolerance), s->target[0] - s->lo[0]);
 }
 
-static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, size_t sample_count,
-                                 qmat_boundary_distance *result) {
+static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, qmat_boundary_distance *result) {
   const size_t count = qmat_boundary_features_count(s->features);
-  const size_t most_queries = count > MANY_FEATURES ? MOST_QUERIES_OF_MANY : MOST_QUERIES;
-  const bool in_space = count > MANY_FEATURES || (double)result->sample_count < least_exposed * (double)sample_count;
+  const bool in_space = count > MANY_FEATURES;
+  const size_t most_queries = in_space ? MOST_QUERIES_OF_MANY : MOST_QUERIES;
   piece_list lists[2] = {{0}, {0}};
   finding *findings = NULL;
   size_t capacity = 0;
@@ -345,7 +342,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
               .epsilon = epsilon,
               .skin = outside ? certain_skin : QMAT_BOUNDARY_SKIN,
               .wanted = outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
-  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, sample_count, result);
+  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, result);
   result->either_side = raised(result->either_side);
   result->outside = raised(result->outside);
   return status;
