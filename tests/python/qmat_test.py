@@ -240,7 +240,7 @@ class Mistakes(InAFolder):
         self.assertIn(str(raised.exception), said)
         self.assertEqual((raised.exception.line, raised.exception.file), (3, "bad.yaml"))
         self.assertEqual(qmat.Graph("qmat_plus").ports, qmat.Graph().ports)
-        self.assertIn("colliders", qmat.Graph("colliders").outputs)
+        self.assertIn("colliders.colliders", qmat.Graph("colliders").ports)
         with self.assertRaises(qmat.Error):
             qmat.Graph("qmat_plu")
         with self.assertRaises(qmat.Error) as raised:
