@@ -30,6 +30,13 @@ qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *m
 qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat_medial *medial, uint32_t **corners,
                                                size_t *count);
 
+/* Finds the edges that no triangle has and that are on a loop: the components stay when one of them is removed.
+ * `*edges`:
+ * `*count` numbers of edges, the shortest first, in the context's arena. QMAT_ERROR_MEMORY. Linear but for a sort and
+ * for finding the edges of triangles. */
+qmat_status qmat_topology_find_loop_edges(qmat_context *context, const qmat_medial *medial, uint32_t **edges,
+                                          size_t *count);
+
 /* Computes the topology of the solid within a closed and oriented surface. Outward shells bound its components, inward
  * shells its voids, and the genus of either counts its loops. Shells that do not separate inside from outside
  * (contained in another, or without volume) are left out; shells that cross count separately. Not known for an open

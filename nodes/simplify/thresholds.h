@@ -27,7 +27,7 @@ enum {
   QMAT_MOST_JOINT_REFITS = 3,  /* the same for joint refits */
   QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
   QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
-  QMAT_MOST_WALLS = 12,        /* tried per void */
+  QMAT_MOST_WALLS = 12,        /* tried per void; of edges, per loop */
   QMAT_MOST_FITS = 6           /* of a neighbourhood, each with the newest failure as a target */
 };
 

@@ -151,15 +151,6 @@ qmat_status qmat_simplification_open_voids(const qmat_simplification *s, qmat_si
 
 /* ---- loops ---- */
 
-static bool has_triangle(const qmat_medial *unit, const uint32_t edge[2]) {
-  for (size_t i = 0; i < unit->triangle_count; i++) {
-    const uint32_t *row = &unit->triangles[3 * i];
-    if ((row[0] == edge[0] && (row[1] == edge[1] || row[2] == edge[1])) || (row[1] == edge[0] && row[2] == edge[1]))
-      return true;
-  }
-  return false;
-}
-
 /* Fills three edges without a slab that form a loop. */
 static qmat_status fill_loop(const qmat_simplification *s, const qmat_topology *before, qmat_simplified *result,
                              bool *closed) {
@@ -182,21 +173,28 @@ static qmat_status fill_loop(const qmat_simplification *s, const qmat_topology *
   return status;
 }
 
-/* Removes an edge without a slab that is part of a loop, or with `share` > 0 this part of it, at either end: then a new
- * sphere is the end of the other part. */
-static qmat_status cut_loop(const qmat_simplification *s, const qmat_topology *before, double share,
-                            qmat_simplified *result, bool *closed) {
+/* Removes an edge without a slab that is part of a loop, or a part of it at either end: then a new sphere is the end of
+ * the other part. The shortest edges are tried. */
+static qmat_status cut_loop(const qmat_simplification *s, const qmat_topology *before, qmat_simplified *result,
+                            bool *closed) {
   const qmat_medial *unit = result->medial;
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < 2 * unit->edge_count && status == QMAT_OK && !*closed; i++) {
-    const uint32_t *row = &unit->edges[i - i % 2], edge[2] = {row[0], row[1]}, kept = row[i % 2], cut = row[1 - i % 2];
-    if ((share == 0 && i % 2 == 1) || has_triangle(unit, edge)) continue;
-    double sphere[4];
-    for (size_t k = 0; k < 4; k++)
-      sphere[k] = share * unit->spheres[4 * (size_t)kept + k] + (1 - share) * unit->spheres[4 * (size_t)cut + k];
-    const edit part = {
-        .edge = edge, .new_edge = {kept, (uint32_t)unit->sphere_count}, .new_edge_count = 1, .sphere = sphere};
-    status = try_edit(s, before, share > 0 ? &part : &(edit){.edge = edge}, result, closed);
+  uint32_t *edges;
+  size_t count;
+  qmat_status status = qmat_topology_find_loop_edges(s->context, unit, &edges, &count);
+  if (count > QMAT_MOST_WALLS) count = QMAT_MOST_WALLS;
+  for (size_t n = 0; n < SHARES && allows(s, result, shares[n]); n++) {
+    const size_t ends = shares[n] > 0 ? 2 : 1;
+    for (size_t i = 0; i < ends * count && status == QMAT_OK && !*closed; i++) {
+      const uint32_t *row = &unit->edges[2 * (size_t)edges[i / ends]], edge[2] = {row[0], row[1]};
+      const uint32_t kept = row[i % ends], cut = row[1 - i % ends];
+      double sphere[4];
+      for (size_t k = 0; k < 4; k++)
+        sphere[k] =
+            shares[n] * unit->spheres[4 * (size_t)kept + k] + (1 - shares[n]) * unit->spheres[4 * (size_t)cut + k];
+      const edit part = {
+          .edge = edge, .new_edge = {kept, (uint32_t)unit->sphere_count}, .new_edge_count = 1, .sphere = sphere};
+      status = try_edit(s, before, shares[n] > 0 ? &part : &(edit){.edge = edge}, result, closed);
+    }
   }
   return status;
 }
@@ -209,8 +207,7 @@ qmat_status qmat_simplification_close_loops(const qmat_simplification *s, qmat_s
     qmat_status status = qmat_topology_of_medial(s->context, result->medial, &topology);
     if (status != QMAT_OK || !topology.known || topology.loops <= s->solid.loops) return status;
     status = fill_loop(s, &topology, result, &closed);
-    for (size_t t = 0; t < SHARES && status == QMAT_OK && !closed && allows(s, result, shares[t]); t++)
-      status = cut_loop(s, &topology, shares[t], result, &closed);
+    if (status == QMAT_OK && !closed) status = cut_loop(s, &topology, result, &closed);
     if (status != QMAT_OK || !closed) return status;
   }
 }

@@ -110,6 +110,55 @@ static void test_empty_triangles_by_hand(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Against the components without each edge. The spheres are at their numbers on a line. */
+static void test_loop_edges_of_random_complexes_leave_the_components(void **state) {
+  (void)state;
+  enum { SPHERES = 14, EDGES = 15, TRIANGLES = 3 };
+  random_numbers random = {.seed = 7};
+  size_t found = 0;
+  for (int round = 0; round < 200; round++) {
+    uint32_t edges[2 * EDGES], triangles[3 * TRIANGLES];
+    for (size_t i = 0; i < COUNT(edges); i++) edges[i] = (uint32_t)random_index(&random, SPHERES);
+    for (size_t i = 0; i < COUNT(triangles); i++) triangles[i] = (uint32_t)random_index(&random, SPHERES);
+    qmat_medial *medial = complex_of(SPHERES, edges, EDGES, triangles, TRIANGLES);
+    const size_t components = topology_of(medial).components;
+    qmat_context context = {0};
+    uint32_t *loop_edges, before = 0;
+    size_t count, expected = 0;
+    assert_int_equal(qmat_topology_find_loop_edges(&context, medial, &loop_edges, &count), QMAT_OK);
+    for (uint32_t e = 0; e < medial->edge_count; e++) {
+      const uint32_t *row = &medial->edges[2 * (size_t)e];
+      bool in_triangle = false, in_list = false;
+      for (size_t t = 0; t < medial->triangle_count; t++) {
+        int shared = 0;
+        for (size_t k = 0; k < 3; k++)
+          shared += medial->triangles[3 * t + k] == row[0] || medial->triangles[3 * t + k] == row[1];
+        in_triangle |= shared == 2;
+      }
+      uint32_t rest[2 * (EDGES + 3 * TRIANGLES)];
+      memcpy(rest, medial->edges, 2 * e * sizeof *rest);
+      memcpy(rest + 2 * e, row + 2, 2 * (medial->edge_count - e - 1) * sizeof *rest);
+      qmat_medial *without =
+          complex_of(SPHERES, rest, medial->edge_count - 1, medial->triangles, medial->triangle_count);
+      const bool is_loop_edge = !in_triangle && topology_of(without).components == components;
+      for (size_t i = 0; i < count; i++) in_list |= loop_edges[i] == e;
+      assert_int_equal(in_list, is_loop_edge);
+      expected += is_loop_edge;
+      qmat_value_release(&without->base);
+    }
+    assert_int_equal(count, expected);
+    for (size_t i = 0; i < count; i++) { /* the shortest first */
+      const uint32_t *row = &medial->edges[2 * (size_t)loop_edges[i]];
+      assert_true(row[1] - row[0] >= before);
+      before = row[1] - row[0];
+    }
+    found += count;
+    qmat_value_release(&medial->base);
+    qmat_context_uninit(&context);
+  }
+  assert_true(found > 200);
+}
+
 static void test_cavities_that_share_a_side_are_two(void **state) {
   (void)state;
   /* Tetrahedra over and under the triangle 0 1 2: their edges in common lie on three triangles. */
@@ -281,6 +330,7 @@ int main(void) {
       cmocka_unit_test(test_small_complexes_by_hand),
       cmocka_unit_test(test_walls_of_a_void_by_hand),
       cmocka_unit_test(test_empty_triangles_by_hand),
+      cmocka_unit_test(test_loop_edges_of_random_complexes_leave_the_components),
       cmocka_unit_test(test_cavities_that_share_a_side_are_two),
       cmocka_unit_test(test_surfaces_without_a_side_are_told_over_z2),
       cmocka_unit_test(test_random_complexes_have_the_rank_of_full_elimination),
