@@ -482,8 +482,7 @@ static const qmat_param params[] = {
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
     QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
-             "often where that makes "
-             "more than 200,000 triangles to decimate"),
+             "often where that makes more than 200,000 triangles to decimate"),
     QMAT_LENGTH(
         medial_skin_params, error, 2e-3, 0, 0.1,
         "envelope: the distance from the envelope that the mesh may have; 0: no decimation, and nothing is measured"),
