@@ -141,14 +141,16 @@ holds "parts: the stated errors hold" qmat info parts.glb --against parts.off
 
 # ---- Bad input ----
 
-# refused WHAT FILE [OPTION...]: exit code 1, no output, and one line on stderr that names the file or the node.
+# refused WHAT FILE [OPTION...]: exit code 1, no output, and one line on stderr, warnings aside, that names the file or the
+# node.
 refused() {
   what=$1
   file=$2
   shift 2
   rm -f out.ma out.glb
-  qmat mat "$file" -o out.ma -o out.glb "$@" >said.txt 2>complaints.txt
+  qmat mat "$file" -o out.ma -o out.glb "$@" >said.txt 2>all_complaints.txt
   code=$?
+  grep -v '^qmat: warning: ' all_complaints.txt >complaints.txt
   if [ $code -eq 1 ] && [ "$(wc -l <complaints.txt)" -eq 1 ] && grep -qF -e "$(basename "$file")" -e "node '" complaints.txt &&
     [ -z "$(find . -maxdepth 1 -name '*out.*')" ]; then
     pass "refused: $what: $(cut -c 1-150 complaints.txt)"
