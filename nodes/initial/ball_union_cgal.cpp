@@ -41,6 +41,7 @@ constexpr size_t kSimplicesPerReport = 16384;
 /* The corners of a box around all balls, without weight: the triangulation is three-dimensional, and no simplex of
  * balls is on its hull. */
 constexpr double kBoxReach = 8;
+constexpr size_t kBoxCorners = 8;
 
 struct Corner {
   std::array<uint32_t, 3> balls;
@@ -150,8 +151,13 @@ qmat_status find_edges(qmat_context *context, const Triangulation &t, size_t cou
                        std::vector<uint8_t> &isolated) {
   const auto compare = t.geom_traits().compare_weighted_squared_radius_3_object();
   size_t done = 0;
-  for (auto v = t.finite_vertices_begin(); v != t.finite_vertices_end(); v++)
+  for (auto v = t.finite_vertices_begin(); v != t.finite_vertices_end(); v++) {
+    if (done++ % kSimplicesPerReport == 0) {
+      const qmat_status status = qmat_progress(context, 0, 0, "balls");
+      if (status != QMAT_OK) return status;
+    }
     if (v->info().value < count && t.is_Gabriel(v)) isolated[v->info().value] = 1;
+  }
   for (auto e = t.finite_edges_begin(); e != t.finite_edges_end(); e++) {
     if (done++ % kSimplicesPerReport == 0) {
       const qmat_status status = qmat_progress(context, 0, 0, "balls");
@@ -185,10 +191,11 @@ qmat_status collect(qmat_context *context, qmat_ball_union &u, qmat_ball_union_p
   qmat_status status = find_cells(context, u.triangulation);
   if (status == QMAT_OK) status = find_corners(context, u.triangulation, corners, triangles);
   if (status == QMAT_OK) status = find_edges(context, u.triangulation, u.count, edges, isolated);
+  if (status == QMAT_OK)
+    status = sort_in_groups(
+        context, corners, u.count + kBoxCorners, [](const Corner &corner) { return corner.balls[0]; },
+        [](const Corner &a, const Corner &b) { return a.balls != b.balls ? a.balls < b.balls : a.point < b.point; });
   if (status != QMAT_OK) return status;
-  std::sort(corners.begin(), corners.end(), [](const Corner &a, const Corner &b) {
-    return a.balls != b.balls ? a.balls < b.balls : a.point < b.point;
-  });
   std::sort(triangles.begin(), triangles.end());
   std::sort(edges.begin(), edges.end());
   parts->corner_count = corners.size();
@@ -255,17 +262,17 @@ qmat_status qmat_ball_union_new(qmat_context *context, const double *balls, size
                                 qmat_ball_union_parts *parts) {
   *balls_union = nullptr;
   *parts = {};
-  if (count >= UINT32_MAX - 8) return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu balls are too many", count);
+  if (count >= UINT32_MAX - kBoxCorners) return qmat_fail(context, QMAT_ERROR_MEMORY, "%zu balls are too many", count);
   const qmat_status status = guarded(context, [&]() {
     *balls_union = new qmat_ball_union;
     (*balls_union)->count = count;
     std::vector<Ball> sites;
-    sites.reserve(count + 8);
+    sites.reserve(count + kBoxCorners);
     for (size_t i = 0; i < count; i++) {
       const double *s = balls + 4 * i;
       sites.emplace_back(Point(s[0], s[1], s[2]), s[3] * s[3]);
     }
-    for (int i = 0; i < 8; i++)
+    for (size_t i = 0; i < kBoxCorners; i++)
       sites.emplace_back(
           Point(i & 1 ? kBoxReach : -kBoxReach, i & 2 ? kBoxReach : -kBoxReach, i & 4 ? kBoxReach : -kBoxReach), 0);
     const qmat_status inserted = insert_spheres(context, sites, (*balls_union)->triangulation);

@@ -27,33 +27,49 @@ using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_
 template <size_t N>
 using Simplices = std::vector<std::array<uint32_t, N>>;
 
+constexpr size_t kSimplicesPerReport = 65536;
+
+/* Copies the simplices, whose ids ascend, in lexicographic order. */
 template <size_t N>
-uint32_t *copy_sorted(qmat_context *context, Simplices<N> &simplices) {
-  for (auto &ids : simplices) std::sort(ids.begin(), ids.end());
-  std::sort(simplices.begin(), simplices.end());
-  auto *copy = static_cast<uint32_t *>(qmat_arena_alloc(&context->arena, simplices.size(), N * sizeof(uint32_t)));
-  if (copy && !simplices.empty()) std::memcpy(copy, simplices.data(), simplices.size() * N * sizeof(uint32_t));
-  return copy;
+qmat_status copy_sorted(qmat_context *context, Simplices<N> &simplices, size_t count, uint32_t **copy) {
+  const qmat_status status = sort_in_groups(
+      context, simplices, count, [](const auto &ids) { return ids[0]; },
+      [](const auto &a, const auto &b) { return a < b; });
+  if (status != QMAT_OK) return status;
+  *copy = static_cast<uint32_t *>(qmat_arena_alloc(&context->arena, simplices.size(), N * sizeof(uint32_t)));
+  if (!*copy) return qmat_fail_memory(context, "the power diagram");
+  if (!simplices.empty()) std::memcpy(*copy, simplices.data(), simplices.size() * N * sizeof(uint32_t));
+  return QMAT_OK;
 }
 
 qmat_status collect(qmat_context *context, const Triangulation &triangulation, size_t count,
                     qmat_regular_simplices *found) {
   Simplices<2> edges;
   Simplices<3> triangles;
-  for (auto edge = triangulation.finite_edges_begin(); edge != triangulation.finite_edges_end(); edge++)
-    edges.push_back({edge->first->vertex(edge->second)->info().value, edge->first->vertex(edge->third)->info().value});
+  qmat_status status;
+  size_t done = 0;
+  for (auto edge = triangulation.finite_edges_begin(); edge != triangulation.finite_edges_end(); edge++) {
+    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "edges")) != QMAT_OK) return status;
+    const uint32_t a = edge->first->vertex(edge->second)->info().value;
+    const uint32_t b = edge->first->vertex(edge->third)->info().value;
+    edges.push_back({std::min(a, b), std::max(a, b)});
+  }
   for (auto facet = triangulation.finite_facets_begin(); facet != triangulation.finite_facets_end(); facet++) {
+    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "facets")) != QMAT_OK)
+      return status;
     std::array<uint32_t, 3> ids;
     for (int k = 0, n = 0; k < 4; k++)
       if (k != facet->second) ids[static_cast<size_t>(n++)] = facet->first->vertex(k)->info().value;
+    std::sort(ids.begin(), ids.end());
     triangles.push_back(ids);
   }
-  found->edges = copy_sorted(context, edges);
-  found->triangles = copy_sorted(context, triangles);
-  found->hidden = static_cast<uint8_t *>(qmat_arena_alloc(&context->arena, count, 1));
-  if (!found->edges || !found->triangles || !found->hidden) return qmat_fail_memory(context, "the power diagram");
   found->edge_count = edges.size();
   found->triangle_count = triangles.size();
+  status = copy_sorted(context, edges, count, &found->edges);
+  if (status == QMAT_OK) status = copy_sorted(context, triangles, count, &found->triangles);
+  if (status != QMAT_OK) return status;
+  found->hidden = static_cast<uint8_t *>(qmat_arena_alloc(&context->arena, count, 1));
+  if (!found->hidden) return qmat_fail_memory(context, "the power diagram");
   std::memset(found->hidden, 1, count);
   for (auto vertex = triangulation.finite_vertices_begin(); vertex != triangulation.finite_vertices_end(); vertex++)
     found->hidden[vertex->info().value] = 0;

@@ -12,6 +12,7 @@
 #include <CGAL/property_map.h>
 #include <CGAL/spatial_sort.h>
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -57,6 +58,29 @@ qmat_status insert_spheres(qmat_context *context, const std::vector<typename Tri
     if (known == kNoSphereId || id < known || spheres[known].weight() != spheres[id].weight()) known = id;
     hint = vertex->cell();
   }
+  return QMAT_OK;
+}
+
+/* Sorts items in the order of `is_less`, whose first criterion is `first_of`: an id below `id_count`. The groups of
+ * equal ids are small, so that it can be cancelled at any time. */
+template <class Item, class FirstOf, class IsLess>
+qmat_status sort_in_groups(qmat_context *context, std::vector<Item> &items, size_t id_count, const FirstOf &first_of,
+                           const IsLess &is_less) {
+  constexpr size_t kGroupsPerReport = 8192;
+  std::vector<size_t> ends(id_count + 2);
+  for (const Item &item : items) ends[first_of(item) + 2]++;
+  for (size_t i = 0; i <= id_count; i++) ends[i + 1] += ends[i];
+  std::vector<Item> sorted(items.size());
+  for (const Item &item : items) sorted[ends[first_of(item) + 1]++] = item;
+  for (size_t i = 0; i < id_count; i++) {
+    if (i % kGroupsPerReport == 0) {
+      const qmat_status status = qmat_progress(context, i, id_count, "spheres");
+      if (status != QMAT_OK) return status;
+    }
+    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(ends[i]),
+              sorted.begin() + static_cast<std::ptrdiff_t>(ends[i + 1]), is_less);
+  }
+  items.swap(sorted);
   return QMAT_OK;
 }
 

@@ -4,7 +4,7 @@
 BEGIN {
   FS = "\t"
   width = 300; height = 220; left = 62; top = 62; gap_x = 24; gap_y = 70
-  split("#0072b2 #009e73 #e69f00 #d55e00 #cc79a7 #56b4e9", colours, " ")
+  split("#0072b2 #009e73 #e69f00 #d55e00 #cc79a7 #56b4e9 #777777", colours, " ")
   split("surface to envelope;envelope to surface", directions, ";")
   low_x = low_y = 1e9; high_x = high_y = 0
 }

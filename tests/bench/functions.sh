@@ -39,6 +39,117 @@ percent() {
   awk -v digits="$1" -v x="$2" 'BEGIN { printf "%.*f %%", digits, 100 * x }'
 }
 
+# name_of PATH: the name of a model.
+name_of() {
+  basename "${1%.*}"
+}
+
+# say WORDS...: progress, with the time.
+say() {
+  echo "$(date +%H:%M:%S) $*" >&2
+}
+
+# qmat_run ARGUMENT...: `qmat run` with the cache of this script.
+qmat_run() {
+  "$build/qmat" run "$@" --cache "$work/cache" --quiet --progress off
+}
+
+# note_used: sets used to the processor seconds of the commands so far.
+note_used() {
+  times >"$work/times"
+  used=$(awk 'NR == 2 { split($0, t, /[ms ]+/); print 60 * (t[1] + t[3]) + t[2] + t[4] }' "$work/times")
+}
+
+# timed COMMAND...: runs it and sets seconds to its processor seconds, those of all threads. Fails where it is ended since
+# it takes more than $limit of them (unset: it may take any).
+timed() {
+  note_used
+  before=$used
+  status=0
+  (ulimit -t "${limit:-unlimited}" && "$@") || status=$?
+  note_used
+  seconds=$(awk -v from="$before" -v to="$used" 'BEGIN { printf "%.2f", to - from }')
+  if [ "$status" -eq 0 ]; then return 0; fi
+  if [ "$status" -lt 128 ] || awk -v s="$seconds" -v l="${limit:-1e9}" 'BEGIN { exit (s >= 0.8 * l) }'; then
+    say "exit $status: $*"
+    exit 1
+  fi
+  return 1
+}
+
+# --- rows of figures: a row has a section, a model, a method and what row_keys names, with tabs between them ---
+
+row_keys="section model method seconds spheres surface_to_envelope envelope_to_surface components loops voids \
+components_of_solid loops_of_solid voids_of_solid"
+
+# note SECTION MODEL METHOD [late]: adds a row to the file $rows: seconds, and the rest from errors.json. A row of a method
+# that was ended has the limit and nothing else.
+note() {
+  if [ "${4:-}" = late ]; then
+    printf '%s\t%s\t%s\t>%s\t-\t-\t-\t-\t-\t-\t-\t-\t-\n' "$1" "$2" "$3" "$limit" >>"$rows"
+    say "$1: $2: $3: more than $limit s"
+    return
+  fi
+  printf '%s\t%s\t%s\t%s' "$1" "$2" "$3" "$seconds" >>"$rows"
+  for key in spheres surface_to_envelope_at_least envelope_to_surface_at_least components loops voids \
+    components_of_solid loops_of_solid voids_of_solid; do
+    printf '\t%s' "$(number $key "$work/errors.json")" >>"$rows"
+  done
+  echo >>"$rows"
+  say "$1: $2: $3: $seconds s, $(number spheres "$work/errors.json") spheres"
+}
+
+# rows_to_json: rows as JSON, an object a line. A method that was ended has "more_than_seconds" and nothing else.
+rows_to_json() {
+  awk -F '\t' -v keys="$row_keys" 'BEGIN { n = split(keys, key, " "); print "[" }
+    {
+      late = $4 ~ /^>/
+      line = ""
+      for (i = 1; i <= (late ? 4 : n); i++)
+        line = line sprintf("%s\"%s\": %s", i > 1 ? ", " : "", late && i == 4 ? "more_than_seconds" : key[i],
+          i < 4 ? "\"" $i "\"" : late ? substr($i, 2) : $i + 0)
+      printf "%s  {%s}", (NR > 1 ? ",\n" : ""), line
+    }
+    END { print "\n]" }'
+}
+
+# json_to_rows: the reverse.
+json_to_rows() {
+  awk '/^  {/ {
+      gsub(/^  {|},?$/, "")
+      late = /"more_than_seconds"/
+      n = split($0, part, /(^|, )"[a-z_]+": /)
+      line = ""
+      for (i = 2; i <= n; i++) {
+        gsub(/"/, "", part[i])
+        line = line (i > 2 ? "\t" : "") (late && i == 5 ? ">" : "") part[i]
+      }
+      print line (late ? "\t-\t-\t-\t-\t-\t-\t-\t-\t-" : "")
+    }'
+}
+
+# markdown_rows SECTION: its rows as lines of a table: model, method, spheres, both errors, Betti numbers, seconds.
+markdown_columns="| model | method | spheres | surface to envelope | envelope to surface | components, loops, voids | s |"
+markdown_rows() {
+  echo "$markdown_columns"
+  echo "| --- | --- | ---: | ---: | ---: | ---: | ---: |"
+  awk -F '\t' -v s="$1" '$1 != s { next }
+    $4 ~ /^>/ { printf "| %s | %s | | | | | more than %s |\n", $2, $3, substr($4, 2); next }
+    { printf "| %s | %s | %d | %.2f %% | %.2f %% | %d, %d, %d | %.2f |\n", $2, $3, $5, 100 * $6, 100 * $7, $8, $9, $10, $4 }'
+}
+
+started=$(date +%s)
+
+# made_by COMMAND: how, when and where a page was made.
+made_by() {
+  note_used
+  echo "Made by \`$1\` on $(date -u +%Y-%m-%d), on a machine with $(nproc) processors" \
+    "($(awk -F ': ' '/^model name/ { print $2; exit }' /proc/cpuinfo), $(awk '/^MemTotal/ { printf "%.0f GB", $2 / 1e6 }' /proc/meminfo))" \
+    "with a load of $(cut -d ' ' -f 1 /proc/loadavg). It took $(awk -v s="$used" 'BEGIN { printf "%.0f", s / 60 }') minutes of" \
+    "processor time, $((($(date +%s) - started + 59) / 60)) by the clock. The machine may be shared, so all seconds are" \
+    "processor seconds, summed over threads."
+}
+
 if [ -n "${epsilon:-}" ] && [ "${1:-}" = --epsilon ]; then
   epsilon=$2
   shift 2

@@ -12,21 +12,11 @@ epsilon=1%
 default_models="ant chair plane"
 . "$(dirname "$0")/functions.sh"
 
-# note_used: sets used to the processor seconds of the commands so far.
-note_used() {
-  times >"$work/times"
-  used=$(awk 'NR == 2 { split($0, t, /[ms ]+/); print 60 * (t[1] + t[3]) + t[2] + t[4] }' "$work/times")
-}
-
 # simplify MODEL COST ERROR RULE: sets initial, spheres and seconds.
 simplify() {
-  note_used
-  before=$used
-  "$build/qmat" run "$top/graphs/qmat_plus.yaml" --to simple --set "model=$1" --set "epsilon=$epsilon" \
+  timed "$build/qmat" run "$top/graphs/qmat_plus.yaml" --to simple --set "model=$1" --set "epsilon=$epsilon" \
     --set "simple.cost=$2" --set "simple.error=$3" --set "simple.on_exceed=$4" --set "simple.finest=$epsilon" \
     --cache "$work/cache" --force=simple --report "$work/run.json" --quiet --progress off
-  note_used
-  seconds=$(awk -v from="$before" -v to="$used" 'BEGIN { print to - from }')
   initial=$(number initial_spheres "$work/run.json")
   spheres=$(number spheres "$work/run.json")
 }

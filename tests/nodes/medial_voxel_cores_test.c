@@ -233,7 +233,7 @@ static void test_progress_function_cancels(void **state) {
 static void test_it_can_be_cancelled_within_half_a_second(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_seal(shape_torus(2, 0.6, 48, 24));
-  pipeline_must_stop_within(0.5, "medial.voxel_cores", "depth=8", (const qmat_value *[]){&mesh->base});
+  pipeline_must_stop_within(0.5, "medial.voxel_cores", "depth=9", (const qmat_value *[]){&mesh->base});
   qmat_value_release(&mesh->base);
 }
 
