@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Draws error against vertices, both logarithmic, as an SVG. Input lines have model, method, vertices, surface to
-# envelope and envelope to surface, separated by tabs. Each model is a column, each direction a row.
+# envelope and envelope to surface, separated by tabs. Each model is a column, each direction a row. With -v order="A;B"
+# these methods have the first colours, whether they have points or not.
 BEGIN {
   FS = "\t"
   width = 300; height = 220; left = 62; top = 62; gap_x = 24; gap_y = 70
   split("#0072b2 #009e73 #e69f00 #d55e00 #cc79a7 #56b4e9 #777777", colours, " ")
   split("surface to envelope;envelope to surface", directions, ";")
+  methods = split(order, names, ";")
+  for (m = 1; m <= methods; m++) method[names[m]] = m
   low_x = low_y = 1e9; high_x = high_y = 0
 }
 {

@@ -163,9 +163,13 @@ done
 
 # --- the page ---
 
-# The rows of a model follow each other.
-awk -F '\t' '!($2 in at) { name[++n] = $2; at[$2] = 1 } { of[$2] = of[$2] $0 "\n" }
-  END { for (i = 1; i <= n; i++) printf "%s", of[name[i]] }' "$rows" >"$work/ordered"
+# The rows of a model follow each other, in the order of the methods.
+order="ours;Q-MAT;PMAT;HEM;PC;SAT;VC"
+awk -F '\t' -v order="$order" '!($2 in at) { name[++n] = $2; at[$2] = 1 } { of[$2, $3] = of[$2, $3] $0 "\n" }
+  END {
+    methods = split(order, method, ";")
+    for (i = 1; i <= n; i++) for (k = 1; k <= methods; k++) printf "%s", of[name[i], method[k]]
+  }' "$rows" >"$work/ordered"
 rows=$work/ordered
 
 # Groups of four models share a picture. A logarithmic axis has no zero.
@@ -188,7 +192,7 @@ groups=$(awk -F '\t' '$1 > most { most = $1 } END { print most + 0 }' "$work/poi
 group=0
 while [ $((group += 1)) -le "$groups" ]; do
   awk -F '\t' -v g=$group '$1 == g' "$work/points" | cut -f 2- |
-    awk -f "$top/tests/bench/curve.awk" >"$out/curves_$group.svg"
+    awk -v order="$order" -f "$top/tests/bench/curve.awk" >"$out/curves_$group.svg"
 done
 
 {
