@@ -43,13 +43,15 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 6,
+    .version = 7,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
         "Otherwise it is the incentre, with the distance to the surface as radius; this completes parts that are too "
         "thin for circumcentres. Medial edges are dual to the facets between such tetrahedra, and medial slabs to the "
         "Delaunay edges that they surround.\n\n"
+        "A sliver on the surface can be on the wrong side of it, which makes a loop or a void. Where incentres is all, "
+        "the tetrahedra nearest to the surface change sides until the loops and voids are those of the solid.\n\n"
         "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
         "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
         "where one surface component contains several.\n\n"

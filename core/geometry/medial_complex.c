@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
+
 static qmat_status rows_init(qmat_context *context, qmat_rows *rows, const uint32_t *simplices, size_t count,
                              size_t corners, size_t vertex_count) {
   rows->starts = qmat_calloc(vertex_count + 1, sizeof *rows->starts);
@@ -92,11 +94,14 @@ qmat_status qmat_complex_init(qmat_context *context, qmat_complex *complex, cons
   complex->triangle_alive = qmat_alloc(triangles, 1);
   complex->mark_of_vertex = qmat_calloc(vertices, sizeof(uint32_t));
   complex->edge_to_vertex = qmat_alloc(vertices, sizeof(uint32_t));
+  complex->part_of_vertex = qmat_alloc(vertices, sizeof(uint32_t));
+  complex->part_has_apex = qmat_alloc(vertices, sizeof(uint8_t));
   complex->mark_of_edge = qmat_calloc(edges, sizeof(uint32_t));
   complex->triangle_at_edge = qmat_alloc(edges, sizeof(uint32_t));
   if (!complex->spheres || !complex->edges || !complex->edge_triangles || !complex->triangles ||
       !complex->triangle_edges || !complex->vertex_alive || !complex->edge_alive || !complex->triangle_alive ||
-      !complex->mark_of_vertex || !complex->edge_to_vertex || !complex->mark_of_edge || !complex->triangle_at_edge)
+      !complex->mark_of_vertex || !complex->edge_to_vertex || !complex->part_of_vertex || !complex->part_has_apex ||
+      !complex->mark_of_edge || !complex->triangle_at_edge)
     return qmat_fail_memory(context, "the medial complex");
   memcpy(complex->spheres, spheres ? spheres : medial->spheres, 4 * vertices * sizeof(double));
   if (edges) memcpy(complex->edges, medial->edges, 2 * edges * sizeof(uint32_t));
@@ -122,6 +127,8 @@ void qmat_complex_uninit(qmat_complex *complex) {
   qmat_free(complex->triangle_alive);
   qmat_free(complex->mark_of_vertex);
   qmat_free(complex->edge_to_vertex);
+  qmat_free(complex->part_of_vertex);
+  qmat_free(complex->part_has_apex);
   qmat_free(complex->mark_of_edge);
   qmat_free(complex->triangle_at_edge);
   rows_uninit(&complex->vertex_edges);
@@ -271,6 +278,32 @@ qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *compl
                                       qmat_collapse *collapse) {
   collapse->edge = QMAT_NONE;
   return preview_stars(context, complex, vertex, QMAT_NONE, collapse);
+}
+
+bool qmat_collapse_keeps_homotopy(qmat_complex *complex, const qmat_collapse *c) {
+  uint32_t *parts = complex->part_of_vertex;
+  uint8_t *has_apex = complex->part_has_apex;
+  for (size_t n = 0; n < c->neighbour_count; n++) {
+    parts[c->neighbours[n]] = c->neighbours[n];
+    has_apex[c->neighbours[n]] = 0;
+  }
+  for (size_t t = 0; t < c->triangle_count; t++) {
+    const bool is_shared = c->kept_triangles[t] != QMAT_NONE && c->removed_triangles[t] != QMAT_NONE;
+    if (is_shared && !qmat_sets_join(parts, c->triangle_pairs[2 * t], c->triangle_pairs[2 * t + 1])) return false;
+  }
+  for (size_t i = 0; i < c->vanishing_count; i++) {
+    const uint32_t *corners = &complex->triangles[3 * (size_t)c->vanishing[i]];
+    size_t k = 0;
+    while (corners[k] == c->kept || corners[k] == c->removed) k++;
+    const uint32_t part = qmat_set_leader(parts, corners[k]);
+    if (has_apex[part]) return false;
+    has_apex[part] = 1;
+  }
+  for (size_t n = 0; n < c->neighbour_count; n++) {
+    const bool is_shared = c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
+    if (is_shared && !has_apex[qmat_set_leader(parts, c->neighbours[n])]) return false;
+  }
+  return true;
 }
 
 /* Removes a triangle everywhere but in the rows of `kept` and `removed`, which are rebuilt anyway. */

@@ -30,6 +30,9 @@ typedef struct qmat_complex {
   uint32_t *mark_of_vertex, *edge_to_vertex; /* per vertex */
   uint32_t *mark_of_edge, *triangle_at_edge; /* per edge */
   uint32_t stamp;
+  /* Scratch of qmat_collapse_keeps_homotopy, per vertex. */
+  uint32_t *part_of_vertex;
+  uint8_t *part_has_apex;
 } qmat_complex;
 
 /* The star of the merged vertex after the collapse of an edge: vertex `kept` stays, `removed` goes. For a vertex that
@@ -63,6 +66,12 @@ void qmat_collapse_uninit(qmat_collapse *collapse);
 /* The same for moving a vertex, which changes no simplex: its present star. */
 qmat_status qmat_complex_preview_move(qmat_context *context, qmat_complex *complex, uint32_t vertex,
                                       qmat_collapse *collapse);
+
+/* Whether the newest preview of an edge keeps the homotopy type of the complex. Contracting the edge identifies what
+ * the links of both ends share. That is the same as adding what the edge spans with it, and contracting the edge under
+ * the link condition (Dey et al. 1999). The addition keeps the homotopy type if every connected part of what is shared
+ * is a tree with one vertex of the edge's own link. Cost: linear in the star. */
+bool qmat_collapse_keeps_homotopy(qmat_complex *complex, const qmat_collapse *collapse);
 
 /* Performs the newest preview; `sphere` (4 doubles) is the merged sphere. Where both vertices had an edge to the same
  * neighbour, the edge of `kept` survives. */

@@ -25,6 +25,12 @@ static void incentre(const double *const p[4], double centre[3]) {
   for (int i = 0; i < 3; i++) centre[i] = total > 0 ? sum[i] / total : 0.25 * (p[0][i] + p[1][i] + p[2][i] + p[3][i]);
 }
 
+void qmat_medial_vertex_incentre(const qmat_dual_complex *d, size_t cell, double centre[3]) {
+  const double *p[4];
+  for (size_t k = 0; k < 4; k++) p[k] = &d->points[3 * (size_t)d->cells.corners[4 * cell + k]];
+  incentre(p, centre);
+}
+
 /* Points closer to the surface than this (unit frame) do not count as inside. Coplanar samples are coplanar only up to
  * rounding and make flat tetrahedra on the surface, whose side would depend on chance. */
 static const double least_depth = 1e-8;

@@ -14,6 +14,7 @@
 #include "nodes/initial/edge_halving.h"
 #include "nodes/initial/medial_vertices.h"
 #include "nodes/initial/sample_thinning.h"
+#include "nodes/initial/tetrahedra_topology.h"
 
 /* --- connectivity ------------------------------------------------------------------------------------------------ */
 
@@ -246,6 +247,7 @@ static qmat_status triangulate(qmat_dual_complex *d) {
 typedef struct {
   size_t by_kind[3]; /* tetrahedra */
   size_t refined;    /* spheres that halve an edge */
+  qmat_mended_tetrahedra mended;
   qmat_dual_component_counts joined;
 } dual_counts;
 
@@ -258,6 +260,8 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
       {"tetrahedra", d->cells.count},
       {"circumcentres", made->by_kind[QMAT_CELL_CIRCUMCENTRE]},
       {"incentres", made->by_kind[QMAT_CELL_INCENTRE]},
+      {"kept_for_topology", made->mended.kept},
+      {"dropped_for_topology", made->mended.dropped},
       {"spheres", medial->sphere_count},
       {"edges", medial->edge_count},
       {"triangles", medial->triangle_count},
@@ -292,6 +296,7 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
                                                  d->params->thinning_tolerance, reaches, representatives);
   if (status == QMAT_OK) status = triangulate(d);
   if (status == QMAT_OK) status = qmat_medial_vertices_select(d);
+  if (status == QMAT_OK && d->params->incentres == QMAT_INCENTRES_ALL) status = qmat_tetrahedra_mend(d, &made->mended);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < d->cells.count; i++) made->by_kind[d->kinds[i]]++;
   if ((status = qmat_medial_vertices_number(d)) != QMAT_OK) return status;

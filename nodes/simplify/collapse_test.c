@@ -41,17 +41,10 @@ bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, q
   return true;
 }
 
-/* Neighbours shared by both ends span a slab with the edge, and the ends span no slab with a common edge. */
-bool qmat_decimation_keeps_topology(const qmat_decimation *s) {
+bool qmat_decimation_keeps_topology(qmat_decimation *s) {
   const qmat_collapse *c = &s->collapse;
   if (qmat_decimation_is_of_sheet(s, c->kept) != qmat_decimation_is_of_sheet(s, c->removed)) return false;
-  if (s->rules.topology != QMAT_TOPOLOGY_PRESERVE) return true;
-  size_t shared_neighbours = 0, shared_edges = 0;
-  for (size_t n = 0; n < c->neighbour_count; n++)
-    shared_neighbours += c->kept_edges[n] != QMAT_NONE && c->removed_edges[n] != QMAT_NONE;
-  for (size_t t = 0; t < c->triangle_count; t++)
-    shared_edges += c->kept_triangles[t] != QMAT_NONE && c->removed_triangles[t] != QMAT_NONE;
-  return shared_neighbours == c->vanishing_count && shared_edges == 0;
+  return s->rules.topology != QMAT_TOPOLOGY_PRESERVE || qmat_collapse_keeps_homotopy(&s->complex, c);
 }
 
 static bool bounds_envelope(const qmat_decimation *s) {

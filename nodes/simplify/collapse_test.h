@@ -32,9 +32,8 @@ bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_
                                       bool *bound);
 
 /* Whether the topology policy allows the newest preview. Spheres of sheets and solids never merge. With
- * QMAT_TOPOLOGY_PRESERVE it has to satisfy the link condition (Attali et al. 2011), which preserves the homotopy type.
- */
-bool qmat_decimation_keeps_topology(const qmat_decimation *decimation);
+ * QMAT_TOPOLOGY_PRESERVE it has to keep the homotopy type. */
+bool qmat_decimation_keeps_topology(qmat_decimation *decimation);
 
 /* Whether the newest preview may be done with this sphere (4 doubles): inside the model, and both errors within the
  * threshold. `first` is a constraint point to test first (QMAT_NONE: none). Where an error exceeds the threshold,

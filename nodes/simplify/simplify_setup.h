@@ -47,7 +47,7 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
       QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                           \
                 "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
                 "loops and voids of the result are corrected to those of the solid (on_exceed=skip only). preserve: " \
-                "collapses keep the topology of the initial mesh (link condition)"),                                  \
+                "every collapse keeps the homotopy type of the initial medial mesh"),                                 \
       QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                \
                 "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
       QMAT_ENUM(                                                                                                      \

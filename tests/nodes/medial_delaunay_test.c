@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/surface.h"
+#include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
 
 /* The spheres of the tetrahedra, without merging, halving or thinning. */
@@ -608,6 +609,29 @@ static void test_progress_function_cancels(void **state) {
   pipeline_free(&p);
 }
 
+/* Slivers on the wrong side of the surface make seven loops in the octopus, at this resolution. */
+static void test_loops_are_those_of_the_solid(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    size_t loops;
+    bool is_changed;
+  } models[] = {{"octopus", 0, true}, {"torus", 1, false}, {"l-bracket", 0, false}};
+  for (size_t i = 0; i < sizeof models / sizeof *models; i++) {
+    pipeline p;
+    pipeline_make(&p, pipeline_model(models[i].name, 0), "", "");
+    const int64_t changed =
+        pipeline_count(p.report, "kept_for_topology") + pipeline_count(p.report, "dropped_for_topology");
+    assert_int_equal(changed > 0, models[i].is_changed);
+    qmat_context context = {0};
+    qmat_topology topology;
+    assert_int_equal(qmat_topology_of_medial(&context, p.medial, &topology), QMAT_OK);
+    assert_int_equal(topology.loops, models[i].loops);
+    qmat_context_uninit(&context);
+    pipeline_free(&p);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_regular_tetrahedron),
@@ -633,6 +657,7 @@ int main(void) {
       cmocka_unit_test(test_meshes_without_an_inside_are_refused),
       cmocka_unit_test(test_inputs_that_do_not_fit_are_named),
       cmocka_unit_test(test_progress_function_cancels),
+      cmocka_unit_test(test_loops_are_those_of_the_solid),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
