@@ -15,6 +15,8 @@
 #include "nodes/measure/unit_spheres.h"
 
 typedef enum fit_side { FIT_BOTH, FIT_CONTAIN, FIT_INSIDE } fit_side;
+/* The kinds are those of qmat_shape_kind, and this. */
+enum { KIND_HULLS = QMAT_SHAPES_SPHERES + 1 };
 
 typedef struct medial_colliders_params {
   int fit, kind;
@@ -39,6 +41,11 @@ typedef struct work {
   qmat_shape_measures measures;
 } work;
 
+/* The kind of the shapes that hulls are made of, too. */
+static qmat_shape_kind kind_of(const medial_colliders_params *p) {
+  return p->kind == KIND_HULLS ? QMAT_SHAPES_ANY : (qmat_shape_kind)p->kind;
+}
+
 static int compare_numbers(const void *left, const void *right) {
   const double a = *(const double *)left, b = *(const double *)right;
   return (a > b) - (a < b);
@@ -52,8 +59,8 @@ static qmat_status keep_budget(work *w, double growth) {
   const size_t most = (size_t)p->shapes, count = set->shape_count;
   if (most == 0 || count <= most) return QMAT_OK;
   if (p->fit != FIT_INSIDE)
-    return qmat_shape_set_merge(
-        w->context, set, p->kind == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : (qmat_shape_kind)p->kind, growth, most);
+    return qmat_shape_set_merge(w->context, set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
+                                growth, most);
   double *volumes = qmat_arena_alloc(&w->context->arena, 2 * count, sizeof *volumes), *sorted = volumes + count;
   if (!volumes) return qmat_fail_memory(w->context, "the colliders");
   for (size_t i = 0; i < count; i++) volumes[i] = qmat_shape_volume(set->spheres, &set->shapes[3 * i]);
@@ -76,14 +83,14 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
   status = qmat_unit_spheres(context, qmat_surface_frame(w->surface), medial, &unit.spheres);
   if (status != QMAT_OK) return status;
   for (w->dent = p->dent; status == QMAT_OK; w->dent *= 1.25) {
-    const bool may_deepen = p->kind != QMAT_SHAPES_ANY && w->dent < deepest_dent;
-    status = qmat_shape_set_make(context, &unit, p->least_radius, (qmat_shape_kind)p->kind, w->dent,
+    const bool may_deepen = kind_of(p) != QMAT_SHAPES_ANY && w->dent < deepest_dent;
+    status = qmat_shape_set_make(context, &unit, p->least_radius, kind_of(p), w->dent,
                                  may_deepen ? 4 * MOST_IN_ROWS : SIZE_MAX, &w->set);
     if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
   }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
   if (status == QMAT_OK && p->shapes > 0)
-    status = qmat_shape_set_merge(context, &w->set, (qmat_shape_kind)p->kind, growth[p->fit], (size_t)p->shapes);
+    status = qmat_shape_set_merge(context, &w->set, kind_of(p), growth[p->fit], (size_t)p->shapes);
   /* The surface itself is known to the deviation. */
   const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
   if (status == QMAT_OK && p->fit == FIT_CONTAIN) {
@@ -102,9 +109,21 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
                         "the solid is thinner than least_radius, or open; fit=both takes the spheres as they are");
 }
 
+/* Makes each shape one of three spheres, which is written as a hull: the last one is repeated as further spheres. */
+static void widen_shapes(qmat_colliders *c) {
+  for (size_t i = 0; i < c->shape_count; i++) {
+    uint32_t *ids = &c->shapes[3 * i];
+    const int width = qmat_shape_width(ids);
+    for (int k = width; k < 3; k++) {
+      memcpy(&c->spheres[4 * c->sphere_count], &c->spheres[4 * (size_t)ids[width - 1]], 4 * sizeof *c->spheres);
+      ids[k] = (uint32_t)c->sphere_count++;
+    }
+  }
+}
+
 static qmat_status fill_colliders(work *w) {
   qmat_colliders *c = w->colliders;
-  c->spheres = qmat_alloc(w->set.sphere_count, 4 * sizeof *c->spheres);
+  c->spheres = qmat_alloc(w->set.sphere_count + 2 * w->set.shape_count, 4 * sizeof *c->spheres);
   c->shapes = qmat_alloc(w->set.shape_count, 3 * sizeof *c->shapes);
   c->body = qmat_alloc(10, sizeof *c->body);
   if (!c->spheres || !c->shapes || !c->body) return qmat_fail_memory(w->context, "the colliders");
@@ -115,11 +134,17 @@ static qmat_status fill_colliders(work *w) {
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
   const double error = w->params->hull_error * qmat_surface_frame(w->surface)->diagonal;
-  return qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side);
+  const qmat_surface *solid =
+      w->params->kind == KIND_HULLS && side == QMAT_HULL_OUTSIDE && w->proved && qmat_surface_is_watertight(w->surface)
+          ? w->surface
+          : NULL;
+  const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side, solid);
+  if (status == QMAT_OK && w->params->kind == KIND_HULLS) widen_shapes(c);
+  return status;
 }
 
 static const char *const fits[] = {"both", "contain", "inside", NULL};
-static const char *const kinds[] = {"any", "capsules", "spheres", NULL};
+static const char *const kinds[] = {"any", "capsules", "spheres", "hulls", NULL};
 
 static qmat_status make_report(const work *w, qmat_report *report) {
   const qmat_shape_measures *m = &w->measures;
@@ -185,8 +210,10 @@ static const qmat_param params[] = {
               "of a shape is outside of the solid"),
     QMAT_INT(medial_colliders_params, shapes, "shapes", 0, 0, 1e6,
              "The largest number of shapes; pairs become one until it is reached; 0: any number"),
-    QMAT_ENUM(medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
-              "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only"),
+    QMAT_ENUM(
+        medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
+        "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only; hulls: "
+        "hulls of all of these, with contain only around the solid's part in each"),
     QMAT_LENGTH(
         medial_colliders_params, dent, 0.01, 1e-4, 1,
         "How deep the dents between the capsules or spheres may be that replace a cone or slab; deeper where that "
@@ -220,7 +247,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 5,
+    .version = 6,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -228,11 +255,13 @@ const qmat_node qmat_node_medial_colliders = {
         "shapes.\n\n"
         "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
         "branch and bound that no point of the solid is outside, and grows them where one is; hulls then contain "
-        "their shapes. inside changes radii and proves the opposite; otherwise hulls are inside their shapes. proved "
+        "their shapes, but with kind=hulls only the solid's part in each, which takes the least volume. inside changes "
+        "radii and proves the opposite; otherwise hulls are inside their shapes. proved "
         "is false for open surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
         "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
-        "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union.",
+        "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. They are "
+        "those of the shapes, not of hulls.",
     .citation = "",
     .params_size = sizeof(medial_colliders_params),
     .params = params,

@@ -11,8 +11,13 @@
  * this cosine of one that the round has added: that plane may serve both. */
 static const double worth = 0.6, apart = 0.94;
 
-/* The shape that is being surrounded, and a point inside it. */
+static const double directions[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+
+/* The shape that is being surrounded, or the cloud of points, and a point inside. */
 typedef struct target {
+  const double *cloud, *facets; /* NULL for a shape; 3 per point; 4 per facet of its hull: normal, reach */
+  size_t point_count, facet_count;
+  double margin; /* by which a cloud is surrounded farther out */
   const double *spheres;
   const uint32_t *ids;
   qmat_prepared_shape shape;
@@ -29,9 +34,14 @@ qmat_status qmat_tangent_hull_init(qmat_context *context, size_t most, qmat_tang
   return qmat_fail_memory(context, "the hulls");
 }
 
-/* How far the shape reaches from its centre along a direction. */
+/* How far the shape or cloud reaches from its centre along a direction. */
 static double reach(const target *t, const double normal[3]) {
   double most = 0;
+  for (size_t i = 0; i < t->point_count; i++) {
+    double to[3];
+    qmat_subtract(&t->cloud[3 * i], t->centre, to);
+    most = fmax(most, qmat_dot(normal, to) + t->margin);
+  }
   for (int k = 0; k < t->shape.count; k++) {
     const double *s = &t->spheres[4 * (size_t)t->ids[k]];
     double to[3];
@@ -105,6 +115,28 @@ static qmat_status meet(qmat_tangent_hull *h) {
   return QMAT_OK;
 }
 
+/* How far a vertex is outside; `way` receives the normal of the plane that would cut it off. */
+static double outside_by(const target *t, const double *vertex, double way[3]) {
+  if (t->cloud) {
+    double most = -INFINITY;
+    for (size_t i = 0; i < t->facet_count; i++) {
+      const double *facet = &t->facets[4 * i], away = qmat_dot(facet, vertex) - facet[3];
+      if (!(away > most)) continue;
+      most = away;
+      memcpy(way, facet, 3 * sizeof *way);
+    }
+    return most;
+  }
+  double point[3], weights[3], medial[3] = {0};
+  for (int k = 0; k < 3; k++) point[k] = vertex[k] + t->centre[k];
+  const double away = qmat_shape_distance(&t->shape, point, weights);
+  for (int s = 0; s < t->shape.count; s++)
+    for (int k = 0; k < 3; k++) medial[k] += weights[s] * t->spheres[4 * (size_t)t->ids[s] + (size_t)k];
+  qmat_subtract(point, medial, way);
+  qmat_normalize(way);
+  return away;
+}
+
 /* Adds planes where vertices are far out. How many. */
 static size_t refine(qmat_tangent_hull *h, const target *t, double error, size_t most_planes) {
   const size_t before = h->plane_count;
@@ -112,14 +144,9 @@ static size_t refine(qmat_tangent_hull *h, const target *t, double error, size_t
   while (h->plane_count < most_planes) {
     double best = error, normal[3] = {0};
     for (size_t i = 0; i < h->point_count; i++) {
-      double point[3], weights[3], way[3], medial[3] = {0};
-      for (int k = 0; k < 3; k++) point[k] = h->points[3 * i + (size_t)k] + t->centre[k];
-      const double away = qmat_shape_distance(&t->shape, point, weights);
+      double way[3];
+      const double away = outside_by(t, &h->points[3 * i], way);
       if (!(away > best) || (isfinite(farthest) && away < worth * farthest)) continue;
-      for (int s = 0; s < t->shape.count; s++)
-        for (int k = 0; k < 3; k++) medial[k] += weights[s] * t->spheres[4 * (size_t)t->ids[s] + (size_t)k];
-      qmat_subtract(point, medial, way);
-      qmat_normalize(way);
       bool served = false;
       for (size_t j = before; j < h->plane_count && !served; j++) served = qmat_dot(way, &h->normals[3 * j]) > apart;
       if (served) continue;
@@ -153,14 +180,58 @@ static qmat_status finish(qmat_tangent_hull *h, const target *t) {
   return QMAT_OK;
 }
 
+/* Adds planes until none is worth it. */
+static qmat_status surround(qmat_tangent_hull *hull, const target *t, double error) {
+  const size_t most_planes = hull->most / 2 + 2; /* they meet in 2 planes - 4 vertices at most */
+  qmat_status status = meet(hull);
+  while (status == QMAT_OK && refine(hull, t, error, most_planes) > 0) status = meet(hull);
+  return status == QMAT_OK ? finish(hull, t) : status;
+}
+
 qmat_status qmat_tangent_hull_fit(qmat_tangent_hull *hull, const double *spheres, const uint32_t ids[3], double error) {
   target t = {.spheres = spheres, .ids = ids};
-  const size_t most_planes = hull->most / 2 + 2; /* they meet in 2 planes - 4 vertices at most */
   qmat_shape_prepare(&t.shape, spheres, ids);
   for (int s = 0; s < t.shape.count; s++)
     for (int k = 0; k < 3; k++) t.centre[k] += spheres[4 * (size_t)ids[s] + (size_t)k] / t.shape.count;
   start(hull, &t);
-  qmat_status status = meet(hull);
-  while (status == QMAT_OK && refine(hull, &t, error, most_planes) > 0) status = meet(hull);
-  return status == QMAT_OK ? finish(hull, &t) : status;
+  return surround(hull, &t, error);
+}
+
+/* The planes of the facets of the cloud's hull, from the centre of its points: `t->facets`. */
+static qmat_status find_facets(target *t, uint32_t *triangles, double *facets) {
+  size_t count;
+  const qmat_status status = qmat_convex_hull(t->cloud, t->point_count, triangles, &count);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < t->point_count; i++)
+    for (int k = 0; k < 3; k++) t->centre[k] += t->cloud[3 * i + (size_t)k] / (double)t->point_count;
+  for (size_t i = 0; i < count; i++) {
+    const double *p = &t->cloud[3 * (size_t)triangles[3 * i]];
+    double u[3], v[3], *facet = &facets[4 * t->facet_count];
+    qmat_subtract(&t->cloud[3 * (size_t)triangles[3 * i + 1]], p, u);
+    qmat_subtract(&t->cloud[3 * (size_t)triangles[3 * i + 2]], p, v);
+    qmat_cross(u, v, facet);
+    if (!(qmat_dot(facet, facet) > 0)) continue;
+    qmat_normalize(facet);
+    facet[3] = reach(t, facet);
+    t->facet_count++;
+  }
+  t->facets = facets;
+  return QMAT_OK;
+}
+
+qmat_status qmat_tangent_hull_fit_points(qmat_tangent_hull *hull, const double *points, size_t count, double margin,
+                                         double error) {
+  target t = {.cloud = points, .point_count = count, .margin = margin};
+  uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
+  double *facets = qmat_alloc(count, 8 * sizeof *facets);
+  qmat_status status = triangles && facets ? QMAT_OK : QMAT_ERROR_MEMORY;
+  if (status == QMAT_OK) status = count < 4 ? QMAT_ERROR_GEOMETRY : find_facets(&t, triangles, facets);
+  if (status == QMAT_OK) {
+    hull->plane_count = 0;
+    for (int i = 0; i < 6; i++) add_plane(hull, &t, directions[i]);
+    status = surround(hull, &t, error);
+  }
+  qmat_free(triangles);
+  qmat_free(facets);
+  return status;
 }

@@ -23,4 +23,11 @@ qmat_status qmat_tangent_hull_init(qmat_context *context, size_t most, qmat_tang
  * thousandth; QMAT_ERROR_MEMORY. Cost: some twenty hulls of most / 2 points. */
 qmat_status qmat_tangent_hull_fit(qmat_tangent_hull *hull, const double *spheres, const uint32_t ids[3], double error);
 
+/* Finds the vertices of a polyhedron that contains `count` points (3 doubles each) and all within `margin` of them:
+ * where half-spaces meet that are parallel to facets of the points' hull. Bounds and statuses as above;
+ * QMAT_ERROR_GEOMETRY also for points near a plane. Cost: also that of the points' hull, and its facets times the
+ * vertices. */
+qmat_status qmat_tangent_hull_fit_points(qmat_tangent_hull *hull, const double *points, size_t count, double margin,
+                                         double error);
+
 #endif

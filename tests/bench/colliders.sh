@@ -1,14 +1,19 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Colliders that contain the solid, against those of VHACD at about the same number of shapes:
-#   colliders.sh [--epsilon E] [--json FILE] [MODEL...]   default: the eleven of ../shared/data/surfaces, epsilon 0.5 %
+#   colliders.sh [--epsilon E] [--kind K] [--json FILE] [MODEL...]
+# The default: the eleven of ../shared/data/surfaces, epsilon 0.5 %, hulls (the other kind is any).
 # E is that of the medial mesh; the colliders may be twice as far from the surface. A Markdown table: shapes, random points
 # of the solid that no shape contains, volume and intersection over union with the solid, bytes. Models are closed
 # surfaces. Needs node and npm, which fetches Rapier.
 set -eu
 epsilon=0.5%
 . "$(dirname "$0")/functions.sh"
-json=
+kind=hulls json=
+if [ "${1:-}" = --kind ]; then
+  kind=$2
+  shift 2
+fi
 if [ "${1:-}" = --json ]; then
   json=$2
   : >"$json"
@@ -27,7 +32,8 @@ cp "$top/tests/engines/package.json" "$top/tests/engines/surface.mjs" "$top/test
 echo "| model | shapes | outside | volume | IoU | bytes | VHACD: hulls | outside | volume | IoU | bytes |"
 echo "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
 for model in "$@"; do
-  "$build/qmat" run "$top/graphs/colliders.yaml" --set model="$model" --set epsilon="$epsilon" --quiet -o "$work/out.glb"
+  "$build/qmat" run "$top/graphs/colliders.yaml" --set model="$model" --set epsilon="$epsilon" --set kind="$kind" \
+    --quiet -o "$work/out.glb"
   line=$(node "$work/colliders.mjs" "$top/examples/readers" "$work/out.glb" "$model")
   name=$(basename "$model")
   node -e '

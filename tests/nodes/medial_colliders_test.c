@@ -8,6 +8,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/surface.h"
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/colliders/shape_set.h"
 #include "tests/medial_meshes.h"
@@ -291,6 +292,72 @@ static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Whether a point is in the hull of a shape, or nearer than `slack` to one of its planes. */
+static bool is_in_hull(const qmat_colliders *c, size_t shape, const double point[3], double slack) {
+  for (size_t i = shape > 0 ? c->hull_ends[2 * shape - 1] : 0; i < c->hull_ends[2 * shape + 1]; i++) {
+    const double *p[3];
+    double u[3], v[3], to[3], normal[3];
+    for (int k = 0; k < 3; k++) p[k] = &c->points[3 * (size_t)c->triangles[3 * i + (size_t)k]];
+    qmat_subtract(p[1], p[0], u);
+    qmat_subtract(p[2], p[0], v);
+    qmat_subtract(point, p[0], to);
+    qmat_cross(u, v, normal);
+    if (qmat_dot(normal, to) > slack * sqrt(qmat_dot(normal, normal))) return false;
+  }
+  return true;
+}
+
+/* A ball around a box leaves only the box in its hull, as exactly as the planes of facets can. */
+static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
+  (void)state;
+  result r = make(box_around(1, 2, 3), sealed_medial_mesh((double[]){0, 0, 0, 4}, 1, NULL, 0, NULL, 0),
+                  "fit=contain kind=hulls", 0);
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_int_equal(r.colliders->shape_count, 1);
+  assert_int_equal(qmat_shape_width(r.colliders->shapes), 3);
+  assert_int_equal(r.colliders->point_count, 8);
+  assert_near(hull_volume(r.colliders, 0), 48, 1e-3);
+  assert_true(hull_volume(r.colliders, 0) > 48);
+  result_free(&r);
+}
+
+/* Of an l-bracket, all points are in hulls, and these have less volume beyond it than the shapes. */
+static void test_hulls_of_the_solid_contain_it(void **state) {
+  (void)state;
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("l-bracket", &mesh, &medial);
+  qmat_value_retain(&mesh->base);
+  qmat_value_retain(&medial->base);
+  result r = make(mesh, medial, "fit=contain kind=hulls", 0), shapes = make(mesh, medial, "fit=contain", 0);
+  assert_int_equal(r.colliders->shape_count, shapes.colliders->shape_count);
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
+  size_t inside = 0, outside = 0, held = 0, of_shapes = 0;
+  for (uint64_t i = 0; inside < 100000; i++) {
+    double point[3];
+    for (uint64_t k = 0; k < 3; k++) point[k] = 1.2 * qmat_hash_unit(qmat_hash3(7, i, k)) - 0.6;
+    const bool is_inside = qmat_surface_inside(surface, point);
+    qmat_frame_to_model(qmat_surface_frame(surface), point, 1, point);
+    bool found = false, in_shape = false;
+    for (size_t s = 0; s < r.colliders->shape_count && !found; s++) found = is_in_hull(r.colliders, s, point, 0);
+    for (size_t s = 0; s < shapes.colliders->shape_count && !in_shape; s++)
+      in_shape = is_in_hull(shapes.colliders, s, point, 0);
+    inside += is_inside;
+    outside += is_inside && !found;
+    held += found;
+    of_shapes += in_shape;
+  }
+  assert_int_equal(outside, 0);
+  assert_true((double)held < 1.1 * (double)inside);
+  assert_true(held < of_shapes);
+  qmat_surface_free(surface);
+  qmat_context_uninit(&context);
+  result_free(&r);
+  result_free(&shapes);
+}
+
 static void test_budget_kind_and_hull_points_are_kept(void **state) {
   (void)state;
   static const char *const cases[][2] = {{"fit=both shapes=5", "both"},
@@ -298,9 +365,11 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
                                          {"fit=contain shapes=12 kind=spheres", "contain"},
                                          {"fit=inside kind=spheres", "inside"},
                                          {"fit=contain shapes=3", "contain"},
+                                         {"fit=contain kind=hulls hull_points=24", "contain"},
+                                         {"fit=inside kind=hulls", "inside"},
                                          {"fit=inside shapes=2", "inside"},
                                          {"fit=both kind=spheres dent=0.0005", "both"}};
-  static const size_t most[] = {5, 4, 12, 256, 3, 2, 256};
+  static const size_t most[] = {5, 4, 12, 256, 3, 256, 256, 2, 256};
   qmat_mesh *mesh;
   qmat_medial *medial;
   describe("l-bracket", &mesh, &medial);
@@ -313,7 +382,10 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
     if (strstr(cases[i][0], "spheres"))
       assert_int_equal(pipeline_count(r.report, "single_spheres"), r.colliders->shape_count);
     for (size_t s = 0; s < r.colliders->shape_count; s++)
-      assert_true(r.colliders->hull_ends[2 * s] - (s ? r.colliders->hull_ends[2 * s - 2] : 0) <= (i == 1 ? 24 : 128));
+      assert_true(r.colliders->hull_ends[2 * s] - (s ? r.colliders->hull_ends[2 * s - 2] : 0) <=
+                  (strstr(cases[i][0], "=24") ? 24 : 128));
+    for (size_t s = 0; s < r.colliders->shape_count && strstr(cases[i][0], "kind=hulls"); s++)
+      assert_int_equal(qmat_shape_width(&r.colliders->shapes[3 * s]), 3);
     if (!strstr(cases[i][0], "both")) assert_true(json_is_true(json_object_get(r.report->root, "proved")));
     if (strstr(cases[i][0], "contain")) assert_near(pipeline_number(r.report, "coverage"), 1, 0);
     result_free(&r);
@@ -327,8 +399,9 @@ static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
   qmat_mesh *mesh;
   qmat_medial *medial;
   describe("l-bracket", &mesh, &medial);
-  static const char *const params[] = {"fit=contain samples=1000", "fit=inside samples=1000"};
-  for (size_t p = 0; p < 2; p++) {
+  static const char *const params[] = {"fit=contain samples=1000", "fit=inside samples=1000",
+                                       "fit=contain kind=hulls samples=1000"};
+  for (size_t p = 0; p < 3; p++) {
     qmat_digest first;
     for (int threads = 1; threads <= 8; threads *= 2) {
       qmat_value_retain(&mesh->base);
@@ -353,6 +426,8 @@ int main(void) {
       cmocka_unit_test(test_nested_and_degenerate_shapes_are_left_out),
       cmocka_unit_test(test_contain_leaves_none_of_a_million_points_outside),
       cmocka_unit_test(test_inside_leaves_no_point_of_a_shape_outside),
+      cmocka_unit_test(test_the_hull_of_a_ball_around_a_box_is_the_box),
+      cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
       cmocka_unit_test(test_one_two_and_eight_threads_make_the_same_bytes),
   };
