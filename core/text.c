@@ -180,12 +180,17 @@ void qmat_format_bytes(uint64_t bytes, char *text) {
   snprintf(text, 32, "%.20s %s", number, units[unit]);
 }
 
+/* The least percentage, and number of millimetres, that bounds are written as: what is below is an effect of rounding.
+ */
+static const double least_written = 0.001;
+
 void qmat_format_bound(double fraction, char *text) {
   double percent = fraction * 100;
   if (!(percent > 0)) {
     snprintf(text, 48, "0 %%");
     return;
   }
+  percent = fmax(percent, least_written);
   /* The factor below 1 absorbs rounding errors: 0.98 % must not be rounded up to 0.99 %. */
   double digits = floor(1 - floor(log10(percent)));
   double scale = pow(10, digits > 0 ? digits : 0);
@@ -201,9 +206,10 @@ void qmat_format_length(double meters, char *text) {
   } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, INFINITY}};
   size_t i = 0;
   while (meters >= units[i].below) i++;
-  const double value = meters * units[i].scale;
+  double value = meters * units[i].scale;
   char number[40] = "0";
   if (value > 0) {
+    value = fmax(value, least_written);
     const double digits = floor(1 - floor(log10(value))), scale = pow(10, digits > 0 ? digits : 0);
     qmat_format_number(ceil(value * scale * (1 - 1e-12)) / scale, number, sizeof number);
   }

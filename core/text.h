@@ -40,10 +40,12 @@ void qmat_format_number(double number, char *text, size_t size);
 void qmat_format_count(uint64_t count, char *text);
 /* 1234567 as "1.2 MB"; `text` holds at least 32 bytes. */
 void qmat_format_bytes(uint64_t bytes, char *text);
-/* An upper bound as a percentage with two digits, rounded up: 0.00977 as "0.98 %". `text` holds at least 48 bytes. */
+/* An upper bound as a percentage with two digits, rounded up, 0.001 % at least unless it is 0: 0.00977 as "0.98 %".
+ * `text` holds at least 48 bytes. */
 void qmat_format_bound(double fraction, char *text);
 
-/* A length as "4.9 mm", "12 cm" or "3.1 m", with two digits, rounded up. `text` holds at least 48 bytes. */
+/* A length as "4.9 mm", "12 cm" or "3.1 m", with two digits, rounded up, 0.001 mm at least unless it is 0. `text` holds
+ * at least 48 bytes. */
 void qmat_format_length(double meters, char *text);
 
 /* The name nearest to `text` by edit distance among `count` names, or NULL when none is near. */

@@ -28,6 +28,12 @@ int qmat_columns_of(const char *text) {
   return columns;
 }
 
+/* Whether `text` starts with a short remark in parentheses, such as a size, which stays with the word before it. */
+static bool starts_remark(const char *text) {
+  const char *end = *text == '(' ? strchr(text, ')') : NULL;
+  return end && end - text < 12;
+}
+
 /* The length of the word at the start of `text` in bytes, and its columns. */
 static size_t word_length(const char *text, int whole, int *columns) {
   size_t length = 0;
@@ -35,8 +41,8 @@ static size_t word_length(const char *text, int whole, int *columns) {
   for (*columns = 0; text[length] && text[length] != '\n'; length++) {
     if (whole && text[length] == '(') depth++;
     if (whole && text[length] == ')') depth--;
-    const char next = text[length] == ' ' ? text[length + 1] : 0;
-    if (text[length] == ' ' && depth <= 0 && !(whole && (next == '%' || next == '('))) break;
+    if (text[length] == ' ' && depth <= 0 && !(whole && (text[length + 1] == '%' || starts_remark(text + length + 1))))
+      break;
     *columns += starts_character(text[length]);
   }
   return length;

@@ -13,8 +13,8 @@ int qmat_terminal_width(FILE *stream);
 int qmat_columns_of(const char *text);
 
 /* Prints `text` wrapped at `width` columns. The first line starts at column `column`; the others are indented by
- * `indent`. Parentheses stay whole and a number keeps its per cent sign when `whole` is set. A longer word has a line
- * of its own; where `out` is a terminal, its middle is left out. */
+ * `indent`. When `whole` is set, parentheses stay whole, a short one stays with the word before it, and a number keeps
+ * its per cent sign. A longer word has a line of its own; where `out` is a terminal, its middle is left out. */
 void qmat_put_wrapped(FILE *out, const char *text, int column, int indent, int width, int whole);
 
 #endif

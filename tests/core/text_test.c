@@ -170,9 +170,9 @@ static void test_counts_sizes_and_bounds_are_written_for_people(void **state) {
   static const struct {
     double fraction;
     const char *text;
-  } bounds[] = {{0, "0 %"},      {-1, "0 %"},     {0.0098, "0.98 %"}, {0.00977, "0.98 %"}, {0.00981, "0.99 %"},
-                {0.01, "1 %"},   {0.123, "13 %"}, {1, "100 %"},       {1.234, "124 %"},    {0.0000123, "0.0013 %"},
-                {0.00999, "1 %"}};
+  } bounds[] = {{0, "0 %"},       {-1, "0 %"},         {0.0098, "0.98 %"}, {0.00977, "0.98 %"}, {0.00981, "0.99 %"},
+                {0.01, "1 %"},    {0.123, "13 %"},     {1, "100 %"},       {1.234, "124 %"},    {0.0000123, "0.0013 %"},
+                {0.00999, "1 %"}, {1.4e-15, "0.001 %"}};
   char text[48];
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
     qmat_format_count(numbers[i].number, text);
@@ -191,8 +191,9 @@ static void test_lengths_are_rounded_up_in_a_fitting_unit(void **state) {
   static const struct {
     double meters;
     const char *text;
-  } lengths[] = {{0, "0 mm"},      {1.2345e-6, "0.0013 mm"}, {0.0049, "4.9 mm"}, {0.00491, "5 mm"}, {0.0999, "100 mm"},
-                 {0.123, "13 cm"}, {0.98, "98 cm"},          {1, "1 m"},         {3.14, "3.2 m"},   {1234, "1234 m"}};
+  } lengths[] = {{0, "0 mm"},       {2e-12, "0.001 mm"}, {1.2345e-6, "0.0013 mm"}, {0.0049, "4.9 mm"},
+                 {0.00491, "5 mm"}, {0.0999, "100 mm"},  {0.123, "13 cm"},         {0.98, "98 cm"},
+                 {1, "1 m"},        {3.14, "3.2 m"},     {1234, "1234 m"}};
   char text[48];
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
     qmat_format_length(lengths[i].meters, text);
