@@ -11,8 +11,10 @@
 
 const double qmat_corner_bend = 45;
 
+static const double RADIANS_PER_DEGREE = 3.14159265358979323846 / 180;
+
 static double cosine_of(double degrees) {
-  return cos(degrees * (3.14159265358979323846 / 180));
+  return cos(degrees * RADIANS_PER_DEGREE);
 }
 
 /* A side of a triangle: its ends, and 3 * triangle + k for the side from corner k to the next. */
@@ -33,17 +35,23 @@ static void normal_of(const qmat_mesh *mesh, const double *positions, size_t tri
   qmat_triangle_area(&positions[3 * (size_t)t[0]], &positions[3 * (size_t)t[1]], &positions[3 * (size_t)t[2]], normal);
 }
 
-/* Whether the edge of two sides is sharp and convex: the second triangle's opposite corner is below the first triangle.
- */
-static bool is_crease(const qmat_mesh *mesh, const double *positions, const triangle_side *sides, double least_cosine) {
-  double normals[2][3], across[3];
+/* How an edge bends: the angle between the normals of its triangles, and whether the second triangle's opposite corner
+ * is below the first triangle. */
+typedef struct {
+  double angle; /* radians; 0 at degenerate triangles */
+  bool is_convex;
+} edge_bend;
+
+static edge_bend bend_of(const qmat_mesh *mesh, const double *positions, const triangle_side *sides) {
+  double normals[2][3], axis[3], across[3];
   for (int k = 0; k < 2; k++) normal_of(mesh, positions, sides[k].side / 3, normals[k]);
-  if (qmat_dot(normals[0], normals[0]) == 0 || qmat_dot(normals[1], normals[1]) == 0) return false;
-  if (!(qmat_dot(normals[0], normals[1]) < least_cosine)) return false;
+  if (qmat_dot(normals[0], normals[0]) == 0 || qmat_dot(normals[1], normals[1]) == 0) return (edge_bend){0};
+  qmat_cross(normals[0], normals[1], axis);
   const size_t second = sides[1].side / 3, opposite = (sides[1].side + 2) % 3;
   const double *apex = &positions[3 * (size_t)mesh->triangles[3 * second + opposite]];
   for (int k = 0; k < 3; k++) across[k] = apex[k] - positions[3 * (size_t)sides[0].low + (size_t)k];
-  return qmat_dot(normals[0], across) < 0;
+  return (edge_bend){atan2(sqrt(qmat_dot(axis, axis)), qmat_dot(normals[0], normals[1])),
+                     qmat_dot(normals[0], across) < 0};
 }
 
 /* Leaves out connected edges with a total length below `shortest`. */
@@ -72,6 +80,7 @@ qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh,
   triangle_side *sides = qmat_arena_alloc(&context->arena, count, sizeof *sides);
   edges->ends = qmat_arena_alloc(&context->arena, count / 2, 2 * sizeof *edges->ends);
   edges->count = 0;
+  edges->sharp_share = 0;
   if (!sides || !edges->ends) return qmat_fail_memory(context, "creases");
   for (size_t i = 0; i < count; i++) {
     const uint32_t a = mesh->triangles[i], b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
@@ -81,13 +90,22 @@ qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh,
   if (status != QMAT_OK) return status;
   if (count) qsort(sides, count, sizeof *sides, by_ends);
   if ((status = qmat_progress(context, 0, 0, "creases")) != QMAT_OK) return status;
-  const double least_cosine = cosine_of(angle);
+  const double least_angle = angle * RADIANS_PER_DEGREE;
+  double bending = 0, sharp = 0;
   for (size_t i = 0, end; i < count; i = end) {
     for (end = i + 1; end < count && sides[end].low == sides[i].low && sides[end].high == sides[i].high;) end++;
-    if (end - i != 2 || !is_crease(mesh, positions, &sides[i], least_cosine)) continue;
+    if (end - i != 2) continue;
+    const edge_bend bend = bend_of(mesh, positions, &sides[i]);
+    const double share =
+        bend.angle * qmat_point_distance(&positions[3 * (size_t)sides[i].low], &positions[3 * (size_t)sides[i].high]);
+    bending += share;
+    if (!(bend.angle > least_angle)) continue;
+    sharp += share;
+    if (!bend.is_convex) continue;
     edges->ends[2 * edges->count] = sides[i].low;
     edges->ends[2 * edges->count++ + 1] = sides[i].high;
   }
+  edges->sharp_share = bending > 0 ? sharp / bending : 0;
   return drop_short(context, positions, mesh->vertex_count, shortest, edges);
 }
 

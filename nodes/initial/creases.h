@@ -10,13 +10,14 @@
 /* Convex sharp edges: sorted pairs of vertices, the smaller id first. */
 typedef struct qmat_crease_edges {
   size_t count;
-  uint32_t *ends; /* 2 * count */
+  uint32_t *ends;     /* 2 * count */
+  double sharp_share; /* of the surface's bending, the angle times the length of edges, what all sharp edges have */
 } qmat_crease_edges;
 
 /* Finds the convex edges of an oriented mesh at which the normals of both triangles differ by more than `angle`
- * (degrees). Connected edges with a total length below `shortest` are left out as noise. `positions` are the mesh's
- * vertices (3 doubles each) in the unit frame, and `shortest` is a length in that frame. Edges at degenerate triangles
- * do not count. QMAT_ERROR_MEMORY. Cost: a sort of the edges. */
+ * (degrees): sharp edges may be concave, too. Connected edges with a total length below `shortest` are left out as
+ * noise. `positions` are the mesh's vertices (3 doubles each) in the unit frame, and `shortest` is a length in that
+ * frame. Edges at degenerate triangles do not count. QMAT_ERROR_MEMORY. Cost: a sort of the edges. */
 qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh, const double *positions, double angle,
                                    double shortest, qmat_crease_edges *edges);
 

@@ -3,12 +3,14 @@
 
 #include <math.h>
 
+#include "core/geometry/medial_build.h"
 #include "nodes/simplify/side_by_side.h"
 
 typedef struct all_starts {
   const qmat_simplification *prepared;
   const qmat_simplify_params *params;
   size_t rule_count; /* 2 where creases are kept and not kept */
+  qmat_medial *bare; /* the initial medial mesh without features, where creases are not kept */
   qmat_simplified *results;
   _Atomic size_t done;
 } all_starts;
@@ -21,6 +23,34 @@ static bool chooses_features(const qmat_simplification *s, const qmat_simplify_p
   return false;
 }
 
+/* Moves the simplices of `width` ids whose ids are all below `limit` to the front. Returns their number. */
+static size_t keep_below(uint32_t *rows, size_t count, size_t width, size_t limit) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    bool is_below = true;
+    for (size_t k = 0; k < width; k++) is_below = is_below && rows[width * i + k] < limit;
+    if (!is_below) continue;
+    for (size_t k = 0; k < width; k++) rows[width * kept + k] = rows[width * i + k];
+    kept++;
+  }
+  return kept;
+}
+
+/* Makes a copy of a medial mesh without the spheres of radius 0 at its end: those that medial.features has added. */
+static qmat_status leave_features(qmat_context *context, const qmat_medial *medial, qmat_medial **bare) {
+  qmat_medial *copy = *bare = qmat_medial_copy(medial);
+  if (!copy) return qmat_fail_memory(context, "the initial medial mesh");
+  while (copy->sphere_count > copy->sheet_sphere_count && copy->spheres[4 * copy->sphere_count - 1] == 0)
+    copy->sphere_count--;
+  if (copy->region_offset_count > 0) {
+    copy->region_offset_count = copy->sphere_count + 1;
+    copy->region_sample_count = copy->region_offsets[copy->sphere_count];
+  }
+  copy->edge_count = keep_below(copy->edges, copy->edge_count, 2, copy->sphere_count);
+  copy->triangle_count = keep_below(copy->triangles, copy->triangle_count, 3, copy->sphere_count);
+  return QMAT_OK;
+}
+
 /* Starts with the same seed follow each other, creases kept first. */
 static qmat_status run_start(qmat_context *own, void *user, size_t start) {
   all_starts *all = user;
@@ -29,6 +59,7 @@ static qmat_status run_start(qmat_context *own, void *user, size_t start) {
   s.params = *all->params;
   s.seed = start / all->rule_count;
   if (all->rule_count == 2) s.params.features = start % 2 == 0 ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
+  if (all->rule_count == 2 && s.params.features == QMAT_FEATURES_NONE) s.initial = all->bare;
   const qmat_status status = qmat_simplification_run(&s, &all->results[start]);
   s.surface = NULL; /* the caller's */
   qmat_simplification_uninit(&s);
@@ -55,9 +86,10 @@ qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, 
   all.results = qmat_arena_alloc(&context->arena, count, sizeof *all.results);
   if (!all.results) return qmat_fail_memory(context, "starts");
   for (size_t i = 0; i < count; i++) all.results[i] = *best;
-  const qmat_status status = count == 1
-                                 ? run_alone(context, &all)
-                                 : qmat_run_side_by_side(context, count, run_start, &all, &all.done, count, "starts");
+  qmat_status status = all.rule_count == 2 ? leave_features(context, prepared->initial, &all.bare) : QMAT_OK;
+  if (status == QMAT_OK)
+    status = count == 1 ? run_alone(context, &all)
+                        : qmat_run_side_by_side(context, count, run_start, &all, &all.done, count, "starts");
   for (size_t i = 0; i < count; i++) {
     if (status == QMAT_OK && (i == 0 || qmat_simplified_is_better(&all.results[i], best))) {
       qmat_simplified_uninit(best);
@@ -66,5 +98,6 @@ qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, 
       qmat_simplified_uninit(&all.results[i]);
     }
   }
+  qmat_value_release(all.bare ? &all.bare->base : NULL);
   return status;
 }

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Simplifies simple solids with few spheres, and compares their numbers with the wanted ones: a Markdown table.
 #   simple.sh [--epsilon E] [OPTION...]      default: 1 %; OPTIONs are those of `qmat mat`
-# Solids with edges, and the cylinder, are tried with kept and with free creases (--features auto). A spheroid has 5 and
-# 20 thousand triangles. QMAT_BUILD is the build folder, by default build/release.
+# A spheroid has 5 and 20 thousand triangles. QMAT_BUILD is the build folder, by default build/release.
 set -eu
 epsilon=1%
 . "$(dirname "$0")/functions.sh"
@@ -55,10 +54,10 @@ for name in torus box l-bracket curved-sheet; do "$build/qmat_models" $name -o "
 echo "| solid | triangles | wanted | spheres | certified | processor seconds |"
 echo "| --- | ---: | ---: | ---: | --- | ---: |"
 short=0
-while read -r name wanted features; do
+while read -r name wanted; do
   rm -f "$work/out.ma"
   times >"$work/before"
-  "$build/qmat" mat "$work/$name.off" -o "$work/out.ma" --epsilon "$epsilon" ${features:+--features "$features"} "$@" \
+  "$build/qmat" mat "$work/$name.off" -o "$work/out.ma" --epsilon "$epsilon" "$@" \
     --report "$work/report.json" --quiet --progress off
   times >"$work/after"
   spheres=$(head -n 1 "$work/out.ma" | cut -d ' ' -f 1)
@@ -74,9 +73,9 @@ spheroid-2-20000 4
 spheroid-4-5000 4
 spheroid-4-20000 4
 torus 10
-cylinder 26 auto
-box 12 auto
-l-bracket 18 auto
+cylinder 26
+box 12
+l-bracket 18
 curved-sheet 16
 END
 printf '\n%d fall short\n' $short

@@ -160,6 +160,33 @@ static void test_a_smooth_model_keeps_its_medial_mesh(void **state) {
   pipeline_free(&p);
 }
 
+/* The bending of a prism of 24 sides, in degrees times length: 90 x 2 x its circumference on the edges, and 360 x its
+ * height on the sides. */
+static void test_auto_adds_features_to_flat_faces_alone(void **state) {
+  (void)state;
+  const double round = 2 * 24 * sin(3.14159265358979323846 / 24), height = 2;
+  const struct {
+    qmat_mesh *mesh;
+    double sharp_share;
+    bool adds;
+  } cases[] = {{pipeline_model("box", 4), 1, true},
+               {pipeline_model("l-bracket", 4), 1, true},
+               {shape_prism(24, height), 180 * round / (180 * round + 360 * height), false},
+               {pipeline_model("sphere", 12), 0, false}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    pipeline p;
+    pipeline_make(&p, cases[i].mesh, sampling, "");
+    result r = find_features(&p, 0, "features=auto");
+    assert_near(json_number_value(json_object_get(r.report->root, "sharp_share")), cases[i].sharp_share, 1e-9);
+    if (cases[i].adds)
+      assert_true(r.medial->sphere_count > p.medial->sphere_count);
+    else
+      assert_ptr_equal(r.medial, p.medial);
+    release(&r);
+    pipeline_free(&p);
+  }
+}
+
 static void test_none_keeps_the_medial_mesh_whatever_the_surface(void **state) {
   (void)state;
   pipeline p;
@@ -257,6 +284,7 @@ int main(void) {
       cmocka_unit_test(test_rims_of_a_hole_and_of_a_prism_of_many_sides_are_loops),
       cmocka_unit_test(test_creases_do_not_join_parts),
       cmocka_unit_test(test_a_smooth_model_keeps_its_medial_mesh),
+      cmocka_unit_test(test_auto_adds_features_to_flat_faces_alone),
       cmocka_unit_test(test_none_keeps_the_medial_mesh_whatever_the_surface),
       cmocka_unit_test(test_short_creases_are_noise),
       cmocka_unit_test(test_features_answer_for_their_vertices),
