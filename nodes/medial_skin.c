@@ -239,8 +239,10 @@ static qmat_status count_components(skin *s, size_t *components) {
 enum { MOST_CONTOUR_TRIANGLES = 200000 };
 /* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
  */
-static const double CONTOUR_SHARE = 0.5;
-/* Where the decimated mesh exceeds the error and the contour does not, it is decimated again for this share. */
+static const double CONTOUR_SHARE = 0.3;
+/* So many contours are decimated for all of the error, each with finer cells where the one before exceeds it; then one
+ * for the share. */
+enum { MOST_CONTOURS = 4 };
 static const double SECOND_SHARE = 0.6;
 
 static void drop_triangles(qmat_skin_triangles *surface) {
@@ -275,6 +277,13 @@ static qmat_status bound_distance(skin *s, const qmat_skin_triangles *surface, d
   return status;
 }
 
+static void centroid_of(const qmat_skin_triangles *surface, size_t triangle, double centroid[3]) {
+  for (int k = 0; k < 3; k++) centroid[k] = 0;
+  for (size_t c = 0; c < 3; c++)
+    for (size_t k = 0; k < 3; k++)
+      centroid[k] += surface->positions[3 * (size_t)surface->triangles[3 * triangle + c] + k] / 3;
+}
+
 static double distance_of(const skin *s) {
   return fmax(s->to_envelope, s->from_envelope);
 }
@@ -282,69 +291,6 @@ static double distance_of(const skin *s) {
 static qmat_status make_contour(skin *s, int detail, qmat_skin_triangles *surface, qmat_envelope_grid *grid) {
   return qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
                                1 / (double)s->params->resolution, detail, s->marks, s->mark_count, surface, grid);
-}
-
-/* Halves cells where the contour is too far from the envelope, one step a round, and measures the result. */
-static qmat_status refine_contour(skin *s, int detail) {
-  for (int level = 1;; level++) {
-    qmat_skin_distance distance;
-    qmat_status status = bound_distance(s, &s->surface, CONTOUR_SHARE * s->params->error, &distance);
-    const size_t far = distance.far_count;
-    if (status == QMAT_OK && qmat_grow((void **)&s->marks, &s->mark_capacity, s->mark_count + far, sizeof *s->marks))
-      status = qmat_fail_memory(s->context, "places far from the skin");
-    for (size_t i = 0; i < far && status == QMAT_OK; i++) {
-      qmat_cell_mark *mark = &s->marks[s->mark_count++];
-      memcpy(mark->point, distance.far_points + 3 * i, sizeof mark->point);
-      mark->level = level;
-    }
-    qmat_skin_distance_uninit(&distance);
-    if (status != QMAT_OK || far == 0 || level > detail || 2 * s->surface.triangle_count > MOST_CONTOUR_TRIANGLES)
-      return status;
-    qmat_skin_triangles finer;
-    qmat_envelope_grid grid;
-    status = make_contour(s, detail, &finer, &grid);
-    if (status != QMAT_OK || finer.triangle_count > MOST_CONTOUR_TRIANGLES) {
-      drop_triangles(&finer);
-      return status;
-    }
-    drop_triangles(&s->surface);
-    s->surface = finer;
-    s->grid = grid;
-  }
-}
-
-/* Decimates the contour, which is `contour_error` from the envelope, and measures what is left. */
-static qmat_status decimate_contour(skin *s, double contour_error) {
-  const medial_skin_params *p = s->params;
-  qmat_skin_triangles contour = s->surface;
-  double error = p->error;
-  qmat_status status;
-  for (int attempt = 0;; attempt++) {
-    status = copy_triangles(s, &contour, &s->surface);
-    if (status == QMAT_OK)
-      status = qmat_skin_decimate(s->context, s->envelope, error, (size_t)p->triangles, &s->surface, &s->errors);
-    if (status == QMAT_OK) status = bound_distance(s, &s->surface, p->error, NULL);
-    if (status != QMAT_OK || attempt > 0 || p->triangles > 0 || distance_of(s) <= p->error || contour_error > p->error)
-      break;
-    error *= SECOND_SHARE;
-    drop_triangles(&s->surface);
-  }
-  drop_triangles(&contour);
-  return status;
-}
-
-static qmat_status make_envelope_surface(skin *s) {
-  const medial_skin_params *p = s->params;
-  qmat_status status = QMAT_OK;
-  int detail = (int)p->detail;
-  for (;; detail--) {
-    status = make_contour(s, detail, &s->surface, &s->grid);
-    if (status != QMAT_OK || detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
-    drop_triangles(&s->surface);
-  }
-  if (status == QMAT_OK && p->error > 0) status = refine_contour(s, detail);
-  s->contour_triangle_count = s->surface.triangle_count;
-  return status == QMAT_OK && p->error > 0 ? decimate_contour(s, distance_of(s)) : status;
 }
 
 /* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
@@ -361,11 +307,8 @@ static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
         vertices = fmax(vertices, fabs(qmat_envelope_distance(s->envelope, surface->positions + 3 * i, NULL)));
         continue;
       }
-      const uint32_t *t = surface->triangles + 3 * (i - surface->vertex_count);
-      double centroid[3] = {0, 0, 0};
-      for (int c = 0; c < 3; c++) {
-        for (int k = 0; k < 3; k++) centroid[k] += surface->positions[3 * (size_t)t[c] + (size_t)k] / 3;
-      }
+      double centroid[3];
+      centroid_of(surface, i - surface->vertex_count, centroid);
       centroids = fmax(centroids, fabs(qmat_envelope_distance(s->envelope, centroid, NULL)));
     }
     qmat_status status = qmat_progress(s->context, end, total, "measured points");
@@ -374,6 +317,142 @@ static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
   *at_vertices = vertices;
   *at_centroids = centroids;
   return QMAT_OK;
+}
+
+/* Marks places where cells are to be halved `level` times. `points` has 3 doubles a place. */
+static qmat_status mark_places(skin *s, const double *points, size_t count, int level) {
+  if (qmat_grow((void **)&s->marks, &s->mark_capacity, s->mark_count + count, sizeof *s->marks))
+    return qmat_fail_memory(s->context, "places far from the skin");
+  for (size_t i = 0; i < count; i++) {
+    qmat_cell_mark *mark = &s->marks[s->mark_count++];
+    memcpy(mark->point, points + 3 * i, sizeof mark->point);
+    mark->level = level;
+  }
+  return QMAT_OK;
+}
+
+/* Marks the triangles whose centroid is farther from the envelope than the share of the error. */
+static qmat_status mark_far_triangles(skin *s, int level, size_t *far) {
+  const qmat_skin_triangles *surface = &s->surface;
+  const size_t count = surface->triangle_count;
+  double *distances = qmat_alloc(count, sizeof *distances), centroid[3];
+  const int threads = qmat_threads(s->context);
+  *far = 0;
+  if (!distances) return qmat_fail_memory(s->context, "places far from the skin");
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) private(centroid)
+  for (size_t t = 0; t < count; t++) {
+    centroid_of(surface, t, centroid);
+    distances[t] = fabs(qmat_envelope_distance(s->envelope, centroid, NULL));
+  }
+  qmat_status status = qmat_progress(s->context, 0, 0, "measured points");
+  for (size_t t = 0; t < count && status == QMAT_OK; t++) {
+    if (!(distances[t] > CONTOUR_SHARE * s->params->error)) continue;
+    centroid_of(surface, t, centroid);
+    status = mark_places(s, centroid, 1, level);
+    ++*far;
+  }
+  qmat_free(distances);
+  return status;
+}
+
+/* Makes the contour again with the marks of now. It stays where no cell is halved, or where that is too much. */
+static qmat_status make_finer_contour(skin *s, int detail, bool *is_finer) {
+  qmat_skin_triangles finer;
+  qmat_envelope_grid grid;
+  *is_finer = false;
+  if (2 * s->surface.triangle_count > MOST_CONTOUR_TRIANGLES) return QMAT_OK;
+  const qmat_status status = make_contour(s, detail, &finer, &grid);
+  if (status != QMAT_OK || grid.cell_count == s->grid.cell_count || finer.triangle_count > MOST_CONTOUR_TRIANGLES) {
+    drop_triangles(&finer);
+    return status;
+  }
+  drop_triangles(&s->surface);
+  s->surface = finer;
+  s->grid = grid;
+  *is_finer = true;
+  return QMAT_OK;
+}
+
+/* Halves cells where the contour is too far from the envelope, one step a round. */
+static qmat_status refine_contour(skin *s, int detail) {
+  bool is_finer = true;
+  qmat_status status = QMAT_OK;
+  for (int level = 1; level <= detail && is_finer && status == QMAT_OK; level++) {
+    size_t far;
+    status = mark_far_triangles(s, level, &far);
+    if (status != QMAT_OK || far == 0) break;
+    status = make_finer_contour(s, detail, &is_finer);
+  }
+  return status;
+}
+
+/* Decimates a copy of the contour, and bounds the errors of what is left. The surface becomes that. `far` gets the
+ * places beyond the error; free it with qmat_skin_distance_uninit, also after a failure. */
+static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, double error, qmat_skin_distance *far) {
+  const medial_skin_params *p = s->params;
+  *far = (qmat_skin_distance){0};
+  qmat_status status = copy_triangles(s, contour, &s->surface);
+  if (status == QMAT_OK)
+    status = qmat_skin_decimate(s->context, s->envelope, error, (size_t)p->triangles, &s->surface, &s->errors);
+  return status == QMAT_OK ? bound_distance(s, &s->surface, p->error, far) : status;
+}
+
+/* Makes the finest cells at the places, as the surface. False where that changes nothing. */
+static qmat_status refine_places(skin *s, const qmat_skin_distance *far, int detail, bool *is_finer) {
+  *is_finer = false;
+  const qmat_status status = mark_places(s, far->far_points, far->far_count, detail);
+  return status == QMAT_OK && far->far_count > 0 ? make_finer_contour(s, detail, is_finer) : status;
+}
+
+/* Decimates the contour. Where the result exceeds the error, the contour gets the finest cells. If that does not help,
+ * a contour within the error is decimated for a share of it. */
+static qmat_status decimate_contour(skin *s, int detail) {
+  const double error = s->params->error;
+  qmat_skin_triangles contour = s->surface;
+  qmat_status status = QMAT_OK;
+  double share = 1;
+  for (int attempt = 1; status == QMAT_OK; attempt++) {
+    qmat_skin_distance far;
+    s->contour_triangle_count = contour.triangle_count;
+    status = decimate_copy(s, &contour, share * error, &far);
+    const double to_envelope = s->to_envelope, from_envelope = s->from_envelope;
+    bool is_finer = false, goes_on = share == 1 && s->params->triangles == 0 && distance_of(s) > error;
+    if (status == QMAT_OK && goes_on) {
+      qmat_skin_triangles decimated = s->surface;
+      s->surface = contour;
+      if (attempt < MOST_CONTOURS) status = refine_places(s, &far, detail, &is_finer);
+      if (status == QMAT_OK && !is_finer) {
+        share = SECOND_SHARE;
+        status = bound_distance(s, &s->surface, error, NULL);
+        goes_on = distance_of(s) <= error;
+      }
+      contour = s->surface;
+      s->surface = decimated;
+    }
+    qmat_skin_distance_uninit(&far);
+    if (!goes_on) {
+      s->to_envelope = to_envelope;
+      s->from_envelope = from_envelope;
+      break;
+    }
+    if (status == QMAT_OK) drop_triangles(&s->surface);
+  }
+  drop_triangles(&contour);
+  return status;
+}
+
+static qmat_status make_envelope_surface(skin *s) {
+  const medial_skin_params *p = s->params;
+  qmat_status status = QMAT_OK;
+  int detail = (int)p->detail;
+  for (;; detail--) {
+    status = make_contour(s, detail, &s->surface, &s->grid);
+    if (status != QMAT_OK || detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
+    drop_triangles(&s->surface);
+  }
+  s->contour_triangle_count = s->surface.triangle_count;
+  if (status == QMAT_OK && p->error > 0) status = refine_contour(s, detail);
+  return status == QMAT_OK && p->error > 0 ? decimate_contour(s, detail) : status;
 }
 
 /* Says that the mesh is farther from the envelope than it should be. Nonzero when memory is short. */
@@ -512,14 +591,15 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 6,
+    .version = 7,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
         "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
         "the report counts them. The mesh is a closed 2-manifold. Crevices narrower than a cell fill: cells are halved "
-        "where that makes more than half of `error`, up to `detail` times. Edges are then collapsed (CGAL) as far as "
+        "where that makes more than a third of `error`, up to `detail` times. Edges are then collapsed (CGAL) as far "
+        "as "
         "`error` and the topology allow. Both distances between the mesh and the envelope are bounded at the end "
         "(mesh_to_envelope, envelope_to_mesh), files state the larger, and a warning says when it exceeds `error`.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "

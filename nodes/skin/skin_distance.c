@@ -9,9 +9,10 @@
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/hausdorff_bound.h"
 
-/* The share of the threshold, or of the distance, that bounds may be too large by; samples that search the boundary
- * before the bounds do. */
-static const double TOLERANCE = 0.1;
+/* The share of the threshold, or of the distance, that bounds may be too large by. Those of the boundary are better
+ * where that decides whether the threshold is kept. */
+static const double TOLERANCE = 0.1, FINE_TOLERANCE = 0.02;
+/* Samples that search the boundary before the bounds do. */
 enum { SAMPLE_COUNT = 4000 };
 
 void qmat_skin_distance_uninit(qmat_skin_distance *distance) {
@@ -63,7 +64,7 @@ static qmat_status measure(qmat_context *context, const qmat_surface *surface, c
     status = qmat_boundary_distance_measure(context, surface, envelope, unit, threshold, TOLERANCE, false, SAMPLE_COUNT,
                                             &boundary);
   if (status == QMAT_OK)
-    status = qmat_hausdorff_bound_measure(context, surface, envelope, 0, TOLERANCE * threshold, threshold, &bound);
+    status = qmat_hausdorff_bound_measure(context, surface, envelope, 0, FINE_TOLERANCE * threshold, threshold, &bound);
   distance->from_envelope = frame->diagonal * boundary.either_side.hi;
   distance->to_envelope = frame->diagonal * fmax(bound.bound, 0);
   if (status == QMAT_OK) status = add_points(context, frame, boundary.far_points, boundary.far_count, distance);
