@@ -21,8 +21,10 @@ typedef struct {
   double spacing;
 } medial_features_params;
 
-/* The share of the bending on sharp edges above which a surface is made of flat faces. */
+/* The share of the bending on sharp edges above which a surface is made of flat faces, and the corners of a simple one:
+ * each corner stays a sphere. */
 static const double FLAT_FACED = 0.9;
+enum { MOST_SIMPLE_CORNERS = 64 };
 
 #define NONE UINT32_MAX
 
@@ -112,15 +114,26 @@ static qmat_status divide_edge(feature_builder *b, uint32_t from, uint32_t to) {
   return status == QMAT_OK ? add_segment(b, last, next) : status;
 }
 
+static size_t count_corners(const feature_builder *b) {
+  size_t corners = 0;
+  for (size_t v = 0; b->creases.count && v < b->mesh->vertex_count; v++) corners += b->creases.is_corner[v];
+  return corners;
+}
+
+/* Whether kept creases may take fewer spheres than fitted ones. */
+static bool is_simple(const feature_builder *b) {
+  return b->sharp_share >= FLAT_FACED && count_corners(b) <= MOST_SIMPLE_CORNERS;
+}
+
 static qmat_status place_features(feature_builder *b) {
   qmat_crease_edges edges = {.sharp_share = 0};
   const qmat_mesh solids = qmat_mesh_of_solids(b->mesh);
   qmat_status status =
       qmat_crease_edges_find(b->context, &solids, b->positions, b->params->angle, b->params->shortest, &edges);
   b->sharp_share = edges.sharp_share;
-  if (b->params->features == FEATURES_AUTO && edges.sharp_share < FLAT_FACED) edges.count = 0;
   if (status == QMAT_OK)
     status = qmat_creases_chain(b->context, &edges, b->positions, 3, b->mesh->vertex_count, &b->creases);
+  if (status == QMAT_OK && b->params->features == FEATURES_AUTO && !is_simple(b)) b->creases.count = 0;
   b->feature_of_vertex = qmat_arena_alloc(&b->context->arena, b->mesh->vertex_count, sizeof *b->feature_of_vertex);
   if (status == QMAT_OK && !b->feature_of_vertex) status = qmat_fail_memory(b->context, "features");
   if (status != QMAT_OK) return status;
@@ -362,10 +375,8 @@ static qmat_status make_medial(feature_builder *b, qmat_medial *medial) {
 }
 
 static qmat_status make_report(const feature_builder *b, qmat_report *report) {
-  size_t corners = 0;
-  for (size_t v = 0; b->creases.count && v < b->mesh->vertex_count; v++) corners += b->creases.is_corner[v];
   const qmat_json_count counts[] = {
-      {"creases", b->creases.count}, {"corners", corners}, {"spheres", b->feature_count}, {"gaps", b->gaps}};
+      {"creases", b->creases.count}, {"corners", count_corners(b)}, {"spheres", b->feature_count}, {"gaps", b->gaps}};
   int bad = qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   bad |= json_object_set_new(report->root, "longest_link", json_real(b->longest_link));
   bad |= json_object_set_new(report->root, "sharp_share", json_real(b->sharp_share));

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* report.page: a surface and its medial mesh as one HTML file, to look at in a browser. */
+#include <stdatomic.h>
+
 #include "core/node.h"
+#include "core/side_by_side.h"
 #include "io/page/page_write.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/page/figure.h"
@@ -44,54 +47,94 @@ static size_t first_equal(const qmat_value *const inputs[], size_t index) {
   return index;
 }
 
-/* Adds one mesh to the page; the first makes the picture. A mesh that could not be described has only its reason. */
-static qmat_status add_mesh(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
-                            size_t index, json_t *meshes, char **picture) {
-  const qmat_mesh *mesh = (const qmat_mesh *)qmat_shown_given(inputs[QMAT_SHOWN_MESH], index);
-  const qmat_medial *medial = (const qmat_medial *)qmat_shown_given(inputs[QMAT_SHOWN_MEDIAL], index);
-  const qmat_report *report = (const qmat_report *)qmat_shown_given(inputs[QMAT_SHOWN_REPORT], index);
-  const qmat_scene *scene = (const qmat_scene *)inputs[QMAT_SHOWN_SCENE];
-  const char *name = name_of(inputs, index);
-  if (!mesh || !medial) {
-    const char *reason = qmat_value_failure(qmat_value_at(inputs[mesh ? QMAT_SHOWN_MEDIAL : QMAT_SHOWN_MESH], index));
-    if (json_array_append_new(meshes, json_pack("{s:s, s:s}", "name", name, "failure", reason))) goto short_of_memory;
-    return QMAT_OK;
-  }
-  const size_t equal = first_equal(inputs, index);
-  if (equal < index) {
-    if (json_array_append_new(meshes, json_pack("{s:s, s:I}", "name", name, "same", (json_int_t)equal)))
-      goto short_of_memory;
-    return QMAT_OK;
-  }
-  qmat_shown shown;
-  json_t *data = NULL;
-  qmat_status status = qmat_shown_init(context, mesh, medial, report, &shown);
-  if (status == QMAT_OK) {
-    data =
-        qmat_page_data(context, &shown, report, (const qmat_chain *)qmat_shown_given(inputs[QMAT_SHOWN_CHAIN], index),
-                       (size_t)params->levels);
-    status = data ? QMAT_OK : context->error.status;
-  }
+/* The meshes of a page while they are made. */
+typedef struct page_meshes {
+  const report_page_params *params;
+  const qmat_value *const *inputs;
+  size_t drawn;  /* the mesh that makes the picture */
+  json_t **data; /* per mesh */
+  char *picture;
+  _Atomic size_t done;
+} page_meshes;
+
+static bool is_described(const qmat_value *const inputs[], size_t index) {
+  return qmat_shown_given(inputs[QMAT_SHOWN_MESH], index) && qmat_shown_given(inputs[QMAT_SHOWN_MEDIAL], index);
+}
+
+static qmat_status draw_picture(qmat_context *context, const qmat_shown *shown, page_meshes *all) {
+  const qmat_scene *scene = (const qmat_scene *)all->inputs[QMAT_SHOWN_SCENE];
+  const qmat_picture_options options = {
+      .turn = all->params->turn, .tilt = all->params->tilt, .is_z_up = qmat_shown_is_z_up(all->params->up, scene)};
   qmat_picture drawn = {0};
-  if (status == QMAT_OK && !*picture) {
-    const qmat_picture_options options = {
-        .turn = params->turn, .tilt = params->tilt, .is_z_up = qmat_shown_is_z_up(params->up, scene)};
-    status = qmat_picture_init(context, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
-    if (status == QMAT_OK)
-      status = qmat_picture_draw(context, &shown, &options, 0, 0, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
-    if (status == QMAT_OK) *picture = qmat_figure_base64(context, &drawn);
-    if (status == QMAT_OK && !*picture) status = context->error.status;
-  }
+  qmat_status status = qmat_picture_init(context, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
+  if (status == QMAT_OK)
+    status = qmat_picture_draw(context, shown, &options, 0, 0, PICTURE_WIDTH, PICTURE_HEIGHT, &drawn);
+  if (status == QMAT_OK) all->picture = qmat_figure_base64(context, &drawn);
+  if (status == QMAT_OK && !all->picture) status = context->error.status;
   qmat_picture_uninit(&drawn);
-  qmat_shown_uninit(&shown);
-  if (status != QMAT_OK) {
-    json_decref(data);
-    return qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]) > 1 ? qmat_fail_within(context, name) : status;
+  return status;
+}
+
+/* The numbers of a mesh that is described and equal to none before it. */
+static qmat_status describe(qmat_context *context, page_meshes *all, size_t index) {
+  const qmat_value *const *inputs = all->inputs;
+  const qmat_report *report = (const qmat_report *)qmat_shown_given(inputs[QMAT_SHOWN_REPORT], index);
+  qmat_shown shown;
+  qmat_status status =
+      qmat_shown_init(context, (const qmat_mesh *)qmat_shown_given(inputs[QMAT_SHOWN_MESH], index),
+                      (const qmat_medial *)qmat_shown_given(inputs[QMAT_SHOWN_MEDIAL], index), report, &shown);
+  if (status == QMAT_OK) {
+    const qmat_chain *chain = (const qmat_chain *)qmat_shown_given(inputs[QMAT_SHOWN_CHAIN], index);
+    all->data[index] = qmat_page_data(context, &shown, report, chain, (size_t)all->params->levels);
+    status = all->data[index] ? QMAT_OK : context->error.status;
   }
-  const bool is_named = json_object_set_new(data, "name", json_string(name)) == 0;
-  if (json_array_append_new(meshes, data) == 0 && is_named) return QMAT_OK;
-short_of_memory:
-  return qmat_fail_memory(context, "the page");
+  if (status == QMAT_OK && index == all->drawn) status = draw_picture(context, &shown, all);
+  qmat_shown_uninit(&shown);
+  return status == QMAT_OK || qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]) == 1
+             ? status
+             : qmat_fail_within(context, name_of(inputs, index));
+}
+
+/* Makes the data of one mesh. One that could not be described has only its reason. */
+static qmat_status make_mesh(qmat_context *context, void *user, size_t index) {
+  page_meshes *all = user;
+  const qmat_value *const *inputs = all->inputs;
+  const size_t equal = first_equal(inputs, index);
+  qmat_status status = QMAT_OK;
+  if (!is_described(inputs, index)) {
+    const qmat_value *mesh = qmat_shown_given(inputs[QMAT_SHOWN_MESH], index);
+    const char *reason = qmat_value_failure(qmat_value_at(inputs[mesh ? QMAT_SHOWN_MEDIAL : QMAT_SHOWN_MESH], index));
+    all->data[index] = json_pack("{s:s}", "failure", reason);
+  } else if (equal < index) {
+    all->data[index] = json_pack("{s:I}", "same", (json_int_t)equal);
+  } else {
+    status = describe(context, all, index);
+  }
+  atomic_fetch_add(&all->done, 1);
+  if (status == QMAT_OK &&
+      (!all->data[index] || json_object_set_new(all->data[index], "name", json_string(name_of(inputs, index)))))
+    status = qmat_fail_memory(context, "the page");
+  return status;
+}
+
+/* Adds all meshes, several side by side. `picture` gets that of the first that is described; the caller frees it. */
+static qmat_status add_meshes(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
+                              json_t *meshes, char **picture) {
+  const size_t count = qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]);
+  page_meshes all = {.params = params, .inputs = inputs, .data = qmat_calloc(count, sizeof *all.data)};
+  if (!all.data) return qmat_fail_memory(context, "the page");
+  while (all.drawn < count && !is_described(inputs, all.drawn)) all.drawn++;
+  qmat_status status = count == 1 ? make_mesh(context, &all, 0)
+                                  : qmat_run_side_by_side(context, count, make_mesh, &all, &all.done, count, "meshes");
+  for (size_t i = 0; i < count; i++) {
+    if (status != QMAT_OK)
+      json_decref(all.data[i]);
+    else if (json_array_append_new(meshes, all.data[i]))
+      status = qmat_fail_memory(context, "the page");
+  }
+  *picture = all.picture;
+  qmat_free(all.data);
+  return status;
 }
 
 static qmat_status fill(qmat_context *context, const report_page_params *params, const qmat_value *const inputs[],
@@ -106,11 +149,7 @@ static qmat_status fill(qmat_context *context, const report_page_params *params,
   bad |= json_object_set_new(data, "version", json_string(QMAT_VERSION));
   bad |= json_object_set_new(data, "camera",
                              json_pack("{s:f, s:f, s:b}", "turn", params->turn, "tilt", params->tilt, "z_up", is_z_up));
-  if (bad) return qmat_fail_memory(context, "the page");
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < qmat_value_count(inputs[QMAT_SHOWN_MEDIAL]) && status == QMAT_OK; i++)
-    status = add_mesh(context, params, inputs, i, meshes, picture);
-  return status;
+  return bad ? qmat_fail_memory(context, "the page") : add_meshes(context, params, inputs, meshes, picture);
 }
 
 static qmat_status run(qmat_context *context, const void *parameters, const qmat_value *const inputs[],

@@ -15,7 +15,7 @@
 static const double most_gap = 0.005;
 
 /* Searches for the outside end after this number of samples, as if they had found it. Pockets have a handful. */
-enum { MOST_POCKET = 256 };
+enum { MOST_POCKET = 64 };
 
 enum { CELLS_A_REPORT = 1024 };
 
@@ -154,10 +154,12 @@ static int64_t distance_between(betti a, betti b) {
 
 /* ---- searches ---- */
 
-/* Whether dropped tetrahedra connect a sample to the outside. */
-static bool reaches_outside(mending *m, uint32_t sample) {
+/* Whether dropped tetrahedra connect a sample to the outside. `answers` are those of the searches before, which have
+ * the stamps after `base`: a search that meets one has its answer. */
+static bool reaches_outside(mending *m, uint32_t sample, uint32_t base, const bool *answers) {
   uint32_t found[MOST_POCKET];
   size_t count = 0;
+  if (m->marks[sample] > base) return answers[m->marks[sample] - base - 1];
   found[count++] = sample;
   m->marks[sample] = ++m->stamp;
   for (size_t i = 0; i < count; i++) {
@@ -167,6 +169,7 @@ static bool reaches_outside(mending *m, uint32_t sample) {
       for (size_t k = 0; k < 4 && !m->d->kinds[cell]; k++) {
         const uint32_t corner = m->d->cells.corners[4 * (size_t)cell + k];
         if (m->marks[corner] == m->stamp) continue;
+        if (m->marks[corner] > base) return answers[m->marks[corner] - base - 1];
         if (count == MOST_POCKET) return true;
         m->marks[corner] = m->stamp;
         found[count++] = corner;
@@ -178,10 +181,17 @@ static bool reaches_outside(mending *m, uint32_t sample) {
 
 /* The corners of a tetrahedron that are connected to the outside without it. */
 static int corners_outside(mending *m, uint32_t cell) {
+  const uint32_t base = m->stamp;
   const uint8_t kind = m->d->kinds[cell];
+  bool answers[4];
   int count = 0;
   m->d->kinds[cell] = QMAT_CELL_INCENTRE;
-  for (size_t k = 0; k < 4; k++) count += reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k]);
+  for (size_t k = 0; k < 4; k++) {
+    const uint32_t before = m->stamp;
+    const bool is_outside = reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k], base, answers);
+    if (m->stamp > before) answers[before - base] = is_outside;
+    count += is_outside;
+  }
   m->d->kinds[cell] = kind;
   return count;
 }

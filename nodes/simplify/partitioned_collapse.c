@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/medial_build.h"
-#include "nodes/simplify/side_by_side.h"
+#include "core/side_by_side.h"
 
 static bool has_features(const qmat_decimation_rules *rules, const qmat_complex *complex, size_t first) {
   for (size_t v = first; rules->features == QMAT_FEATURES_SHARP && v < complex->vertex_count; v++)

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "core/geometry/medial_build.h"
-#include "nodes/simplify/side_by_side.h"
+#include "core/side_by_side.h"
 
 typedef struct all_starts {
   const qmat_simplification *prepared;

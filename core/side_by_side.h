@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_SIMPLIFY_SIDE_BY_SIDE_H
-#define QMAT_NODES_SIMPLIFY_SIDE_BY_SIDE_H
+#ifndef QMAT_CORE_SIDE_BY_SIDE_H
+#define QMAT_CORE_SIDE_BY_SIDE_H
 
 #include <stdatomic.h>
 

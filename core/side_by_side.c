@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/simplify/side_by_side.h"
+#include "core/side_by_side.h"
 
 typedef struct shared_progress {
   qmat_context *context;

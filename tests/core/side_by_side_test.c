@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/side_by_side.h"
+
+typedef struct {
+  _Atomic size_t done;
+  size_t first_failure, last_failure;
+  uint8_t ran[64];
+} items;
+
+static qmat_status run_item(qmat_context *own, void *user, size_t item) {
+  items *all = user;
+  assert_int_equal(qmat_threads(own), 1);
+  all->ran[item]++;
+  if (item == all->first_failure || item == all->last_failure)
+    return qmat_fail(own, QMAT_ERROR_GEOMETRY, "item %zu", item);
+  atomic_fetch_add(&all->done, 1);
+  return qmat_progress(own, 0, 0, "ignored");
+}
+
+static void test_every_item_runs_once(void **state) {
+  (void)state;
+  for (int threads = 1; threads <= 8; threads *= 2) {
+    qmat_context context = {.threads = threads};
+    items all = {.first_failure = 64, .last_failure = 64};
+    assert_int_equal(qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items"), QMAT_OK);
+    for (size_t i = 0; i < 64; i++) assert_int_equal(all.ran[i], 1);
+    assert_int_equal(atomic_load(&all.done), 64);
+    qmat_context_uninit(&context);
+  }
+}
+
+static void test_a_failure_ends_it_with_its_error(void **state) {
+  (void)state;
+  qmat_context context = {.threads = 1};
+  items all = {.first_failure = 5, .last_failure = 9};
+  assert_int_equal(qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items"), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "item 5");
+  assert_int_equal(all.ran[6], 0);
+  qmat_context_uninit(&context);
+}
+
+static bool refuse_later(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                         const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return --*(int *)user > 0;
+}
+
+static void test_it_can_be_cancelled(void **state) {
+  (void)state;
+  for (int calls = 1; calls <= 2; calls++) {
+    int left = calls;
+    qmat_context context = {.threads = 2, .progress = refuse_later, .progress_user = &left};
+    items all = {.first_failure = 64, .last_failure = 64};
+    const qmat_status status = qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items");
+    if (calls == 1) assert_int_equal(status, QMAT_CANCELLED);
+    if (status != QMAT_OK) assert_int_equal(context.error.status, QMAT_CANCELLED);
+    qmat_context_uninit(&context);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_every_item_runs_once),
+      cmocka_unit_test(test_a_failure_ends_it_with_its_error),
+      cmocka_unit_test(test_it_can_be_cancelled),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
