@@ -13,7 +13,7 @@ export SOURCE_DATE_EPOCH
 umask 022
 rm -f "$build"/*.deb
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr -DQMAT_TESTS=OFF -DQMAT_DEBIAN=ON \
-  -DQMAT_PYTHON_DIR=lib/python3/dist-packages -DQMAT_MAINTAINER="${QMAT_MAINTAINER:-qmat@users.noreply.github.com}" \
+  -DQMAT_PYTHON_DIR=lib/python3/dist-packages -DQMAT_ZSH_DIR=share/zsh/vendor-completions -DQMAT_MAINTAINER="${QMAT_MAINTAINER:-qmat@users.noreply.github.com}" \
   -DCMAKE_SHARED_LINKER_FLAGS='-Wl,-z,relro,-z,now' -DCMAKE_EXE_LINKER_FLAGS='-Wl,-z,relro,-z,now' "$@"
 cmake --build "$build" -j "$(nproc)"
 (cd "$build" && cpack)
