@@ -441,7 +441,7 @@ static const qmat_param params[] = {
     QMAT_ENUM(
         medial_features_params, features, feature_kinds, FEATURES_SHARP,
         "Leave the medial mesh as it is, or add spheres of radius zero on sharp convex edges and corners. auto: "
-        "as sharp where the surface is made of flat faces, none elsewhere; medial.simplify with features=auto then "
+        "as sharp where the surface is made of few flat faces, none elsewhere; medial.simplify with features=auto then "
         "keeps them where that takes fewer spheres"),
     QMAT_FLOAT(medial_features_params, angle, "degrees", 40, 1, 179,
                "An edge is sharp if the normals of its facets differ by more than this"),
@@ -475,9 +475,9 @@ const qmat_node qmat_node_medial_features = {
         "spheres on their creases.\n\n"
         "A crease runs from corner to corner: where creases meet, end or bend by more than 45 degrees. Concave creases "
         "are ignored, since the medial axis does not reach them.\n\n"
-        "A surface is made of flat faces when nine tenths of its bending are on sharp edges: the sum of the angle "
-        "times "
-        "the length of edges (sharp_share in the report). On other surfaces fitted spheres do better.",
+        "A surface is made of few flat faces when it has at most 64 corners, and nine tenths of its bending are on "
+        "sharp edges: the sum of the angle times the length of edges (sharp_share in the report). On other surfaces "
+        "fitted spheres do better.",
     .citation = "Section 5, future work",
     .params_size = sizeof(medial_features_params),
     .params = params,

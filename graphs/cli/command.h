@@ -21,7 +21,7 @@ typedef struct qmat_given_option {
   const char *name, *value;
 } qmat_given_option;
 
-enum { QMAT_MAX_OPTIONS = 48, QMAT_OPTION_DOC_SIZE = 256 };
+enum { QMAT_MAX_OPTIONS = 48, QMAT_OPTION_DOC_SIZE = 768 };
 
 typedef struct qmat_command qmat_command;
 

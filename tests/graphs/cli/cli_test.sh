@@ -24,7 +24,10 @@ for command in mat run batch watch why cache check info extract dot graphs nodes
 done
 expect 0 "--epsilon" "$qmat" help mat
 expect 0 "0.01" "$qmat" mat --help
-expect 0 "default none" "$qmat" mat --help # the graph's, not that of medial.features
+"$qmat" mat --help | tr -s '\n ' ' ' >options.txt
+holds "mat has the default of the graph, not that of medial.features" grep -q "none, sharp or auto, default auto" options.txt
+holds "mat tells all of an option of the colliders" grep -q "both, contain or inside, default contain" options.txt
+holds "mat tells all of the longest option" grep -q "any, capsules, spheres or hulls, default any" options.txt
 expect 2 "did you mean '--threads'?" "$qmat" run g.yaml --thread 2
 expect 2 "did you mean '--epsilon'?" "$qmat" mat box.off -o x.glb --epsilom 1%
 expect 2 "needs a value" "$qmat" run g.yaml --set
