@@ -13,6 +13,7 @@
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/storage_share.h"
+#include "nodes/page/skin_colours.h"
 
 /* Without a report, epsilon is taken for this share of the diagonal. */
 #define DEFAULT_EPSILON 1e-3
@@ -35,7 +36,7 @@ typedef enum requirement { REQUIRE_NOTHING, REQUIRE_CERTIFIED } requirement;
 
 typedef struct scene_write_params {
   int format; /* a file_format */
-  bool draco, draco_meshes, skin_beside, side_files;
+  bool draco, draco_meshes, skin_beside, skin_colours, side_files;
   int64_t position_bits, radius_bits;
   int flat;    /* a qmat_flat_form */
   int require; /* a requirement */
@@ -162,12 +163,17 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   const bool placed = scene && scene->placement_count > 0, kept = keeps_scene(params, scene);
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]),
                expected = (kept || placed) && scene->mesh_count > 0 ? scene->mesh_count : 1;
+  if (params->skin_colours && params->draco) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "a skin that Draco compresses has no colours");
+    return qmat_fail_field(context, "skin_colours");
+  }
   if (count != expected) {
     qmat_fail(context, QMAT_ERROR_USAGE, "%zu medial meshes for %zu meshes", count, expected);
     return qmat_fail_field(context, "medial");
   }
   qmat_gltf_addition *additions = qmat_calloc(count, sizeof *additions);
   if (!additions) return qmat_fail_memory(context, "a glTF file");
+  qmat_status status = QMAT_OK;
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
     additions[i] = addition_of(context, params, scene, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
@@ -177,11 +183,13 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
     additions[i].colliders = (const qmat_colliders *)given_for(inputs[IN_COLLIDERS], i);
     additions[i].collider_forms = collider_forms(params);
     additions[i].dynamic = !params->fixed;
+    if (params->skin_colours && additions[i].skin && additions[i].medial && status == QMAT_OK)
+      status = qmat_skin_colours(context, additions[i].medial, additions[i].skin, &additions[i].colours);
   }
-  const qmat_status status =
-      kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
-      : placed ? qmat_gltf_write_places(context, scene, additions, count, file)
-               : qmat_gltf_write_addition(context, &additions[0], file);
+  if (status == QMAT_OK)
+    status = kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
+             : placed ? qmat_gltf_write_places(context, scene, additions, count, file)
+                      : qmat_gltf_write_addition(context, &additions[0], file);
   qmat_free(additions);
   return status;
 }
@@ -454,6 +462,8 @@ static const qmat_param params[] = {
               "Compress the triangles of a glTF scene with Draco (glb, gltf). Its move is part of the errors"),
     QMAT_BOOL(scene_write_params, skin_beside,
               "Add the skin to a glTF scene as a further mesh beside the one that it describes"),
+    QMAT_BOOL(scene_write_params, skin_colours,
+              "Colour the skin's vertices by kind: sphere, cone or slab (glb, gltf; not with draco)"),
     QMAT_BOOL(scene_write_params, side_files,
               "Keep the buffers and images of a glTF scene in files beside a .glb instead of inside it"),
     QMAT_INT(scene_write_params, position_bits, "bits", 0, 0, 30,
@@ -513,7 +523,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 12,
+    .version = 13,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

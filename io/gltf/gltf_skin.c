@@ -57,8 +57,8 @@ static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
   }
 }
 
-static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, qmat_gltf_skin *data,
-                           qmat_writer *buffer) {
+static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, const uint8_t *colours,
+                           qmat_gltf_skin *data, qmat_writer *buffer) {
   size_t count = 3 * skin->vertex_count;
   data->vertex_count = skin->vertex_count;
   data->index_count = 3 * skin->triangle_count;
@@ -80,6 +80,10 @@ static void put_plain_skin(const qmat_mesh *skin, const float *positions, const 
   }
   data->sizes[0] = data->sizes[1] = count * sizeof(float);
   data->sizes[2] = data->index_count * (data->wide ? 4 : 2);
+  if (!colours) return;
+  data->coloured = true;
+  data->sizes[3] = 4 * skin->vertex_count;
+  qmat_put_bytes(buffer, colours, data->sizes[3]);
 }
 
 static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, const float *positions,
@@ -111,8 +115,8 @@ static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, 
   return QMAT_OK;
 }
 
-qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, const double origin[3], double moved,
-                               qmat_gltf_skin *data, qmat_writer *buffer) {
+qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, const double origin[3],
+                               const uint8_t *colours, double moved, qmat_gltf_skin *data, qmat_writer *buffer) {
   float *positions = qmat_alloc(skin->vertex_count, 3 * sizeof *positions);
   float *normals = qmat_alloc(skin->vertex_count, 3 * sizeof *normals);
   double *sums = qmat_calloc(skin->vertex_count, 3 * sizeof *sums);
@@ -124,7 +128,7 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
     if (moved > 0) {
       status = put_draco_skin(context, skin, positions, normals, moved, data, buffer);
     } else {
-      put_plain_skin(skin, positions, normals, data, buffer);
+      put_plain_skin(skin, positions, normals, colours, data, buffer);
     }
     qmat_gltf_pad(buffer, 0);
     if (status == QMAT_OK && buffer->failed) status = qmat_fail_memory(context, "the skin");
@@ -141,8 +145,8 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
 
 /* Adds the buffer views of a skin whose data start at `offset`. `*first` gets the number of the first view. */
 static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset, json_int_t *first) {
-  static const int targets[3] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
-  for (int i = 0; i < (data->compressed ? 1 : 3); i++) {
+  static const int targets[4] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, ARRAY_BUFFER};
+  for (int i = 0; i < (data->compressed ? 1 : data->coloured ? 4 : 3); i++) {
     json_int_t number;
     json_t *view = json_pack("{s:I, s:I, s:I}", "buffer", buffer, "byteOffset", (json_int_t)offset, "byteLength",
                              (json_int_t)data->sizes[i]);
@@ -157,7 +161,7 @@ static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffe
   return true;
 }
 
-/* Adds the accessors of positions, normals and indices, in this order. */
+/* Adds the accessors of positions, normals, indices and colours, in this order. */
 static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t first_view, json_int_t *first) {
   json_t *position =
       json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", QMAT_GLTF_FLOAT, "count",
@@ -168,9 +172,12 @@ static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t f
   json_t *indices =
       json_pack("{s:i, s:I, s:s}", "componentType", data->wide ? QMAT_GLTF_UNSIGNED_INT : QMAT_GLTF_UNSIGNED_SHORT,
                 "count", (json_int_t)data->index_count, "type", "SCALAR");
-  json_t *accessors[3] = {position, normal, indices};
+  json_t *accessors[4] = {position, normal, indices};
+  if (data->coloured)
+    accessors[3] = json_pack("{s:i, s:b, s:I, s:s}", "componentType", QMAT_GLTF_UNSIGNED_BYTE, "normalized", 1, "count",
+                             (json_int_t)data->vertex_count, "type", "VEC4");
   bool done = true;
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < (data->coloured ? 4 : 3); i++) {
     json_int_t number;
     if (accessors[i] && !data->compressed)
       done = qmat_gltf_set(accessors[i], "bufferView", json_integer(first_view + i)) && done;
@@ -180,10 +187,11 @@ static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t f
   return done;
 }
 
-static bool add_material(json_t *root, json_int_t *number) {
+static bool add_material(json_t *root, bool white, json_int_t *number) {
   if (*number >= 0) return true;
   json_t *material = json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}}", "name", "skin", "pbrMetallicRoughness",
-                               "baseColorFactor", 0.75, 0.72, 0.65, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.6);
+                               "baseColorFactor", white ? 1.0 : 0.75, white ? 1.0 : 0.72, white ? 1.0 : 0.65, 1.0,
+                               "metallicFactor", 0.0, "roughnessFactor", 0.6);
   return qmat_gltf_add(root, "materials", material, number);
 }
 
@@ -201,16 +209,18 @@ static json_t *extras_of(const qmat_gltf_skin *data, bool mark) {
 bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset,
                         json_int_t *material, const char *name, bool mark, json_int_t *mesh_number) {
   json_int_t view = 0, accessor = 0;
-  if (!add_material(root, material) || !add_views(root, data, buffer, offset, &view) ||
+  if (!add_material(root, data->coloured, material) || !add_views(root, data, buffer, offset, &view) ||
       !add_accessors(root, data, view, &accessor))
     return false;
   json_t *primitive = json_pack("{s:{s:I, s:I}, s:I, s:I}", "attributes", "POSITION", accessor, "NORMAL", accessor + 1,
                                 "indices", accessor + 2, "material", *material);
-  bool done = true;
+  bool done = !primitive || !data->coloured ||
+              qmat_gltf_set(json_object_get(primitive, "attributes"), "COLOR_0", json_integer(accessor + 3));
   if (primitive && data->compressed) {
     json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", QMAT_GLTF_DRACO, "bufferView", view, "attributes",
                                   "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);
-    done = qmat_gltf_set(primitive, "extensions", extension) && qmat_gltf_require_extension(root, QMAT_GLTF_DRACO);
+    done =
+        done && qmat_gltf_set(primitive, "extensions", extension) && qmat_gltf_require_extension(root, QMAT_GLTF_DRACO);
   }
   json_t *mesh = json_pack("{s:[o]}", "primitives", primitive);
   if (mesh && name) done = qmat_gltf_set(mesh, "name", json_string(name)) && done;

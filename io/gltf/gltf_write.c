@@ -501,7 +501,8 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   qmat_status status = make_medial_text(context, addition->medial, origin, of_mesh, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
   const double skin_moved = options.compress_skin ? fmax(options.quantisation, DBL_MIN) : 0;
-  if (status == QMAT_OK && mesh) status = qmat_gltf_skin_put(context, mesh, origin, skin_moved, &data, &document->data);
+  if (status == QMAT_OK && mesh)
+    status = qmat_gltf_skin_put(context, mesh, origin, addition->colours, skin_moved, &data, &document->data);
   json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, &stated) : NULL;
   bool done = extras && (!mesh || qmat_gltf_skin_add(document->root, &data, document->buffer, offset,
                                                      &document->material, name, scene != NULL, &skin));

@@ -69,6 +69,7 @@ qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, co
 typedef struct qmat_gltf_addition {
   const qmat_medial *medial; /* NULL, in a scene: nothing is added for this mesh */
   const qmat_mesh *skin;     /* added as a mesh; NULL: none */
+  const uint8_t *colours;    /* of the skin's vertices, 4 bytes each (linear RGBA); NULL: none; not compressed */
   qmat_gltf_options options;
   const qmat_colliders *colliders; /* added to the nodes that get the medial mesh; NULL: none */
   unsigned collider_forms;         /* of io/gltf/gltf_colliders.h */

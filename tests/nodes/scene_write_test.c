@@ -279,6 +279,60 @@ static void test_scene_and_skin_name_and_show_the_node(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* A slab of three spheres of radius 1, and a triangle with a vertex on its face, on its rim and on a corner. The
+ * colours are Okabe and Ito's green, blue and orange, without the curve of sRGB. */
+static void test_a_skins_vertices_have_the_colour_of_their_kind(void **state) {
+  (void)state;
+  static const uint8_t expected[12] = {0, 87, 44, 255, 24, 116, 208, 255, 202, 88, 0, 255};
+  const double spheres[12] = {0, 0, 0, 1, 4, 0, 0, 1, 0, 4, 0, 1};
+  qmat_context context = {0};
+  qmat_medial *medial = qmat_medial_new();
+  medial->spheres = qmat_alloc(12, sizeof(double));
+  memcpy(medial->spheres, spheres, sizeof spheres);
+  medial->sphere_count = 3;
+  assert_int_equal(qmat_medial_set_simplices(&context, medial, NULL, 0, (const uint32_t[]){0, 1, 2}, 1), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_mesh *skin = shape_new();
+  shape_vertex(skin, 1, 1, 1);
+  shape_vertex(skin, 2, -1, 0);
+  shape_vertex(skin, -0.6, -0.8, 0);
+  shape_triangle(skin, 0, 1, 2);
+  shape_seal(skin);
+
+  const char *const settings[][2] = {{"skin_colours", "true"}, {NULL, NULL}};
+  qmat_file *file = must_write(medial, (wiring){.skin = skin}, settings);
+  json_t *root = glb_root(file),
+         *primitive =
+             json_array_get(json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
+  const json_t *id = json_object_get(json_object_get(primitive, "attributes"), "COLOR_0");
+  const json_t *accessor = json_array_get(json_object_get(root, "accessors"), (size_t)json_integer_value(id));
+  const json_t *view = json_array_get(json_object_get(root, "bufferViews"),
+                                      (size_t)json_integer_value(json_object_get(accessor, "bufferView")));
+  assert_int_equal(json_integer_value(json_object_get(accessor, "componentType")), 5121);
+  assert_true(json_is_true(json_object_get(accessor, "normalized")));
+  assert_int_equal(json_integer_value(json_object_get(accessor, "count")), 3);
+  uint32_t text;
+  memcpy(&text, file->parts[0].bytes + 12, sizeof text);
+  const uint8_t *data = (const uint8_t *)file->parts[0].bytes + 28 + text;
+  assert_memory_equal(data + json_integer_value(json_object_get(view, "byteOffset")), expected, sizeof expected);
+  json_decref(root);
+  qmat_value_release(&file->base);
+
+  const qmat_node *node = qmat_node_find("scene.write");
+  const char *const both[][2] = {{"skin_colours", "true"}, {"draco", "true"}, {NULL, NULL}};
+  void *params = make_params(node, both);
+  const qmat_value *inputs[5] = {NULL};
+  inputs[qmat_input_find(node, "medial")] = &medial->base;
+  inputs[qmat_input_find(node, "skin")] = &skin->base;
+  qmat_value *outputs[2] = {NULL};
+  assert_int_equal(node->run(&context, params, inputs, outputs), QMAT_ERROR_USAGE);
+  assert_string_equal(context.error.field, "skin_colours");
+  free(params);
+  qmat_value_release(&skin->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_each_format_is_made(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
@@ -413,6 +467,7 @@ int main(void) {
       cmocka_unit_test(test_what_is_certified_stays_so_where_quantisation_can_be_fine_enough),
       cmocka_unit_test(test_quantisation_takes_half_of_the_share_of_storage_at_most),
       cmocka_unit_test(test_scene_and_skin_name_and_show_the_node),
+      cmocka_unit_test(test_a_skins_vertices_have_the_colour_of_their_kind),
       cmocka_unit_test(test_each_format_is_made),
       cmocka_unit_test(test_ma_keeps_every_number),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
