@@ -139,10 +139,10 @@ markdown_rows() {
 }
 
 started=$(date +%s)
+used=0
 
-# made_by COMMAND: how, when and where a page was made.
+# made_by COMMAND: how, when and where a page was made. The processor time is that of all timed commands.
 made_by() {
-  note_used
   echo "Made by \`$1\` on $(date -u +%Y-%m-%d), on a machine with $(nproc) processors" \
     "($(awk -F ': ' '/^model name/ { print $2; exit }' /proc/cpuinfo), $(awk '/^MemTotal/ { printf "%.0f GB", $2 / 1e6 }' /proc/meminfo))" \
     "with a load of $(cut -d ' ' -f 1 /proc/loadavg). It took $(awk -v s="$used" 'BEGIN { printf "%.0f", s / 60 }') minutes of" \
