@@ -50,7 +50,7 @@ qmat_status qmat_run_side_by_side(qmat_context *context, size_t count, qmat_item
 #pragma omp for schedule(dynamic, 1)
     for (size_t item = 0; item < count; item++) {
       if (atomic_load(&shared.ended)) continue;
-      const qmat_status result = run(&own, user, item);
+      const qmat_status result = run(user, &own, item);
       qmat_arena_uninit(&own.arena);
       if (result == QMAT_OK || result == QMAT_CANCELLED) continue;
       atomic_store(&shared.ended, true);

@@ -6,12 +6,13 @@
 
 #include "core/context.h"
 
-/* One of several items. `own` is a context with one thread; its scratch memory is freed after the item. */
-typedef qmat_status qmat_item_fn(qmat_context *own, void *user, size_t item);
+/* Processes one of several independent items. `context` is the item's own; its progress function cancels the item when
+ * its result is no longer needed. */
+typedef qmat_status qmat_item_fn(void *user, qmat_context *context, size_t item);
 
-/* Runs items 0 to count - 1 on all threads of `context`, each on one. Progress is `*done` of `total` in `unit`; the
- * items raise `*done`. Ends with QMAT_CANCELLED, or with the error of the first item that failed; items that have not
- * started are then left out. */
+/* Runs items 0 to count - 1 on all threads of `context`, each on one. An item's scratch memory is freed after it.
+ * Progress is `*done` of `total` in `unit`; the items raise `*done`. Ends with QMAT_CANCELLED, or with the error of the
+ * first item that failed; items that have not started are then left out. */
 qmat_status qmat_run_side_by_side(qmat_context *context, size_t count, qmat_item_fn *run, void *user,
                                   const _Atomic size_t *done, size_t total, const char *unit);
 

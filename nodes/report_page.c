@@ -96,7 +96,7 @@ static qmat_status describe(qmat_context *context, page_meshes *all, size_t inde
 }
 
 /* Makes the data of one mesh. One that could not be described has only its reason. */
-static qmat_status make_mesh(qmat_context *context, void *user, size_t index) {
+static qmat_status make_mesh(void *user, qmat_context *context, size_t index) {
   page_meshes *all = user;
   const qmat_value *const *inputs = all->inputs;
   const size_t equal = first_equal(inputs, index);
@@ -124,7 +124,7 @@ static qmat_status add_meshes(qmat_context *context, const report_page_params *p
   page_meshes all = {.params = params, .inputs = inputs, .data = qmat_calloc(count, sizeof *all.data)};
   if (!all.data) return qmat_fail_memory(context, "the page");
   while (all.drawn < count && !is_described(inputs, all.drawn)) all.drawn++;
-  qmat_status status = count == 1 ? make_mesh(context, &all, 0)
+  qmat_status status = count == 1 ? make_mesh(&all, context, 0)
                                   : qmat_run_side_by_side(context, count, make_mesh, &all, &all.done, count, "meshes");
   for (size_t i = 0; i < count; i++) {
     if (status != QMAT_OK)

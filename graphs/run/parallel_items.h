@@ -2,17 +2,13 @@
 #ifndef QMAT_GRAPHS_RUN_PARALLEL_ITEMS_H
 #define QMAT_GRAPHS_RUN_PARALLEL_ITEMS_H
 
-#include "core/context.h"
-
-/* Processes one of several independent items. `context` is the item's own: it has the item's share of the threads, and
- * its progress function cancels the item when its result is no longer needed. */
-typedef qmat_status qmat_item_fn(void *user, qmat_context *context, size_t item);
+#include "core/side_by_side.h"
 
 /* Calls `run` for each of `count` items from several threads, the largest items first. The items share
  * qmat_threads(context) threads: a running item has at least one, and more if items are few or it is much larger than
- * the others. `sizes` has an estimate of each item's cost. Results must not depend on an item's number of threads. The
- * context's progress function is called from the calling thread, with the number of finished items and their name
- * `unit` ("meshes").
+ * the others, and its context has that share. `sizes` has an estimate of each item's cost. Results must not depend on
+ * an item's number of threads. The context's progress function is called from the calling thread, with the number of
+ * finished items and their name `unit` ("meshes").
  *
  * Returns QMAT_OK, or the status of the first item in order that failed, with its error in `context` and its index in
  * `*failed`: the same for any number of threads. Items after a failed one are stopped or not started. For

@@ -270,7 +270,7 @@ static qmat_status end_piece(partition *d, size_t piece, const qmat_decimation *
   return QMAT_OK;
 }
 
-static qmat_status collapse_piece(qmat_context *context, void *user, size_t piece) {
+static qmat_status collapse_piece(void *user, qmat_context *context, size_t piece) {
   partition *d = user;
   qmat_decimation own;
   qmat_constraint_points constraints;

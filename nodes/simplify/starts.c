@@ -36,12 +36,14 @@ static size_t keep_below(uint32_t *rows, size_t count, size_t width, size_t limi
   return kept;
 }
 
-/* Makes a copy of a medial mesh without the spheres of radius 0 at its end: those that medial.features has added. */
+/* Makes a copy of a medial mesh without the spheres of radius 0 at its end: those that medial.features has added. A
+ * medial mesh of nothing else stays whole. */
 static qmat_status leave_features(qmat_context *context, const qmat_medial *medial, qmat_medial **bare) {
   qmat_medial *copy = *bare = qmat_medial_copy(medial);
   if (!copy) return qmat_fail_memory(context, "the initial medial mesh");
-  while (copy->sphere_count > copy->sheet_sphere_count && copy->spheres[4 * copy->sphere_count - 1] == 0)
-    copy->sphere_count--;
+  size_t count = copy->sphere_count;
+  while (count > copy->sheet_sphere_count && copy->spheres[4 * count - 1] == 0) count--;
+  if (count > 0) copy->sphere_count = count;
   if (copy->region_offset_count > 0) {
     copy->region_offset_count = copy->sphere_count + 1;
     copy->region_sample_count = copy->region_offsets[copy->sphere_count];
@@ -52,7 +54,7 @@ static qmat_status leave_features(qmat_context *context, const qmat_medial *medi
 }
 
 /* Starts with the same seed follow each other, creases kept first. */
-static qmat_status run_start(qmat_context *own, void *user, size_t start) {
+static qmat_status run_start(void *user, qmat_context *own, size_t start) {
   all_starts *all = user;
   qmat_simplification s = *all->prepared;
   s.context = own;
@@ -71,7 +73,7 @@ static qmat_status run_start(qmat_context *own, void *user, size_t start) {
 static qmat_status run_alone(qmat_context *context, all_starts *all) {
   const qmat_arena arena = context->arena;
   context->arena = (qmat_arena){0};
-  const qmat_status status = run_start(context, all, 0);
+  const qmat_status status = run_start(all, context, 0);
   qmat_arena_uninit(&context->arena);
   context->arena = arena;
   return status;

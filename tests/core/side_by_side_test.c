@@ -14,7 +14,7 @@ typedef struct {
   uint8_t ran[64];
 } items;
 
-static qmat_status run_item(qmat_context *own, void *user, size_t item) {
+static qmat_status run_item(void *user, qmat_context *own, size_t item) {
   items *all = user;
   assert_int_equal(qmat_threads(own), 1);
   all->ran[item]++;
