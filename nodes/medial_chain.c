@@ -96,8 +96,8 @@ static const qmat_param params[] = {
               "is left"),
     QMAT_COLLAPSE_PARAMS,
     QMAT_INT(medial_chain_params, bounds, "spheres", 0, 0, 1000000,
-             "Prove bounds of both errors for levels of up to this many spheres: every level up to 32, above four in "
-             "each doubling; 0: none"),
+             "Prove bounds of both errors for levels of up to this many spheres, and no finer than the first level "
+             "within `finest`: every level up to 32, above four in each doubling; 0: none"),
     {0},
 };
 
@@ -113,7 +113,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_chain = {
     .name = "medial.chain",
-    .version = 7,
+    .version = 8,
     .summary = "Collapses all medial edges and records the collapses, for any level of detail",
     .doc =
         "Collapses as medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left. "

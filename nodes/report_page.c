@@ -212,15 +212,15 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_report_page = {
     .name = "report.page",
-    .version = 3,
+    .version = 4,
     .summary = "Makes a page that shows a surface and its medial mesh in a browser",
     .doc =
         "One HTML file, which needs no server, no network and no other file. It shows the surface, coloured by its "
         "signed distance to the envelope, beside the spheres, cones and slabs or around them, with one camera; the "
         "places where either error is largest; the errors and the topology; and each mesh of a scene.\n\n"
-        "With a chain a slider goes through its levels of detail, from `levels` spheres down to one: through those "
-        "with proved bounds of both errors, where the chain has them (bounds of medial.chain). The spheres and errors "
-        "of a level are those of medial.lod.\n\n"
+        "With a chain a slider goes through its levels of detail, from `levels` spheres down to one. It stops "
+        "at those with proved bounds of both errors (bounds of medial.chain), and above them at four in each doubling, "
+        "whose errors hold at the constraint points. The spheres and errors of a level are those of medial.lod.\n\n"
         "Primitives are intersected exactly for each pixel (WebGL 2). Browsers without it show a picture, as "
         "report.picture draws it.",
     .citation = "",

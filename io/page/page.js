@@ -96,19 +96,20 @@ class Chain {
     chain.most = json.spheres;
     chain.least = json.spheres - chain.ends.length / 2;
     chain.proved = new Map(json.bounds.map(([spheres, ...both]) => [spheres, both]));
-    chain.stops = [...chain.proved.keys()]; // of the slider
+    chain.stops = chain.sliderStops();
     return chain;
   }
-  /** Of the slider's ends, 0 is the finest level. */
+  /** The levels that the slider stops at, the finest first: the proved ones, and above them four in each doubling. */
+  sliderStops() {
+    const stops = [...this.proved.keys()].reverse();
+    if (stops.length === 0) stops.push(this.least);
+    for (let n = stops.at(-1); n < this.most; stops.push(n)) n = Math.min(this.most, Math.max(n + 1, Math.round(n * 2 ** 0.25)));
+    return stops.reverse();
+  }
+  /** The slider's place nearest to a level; 0 is the finest. */
   place(spheres) {
-    if (this.stops.length > 1) return this.stops.reduce((best, n, i) => (Math.abs(Math.log(n / spheres)) < Math.abs(Math.log(this.stops[best] / spheres)) ? i : best), 0);
-    return Math.round((1000 * Math.log(this.most / spheres)) / Math.log(this.most / this.least || 1)) || 0;
-  }
-  levelAt(place) {
-    return this.stops.length > 1 ? this.stops[place] : this.most * (this.least / this.most) ** (place / 1000);
-  }
-  get places() {
-    return this.stops.length > 1 ? this.stops.length - 1 : 1000;
+    const away = (n) => Math.abs(Math.log(n / spheres));
+    return this.stops.reduce((best, n, i) => (away(n) < away(this.stops[best]) ? i : best), 0);
   }
   /** Both errors of the level are at most this at the constraint points. */
   error(spheres) {
@@ -652,7 +653,7 @@ function showLevel() {
   [...$('kinds').children].forEach((button, k) => (button.lastChild.textContent = counted(numbers[k], KINDS[k])));
   if (chain) {
     const n = state.spheres ?? state.mesh.spheres;
-    $('slider').max = String(chain.places);
+    $('slider').max = String(chain.stops.length - 1);
     $('slider').value = String(chain.place(Math.min(Math.max(n, chain.least), chain.most)));
     const proved = chain.proved.get(n);
     $('level').textContent = state.spheres === null ? `The result: ${counted(n, 'sphere')}` :
@@ -816,7 +817,7 @@ function listen() {
     $(id).addEventListener('click', act);
   for (const button of $('views').children) button.addEventListener('click', () => setView(button.dataset.view));
   $('slider').addEventListener('input', () => {
-    setLevel(state.mesh.chain.levelAt(Number($('slider').value)));
+    setLevel(state.mesh.chain.stops[Number($('slider').value)]);
   });
   $('mesh').addEventListener('change', () => {
     state.mesh = meshes[$('mesh').value];

@@ -48,26 +48,40 @@ static qmat_status bound_level(qmat_context *context, const qmat_surface *surfac
   return status;
 }
 
+/* The recorded error of a level, `finest` at least. */
+static double level_error(const qmat_chain *chain, size_t spheres, double finest) {
+  const size_t collapses = chain->sphere_count - spheres;
+  return fmax(collapses > 0 ? chain->errors[collapses - 1] : 0, finest);
+}
+
+/* The coarsest bounded level of a chain that ends with `least` spheres. */
+static size_t first_level(size_t least) {
+  size_t n = 1;
+  while (n < least) n = next_level(n);
+  return n;
+}
+
 qmat_status qmat_chain_set_bounds(qmat_context *context, const qmat_surface *surface, size_t most, double finest,
                                   double deviation, qmat_chain *chain) {
-  const size_t least = chain->sphere_count - chain->collapse_count;
-  const size_t finest_level = most < chain->sphere_count ? most : chain->sphere_count;
+  const size_t first = first_level(chain->sphere_count - chain->collapse_count);
+  const size_t last = most < chain->sphere_count ? most : chain->sphere_count;
+  const double finest_recorded = finest + qmat_constraint_share * deviation;
   size_t count = 0;
-  for (size_t n = 1; n <= finest_level; n = next_level(n)) count += n >= least;
+  for (size_t n = first; n <= last; n = next_level(n)) {
+    count++;
+    if (level_error(chain, n, finest) <= finest_recorded) break;
+  }
   chain->bounded = qmat_alloc(count, sizeof *chain->bounded);
   chain->bounds = qmat_alloc(2 * count, sizeof *chain->bounds);
   if (!chain->bounded || !chain->bounds) return qmat_fail_memory(context, "the bounds of the chain");
   chain->bounded_count = count;
   qmat_status status = QMAT_OK;
-  size_t i = count;
-  for (size_t n = 1; n <= finest_level && status == QMAT_OK; n = next_level(n)) {
-    if (n < least) continue;
+  for (size_t i = count, n = first; i > 0 && status == QMAT_OK; n = next_level(n)) {
     const size_t collapses = chain->sphere_count - n;
-    const double threshold = fmax(collapses > 0 ? chain->errors[collapses - 1] : 0, finest);
     const qmat_arena arena = context->arena; /* each level frees its scratch memory */
     context->arena = (qmat_arena){NULL};
     chain->bounded[--i] = (uint32_t)collapses;
-    status = bound_level(context, surface, chain, collapses, threshold, &chain->bounds[2 * i]);
+    status = bound_level(context, surface, chain, collapses, level_error(chain, n, finest), &chain->bounds[2 * i]);
     qmat_arena_uninit(&context->arena);
     context->arena = arena;
     for (size_t k = 0; k < 2; k++) chain->bounds[2 * i + k] += deviation;

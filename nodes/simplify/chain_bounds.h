@@ -7,9 +7,10 @@
 
 /* Sets bounded_count, bounded and bounds of a chain whose other fields are set: proved upper bounds of both errors at
  * its levels of at most `most` spheres, as medial.evaluate defines surface_to_envelope and envelope_to_surface. Up to
- * QMAT_BOUNDED_EACH spheres each level has them, above four in each doubling. `finest` (> 0, in diagonals) is the error
- * below which no bound is resolved; `deviation` is added to each. The tolerance
- * of both searches (hausdorff_bound.h, boundary_distance.h) is a twentieth of the level's threshold, or of `finest`.
+ * QMAT_BOUNDED_EACH spheres each level has them, above four in each doubling. The first level whose recorded error is
+ * at most `finest` (> 0, in diagonals) is the finest with bounds: more spheres gain nothing that the chain records, and
+ * their many primitives near the surface take the longest. `deviation` is added to each bound. The tolerance of both
+ * searches (hausdorff_bound.h, boundary_distance.h) is a twentieth of the level's recorded error, or of `finest`.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the
  * result does not depend on their number. Cost: a level takes as long as medial.evaluate without its samples. */
 enum { QMAT_BOUNDED_EACH = 32 };

@@ -290,8 +290,8 @@ static void test_bounds_out_of_order_or_negative_are_refused(void **state) {
   }
 }
 
-/* Every level up to 32 spheres, above four in each doubling, and each bound is medial.evaluate's to within the five
- * tolerances that boundary_distance.h promises. */
+/* Every level up to 32 spheres, above four in each doubling, and none finer than the first one within `finest`. Each
+ * bound is medial.evaluate's to within the five tolerances that boundary_distance.h promises. */
 static void test_bounds_are_those_of_an_evaluation(void **state) {
   (void)state;
   pipeline p = {0};
@@ -303,7 +303,14 @@ static void test_bounds_are_those_of_an_evaluation(void **state) {
   const qmat_chain *chain = (const qmat_chain *)outputs[0];
   assert_true(qmat_digest_equal(&chain->base.digest, &again[0]->digest));
   const size_t least = chain->sphere_count - chain->collapse_count;
-  assert_int_equal(chain->bounded_count, 32 + 4 - (least - 1));
+  assert_int_equal(chain->sphere_count - chain->bounded[chain->bounded_count - 1], least);
+  assert_true(chain->errors[chain->bounded[0] - 1] <= 0.03);
+  for (size_t i = 1; i < chain->bounded_count; i++) {
+    const size_t spheres = chain->sphere_count - chain->bounded[i], finer = chain->sphere_count - chain->bounded[i - 1];
+    assert_true(chain->errors[chain->bounded[i] - 1] > 0.03);
+    assert_int_equal(
+        finer, spheres < 32 ? (long)spheres + 1 : lround(32 * pow(2, 0.25 * (double)(chain->bounded_count - 32))));
+  }
   for (size_t i = 0; i < chain->bounded_count; i += 5) {
     char params[64];
     qmat_report *own;

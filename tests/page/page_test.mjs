@@ -141,8 +141,11 @@ async function testLevels(browser) {
       counts.push([qmatPage.state.spheres, qmatPage.level().spheres.length / 4, qmatPage.state.mesh.chain.error(qmatPage.state.spheres)]);
     }
     document.getElementById('result').click();
-    return { counts, back: qmatPage.state.spheres };`);
-  check('the slider goes from the finest proved level to one sphere', moved.counts[0][0] === 64 && moved.counts[4][0] === 1, JSON.stringify(moved));
+    const { most, proved, stops } = qmatPage.state.mesh.chain;
+    return { counts, most, stops, proved: [...proved.keys()], back: qmatPage.state.spheres };`);
+  check('the slider goes from the finest level to one sphere', moved.most === 300 && moved.counts[0][0] === moved.most && moved.counts[4][0] === 1, JSON.stringify(moved));
+  check('the slider stops at every proved level', moved.proved.length > 30 && moved.proved.every((n) => moved.stops.includes(n)), JSON.stringify(moved));
+  check('the slider has four stops in each doubling above', moved.stops.every((n, i, all) => i === 0 || (n < all[i - 1] && all[i - 1] <= Math.max(n + 1, Math.round(n * 2 ** 0.25)))), JSON.stringify(moved.stops));
   check('each level has as many spheres as it says', moved.counts.every(([n, own]) => n === own), JSON.stringify(moved));
   check('fewer spheres, a larger error', moved.counts.every(([n, , error], i, all) => i === 0 || (n < all[i - 1][0] && error >= all[i - 1][2])), JSON.stringify(moved));
   check('the result comes back', moved.back === null);
