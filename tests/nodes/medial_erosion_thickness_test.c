@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
 /* The mesh is a box with a diagonal of 10: its size is all that counts. */
@@ -229,6 +230,141 @@ static void test_closed_pocket_and_loop_never_burn(void **state) {
   qmat_value_release(&mesh->base);
 }
 
+/* The medial mesh of a box, exactly: twelve sheets, each between an edge of the box, where the radius is 0, and the
+ * rectangle in the middle. */
+typedef struct box_sheets {
+  double sizes[3]; /* the last is the smallest and has 2 steps at least */
+  double step;
+  double spheres[4 * 2048];
+  uint32_t triangles[3 * 4096];
+  size_t sphere_count, triangle_count;
+} box_sheets;
+
+static uint32_t box_sphere(box_sheets *box, const double at[3]) {
+  double radius = INFINITY;
+  for (int k = 0; k < 3; k++) radius = fmin(radius, fmin(at[k], box->sizes[k] - at[k]));
+  for (size_t i = 0; i < box->sphere_count; i++)
+    if (memcmp(&box->spheres[4 * i], at, 3 * sizeof *at) == 0) return (uint32_t)i;
+  assert_true(box->sphere_count < 2048);
+  memcpy(&box->spheres[4 * box->sphere_count], at, 3 * sizeof *at);
+  box->spheres[4 * box->sphere_count + 3] = radius;
+  return (uint32_t)box->sphere_count++;
+}
+
+static void box_triangle(box_sheets *box, uint32_t a, uint32_t b, uint32_t c) {
+  assert_true(box->triangle_count < 4096);
+  memcpy(&box->triangles[3 * box->triangle_count++], (const uint32_t[3]){a, b, c}, 3 * sizeof(uint32_t));
+}
+
+/* Sphere `i` of the row at `depth` from an edge along `axis`; the bits of `sides` choose one of the four edges. */
+static uint32_t row_sphere(box_sheets *box, int axis, int sides, double depth, size_t i) {
+  double at[3];
+  at[axis] = depth + (double)i * box->step;
+  for (int k = 1; k < 3; k++) {
+    const int other = (axis + k) % 3;
+    at[other] = sides & k ? box->sizes[other] - depth : depth;
+  }
+  return box_sphere(box, at);
+}
+
+static void add_box_sheet(box_sheets *box, int axis, int sides) {
+  const double h = box->step;
+  for (double depth = 0; depth < box->sizes[2] / 2; depth += h) {
+    const size_t count = (size_t)lround((box->sizes[axis] - 2 * depth) / h); /* intervals of the outer row */
+    for (size_t i = 0; i < count; i++) { /* the inner row starts above sphere 1 and ends above sphere count - 1 */
+      const uint32_t a = row_sphere(box, axis, sides, depth, i), b = row_sphere(box, axis, sides, depth, i + 1);
+      if (i + 1 < count) box_triangle(box, a, b, row_sphere(box, axis, sides, depth + h, i));
+      if (i > 0)
+        box_triangle(box, a, i + 1 < count ? row_sphere(box, axis, sides, depth + h, i) : b,
+                     row_sphere(box, axis, sides, depth + h, i - 1));
+    }
+  }
+}
+
+static void add_box_middle(box_sheets *box) {
+  const double h = box->step, low = box->sizes[2] / 2;
+  for (double x = low; x < box->sizes[0] - low; x += h) {
+    for (double y = low; y < box->sizes[1] - low; y += h) {
+      uint32_t corners[4];
+      for (int k = 0; k < 4; k++)
+        corners[k] = box_sphere(box, (const double[3]){x + (k & 1) * h, y + (k >> 1) * h, low});
+      box_triangle(box, corners[0], corners[1], corners[3]);
+      box_triangle(box, corners[0], corners[3], corners[2]);
+    }
+  }
+}
+
+/* A sheet at an edge has its sphere of radius r at sqrt(2) r from the edge. Two of them reach the middle at once, and
+ * the fire goes on there. */
+static void test_thickness_of_a_box_is_that_of_its_edges_and_then_the_distance_to_the_seam(void **state) {
+  (void)state;
+  static box_sheets box = {.sizes = {6, 4, 2}, .step = 0.5};
+  for (int axis = 0; axis < 3; axis++)
+    for (int sides = 0; sides < 4; sides++) add_box_sheet(&box, axis, sides);
+  add_box_middle(&box);
+  qmat_mesh *mesh = shape_seal(shape_box(6, 4, 2));
+  qmat_medial *m = sealed_medial_mesh(box.spheres, box.sphere_count, NULL, 0, box.triangles, box.triangle_count);
+  assert_int_equal(pipeline_euler(m), 1);
+  burnt b = burn(mesh, m, 0, "");
+  size_t middle = 0;
+  for (size_t i = 0; i < m->sphere_count; i++) {
+    const double *s = &m->spheres[4 * i];
+    const double from_seam = s[3] < 1 ? 0 : fmin(fmin(s[0] - 1, 5 - s[0]), fmin(s[1] - 1, 3 - s[1]));
+    assert_near(b.thickness->values[i], (sqrt(2) - 1) * s[3] + from_seam, 1e-9);
+    middle += s[3] == 1;
+  }
+  assert_int_equal(middle, 9 * 5);
+  free_burnt(&b);
+  b = burn(mesh, m, 0, "prune=6%"); /* the sheets at the edges have 5.5 % of the diagonal at most */
+  /* At two corners of the rectangle a triangle has all its corners on the seam. */
+  assert_int_equal(b.medial->sphere_count, middle - 2);
+  assert_int_equal(b.medial->triangle_count, 2 * 8 * 4 - 2);
+  for (size_t i = 0; i < b.medial->sphere_count; i++) assert_near(b.medial->spheres[4 * i + 3], 1, 0);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* A sphere's medial mesh is its centre: a border of its own, and all that there is. */
+static void test_sphere_burns_at_once_and_stays(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_seal(shape_sphere(2, 8));
+  qmat_medial *m = sealed_medial_mesh((const double[]){0, 0, 0, 2}, 1, NULL, 0, NULL, 0);
+  burnt b = burn(mesh, m, 0, "prune=100%");
+  assert_near(b.thickness->values[0], 0, 1e-12);
+  assert_int_equal(b.medial->sphere_count, 1);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
+/* The core circle of a torus never burns. A spike from it into the tube does, at once: its tip is a sphere that touches
+ * the surface from within. */
+static void test_torus_keeps_its_core_circle_and_loses_a_spike(void **state) {
+  (void)state;
+  enum { RING = 24 };
+  double spheres[4 * (RING + 1)];
+  uint32_t edges[2 * (RING + 1)];
+  for (uint32_t i = 0; i < RING; i++) {
+    const double angle = 2 * acos(-1) * i / RING, sphere[4] = {3 * cos(angle), 3 * sin(angle), 0, 1};
+    memcpy(&spheres[4 * i], sphere, sizeof sphere);
+    edges[2 * i] = i;
+    edges[2 * i + 1] = (i + 1) % RING;
+  }
+  memcpy(&spheres[4 * RING], (const double[4]){3.5, 0, 0, 0.5}, 4 * sizeof(double));
+  memcpy(&edges[2 * RING], (const uint32_t[2]){0, RING}, 2 * sizeof(uint32_t));
+  qmat_mesh *mesh = shape_seal(pipeline_model("torus", 8));
+  qmat_medial *m = sealed_medial_mesh(spheres, RING + 1, edges, RING + 1, NULL, 0);
+  burnt b = burn(mesh, m, 0, "prune=1%");
+  assert_int_equal(pipeline_count(b.report, "spheres_that_never_burn"), RING);
+  assert_near(b.thickness->values[RING], 0, 1e-12);
+  assert_int_equal(b.medial->sphere_count, RING);
+  assert_int_equal(b.medial->edge_count, RING);
+  free_burnt(&b);
+  qmat_value_release(&m->base);
+  qmat_value_release(&mesh->base);
+}
+
 /* --- models ------------------------------------------------------------------------------------------------------ */
 
 /* Spikes of the initial medial mesh go, its topology stays, and what is left has its samples. */
@@ -316,6 +452,9 @@ int main(void) {
       cmocka_unit_test(test_curve_burns_from_its_ends),
       cmocka_unit_test(test_fire_waits_at_a_seam_until_one_sheet_is_left),
       cmocka_unit_test(test_closed_pocket_and_loop_never_burn),
+      cmocka_unit_test(test_thickness_of_a_box_is_that_of_its_edges_and_then_the_distance_to_the_seam),
+      cmocka_unit_test(test_sphere_burns_at_once_and_stays),
+      cmocka_unit_test(test_torus_keeps_its_core_circle_and_loses_a_spike),
       cmocka_unit_test(test_pruning_keeps_topology_and_regions),
       cmocka_unit_test(test_threads_do_not_change_a_byte),
       cmocka_unit_test(test_sheets_of_the_model_stay),
