@@ -8,7 +8,7 @@
 
 #include "core/geometry/medial_build.h"
 
-/* An unsealed medial mesh; the sides of triangles are added. */
+/* An unsealed medial mesh; the sides of triangles are added. Without `spheres` (NULL) sphere i is (i, 0, 0, 1). */
 static inline qmat_medial *medial_mesh(const double *spheres, size_t sphere_count, const uint32_t *edges,
                                        size_t edge_count, const uint32_t *triangles, size_t triangle_count) {
   qmat_context context = {0};
@@ -17,7 +17,10 @@ static inline qmat_medial *medial_mesh(const double *spheres, size_t sphere_coun
   medial->sphere_count = sphere_count;
   medial->spheres = qmat_alloc(4 * sphere_count, sizeof *medial->spheres);
   assert_non_null(medial->spheres);
-  if (sphere_count > 0) memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
+  for (size_t i = 0; i < sphere_count; i++) {
+    const double in_a_row[4] = {(double)i, 0, 0, 1};
+    memcpy(&medial->spheres[4 * i], spheres ? &spheres[4 * i] : in_a_row, sizeof in_a_row);
+  }
   assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
   qmat_context_uninit(&context);
   return medial;

@@ -8,30 +8,12 @@
 
 #include <cmocka.h>
 
-#include "core/geometry/medial_build.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
 /* The mesh is a box with a diagonal of 10: its size is all that counts. */
 static qmat_mesh *box_of_ten(void) {
   return shape_seal(shape_box(6, 8, 0));
-}
-
-static qmat_medial *new_medial(size_t spheres) {
-  qmat_medial *m = qmat_medial_new();
-  assert_non_null(m);
-  m->spheres = qmat_calloc(spheres, 4 * sizeof *m->spheres);
-  m->sphere_count = spheres;
-  assert_non_null(m->spheres);
-  return m;
-}
-
-static void finish(qmat_medial *m, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
-                   size_t triangle_count) {
-  qmat_context context = {0};
-  assert_int_equal(qmat_medial_set_simplices(&context, m, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &m->base), QMAT_OK);
-  qmat_context_uninit(&context);
 }
 
 typedef struct burnt {
@@ -75,12 +57,12 @@ static void test_thickness_of_a_rectangle_is_the_distance_to_its_border(void **s
   enum { NX = 33, NY = 17 };
   static uint32_t triangles[6 * NX * NY];
   qmat_mesh *mesh = box_of_ten();
-  qmat_medial *m = new_medial(NX * NY);
+  double spheres[4 * NX * NY] = {0};
   for (uint32_t i = 0; i < NX * NY; i++) {
     const double sphere[4] = {i % NX * 0.25, i / NX * 0.25, 0, 0.3};
-    memcpy(&m->spheres[4 * i], sphere, sizeof sphere);
+    memcpy(&spheres[4 * i], sphere, sizeof sphere);
   }
-  finish(m, NULL, 0, triangles, grid(0, NX, NY, triangles));
+  qmat_medial *m = sealed_medial_mesh(spheres, NX * NY, NULL, 0, triangles, grid(0, NX, NY, triangles));
   burnt b = burn(mesh, m, 0, "");
   assert_int_equal(b.thickness->count, NX * NY);
   for (uint32_t i = 0; i < NX * NY; i++) {
@@ -111,16 +93,16 @@ static void test_thickness_of_a_rectangle_is_the_distance_to_its_border(void **s
 static void test_front_is_straight_within_a_triangle(void **state) {
   (void)state;
   qmat_mesh *mesh = box_of_ten();
-  qmat_medial *m = new_medial(7);
+  double spheres[4 * 7] = {0};
   uint32_t triangles[18];
   for (uint32_t i = 0; i < 6; i++) {
-    m->spheres[4 * i] = cos(acos(-1) / 3 * i);
-    m->spheres[4 * i + 1] = sin(acos(-1) / 3 * i);
+    spheres[4 * i] = cos(acos(-1) / 3 * i);
+    spheres[4 * i + 1] = sin(acos(-1) / 3 * i);
     const uint32_t triangle[3] = {i, (i + 1) % 6, 6};
     memcpy(&triangles[3 * i], triangle, sizeof triangle);
   }
-  for (uint32_t i = 0; i < 7; i++) m->spheres[4 * i + 3] = 0.2;
-  finish(m, NULL, 0, triangles, 6);
+  for (uint32_t i = 0; i < 7; i++) spheres[4 * i + 3] = 0.2;
+  qmat_medial *m = sealed_medial_mesh(spheres, 7, NULL, 0, triangles, 6);
   burnt b = burn(mesh, m, 0, "");
   for (int i = 0; i < 6; i++) assert_near(b.thickness->values[i], 0, 1e-12);
   assert_near(b.thickness->values[6], sqrt(0.75), 1e-12);
@@ -133,14 +115,14 @@ static void test_front_is_straight_within_a_triangle(void **state) {
 static void test_curve_burns_from_its_ends(void **state) {
   (void)state;
   qmat_mesh *mesh = box_of_ten();
-  qmat_medial *m = new_medial(6);
+  double spheres[4 * 6] = {0};
   for (int i = 0; i < 5; i++) {
-    m->spheres[4 * i] = i;
-    m->spheres[4 * i + 3] = i == 0 ? 0.5 : 1;
+    spheres[4 * i] = i;
+    spheres[4 * i + 3] = i == 0 ? 0.5 : 1;
   }
-  m->spheres[4 * 5 + 1] = 9; /* a sphere alone */
-  m->spheres[4 * 5 + 3] = 2;
-  finish(m, (const uint32_t[]){0, 1, 1, 2, 2, 3, 3, 4}, 4, NULL, 0);
+  spheres[4 * 5 + 1] = 9; /* a sphere alone */
+  spheres[4 * 5 + 3] = 2;
+  qmat_medial *m = sealed_medial_mesh(spheres, 6, (const uint32_t[]){0, 1, 1, 2, 2, 3, 3, 4}, 4, NULL, 0);
   burnt b = burn(mesh, m, 0, "");
   const double expected[6] = {0, 0.5, 1.5, 1, 0, 0};
   for (int i = 0; i < 6; i++) assert_near(b.thickness->values[i], expected[i], 1e-12);
@@ -162,15 +144,15 @@ static void test_fire_waits_at_a_seam_until_one_sheet_is_left(void **state) {
     const uint32_t up = high ? 12 : 4;
     static uint32_t triangles[6 * SPHERES];
     qmat_mesh *mesh = box_of_ten();
-    qmat_medial *m = new_medial(N * (ACROSS + up));
+    double spheres[4 * N * (ACROSS + 12)] = {0};
     size_t count = 0;
     for (uint32_t i = 0; i < N * ACROSS; i++) {
       const double sphere[4] = {i % N * 0.5, i / N * 0.5 - 2, 0, 0.1};
-      memcpy(&m->spheres[4 * i], sphere, sizeof sphere);
+      memcpy(&spheres[4 * i], sphere, sizeof sphere);
     }
     for (uint32_t i = 0; i < N * up; i++) {
       const double sphere[4] = {i % N * 0.5, 0, (i / N + 1) * 0.25, 0.1};
-      memcpy(&m->spheres[4 * (N * ACROSS + i)], sphere, sizeof sphere);
+      memcpy(&spheres[4 * (N * ACROSS + i)], sphere, sizeof sphere);
     }
     count = grid(0, N, ACROSS, triangles);
     count += grid(N * ACROSS, N, up, &triangles[3 * count]);
@@ -180,7 +162,7 @@ static void test_fire_waits_at_a_seam_until_one_sheet_is_left(void **state) {
       memcpy(&triangles[3 * count], two, sizeof two);
       count += 2;
     }
-    finish(m, NULL, 0, triangles, count);
+    qmat_medial *m = sealed_medial_mesh(spheres, N * (ACROSS + up), NULL, 0, triangles, count);
     burnt b = burn(mesh, m, 0, "");
     const uint32_t middle = N / 2;
     assert_near(b.thickness->values[N * (ACROSS / 2) + middle], 2, 1e-9); /* the seam */
@@ -208,15 +190,16 @@ static void test_fire_waits_at_a_seam_until_one_sheet_is_left(void **state) {
 static void test_closed_pocket_and_loop_never_burn(void **state) {
   (void)state;
   qmat_mesh *mesh = box_of_ten();
-  qmat_medial *m = new_medial(8);
+  double spheres[4 * 8] = {0};
   for (int i = 0; i < 8; i++) {
-    m->spheres[4 * i] = i % 2;
-    m->spheres[4 * i + 1] = i / 2 % 2;
-    m->spheres[4 * i + 2] = i / 4;
-    m->spheres[4 * i + 3] = 0.1;
+    spheres[4 * i] = i % 2;
+    spheres[4 * i + 1] = i / 2 % 2;
+    spheres[4 * i + 2] = i / 4;
+    spheres[4 * i + 3] = 0.1;
   }
   /* A tetrahedron's surface, a ring of three, and a tail on the pocket. */
-  finish(m, (const uint32_t[]){4, 5, 5, 6, 4, 6, 0, 7}, 4, (const uint32_t[]){0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3}, 4);
+  qmat_medial *m = sealed_medial_mesh(spheres, 8, (const uint32_t[]){4, 5, 5, 6, 4, 6, 0, 7}, 4,
+                                      (const uint32_t[]){0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3}, 4);
   burnt b = burn(mesh, m, 0, "");
   assert_int_equal(pipeline_count(b.report, "spheres_that_never_burn"), 7);
   for (int i = 0; i < 7; i++) assert_near(b.thickness->values[i], 10, 1e-12);
@@ -414,10 +397,13 @@ static void test_threads_do_not_change_a_byte(void **state) {
 static void test_sheets_of_the_model_stay(void **state) {
   (void)state;
   qmat_mesh *mesh = box_of_ten();
-  qmat_medial *m = new_medial(6);
-  for (int i = 0; i < 6; i++) m->spheres[4 * i] = i % 2, m->spheres[4 * i + 1] = i / 2;
+  double spheres[4 * 6] = {0};
+  for (int i = 0; i < 6; i++) spheres[4 * i] = i % 2, spheres[4 * i + 1] = i / 2;
+  qmat_medial *m = medial_mesh(spheres, 6, (const uint32_t[]){4, 5}, 1, (const uint32_t[]){0, 1, 2, 1, 2, 3}, 2);
   m->sheet_sphere_count = 4;
-  finish(m, (const uint32_t[]){4, 5}, 1, (const uint32_t[]){0, 1, 2, 1, 2, 3}, 2);
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &m->base), QMAT_OK);
+  qmat_context_uninit(&context);
   burnt b = burn(mesh, m, 0, "prune=100%");
   assert_int_equal(b.medial->triangle_count, 2);
   assert_int_equal(b.medial->sheet_sphere_count, 4);

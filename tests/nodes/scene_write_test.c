@@ -10,11 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/medial_build.h"
 #include "io/base64.h"
 #include "io/draco.h"
 #include "io/mesh/ma.h"
 #include "nodes/nodes.h"
+#include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
 /* The parameters as the node lays them out. */
@@ -34,18 +34,8 @@ static void *make_params(const qmat_node *node, const char *const settings[][2])
 
 /* A cone of two spheres (box of the spheres: 6 by 2 by 2, diagonal sqrt(44)) and a sphere alone inside that box. */
 static qmat_medial *make_medial(void) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
   const double spheres[12] = {0, 0, 0, 1, 4, 0, 0, 1, 2.1, 0.1, 0.3, 0.5};
-  medial->spheres = qmat_alloc(12, sizeof(double));
-  assert_non_null(medial->spheres);
-  memcpy(medial->spheres, spheres, sizeof spheres);
-  medial->sphere_count = 3;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, (const uint32_t[]){0, 1}, 1, NULL, 0), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
+  return sealed_medial_mesh(spheres, 3, (const uint32_t[]){0, 1}, 1, NULL, 0);
 }
 
 static qmat_report *make_report(json_t *root) {
@@ -286,12 +276,7 @@ static void test_a_skins_vertices_have_the_colour_of_their_kind(void **state) {
   static const uint8_t expected[12] = {0, 87, 44, 255, 24, 116, 208, 255, 202, 88, 0, 255};
   const double spheres[12] = {0, 0, 0, 1, 4, 0, 0, 1, 0, 4, 0, 1};
   qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  medial->spheres = qmat_alloc(12, sizeof(double));
-  memcpy(medial->spheres, spheres, sizeof spheres);
-  medial->sphere_count = 3;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, NULL, 0, (const uint32_t[]){0, 1, 2}, 1), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 3, NULL, 0, (const uint32_t[]){0, 1, 2}, 1);
   qmat_mesh *skin = shape_new();
   shape_vertex(skin, 1, 1, 1);
   shape_vertex(skin, 2, -1, 0);

@@ -10,30 +10,13 @@
 
 #include <cmocka.h>
 
-#include "core/geometry/medial_build.h"
+#include "tests/medial_meshes.h"
 #include "tests/random.h"
-
-/* A medial mesh with these simplices (and the sides of the triangles); sphere i is (i, 0, 0, 1). */
-static qmat_medial *medial_of(size_t spheres, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
-                              size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = spheres;
-  medial->spheres = qmat_alloc(spheres, 4 * sizeof(double));
-  for (size_t i = 0; i < spheres; i++) {
-    const double sphere[4] = {(double)i, 0, 0, 1};
-    memcpy(&medial->spheres[4 * i], sphere, sizeof sphere);
-  }
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 static void make_complex(qmat_complex *complex, size_t spheres, const uint32_t *edges, size_t edge_count,
                          const uint32_t *triangles, size_t triangle_count) {
   qmat_context context = {0};
-  qmat_medial *medial = medial_of(spheres, edges, edge_count, triangles, triangle_count);
+  qmat_medial *medial = medial_mesh(NULL, spheres, edges, edge_count, triangles, triangle_count);
   assert_int_equal(qmat_complex_init(&context, complex, medial, NULL), QMAT_OK);
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);
@@ -223,7 +206,7 @@ static void collapse_one(size_t spheres, const uint32_t *edges, size_t edge_coun
   qmat_complex complex;
   qmat_collapse collapse = {0};
   naive n;
-  qmat_medial *medial = medial_of(spheres, edges, edge_count, triangles, triangle_count);
+  qmat_medial *medial = medial_mesh(NULL, spheres, edges, edge_count, triangles, triangle_count);
   make_naive(&n, medial);
   qmat_value_release(&medial->base);
   make_complex(&complex, spheres, edges, edge_count, triangles, triangle_count);
@@ -323,7 +306,7 @@ static void test_spheres_come_from_the_caller_where_given(void **state) {
   (void)state;
   qmat_context context = {0};
   qmat_complex complex;
-  qmat_medial *medial = medial_of(2, (uint32_t[]){0, 1}, 1, NULL, 0);
+  qmat_medial *medial = medial_mesh(NULL, 2, (uint32_t[]){0, 1}, 1, NULL, 0);
   const double spheres[8] = {1, 2, 3, 4, 5, 6, 7, 8};
   assert_int_equal(qmat_complex_init(&context, &complex, medial, spheres), QMAT_OK);
   assert_memory_equal(complex.spheres, spheres, sizeof spheres);
@@ -342,7 +325,7 @@ static void test_nothing_and_isolated_spheres_are_complexes_too(void **state) {
   make_complex(&complex, 0, NULL, 0, NULL, 0);
   check(&complex, &n);
   qmat_complex_uninit(&complex);
-  qmat_medial *medial = medial_of(5, NULL, 0, NULL, 0);
+  qmat_medial *medial = medial_mesh(NULL, 5, NULL, 0, NULL, 0);
   make_naive(&n, medial);
   qmat_value_release(&medial->base);
   make_complex(&complex, 5, NULL, 0, NULL, 0);
@@ -354,7 +337,7 @@ static void test_medial_mesh_without_a_side_of_a_triangle_is_named(void **state)
   (void)state;
   qmat_context context = {0};
   qmat_complex complex;
-  qmat_medial *medial = medial_of(4, NULL, 0, (uint32_t[]){0, 1, 2, 1, 2, 3}, 2);
+  qmat_medial *medial = medial_mesh(NULL, 4, NULL, 0, (uint32_t[]){0, 1, 2, 1, 2, 3}, 2);
   medial->edge_count--; /* 2-3, the last */
   assert_int_equal(qmat_complex_init(&context, &complex, medial, NULL), QMAT_ERROR_INTERNAL);
   assert_string_equal(context.error.element_kind, "triangle");
@@ -376,7 +359,7 @@ static qmat_medial *random_medial(random_numbers *random) {
     edges[i + 1] = (uint32_t)((edges[i] + 1 + random_index(random, spheres - 1)) % spheres);
   }
   for (size_t i = 0; i < 3 * triangle_count; i++) triangles[i] = (uint32_t)random_index(random, spheres);
-  return medial_of(spheres, edges, edge_count, triangles, triangle_count); /* drops what degenerates */
+  return medial_mesh(NULL, spheres, edges, edge_count, triangles, triangle_count); /* drops what degenerates */
 }
 
 /* What a preview must leave alone, as one number. */

@@ -8,26 +8,11 @@
 
 #include <cmocka.h>
 
-#include "core/geometry/medial_build.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
 /* ---- medial meshes ---- */
-
-/* A sealed medial mesh of `count` points anywhere; the sides of triangles are added. */
-static qmat_medial *complex_of(size_t count, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
-                               size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = count;
-  medial->spheres = qmat_calloc(4 * count, sizeof *medial->spheres);
-  for (size_t i = 0; i < count; i++) medial->spheres[4 * i] = (double)i;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 static qmat_topology topology_of(const qmat_medial *medial) {
   qmat_context context = {0};
@@ -41,7 +26,7 @@ static qmat_topology topology_of(const qmat_medial *medial) {
 
 static void check_complex(size_t count, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
                           size_t triangle_count, size_t components, size_t loops, size_t voids) {
-  qmat_medial *medial = complex_of(count, edges, edge_count, triangles, triangle_count);
+  qmat_medial *medial = sealed_medial_mesh(NULL, count, edges, edge_count, triangles, triangle_count);
   const qmat_topology t = topology_of(medial);
   assert_true(t.known);
   assert_int_equal(t.components, components);
@@ -69,7 +54,7 @@ static void test_small_complexes_by_hand(void **state) {
 static void test_walls_of_a_void_by_hand(void **state) {
   (void)state;
   static const uint32_t triangles[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3, 2, 3, 4, 3, 4, 5};
-  qmat_medial *medial = complex_of(6, NULL, 0, triangles, 6);
+  qmat_medial *medial = sealed_medial_mesh(NULL, 6, NULL, 0, triangles, 6);
   qmat_context context = {0};
   uint32_t *walls;
   size_t count;
@@ -77,7 +62,7 @@ static void test_walls_of_a_void_by_hand(void **state) {
   assert_int_equal(count, 4);
   for (size_t i = 0; i < 4; i++) assert_true(medial->triangles[3 * walls[i] + 2] <= 3);
   qmat_value_release(&medial->base);
-  medial = complex_of(4, NULL, 0, triangles, 3); /* open: nothing is left */
+  medial = sealed_medial_mesh(NULL, 4, NULL, 0, triangles, 3); /* open: nothing is left */
   assert_int_equal(qmat_topology_find_walls(&context, medial, &walls, &count), QMAT_OK);
   assert_int_equal(count, 0);
   qmat_value_release(&medial->base);
@@ -89,7 +74,7 @@ static void test_empty_triangles_by_hand(void **state) {
   /* Of a tetrahedron's four triangles two are there, the third sphere has a loop of its own, and a square has none. */
   static const uint32_t edges[] = {2, 3, 3, 4, 2, 4, 4, 5, 5, 6, 6, 7, 4, 7, 0, 3};
   static const uint32_t triangles[] = {0, 1, 2, 1, 2, 3};
-  qmat_medial *medial = complex_of(8, edges, COUNT(edges) / 2, triangles, 2);
+  qmat_medial *medial = sealed_medial_mesh(NULL, 8, edges, COUNT(edges) / 2, triangles, 2);
   qmat_context context = {0};
   uint32_t *corners;
   size_t count;
@@ -99,11 +84,11 @@ static void test_empty_triangles_by_hand(void **state) {
   assert_memory_equal(corners, expected, sizeof expected);
   qmat_value_release(&medial->base);
   static const uint32_t ring[] = {0, 1, 1, 2, 2, 3, 0, 3};
-  medial = complex_of(4, ring, 4, NULL, 0);
+  medial = sealed_medial_mesh(NULL, 4, ring, 4, NULL, 0);
   assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
   assert_int_equal(count, 0);
   qmat_value_release(&medial->base);
-  medial = complex_of(1, NULL, 0, NULL, 0);
+  medial = sealed_medial_mesh(NULL, 1, NULL, 0, NULL, 0);
   assert_int_equal(qmat_topology_find_empty_triangles(&context, medial, &corners, &count), QMAT_OK);
   assert_int_equal(count, 0);
   qmat_value_release(&medial->base);
@@ -120,7 +105,7 @@ static void test_loop_edges_of_random_complexes_leave_the_components(void **stat
     uint32_t edges[2 * EDGES], triangles[3 * TRIANGLES];
     for (size_t i = 0; i < COUNT(edges); i++) edges[i] = (uint32_t)random_index(&random, SPHERES);
     for (size_t i = 0; i < COUNT(triangles); i++) triangles[i] = (uint32_t)random_index(&random, SPHERES);
-    qmat_medial *medial = complex_of(SPHERES, edges, EDGES, triangles, TRIANGLES);
+    qmat_medial *medial = sealed_medial_mesh(NULL, SPHERES, edges, EDGES, triangles, TRIANGLES);
     const size_t components = topology_of(medial).components;
     qmat_context context = {0};
     uint32_t *loop_edges, before = 0;
@@ -139,7 +124,7 @@ static void test_loop_edges_of_random_complexes_leave_the_components(void **stat
       memcpy(rest, medial->edges, 2 * e * sizeof *rest);
       memcpy(rest + 2 * e, row + 2, 2 * (medial->edge_count - e - 1) * sizeof *rest);
       qmat_medial *without =
-          complex_of(SPHERES, rest, medial->edge_count - 1, medial->triangles, medial->triangle_count);
+          sealed_medial_mesh(NULL, SPHERES, rest, medial->edge_count - 1, medial->triangles, medial->triangle_count);
       const bool is_loop_edge = !in_triangle && topology_of(without).components == components;
       for (size_t i = 0; i < count; i++) in_list |= loop_edges[i] == e;
       assert_int_equal(in_list, is_loop_edge);
@@ -224,7 +209,7 @@ static void test_random_complexes_have_the_rank_of_full_elimination(void **state
     uint32_t triangles[180], edges[8];
     for (size_t i = 0; i < 3 * rows; i++) triangles[i] = (uint32_t)random_index(&random, points);
     for (size_t i = 0; i < COUNT(edges); i++) edges[i] = (uint32_t)random_index(&random, points);
-    qmat_medial *medial = complex_of(points, edges, COUNT(edges) / 2, triangles, rows);
+    qmat_medial *medial = sealed_medial_mesh(NULL, points, edges, COUNT(edges) / 2, triangles, rows);
     const qmat_topology t = topology_of(medial);
     assert_true(t.known);
     assert_int_equal(t.voids, medial->triangle_count - rank_in_full(medial));

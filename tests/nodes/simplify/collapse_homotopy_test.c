@@ -7,24 +7,10 @@
 
 #include <cmocka.h>
 
-#include "core/geometry/medial_build.h"
 #include "core/geometry/medial_complex.h"
 #include "nodes/measure/topology.h"
+#include "tests/medial_meshes.h"
 #include "tests/random.h"
-
-static qmat_medial *medial_of(size_t spheres, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
-                              size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->sphere_count = spheres;
-  medial->spheres = qmat_alloc(spheres, 4 * sizeof(double));
-  for (size_t i = 0; i < 4 * spheres; i++) medial->spheres[i] = 1 + (double)i;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
 
 static qmat_topology topology_of(qmat_medial *medial) {
   qmat_context context = {0};
@@ -47,7 +33,7 @@ static qmat_topology topology_left(const qmat_complex *c) {
     for (size_t k = 0; k < 2 && c->edge_alive[e]; k++) edges[edge_count++] = ids[c->edges[2 * e + k]];
   for (size_t t = 0; t < c->triangle_count; t++)
     for (size_t k = 0; k < 3 && c->triangle_alive[t]; k++) triangles[triangle_count++] = ids[c->triangles[3 * t + k]];
-  return topology_of(medial_of(vertex_count, edges, edge_count / 2, triangles, triangle_count / 3));
+  return topology_of(sealed_medial_mesh(NULL, vertex_count, edges, edge_count / 2, triangles, triangle_count / 3));
 }
 
 static bool are_equal(qmat_topology a, qmat_topology b) {
@@ -60,7 +46,7 @@ static bool keeps(size_t spheres, const uint32_t *edges, size_t edge_count, cons
   qmat_context context = {0};
   qmat_complex complex;
   qmat_collapse collapse = {0};
-  qmat_medial *medial = medial_of(spheres, edges, edge_count, triangles, triangle_count);
+  qmat_medial *medial = sealed_medial_mesh(NULL, spheres, edges, edge_count, triangles, triangle_count);
   assert_int_equal(qmat_complex_init(&context, &complex, medial, NULL), QMAT_OK);
   qmat_value_release(&medial->base);
   assert_int_equal(qmat_complex_preview(&context, &complex, qmat_complex_find_edge(&complex, 0, 1), &collapse),
@@ -109,7 +95,7 @@ static void test_collapses_that_are_allowed_keep_all_betti_numbers(void **state)
     qmat_context context = {0};
     qmat_complex complex;
     qmat_collapse collapse = {0};
-    qmat_medial *medial = medial_of(SPHERES, edges, edge_count, triangles, triangle_count);
+    qmat_medial *medial = sealed_medial_mesh(NULL, SPHERES, edges, edge_count, triangles, triangle_count);
     assert_int_equal(qmat_complex_init(&context, &complex, medial, NULL), QMAT_OK);
     qmat_topology before = topology_of(medial);
     for (uint32_t e = 0; e < complex.edge_count; e++) {
