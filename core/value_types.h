@@ -155,7 +155,7 @@ typedef struct qmat_chain {
 
 /* Shapes for collision detection and the rigid body that they stand for. A shape is the convex hull of one, two or
  * three spheres: a sphere, a tapered capsule, a rounded triangle. Its hull is a polyhedron for engines without such
- * shapes. */
+ * shapes. A hull that joins several shapes (medial.colliders with kind=hulls) stands with the spheres of one. */
 typedef struct qmat_colliders {
   qmat_value base;
   size_t sphere_count, shape_count, point_count, triangle_count;

@@ -7,6 +7,7 @@
 #include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/colliders/cover_fit.h"
+#include "nodes/colliders/hull_merge.h"
 #include "nodes/colliders/inside_fit.h"
 #include "nodes/colliders/rigid_body.h"
 #include "nodes/colliders/shape_hulls.h"
@@ -46,6 +47,11 @@ static qmat_shape_kind kind_of(const medial_colliders_params *p) {
   return p->kind == KIND_HULLS ? QMAT_SHAPES_ANY : (qmat_shape_kind)p->kind;
 }
 
+/* Whether hulls are made around the solid's part in each shape, and joined. */
+static bool has_hulls_of_solid(const work *w) {
+  return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && qmat_surface_is_watertight(w->surface);
+}
+
 static int compare_numbers(const void *left, const void *right) {
   const double a = *(const double *)left, b = *(const double *)right;
   return (a > b) - (a < b);
@@ -57,7 +63,7 @@ static qmat_status keep_budget(work *w, double growth) {
   const medial_colliders_params *p = w->params;
   qmat_shape_set *set = &w->set;
   const size_t most = (size_t)p->shapes, count = set->shape_count;
-  if (most == 0 || count <= most) return QMAT_OK;
+  if (most == 0 || count <= most || has_hulls_of_solid(w)) return QMAT_OK;
   if (p->fit != FIT_INSIDE)
     return qmat_shape_set_merge(w->context, set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
                                 growth, most);
@@ -89,7 +95,7 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
     if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
   }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
-  if (status == QMAT_OK && p->shapes > 0)
+  if (status == QMAT_OK && p->shapes > 0 && !has_hulls_of_solid(w))
     status = qmat_shape_set_merge(context, &w->set, kind_of(p), growth[p->fit], (size_t)p->shapes);
   /* The surface itself is known to the deviation. */
   const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
@@ -134,10 +140,7 @@ static qmat_status fill_colliders(work *w) {
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
   const double error = w->params->hull_error * qmat_surface_frame(w->surface)->diagonal;
-  const qmat_surface *solid =
-      w->params->kind == KIND_HULLS && side == QMAT_HULL_OUTSIDE && w->proved && qmat_surface_is_watertight(w->surface)
-          ? w->surface
-          : NULL;
+  const qmat_surface *solid = has_hulls_of_solid(w) ? w->surface : NULL;
   const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side, solid);
   if (status == QMAT_OK && w->params->kind == KIND_HULLS) widen_shapes(c);
   return status;
@@ -166,9 +169,12 @@ static qmat_status make_report(const work *w, qmat_report *report) {
   };
   size_t widths[4] = {0};
   for (size_t i = 0; i < w->set.shape_count; i++) widths[qmat_shape_width(&w->set.shapes[3 * i])]++;
-  const qmat_json_count counts[] = {{"shapes", w->set.shape_count},   {"single_spheres", widths[1]},
-                                    {"capsules", widths[2]},          {"hulls_of_three", widths[3]},
-                                    {"spheres", w->set.sphere_count}, {"hull_points", w->colliders->point_count}};
+  const qmat_json_count counts[] = {{"shapes", w->colliders->shape_count},
+                                    {"single_spheres", widths[1]},
+                                    {"capsules", widths[2]},
+                                    {"hulls_of_three", widths[3]},
+                                    {"spheres", w->set.sphere_count},
+                                    {"hull_points", w->colliders->point_count}};
   int bad = json_object_set_new(report->root, "fit", json_string(fits[w->params->fit]));
   bad |= json_object_set_new(report->root, "proved", json_boolean(w->proved));
   bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
@@ -196,6 +202,9 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK)
     status = qmat_shape_measures_take(context, w.surface, &w.set, w.envelope, w.colliders, w.volume,
                                       (size_t)w.params->samples, &w.measures);
+  if (status == QMAT_OK && has_hulls_of_solid(&w))
+    status = qmat_hulls_merge(context, w.surface, (size_t)w.params->shapes, (size_t)w.params->hull_points,
+                              w.params->hull_error * qmat_surface_frame(w.surface)->diagonal, w.colliders);
   if (status == QMAT_OK) status = make_report(&w, report);
   qmat_envelope_free(w.envelope);
   qmat_surface_free(w.surface);
@@ -213,7 +222,7 @@ static const qmat_param params[] = {
     QMAT_ENUM(
         medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
         "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only; hulls: "
-        "hulls of all of these, with contain only around the solid's part in each"),
+        "hulls of all of these, with contain only around the solid's part in each, joined where that is convex"),
     QMAT_LENGTH(
         medial_colliders_params, dent, 0.01, 1e-4, 1,
         "How deep the dents between the capsules or spheres may be that replace a cone or slab; deeper where that "
@@ -247,17 +256,18 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 6,
+    .version = 7,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
         "mesh that is no side of another one. Each also has a hull, a convex polyhedron for engines without such "
         "shapes.\n\n"
         "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
-        "branch and bound that no point of the solid is outside, and grows them where one is; hulls then contain "
-        "their shapes, but with kind=hulls only the solid's part in each, which takes the least volume. inside changes "
-        "radii and proves the opposite; otherwise hulls are inside their shapes. proved "
-        "is false for open surfaces.\n\n"
+        "branch and bound that no point of the solid is outside, and grows them where one is. Hulls then contain their "
+        "shapes. With kind=hulls they contain only the solid's part in each, which takes the least volume, and are "
+        "joined where the joint hull leaves the solid by at most hull_error, or until `shapes` are left. inside "
+        "changes radii and proves the opposite; otherwise hulls are inside their shapes. proved is false for open "
+        "surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
         "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
         "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. They are "
