@@ -9,7 +9,7 @@
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/tangent_hull.h"
 
-/* Until the end joint hulls may have this many times as many vertices as the limit. */
+/* Before the end joint hulls may have this many times as many vertices. */
 enum { ROOM_FACTOR = 4 };
 
 /* Pairs are compared by a coarse search; the one that is joined is searched to the end. */
@@ -19,7 +19,7 @@ enum { FEW_HALVINGS = 3, MANY_HALVINGS = 48 };
 static const double limit_step = 1.25;
 
 typedef struct part {
-  double *points; /* 3 each */
+  const double *points; /* 3 each */
   size_t count;
   double low[3], high[3]; /* of its box */
   double volume;
@@ -44,8 +44,10 @@ typedef struct joint {
 typedef struct merging {
   qmat_context *context;
   const qmat_surface *solid;
-  size_t room; /* vertices of a part */
-  double limit;
+  size_t room;  /* vertices of a part */
+  double limit; /* unit frame */
+  double error; /* of the vertices of joint hulls, in the model */
+  qmat_tangent_hull tangent;
   part *parts;
   size_t part_count, live_count;
   pair *pairs;
@@ -192,42 +194,68 @@ static pair *best_pair(const merging *m) {
   return best;
 }
 
-/* Joins two parts into the first, unless the hull has too many vertices: then the pair is given up. */
-static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
-  part *into = &m->parts[a], *from = &m->parts[b];
-  joint *j = &m->joints[0];
-  qmat_status status = join(m, into, from, j);
-  if (status != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
-  size_t used = 0;
-  bool *is_used = qmat_calloc(j->point_count, sizeof *is_used);
-  if (!is_used) return qmat_fail_memory(m->context, "the hulls");
-  for (size_t i = 0; i < 3 * j->triangle_count; i++) {
-    used += !is_used[j->triangles[i]];
-    is_used[j->triangles[i]] = true;
-  }
-  const bool fits = used <= m->room;
-  for (size_t i = 0, k = 0; fits && i < j->point_count; i++)
-    if (is_used[i]) memcpy(&into->points[3 * k++], &j->points[3 * i], 3 * sizeof *j->points);
-  qmat_free(is_used);
-  if (fits) {
-    if (from->volume > into->volume) into->shape = from->shape;
-    into->volume = volume_of(j->points, j->triangles, j->triangle_count);
-    into->count = used;
-    into->is_joint = true;
-    from->live = false;
-    m->live_count--;
-    find_box(into);
-  }
+/* Keeps the points that are vertices of the hull: the first `*used`. */
+static void keep_vertices(joint *j, uint8_t *is_vertex, size_t *used) {
+  memset(is_vertex, 0, j->point_count);
+  for (size_t i = 0; i < 3 * j->triangle_count; i++) is_vertex[j->triangles[i]] = 1;
+  *used = 0;
+  for (size_t i = 0; i < j->point_count; i++)
+    if (is_vertex[i]) memmove(&j->points[3 * (*used)++], &j->points[3 * i], 3 * sizeof *j->points);
+}
+
+static void give_up(merging *m, uint32_t a, uint32_t b) {
+  size_t kept = 0;
+  for (size_t i = 0; i < m->pair_count; i++)
+    if (m->pairs[i].a != a || m->pairs[i].b != b) m->pairs[kept++] = m->pairs[i];
+  m->pair_count = kept;
+}
+
+/* Takes the pairs of a part out, and adds those of now. */
+static qmat_status renew_pairs(merging *m, uint32_t a, uint32_t gone) {
   size_t kept = 0;
   for (size_t i = 0; i < m->pair_count; i++) {
     const pair *p = &m->pairs[i];
-    const bool gone = fits ? p->a == a || p->a == b || p->b == a || p->b == b : p->a == a && p->b == b;
-    if (!gone) m->pairs[kept++] = *p;
+    if (p->a != a && p->b != a && p->a != gone && p->b != gone) m->pairs[kept++] = *p;
   }
   m->pair_count = kept;
-  for (size_t i = 0; fits && i < m->part_count && status == QMAT_OK; i++)
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < m->part_count && status == QMAT_OK; i++)
     if (i != a) status = add_pair(m, a, i);
   return status == QMAT_OK ? test_pairs(m, kept) : status;
+}
+
+/* Joins two parts into the first. The pair is given up where rounding spoils the hull of fewer vertices. */
+static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
+  part *into = &m->parts[a], *from = &m->parts[b];
+  joint *j = &m->joints[0];
+  if (join(m, into, from, j) != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
+  const double volume = volume_of(j->points, j->triangles, j->triangle_count);
+  uint8_t *is_vertex = qmat_arena_alloc(&m->context->arena, j->point_count, sizeof *is_vertex);
+  if (!is_vertex) return qmat_fail_memory(m->context, "the hulls");
+  size_t used;
+  keep_vertices(j, is_vertex, &used);
+  const double *vertices = j->points;
+  if (used > m->room) {
+    const qmat_status status = qmat_tangent_hull_fit_points(&m->tangent, j->points, used, 0, m->error);
+    if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
+    if (status != QMAT_OK) {
+      give_up(m, a, b);
+      return QMAT_OK;
+    }
+    vertices = m->tangent.points;
+    used = m->tangent.point_count;
+  }
+  double *points = qmat_arena_alloc(&m->context->arena, used, 3 * sizeof *points);
+  if (!points) return qmat_fail_memory(m->context, "the hulls");
+  into->points = memcpy(points, vertices, 3 * used * sizeof *points);
+  into->count = used;
+  if (from->volume > into->volume) into->shape = from->shape;
+  into->volume = volume;
+  into->is_joint = true;
+  from->live = false;
+  m->live_count--;
+  find_box(into);
+  return renew_pairs(m, a, b);
 }
 
 static qmat_status init(merging *m, const qmat_colliders *c, size_t most_points) {
@@ -238,6 +266,8 @@ static qmat_status init(merging *m, const qmat_colliders *c, size_t most_points)
   m->parts = qmat_arena_alloc(arena, m->part_count, sizeof *m->parts);
   m->joints = qmat_arena_alloc(arena, (size_t)threads, sizeof *m->joints);
   if (!m->parts || !m->joints) return qmat_fail_memory(m->context, "the hulls");
+  const qmat_status status = qmat_tangent_hull_init(m->context, most_points, &m->tangent);
+  if (status != QMAT_OK) return status;
   for (int i = 0; i < threads; i++) {
     joint *j = &m->joints[i];
     j->points = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->points);
@@ -248,38 +278,43 @@ static qmat_status init(merging *m, const qmat_colliders *c, size_t most_points)
   for (size_t i = 0; i < m->part_count; i++) {
     part *p = &m->parts[i];
     const size_t first = i > 0 ? c->hull_ends[2 * i - 2] : 0, first_triangle = i > 0 ? c->hull_ends[2 * i - 1] : 0;
-    *p = (part){.count = c->hull_ends[2 * i] - first, .shape = (uint32_t)i, .live = true};
-    p->points = qmat_arena_alloc(arena, m->room, 3 * sizeof *p->points);
-    if (!p->points) return qmat_fail_memory(m->context, "the hulls");
-    memcpy(p->points, &c->points[3 * first], 3 * p->count * sizeof *p->points);
+    *p = (part){&c->points[3 * first], .count = c->hull_ends[2 * i] - first, .shape = (uint32_t)i, .live = true};
     p->volume = volume_of(c->points, &c->triangles[3 * first_triangle], c->hull_ends[2 * i + 1] - first_triangle);
     find_box(p);
   }
   return QMAT_OK;
 }
 
+/* The vertices of a part, most_points at most. */
+static qmat_status finish_part(merging *m, const part *p, const double **points, size_t *count) {
+  *points = p->points;
+  *count = p->count;
+  if (!p->is_joint) return QMAT_OK;
+  const qmat_status status = qmat_tangent_hull_fit_points(&m->tangent, p->points, p->count, 0, m->error);
+  if (status == QMAT_ERROR_GEOMETRY && p->count <= m->tangent.most) return QMAT_OK;
+  *points = m->tangent.points;
+  *count = m->tangent.point_count;
+  return status;
+}
+
 /* Writes the live parts as the hulls, in their order. */
-static qmat_status write_parts(merging *m, size_t most_points, double error, qmat_colliders *c) {
-  qmat_tangent_hull tangent;
-  qmat_status status = qmat_tangent_hull_init(m->context, most_points, &tangent);
-  double *points = qmat_alloc(m->live_count * most_points, 3 * sizeof *points);
-  uint32_t *triangles = qmat_alloc(m->live_count * most_points, 6 * sizeof *triangles);
+static qmat_status write_parts(merging *m, qmat_colliders *c) {
+  const size_t room = m->live_count * m->tangent.most;
+  qmat_status status = QMAT_OK;
+  double *points = qmat_alloc(room, 3 * sizeof *points);
+  uint32_t *triangles = qmat_alloc(room, 6 * sizeof *triangles);
   uint32_t *shapes = qmat_alloc(m->live_count, 3 * sizeof *shapes);
-  if (status == QMAT_OK && (!points || !triangles || !shapes)) status = qmat_fail_memory(m->context, "the hulls");
+  if (!points || !triangles || !shapes) status = QMAT_ERROR_MEMORY;
   size_t count = 0, point_count = 0, triangle_count = 0;
   for (size_t i = 0; i < m->part_count && status == QMAT_OK; i++) {
     const part *p = &m->parts[i];
     if (!p->live) continue;
-    const double *from = p->points;
-    size_t of_part = p->count, of_hull = 0;
-    if (p->is_joint) {
-      status = qmat_tangent_hull_fit_points(&tangent, p->points, p->count, 0, 0.5 * error);
-      from = tangent.points;
-      of_part = tangent.point_count;
-    }
-    if (status == QMAT_OK) status = qmat_convex_hull(from, of_part, &triangles[3 * triangle_count], &of_hull);
+    const double *vertices;
+    size_t of_part, of_hull = 0;
+    status = finish_part(m, p, &vertices, &of_part);
+    if (status == QMAT_OK) status = qmat_convex_hull(vertices, of_part, &triangles[3 * triangle_count], &of_hull);
     if (status != QMAT_OK) break;
-    memcpy(&points[3 * point_count], from, 3 * of_part * sizeof *points);
+    memcpy(&points[3 * point_count], vertices, 3 * of_part * sizeof *points);
     for (size_t k = 0; k < 3 * of_hull; k++) triangles[3 * triangle_count + k] += (uint32_t)point_count;
     memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)p->shape], 3 * sizeof *shapes);
     c->hull_ends[2 * count] = (uint32_t)(point_count += of_part);
@@ -298,12 +333,16 @@ static qmat_status write_parts(merging *m, size_t most_points, double error, qma
   qmat_free(points);
   qmat_free(triangles);
   qmat_free(shapes);
-  return status == QMAT_ERROR_GEOMETRY ? qmat_fail(m->context, status, "the solid has no volume") : status;
+  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
+  if (status != QMAT_ERROR_GEOMETRY) return status;
+  qmat_fail(m->context, status, "rounding spoils a joint hull of so few points");
+  return qmat_fail_field(m->context, "hull_points");
 }
 
 qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, size_t most, size_t most_points,
                              double error, qmat_colliders *colliders) {
-  merging m = {.context = context, .solid = solid, .limit = error / qmat_surface_frame(solid)->diagonal};
+  merging m = {
+      .context = context, .solid = solid, .limit = error / qmat_surface_frame(solid)->diagonal, .error = 0.5 * error};
   qmat_status status = init(&m, colliders, most_points);
   for (size_t enough = 1; status == QMAT_OK; enough = most, m.limit *= limit_step) {
     status = find_pairs(&m);
@@ -314,6 +353,6 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, s
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }
   qmat_free(m.pairs);
-  if (status == QMAT_OK && m.live_count < m.part_count) status = write_parts(&m, most_points, error, colliders);
+  if (status == QMAT_OK && m.live_count < m.part_count) status = write_parts(&m, colliders);
   return status;
 }
