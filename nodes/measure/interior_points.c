@@ -7,7 +7,7 @@
 
 #include "core/geometry/vector.h"
 
-enum { MOST_NODES_ALONG = 128 };
+enum { MOST_NODES_ALONG = 128, LAYERS_A_REPORT = 4 };
 static const double spacing_share = 2, cube_share = 0.5;
 
 /* A centre needs this share of its sphere's depth beyond `depth`. The whole depth would refuse joints that several
@@ -49,25 +49,129 @@ static placed_sphere *place_spheres(qmat_context *context, const qmat_complex *c
   return placed;
 }
 
-/* Records a sphere at the nodes that it contains to the depth, where it contains them deepest so far. */
-static void enter_sphere(const double *sphere, uint32_t vertex, double depth, double low, double spacing, size_t along,
-                         float *depths, uint32_t *owners) {
-  const double reach = sphere[3] - depth;
-  size_t first[3], last[3];
+/* A hierarchy of the placed spheres along a curve through space (Morton 1966): each group of a level holds up to
+ * GROUP_SIZE groups of the level below, those of level 0 as many spheres. */
+enum { GROUP_SIZE = 8, MOST_LEVELS = 12 };
+
+typedef struct group {
+  double low[3], high[3], largest; /* the box of the centres, and the largest radius */
+} group;
+
+typedef struct sphere_groups {
+  const qmat_complex *complex;
+  const placed_sphere *placed;
+  size_t count;
+  uint32_t *order; /* count: numbers of placed spheres along the curve */
+  size_t counts[MOST_LEVELS];
+  group *levels[MOST_LEVELS];
+  int level_count;
+} sphere_groups;
+
+typedef struct curve_place {
+  uint64_t code;
+  uint32_t number;
+} curve_place;
+
+static int by_code(const void *left, const void *right) {
+  const curve_place *a = left, *b = right;
+  if (a->code != b->code) return a->code < b->code ? -1 : 1;
+  return a->number < b->number ? -1 : a->number > b->number;
+}
+
+/* The bits of three numbers of 21 bits, which follow each other in `cube`, in turns. */
+static uint64_t morton_code(uint64_t cube) {
+  uint64_t code = 0;
+  for (int bit = 0; bit < 21; bit++)
+    for (int k = 0; k < 3; k++) code |= (cube >> (21 * k + bit) & 1) << (3 * bit + k);
+  return code;
+}
+
+static void enclose(group *g, const double low[3], const double high[3], double largest) {
   for (int k = 0; k < 3; k++) {
-    first[k] = (size_t)fmax(ceil((sphere[k] - reach - low) / spacing), 0);
-    last[k] = (size_t)fmax(fmin(floor((sphere[k] + reach - low) / spacing), (double)along - 1), 0);
+    g->low[k] = fmin(g->low[k], low[k]);
+    g->high[k] = fmax(g->high[k], high[k]);
   }
-  for (size_t x = first[0]; x <= last[0]; x++)
-    for (size_t y = first[1]; y <= last[1]; y++)
-      for (size_t z = first[2]; z <= last[2]; z++) {
-        const double node[3] = {low + (double)x * spacing, low + (double)y * spacing, low + (double)z * spacing};
-        const float found = (float)(sphere[3] - qmat_point_distance(node, sphere));
-        const size_t i = (x * along + y) * along + z;
-        if (!(found >= (float)depth) || !(found > depths[i])) continue;
-        depths[i] = found;
-        owners[i] = vertex;
+  g->largest = fmax(g->largest, largest);
+}
+
+static qmat_status make_groups(qmat_context *context, sphere_groups *g) {
+  const size_t count = g->count;
+  qmat_arena *arena = &context->arena;
+  curve_place *places = qmat_arena_alloc(arena, count, sizeof *places);
+  g->order = qmat_arena_alloc(arena, count, sizeof *g->order);
+  if (!places || !g->order) return qmat_fail_memory(context, "interior points");
+  for (size_t i = 0; i < count; i++) places[i] = (curve_place){morton_code(g->placed[i].cube), (uint32_t)i};
+  if (count > 0) qsort(places, count, sizeof *places, by_code);
+  for (size_t i = 0; i < count; i++) g->order[i] = places[i].number;
+  for (size_t below = count; below > 1 || g->level_count == 0; below = g->counts[g->level_count++]) {
+    const int level = g->level_count;
+    g->counts[level] = (below + GROUP_SIZE - 1) / GROUP_SIZE;
+    group *groups = g->levels[level] = qmat_arena_alloc(arena, g->counts[level], sizeof *groups);
+    if (!groups) return qmat_fail_memory(context, "interior points");
+    for (size_t i = 0; i < g->counts[level]; i++)
+      groups[i] = (group){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0};
+    for (size_t i = 0; i < below; i++) {
+      group *into = &groups[i / GROUP_SIZE];
+      if (level > 0) {
+        const group *own = &g->levels[level - 1][i];
+        enclose(into, own->low, own->high, own->largest);
+      } else {
+        const double *s = &g->complex->spheres[4 * (size_t)g->placed[g->order[i]].vertex];
+        enclose(into, s, s, s[3]);
       }
+    }
+  }
+  return QMAT_OK;
+}
+
+/* The placed sphere that contains a node deepest, the first of equally deep ones; UINT32_MAX: none to the depth. */
+typedef struct deepest {
+  float depth;
+  uint32_t number;
+} deepest;
+
+static void try_sphere(const sphere_groups *g, uint32_t number, const double node[3], deepest *best) {
+  const double *s = &g->complex->spheres[4 * (size_t)g->placed[number].vertex];
+  const float depth = (float)(s[3] - qmat_point_distance(node, s));
+  if (depth > best->depth || (depth == best->depth && number < best->number)) *best = (deepest){depth, number};
+}
+
+/* More than rounding of the depth. */
+static const double rounding = 1e-12;
+
+static bool may_be_deeper(const group *g, const double node[3], float depth) {
+  double square = 0;
+  for (int k = 0; k < 3; k++) {
+    const double away = qmat_larger(qmat_larger(g->low[k] - node[k], node[k] - g->high[k]), 0);
+    square += away * away;
+  }
+  return (float)(g->largest - sqrt(square) + rounding) >= depth;
+}
+
+static void search_group(const sphere_groups *g, int level, size_t index, const double node[3], deepest *best) {
+  if (!may_be_deeper(&g->levels[level][index], node, best->depth)) return;
+  const size_t below = level > 0 ? g->counts[level - 1] : g->count, first = index * GROUP_SIZE;
+  for (size_t i = first; i < first + GROUP_SIZE && i < below; i++) {
+    if (level > 0)
+      search_group(g, level - 1, i, node, best);
+    else
+      try_sphere(g, g->order[i], node, best);
+  }
+}
+
+/* The owners of the nodes of a layer. The owner of the node before is tried first: it is near the best. */
+static void find_owners(const sphere_groups *g, double depth, double low, double spacing, size_t along, size_t x,
+                        uint32_t *owners) {
+  uint32_t near = UINT32_MAX;
+  for (size_t y = 0; y < along; y++)
+    for (size_t z = 0; z < along; z++) {
+      const double node[3] = {low + (double)x * spacing, low + (double)y * spacing, low + (double)z * spacing};
+      deepest best = {(float)depth, UINT32_MAX};
+      if (near != UINT32_MAX) try_sphere(g, near, node, &best);
+      search_group(g, g->level_count - 1, 0, node, &best);
+      owners[(x * along + y) * along + z] = best.number;
+      if (best.number != UINT32_MAX) near = best.number;
+    }
 }
 
 qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex *complex, double depth,
@@ -87,14 +191,20 @@ qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex 
   const size_t along = (size_t)(extent / spacing) + 1, nodes = along * along * along;
   size_t count;
   const placed_sphere *placed = place_spheres(context, complex, depth, low, extent, &count);
-  float *depths = qmat_arena_calloc(arena, nodes, sizeof *depths);
-  uint32_t *owners = qmat_arena_alloc(arena, nodes, sizeof *owners);
-  if (!placed || !depths || !owners) return qmat_fail_memory(context, "interior points");
-  for (size_t i = 0; i < count; i++)
-    enter_sphere(&complex->spheres[4 * (size_t)placed[i].vertex], placed[i].vertex, depth, low, spacing, along, depths,
-                 owners);
+  uint32_t *owners = qmat_arena_alloc(arena, nodes, sizeof *owners); /* numbers of placed spheres, or UINT32_MAX */
+  if (!placed || !owners) return qmat_fail_memory(context, "interior points");
+  sphere_groups groups = {.complex = complex, .placed = placed, .count = count};
+  qmat_status status = make_groups(context, &groups);
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < along && status == QMAT_OK; first += LAYERS_A_REPORT) {
+    const size_t end = first + LAYERS_A_REPORT < along ? first + LAYERS_A_REPORT : along;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+    for (size_t x = first; x < end; x++) find_owners(&groups, depth, low, spacing, along, x, owners);
+    status = qmat_progress(context, end, along, "layers of interior points");
+  }
+  if (status != QMAT_OK) return status;
   inner->count = count;
-  for (size_t i = 0; i < nodes; i++) inner->count += depths[i] > 0;
+  for (size_t i = 0; i < nodes; i++) inner->count += owners[i] != UINT32_MAX;
   inner->points = qmat_arena_alloc(arena, inner->count, 3 * sizeof *inner->points);
   inner->spheres = qmat_arena_alloc(arena, inner->count, sizeof *inner->spheres);
   inner->distances = qmat_arena_alloc(arena, inner->count, sizeof *inner->distances);
@@ -110,13 +220,14 @@ qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex 
     inner->distances[next++] = -sphere[3];
   }
   for (size_t i = 0; i < nodes; i++) {
-    if (!(depths[i] > 0)) continue;
+    if (owners[i] == UINT32_MAX) continue;
     const size_t steps[3] = {i / along / along, i / along % along, i % along};
     double *point = &inner->points[3 * next];
     for (int k = 0; k < 3; k++) point[k] = low + (double)steps[k] * spacing;
-    const double *sphere = &complex->spheres[4 * (size_t)owners[i]];
+    const uint32_t vertex = placed[owners[i]].vertex;
+    const double *sphere = &complex->spheres[4 * (size_t)vertex];
     inner->limits[next] = 0;
-    inner->spheres[next] = owners[i];
+    inner->spheres[next] = vertex;
     inner->distances[next++] = qmat_point_distance(point, sphere) - sphere[3];
   }
   return QMAT_OK;

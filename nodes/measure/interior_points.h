@@ -17,7 +17,8 @@ typedef struct qmat_interior_points {
 
 /* Finds such points, at least `depth` (> 0) deep, for a medial complex that fills its solid. Of the spheres larger than
  * `depth` whose centres share a cube of half that side, only the largest counts. The lattice's spacing is twice the
- * depth, or a 127th of the extent of the spheres where that is more. QMAT_ERROR_MEMORY. One thread. */
+ * depth, or a 127th of the extent of the spheres where that is more. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads;
+ * the result does not depend on their number. Cost: a search among the spheres for each node. */
 qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex *complex, double depth,
                                       qmat_interior_points *inner);
 
