@@ -94,6 +94,7 @@ static void enclose(group *g, const double low[3], const double high[3], double 
   g->largest = fmax(g->largest, largest);
 }
 
+/* `g->count` is 1 or more. */
 static qmat_status make_groups(qmat_context *context, sphere_groups *g) {
   const size_t count = g->count;
   qmat_arena *arena = &context->arena;
@@ -101,7 +102,7 @@ static qmat_status make_groups(qmat_context *context, sphere_groups *g) {
   g->order = qmat_arena_alloc(arena, count, sizeof *g->order);
   if (!places || !g->order) return qmat_fail_memory(context, "interior points");
   for (size_t i = 0; i < count; i++) places[i] = (curve_place){morton_code(g->placed[i].cube), (uint32_t)i};
-  if (count > 0) qsort(places, count, sizeof *places, by_code);
+  qsort(places, count, sizeof *places, by_code);
   for (size_t i = 0; i < count; i++) g->order[i] = places[i].number;
   for (size_t below = count; below > 1 || g->level_count == 0; below = g->counts[g->level_count++]) {
     const int level = g->level_count;
@@ -193,6 +194,7 @@ qmat_status qmat_interior_points_find(qmat_context *context, const qmat_complex 
   const placed_sphere *placed = place_spheres(context, complex, depth, low, extent, &count);
   uint32_t *owners = qmat_arena_alloc(arena, nodes, sizeof *owners); /* numbers of placed spheres, or UINT32_MAX */
   if (!placed || !owners) return qmat_fail_memory(context, "interior points");
+  if (count == 0) return QMAT_OK;
   sphere_groups groups = {.complex = complex, .placed = placed, .count = count};
   qmat_status status = make_groups(context, &groups);
   const int threads = qmat_threads(context);
