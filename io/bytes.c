@@ -199,6 +199,10 @@ void qmat_put_u32(qmat_writer *writer, uint32_t number) {
   put_unsigned(writer, number, 4);
 }
 
+void qmat_put_u64(qmat_writer *writer, uint64_t number) {
+  put_unsigned(writer, number, 8);
+}
+
 void qmat_put_f32(qmat_writer *writer, float number) {
   uint32_t bits;
   memcpy(&bits, &number, sizeof bits);

@@ -75,6 +75,7 @@ void qmat_put_integer(qmat_writer *writer, int64_t number);
 void qmat_put_u8(qmat_writer *writer, uint8_t number);
 void qmat_put_u16(qmat_writer *writer, uint16_t number);
 void qmat_put_u32(qmat_writer *writer, uint32_t number);
+void qmat_put_u64(qmat_writer *writer, uint64_t number);
 void qmat_put_f32(qmat_writer *writer, float number);
 void qmat_put_f64(qmat_writer *writer, double number);
 /* Frees the bytes; the writer is empty and usable again. To keep the bytes (qmat_free them), take the pointer and zero

@@ -9,6 +9,7 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_uri.h"
 #include "io/save.h"
+#include "io/usd/usdc_original.h"
 
 static const char *base_of(const char *path) {
   const char *slash = strrchr(path, '/');
@@ -141,7 +142,10 @@ static qmat_status name_original(qmat_context *context, const qmat_file *file, c
   }
   qmat_status status = QMAT_OK;
   if (!name || !made || !made->format || !made->parts) status = qmat_fail_memory(context, "the output file");
-  if (status == QMAT_OK) put_renamed(&out, &file->parts[0], own, name);
+  if (status == QMAT_OK && strcmp(file->format, "usdc") == 0)
+    status = qmat_usdc_rename_original(context, &file->parts[0], name, &out);
+  else if (status == QMAT_OK)
+    put_renamed(&out, &file->parts[0], own, name);
   if (status == QMAT_OK) status = qmat_writer_to_part(context, &out, made, 0, "");
   if (status == QMAT_OK) {
     made->parts[1] =
@@ -164,7 +168,8 @@ static qmat_status name_original(qmat_context *context, const qmat_file *file, c
 
 qmat_status qmat_file_name_sides(qmat_context *context, const qmat_file *file, const char *path, qmat_file **named) {
   *named = NULL;
-  if (strcmp(file->format, "usda") == 0 && file->part_count == 2) return name_original(context, file, path, named);
+  const bool is_layer = strcmp(file->format, "usda") == 0 || strcmp(file->format, "usdc") == 0;
+  if (is_layer && file->part_count == 2) return name_original(context, file, path, named);
   const bool is_gltf = strcmp(file->format, "gltf") == 0 || strcmp(file->format, "glb") == 0;
   if (!is_gltf || file->part_count < 2) {
     *named = (qmat_file *)qmat_value_retain(&file->base);
@@ -238,7 +243,7 @@ static qmat_status check_side(qmat_context *context, const qmat_file_part *part,
   char *side = qmat_gltf_beside(path, part->name), *uri = qmat_gltf_uri_of(part->name);
   qmat_status status = side && uri ? QMAT_OK : qmat_fail_memory(context, "the names of output files");
   if (status == QMAT_OK && stat(side, &about) == 0 && !qmat_file_holds(side, part) && !mentions(path, uri) &&
-      !mentions(path, part->name)) {
+      !mentions(path, part->name) && !qmat_usdc_has_original(path, part->name)) {
     qmat_fail(context, status = QMAT_ERROR_IO, "the side file exists with other content and does not belong to '%s'",
               path);
     qmat_fail_at(context, side, 0, 0);

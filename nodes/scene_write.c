@@ -26,6 +26,7 @@ typedef enum file_format {
   FORMAT_MA,
   FORMAT_PLY,
   FORMAT_USDA,
+  FORMAT_USDC,
   FORMAT_USDZ,
   FORMAT_URDF,
   FORMAT_XML,
@@ -135,7 +136,7 @@ static qmat_gltf_addition addition_of(qmat_context *context, const scene_write_p
 }
 
 static bool is_usd(const scene_write_params *params) {
-  return params->format == FORMAT_USDA || params->format == FORMAT_USDZ;
+  return params->format >= FORMAT_USDA && params->format <= FORMAT_USDZ;
 }
 
 /* Whether the scene itself is written, with its own meshes: a glTF scene as glTF, or a USD scene as USD. */
@@ -199,7 +200,7 @@ static qmat_usd_options usd_options_of(const scene_write_params *params, const q
                                        qmat_stated_errors *stated) {
   const qmat_stated_errors errors = errors_of(medial, report);
   return (qmat_usd_options){
-      .package = params->format == FORMAT_USDZ,
+      .form = (qmat_usd_form)(params->format - FORMAT_USDA + QMAT_USD_TEXT),
       .name = scene ? scene->name : NULL,
       .meters_per_unit = scene ? scene->meters_per_unit : 0,
       .is_z_up = scene && scene->is_z_up,
@@ -417,6 +418,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
         status = write_robot(context, params, inputs, &file);
         break;
       case FORMAT_USDA:
+      case FORMAT_USDC:
       case FORMAT_USDZ:
         status = write_usd(context, params, inputs, stated, &file);
         break;
@@ -440,7 +442,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   return status;
 }
 
-static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdz", "urdf", "xml", "yaml", NULL};
+static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc", "usdz", "urdf", "xml", "yaml", NULL};
 
 static const char *const requirements[] = {[REQUIRE_NOTHING] = "none", [REQUIRE_CERTIFIED] = "certified", NULL};
 
@@ -523,7 +525,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 13,
+    .version = 14,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
@@ -537,7 +539,8 @@ const qmat_node qmat_node_scene_write = {
         "errors of the report plus the distance by which storage moves the solid, at most 0.25 % of epsilon. "
         "qmat_certified says whether both are proved to be within qmat_epsilon. Far from zero, the node is translated "
         "to qmat_origin_x, _y and _z.\n\n"
-        "usda and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. Of a USD "
+        "usda, usdc and usdz hold the skin, and as guides the spheres, edges and triangles with primvars:radius. Of a "
+        "USD "
         "scene they are a layer over the original, which they keep beside or inside: each prim with a mesh gains a "
         "child with its medial mesh. ma and ply hold the medial mesh alone; "
         "urdf, xml (MJCF) and yaml (cuRobo) colliders alone.",

@@ -551,7 +551,7 @@ class MedialMesh(Medial):
         return graph.run("skin.mesh", threads=threads, progress=progress)["skin.mesh"]
 
     def save(self, *paths, threads=0, progress=None):
-        """Writes the file; its ending is the format: .glb, .gltf, .usda, .usdz, .ma, .ply; .html, a page; .png, .svg,
+        """Writes the file; its ending is the format: .glb, .gltf, .usda, .usdc, .usdz, .ma, .ply; .html, a page; .png, .svg,
         a picture."""
         graph = Graph(cache=self._cache).set(self._settings)
         self._continue(graph, ["model.scene", "solid.mesh", "simple.medial", "errors.report"])

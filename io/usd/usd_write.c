@@ -10,6 +10,7 @@
 #include "core/node.h"
 #include "io/bytes.h"
 #include "io/usd/usd_colliders.h"
+#include "io/usd/usdc_write.h"
 #include "io/usd/usdz.h"
 
 #define LONGEST_NAME 200
@@ -389,6 +390,13 @@ qmat_status qmat_usd_put_class(qmat_context *context, const qmat_medial *medial,
   return status;
 }
 
+static qmat_status crate_to_file(qmat_context *context, qmat_writer *layer, qmat_file **file) {
+  const qmat_status status = qmat_usdc_of_text(context, layer);
+  if (status == QMAT_OK) return qmat_writer_to_file(context, layer, "usdc", file);
+  qmat_writer_uninit(layer);
+  return status;
+}
+
 qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                            const qmat_usd_options *options, qmat_file **file) {
   *file = NULL;
@@ -416,7 +424,8 @@ qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, con
   uselocale(before);
   freelocale(plain);
   stored_uninit(&s);
-  if (!options->package) return qmat_writer_to_file(context, &writer, "usda", file);
+  if (options->form == QMAT_USD_CRATE) return crate_to_file(context, &writer, file);
+  if (options->form == QMAT_USD_TEXT) return qmat_writer_to_file(context, &writer, "usda", file);
   snprintf(member, sizeof member, "%s.usda", prim);
   if (!writer.failed) qmat_usdz_put(&package, member, writer.bytes, writer.size);
   package.failed = package.failed || writer.failed;

@@ -5,9 +5,12 @@
 #include "io/bytes.h"
 #include "io/stored_medial.h"
 
+/* The file: a layer as text (.usda) or as a binary crate (.usdc), or a package with a text layer (.usdz). */
+typedef enum qmat_usd_form { QMAT_USD_TEXT, QMAT_USD_CRATE, QMAT_USD_PACKAGE } qmat_usd_form;
+
 /* The form of the file, and facts about the medial mesh. */
 typedef struct qmat_usd_options {
-  bool package;                    /* a .usdz with the layer; else a .usda */
+  qmat_usd_form form;
   const char *name;                /* of the model, UTF-8; NULL or "": none */
   const char *prim;                /* the path of the prim that is described, for qmat_usd_put_class; else NULL */
   double meters_per_unit;          /* 0: unknown, written as 1 */
@@ -18,7 +21,7 @@ typedef struct qmat_usd_options {
   qmat_stated_errors *stated;      /* becomes the errors that the file states; may be NULL */
 } qmat_usd_options;
 
-/* Makes a USD text layer of a medial mesh: one Xform, the default prim, with
+/* Makes a USD layer of a medial mesh: one Xform, the default prim, with
  *  - "skin", a Mesh without subdivision (if `skin` is not NULL and has triangles);
  *  - "spheres", Points with widths (diameters) and primvars:radius, and with primvars:skel:jointIndices and
  * jointWeights (4 each) where the medial mesh has a skin: numbered as by the model's mesh;
@@ -54,9 +57,9 @@ typedef struct qmat_usd_addition {
  * instanceable, which would hide the additions. Layer metadata that only a root layer may have are copied: the default
  * prim, units, axis and times.
  *
- * A text layer has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package contains everything:
- * the layer first, and the scene's files in the folder "original". options->package and name are those of the first
- * addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY. `*file` as above. */
+ * A layer that is no package has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package
+ * contains everything: the layer first, and the scene's files in the folder "original". options->form and name are
+ * those of the first addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY. `*file` as above. */
 qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
                                  size_t count, qmat_file **file);
 

@@ -9,6 +9,7 @@
 #include "core/node.h"
 #include "io/usd/usd_stage.h"
 #include "io/usd/usd_write.h"
+#include "io/usd/usdc_write.h"
 #include "io/usd/usdz.h"
 
 /* A prim that carries a mesh. */
@@ -236,16 +237,17 @@ static qmat_status make_package(qmat_context *context, const qmat_usdz *original
   return status;
 }
 
-static qmat_status make_text(qmat_context *context, const qmat_file_part *part, const char *name, qmat_writer *text,
-                             qmat_file **file) {
+/* A layer beside its original. */
+static qmat_status make_pair(qmat_context *context, const qmat_file_part *part, const char *name, const char *format,
+                             qmat_writer *layer, qmat_file **file) {
   qmat_file *made = qmat_file_new();
   if (made) {
-    made->format = qmat_strdup("usda");
+    made->format = qmat_strdup(format);
     made->parts = qmat_calloc(2, sizeof *made->parts);
     if (made->parts) made->part_count = 2;
   }
   qmat_status status = made && made->format && made->parts ? QMAT_OK : fail_shortage(context);
-  if (status == QMAT_OK) status = qmat_writer_to_part(context, text, made, 0, "");
+  if (status == QMAT_OK) status = qmat_writer_to_part(context, layer, made, 0, "");
   if (status == QMAT_OK) {
     made->parts[1] =
         (qmat_file_part){.name = qmat_strdup(name), .size = part->size, .bytes = qmat_alloc(part->size, 1)};
@@ -264,7 +266,8 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
                                  size_t count, qmat_file **file) {
   const qmat_file_part *part = &scene->parts[0];
   const char *ending = ending_of(part);
-  const bool in_package = additions[0].options.package;
+  const qmat_usd_form form = additions[0].options.form;
+  const bool in_package = form == QMAT_USD_PACKAGE;
   const qmat_bytes bytes = {.data = part->bytes, .size = part->size};
   char sublayer[512];
   qmat_usd_stage *stage = NULL;
@@ -281,9 +284,10 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
     status = put_text(context, scene, additions, count, qmat_usd_stage_root_layer(stage)->root, sublayer, &text);
   }
   if (status == QMAT_OK && text.failed) status = fail_shortage(context);
+  if (status == QMAT_OK && form == QMAT_USD_CRATE) status = qmat_usdc_of_text(context, &text);
   if (status == QMAT_OK)
     status = in_package ? make_package(context, &original, part, sublayer, &text, file)
-                        : make_text(context, part, sublayer, &text, file);
+                        : make_pair(context, part, sublayer, form == QMAT_USD_CRATE ? "usdc" : "usda", &text, file);
   qmat_writer_uninit(&text);
   qmat_usdz_uninit(&original);
   qmat_usd_stage_close(stage);

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "io/usd/usdc_types.h"
 #include "io/usd/usdc_value.h"
 
 enum { OLDEST_VERSION = 6, NEWEST_VERSION = 10, HEADER_BYTES = 24 };
@@ -81,16 +82,6 @@ static qmat_status read_fields(qmat_usdc_values *v, uint32_t set, qmat_usd_spec 
 
 /* ---- specs ---- */
 
-/* The types of specs in the file. */
-enum {
-  SPEC_ATTRIBUTE = 1,
-  SPEC_PRIM = 6,
-  SPEC_PSEUDO_ROOT = 7,
-  SPEC_RELATIONSHIP = 8,
-  SPEC_VARIANT = 10,
-  SPEC_SET = 11
-};
-
 /* Makes the spec of "{set=variant}", and that of the set; of "{set=}" the set only. NULL with the error recorded. */
 static qmat_usd_spec *make_variant(const qmat_usdc *c, qmat_usd_spec *parent, const char *element) {
   const char *equals = strchr(element, '='), *end = element + strlen(element) - 1;
@@ -113,17 +104,18 @@ static qmat_usd_spec *make_variant(const qmat_usdc *c, qmat_usd_spec *parent, co
 /* Makes the spec of a path; it stays NULL for targets and connections, which the layer does not have. */
 static qmat_status make_spec(const qmat_usdc *c, qmat_usdc_path *path, uint32_t type) {
   if (path->parent == QMAT_USDC_NONE) {
-    if (type != SPEC_PSEUDO_ROOT) return fail(c, "the root of the file has the wrong type");
+    if (type != QMAT_USDC_SPEC_PSEUDO_ROOT) return fail(c, "the root of the file has the wrong type");
     path->spec = c->layer->root;
     return QMAT_OK;
   }
   if (path->is_below_target || path->element[0] == '.') return QMAT_OK;
   qmat_usd_spec *parent = c->paths[path->parent].spec;
   if (!parent) return fail(c, "a spec has no parent");
-  const bool is_variant = !path->is_property && path->element[0] == '{', is_relationship = type == SPEC_RELATIONSHIP;
-  const bool matches = path->is_property ? is_relationship || type == SPEC_ATTRIBUTE
-                       : is_variant      ? type == SPEC_VARIANT || type == SPEC_SET
-                                         : type == SPEC_PRIM;
+  const bool is_variant = !path->is_property && path->element[0] == '{',
+             is_relationship = type == QMAT_USDC_SPEC_RELATIONSHIP;
+  const bool matches = path->is_property ? is_relationship || type == QMAT_USDC_SPEC_ATTRIBUTE
+                       : is_variant      ? type == QMAT_USDC_SPEC_VARIANT || type == QMAT_USDC_SPEC_SET
+                                         : type == QMAT_USDC_SPEC_PRIM;
   if (!matches) return fail(c, "the type of a spec does not match its path");
   if (is_variant) {
     path->spec = make_variant(c, parent, path->element);

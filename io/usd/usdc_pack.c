@@ -2,6 +2,8 @@
 #include "io/usd/usdc_pack.h"
 
 #include <lz4.h>
+#include <stdlib.h>
+#include <string.h>
 
 /* LZ4 expands a byte to at most 255 bytes, and a block by a few more. */
 enum { LZ4_RATIO = 255, LZ4_BLOCK_SLACK = 64 };
@@ -77,4 +79,69 @@ qmat_status qmat_usdc_take_integers(const qmat_usd_layer *layer, qmat_byte_reade
     status = qmat_usd_layer_fail(layer, "packed integers unpack to fewer than their count");
   qmat_free(bytes);
   return status;
+}
+
+/* ---- packing ---- */
+
+void qmat_usdc_put_packed(qmat_writer *writer, const void *bytes, size_t size) {
+  const int most = size <= LZ4_MAX_INPUT_SIZE ? LZ4_compressBound((int)size) : 0;
+  char *packed = most > 0 ? qmat_alloc((size_t)most, 1) : NULL;
+  const int made = packed ? LZ4_compress_default(bytes, packed, (int)size, most) : 0;
+  writer->failed = writer->failed || made <= 0;
+  if (made > 0) {
+    qmat_put_u64(writer, (uint64_t)made + 1);
+    qmat_put_u8(writer, 0); /* one block */
+    qmat_put_bytes(writer, packed, (size_t)made);
+  }
+  qmat_free(packed);
+}
+
+static int by_size(const void *left, const void *right) {
+  const int32_t a = *(const int32_t *)left, b = *(const int32_t *)right;
+  return a < b ? -1 : a > b;
+}
+
+/* The commonest of some numbers, the smallest of equally common ones. Sorts them. */
+static int32_t commonest(int32_t *numbers, size_t count) {
+  size_t most = 0;
+  int32_t best = 0;
+  if (count > 0) qsort(numbers, count, sizeof *numbers, by_size);
+  for (size_t i = 0, end; i < count; i = end) {
+    for (end = i + 1; end < count && numbers[end] == numbers[i];) end++;
+    if (end - i <= most) continue;
+    most = end - i;
+    best = numbers[i];
+  }
+  return best;
+}
+
+void qmat_usdc_put_integers(qmat_writer *writer, const int32_t *integers, size_t count) {
+  int32_t *differences = qmat_alloc(count, sizeof *differences), *sorted = qmat_alloc(count, sizeof *sorted);
+  uint8_t *codes = qmat_calloc((count + 3) / 4, 1);
+  qmat_writer out = {0}, rest = {0};
+  writer->failed = writer->failed || !differences || !sorted || !codes;
+  for (size_t i = 0; i < count && !writer->failed; i++)
+    differences[i] = (int32_t)((uint32_t)integers[i] - (i > 0 ? (uint32_t)integers[i - 1] : 0));
+  if (!writer->failed && count > 0) memcpy(sorted, differences, count * sizeof *sorted);
+  const int32_t common = writer->failed ? 0 : commonest(sorted, count);
+  for (size_t i = 0; i < count && !writer->failed; i++) {
+    const int32_t d = differences[i];
+    const unsigned code = d == common ? 0 : d == (int8_t)d ? 1 : d == (int16_t)d ? 2 : 3;
+    codes[i / 4] |= (uint8_t)(code << (2 * (i % 4)));
+    if (code == 1) qmat_put_u8(&rest, (uint8_t)d);
+    if (code == 2) qmat_put_u16(&rest, (uint16_t)d);
+    if (code == 3) qmat_put_u32(&rest, (uint32_t)d);
+  }
+  if (!writer->failed) {
+    qmat_put_u32(&out, (uint32_t)common);
+    qmat_put_bytes(&out, codes, (count + 3) / 4);
+    qmat_put_bytes(&out, rest.bytes, rest.size);
+    writer->failed = out.failed || rest.failed;
+    if (!writer->failed) qmat_usdc_put_packed(writer, out.bytes, out.size);
+  }
+  qmat_writer_uninit(&rest);
+  qmat_writer_uninit(&out);
+  qmat_free(codes);
+  qmat_free(sorted);
+  qmat_free(differences);
 }

@@ -19,4 +19,9 @@ qmat_status qmat_usdc_unpack(const qmat_usd_layer *layer, const uint8_t *packed,
 qmat_status qmat_usdc_take_integers(const qmat_usd_layer *layer, qmat_byte_reader *reader, size_t count, unsigned width,
                                     int64_t *integers);
 
+/* Appends the size of the packed bytes (8 bytes) and then them: of any bytes, or of 32-bit integers. Shortage of
+ * memory, or more than LZ4 takes at once (2 GB), sets writer->failed. */
+void qmat_usdc_put_packed(qmat_writer *writer, const void *bytes, size_t size);
+void qmat_usdc_put_integers(qmat_writer *writer, const int32_t *integers, size_t count);
+
 #endif

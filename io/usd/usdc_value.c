@@ -5,97 +5,7 @@
 #include <string.h>
 
 #include "io/usd/usdc_pack.h"
-
-enum { FEWEST_PACKED = 16 }; /* elements of an array: shorter ones are never packed */
-
-/* A representation has flags, a type, and the value itself or its offset in the file. */
-#define REP_ARRAY ((uint64_t)1 << 63)
-#define REP_INLINED ((uint64_t)1 << 62)
-#define REP_PACKED ((uint64_t)1 << 61)
-#define REP_PAYLOAD (((uint64_t)1 << 48) - 1)
-
-/* Types that are named below, by their number in the file. */
-typedef enum crate_type {
-  CRATE_INT = 3,
-  CRATE_UINT = 4,
-  CRATE_INT64 = 5,
-  CRATE_UINT64 = 6,
-  CRATE_DOUBLE = 9,
-  CRATE_DOUBLE2 = 19,
-  CRATE_DICTIONARY = 31,
-  CRATE_TOKEN_LIST_OP,
-  CRATE_STRING_LIST_OP,
-  CRATE_PATH_LIST_OP,
-  CRATE_REFERENCE_LIST_OP,
-  CRATE_INT_LIST_OP,
-  CRATE_INT64_LIST_OP,
-  CRATE_UINT_LIST_OP,
-  CRATE_UINT64_LIST_OP,
-  CRATE_PATH_VECTOR,
-  CRATE_TOKEN_VECTOR,
-  CRATE_SPECIFIER,
-  CRATE_PERMISSION,
-  CRATE_VARIABILITY,
-  CRATE_VARIANT_SELECTION_MAP,
-  CRATE_TIME_SAMPLES,
-  CRATE_PAYLOAD,
-  CRATE_DOUBLE_VECTOR,
-  CRATE_LAYER_OFFSET_VECTOR,
-  CRATE_STRING_VECTOR,
-  CRATE_VALUE_BLOCK,
-  CRATE_VALUE,
-  CRATE_UNREGISTERED_VALUE,
-  CRATE_UNREGISTERED_VALUE_LIST_OP,
-  CRATE_PAYLOAD_LIST_OP,
-  CRATE_TIME_CODE,
-  CRATE_PATH_EXPRESSION
-} crate_type;
-
-/* Plain types by their number in the file. */
-static const struct {
-  qmat_usd_type type;
-  uint8_t components, rows; /* rows: of a matrix; else 0 */
-  bool is_quaternion;       /* stored with the real part last */
-} plain_types[] = {
-    [1] = {QMAT_USD_BOOL, 1, 0, false},
-    [2] = {QMAT_USD_UCHAR, 1, 0, false},
-    [3] = {QMAT_USD_INT, 1, 0, false},
-    [4] = {QMAT_USD_UINT, 1, 0, false},
-    [5] = {QMAT_USD_INT64, 1, 0, false},
-    [6] = {QMAT_USD_UINT64, 1, 0, false},
-    [7] = {QMAT_USD_HALF, 1, 0, false},
-    [8] = {QMAT_USD_FLOAT, 1, 0, false},
-    [9] = {QMAT_USD_DOUBLE, 1, 0, false},
-    [10] = {QMAT_USD_STRING, 1, 0, false},
-    [11] = {QMAT_USD_TOKEN, 1, 0, false},
-    [12] = {QMAT_USD_ASSET, 1, 0, false},
-    [13] = {QMAT_USD_DOUBLE, 4, 2, false},
-    [14] = {QMAT_USD_DOUBLE, 9, 3, false},
-    [15] = {QMAT_USD_DOUBLE, 16, 4, false},
-    [16] = {QMAT_USD_DOUBLE, 4, 0, true},
-    [17] = {QMAT_USD_FLOAT, 4, 0, true},
-    [18] = {QMAT_USD_HALF, 4, 0, true},
-    [19] = {QMAT_USD_DOUBLE, 2, 0, false},
-    [20] = {QMAT_USD_FLOAT, 2, 0, false},
-    [21] = {QMAT_USD_HALF, 2, 0, false},
-    [22] = {QMAT_USD_INT, 2, 0, false},
-    [23] = {QMAT_USD_DOUBLE, 3, 0, false},
-    [24] = {QMAT_USD_FLOAT, 3, 0, false},
-    [25] = {QMAT_USD_HALF, 3, 0, false},
-    [26] = {QMAT_USD_INT, 3, 0, false},
-    [27] = {QMAT_USD_DOUBLE, 4, 0, false},
-    [28] = {QMAT_USD_FLOAT, 4, 0, false},
-    [29] = {QMAT_USD_HALF, 4, 0, false},
-    [30] = {QMAT_USD_INT, 4, 0, false},
-    [CRATE_TIME_CODE] = {QMAT_USD_TIMECODE, 1, 0, false},
-};
-
-/* The size of a component in the file. */
-static const uint8_t component_bytes[QMAT_USD_TYPE_COUNT] = {
-    [QMAT_USD_BOOL] = 1,   [QMAT_USD_UCHAR] = 1, [QMAT_USD_INT] = 4,   [QMAT_USD_UINT] = 4,   [QMAT_USD_INT64] = 8,
-    [QMAT_USD_UINT64] = 8, [QMAT_USD_HALF] = 2,  [QMAT_USD_FLOAT] = 4, [QMAT_USD_DOUBLE] = 8, [QMAT_USD_TIMECODE] = 8,
-    [QMAT_USD_STRING] = 4, [QMAT_USD_TOKEN] = 4, [QMAT_USD_ASSET] = 4, [QMAT_USD_PATH] = 4,
-};
+#include "io/usd/usdc_types.h"
 
 static qmat_status fail(const qmat_usdc *c, const char *what) {
   return qmat_usd_layer_fail(c->layer, what);
@@ -112,11 +22,11 @@ static unsigned type_of(uint64_t rep) {
 }
 
 static bool is_plain(unsigned type) {
-  return type < sizeof plain_types / sizeof plain_types[0] && plain_types[type].components > 0;
+  return type < QMAT_USDC_PLAIN_TYPES && qmat_usdc_plain_types[type].components > 0;
 }
 
 static qmat_status seek(const qmat_usdc *c, uint64_t rep, qmat_byte_reader *reader) {
-  const uint64_t offset = rep & REP_PAYLOAD;
+  const uint64_t offset = rep & QMAT_USDC_REP_PAYLOAD;
   if (offset >= c->size) return qmat_usdc_fail_short(c);
   *reader = (qmat_byte_reader){.bytes = c->bytes, .size = c->size, .at = (size_t)offset};
   return QMAT_OK;
@@ -182,9 +92,9 @@ static double take_number(qmat_byte_reader *reader, qmat_usd_type type) {
 
 static qmat_status take_elements(const qmat_usdc *c, qmat_byte_reader *reader, unsigned number, uint64_t count,
                                  qmat_usd_value *value) {
-  const qmat_usd_type type = plain_types[number].type;
-  const unsigned components = plain_types[number].components;
-  if (reader->failed || qmat_bytes_left(reader) / (component_bytes[type] * components) < count)
+  const qmat_usd_type type = qmat_usdc_plain_types[number].type;
+  const unsigned components = qmat_usdc_plain_types[number].components;
+  if (reader->failed || qmat_bytes_left(reader) / (qmat_usdc_component_bytes[type] * components) < count)
     return qmat_usdc_fail_short(c);
   void *memory = qmat_usd_alloc(c->layer, count, 8 * components);
   if (!memory) return qmat_usd_layer_error(c->layer);
@@ -198,7 +108,7 @@ static qmat_status take_elements(const qmat_usdc *c, qmat_byte_reader *reader, u
   }
   double *numbers = memory;
   for (size_t i = 0; i < total; i++) numbers[i] = take_number(reader, type);
-  if (plain_types[number].is_quaternion) {
+  if (qmat_usdc_plain_types[number].is_quaternion) {
     for (double *q = numbers; q < numbers + total; q += 4) {
       double real = q[3];
       memmove(q + 1, q, 3 * sizeof *q);
@@ -220,7 +130,7 @@ static qmat_status take_packed_array(const qmat_usdc *c, qmat_byte_reader *reade
   qmat_status status;
   if (qmat_usd_is_integer(type)) {
     int64_t *integers = memory;
-    status = qmat_usdc_take_integers(c->layer, reader, count, component_bytes[type], integers);
+    status = qmat_usdc_take_integers(c->layer, reader, count, qmat_usdc_component_bytes[type], integers);
     if (type == QMAT_USD_UINT) {
       for (uint64_t i = 0; i < count && status == QMAT_OK; i++) integers[i] = (uint32_t)integers[i];
     }
@@ -232,7 +142,7 @@ static qmat_status take_packed_array(const qmat_usdc *c, qmat_byte_reader *reade
   const uint8_t *table = NULL;
   if (code == 't') {
     known = qmat_take_u32(reader);
-    table = qmat_take_bytes(reader, (size_t)known * component_bytes[type]);
+    table = qmat_take_bytes(reader, (size_t)known * qmat_usdc_component_bytes[type]);
     if (!table) return qmat_usdc_fail_short(c);
   } else if (code != 'i') {
     return fail(c, "a packed array of numbers has an unknown encoding");
@@ -251,7 +161,8 @@ static qmat_status take_packed_array(const qmat_usdc *c, qmat_byte_reader *reade
       status = fail(c, "a packed array of numbers refers to a missing entry");
       break;
     }
-    qmat_byte_reader entry = {.bytes = table + (size_t)index * component_bytes[type], .size = component_bytes[type]};
+    qmat_byte_reader entry = {.bytes = table + (size_t)index * qmat_usdc_component_bytes[type],
+                              .size = qmat_usdc_component_bytes[type]};
     numbers[i] = take_number(&entry, type);
   }
   qmat_free(integers);
@@ -260,19 +171,20 @@ static qmat_status take_packed_array(const qmat_usdc *c, qmat_byte_reader *reade
 }
 
 static qmat_status read_array(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
-  const unsigned number = type_of(rep), components = plain_types[number].components;
-  const qmat_usd_type type = plain_types[number].type;
+  const unsigned number = type_of(rep), components = qmat_usdc_plain_types[number].components;
+  const qmat_usd_type type = qmat_usdc_plain_types[number].type;
   qmat_byte_reader reader;
   *value = (qmat_usd_value){.type = type, .is_array = true, .components = (uint8_t)components};
-  if ((rep & REP_PAYLOAD) == 0) return QMAT_OK;
+  if ((rep & QMAT_USDC_REP_PAYLOAD) == 0) return QMAT_OK;
   qmat_status status = seek(c, rep, &reader);
   if (status != QMAT_OK) return status;
   const uint64_t count = c->version < 7 ? qmat_take_u32(&reader) : qmat_take_u64(&reader);
   if (qmat_usd_is_text(type)) return take_texts(c, &reader, type, count, value);
   const bool can_be_packed =
       components == 1 && type != QMAT_USD_BOOL && type != QMAT_USD_UCHAR && type != QMAT_USD_TIMECODE;
-  return can_be_packed && rep & REP_PACKED && count >= FEWEST_PACKED ? take_packed_array(c, &reader, type, count, value)
-                                                                     : take_elements(c, &reader, number, count, value);
+  return can_be_packed && rep & QMAT_USDC_REP_PACKED && count >= QMAT_USDC_FEWEST_PACKED
+             ? take_packed_array(c, &reader, type, count, value)
+             : take_elements(c, &reader, number, count, value);
 }
 
 /* ---- single values ---- */
@@ -285,8 +197,9 @@ static qmat_usd_type inlined_type(qmat_usd_type type) {
 }
 
 static qmat_status read_inlined(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
-  const unsigned number = type_of(rep), components = plain_types[number].components, rows = plain_types[number].rows;
-  const qmat_usd_type type = plain_types[number].type;
+  const unsigned number = type_of(rep), components = qmat_usdc_plain_types[number].components,
+                 rows = qmat_usdc_plain_types[number].rows;
+  const qmat_usd_type type = qmat_usdc_plain_types[number].type;
   const uint8_t bytes[4] = {rep & 0xFF, rep >> 8 & 0xFF, rep >> 16 & 0xFF, rep >> 24 & 0xFF};
   qmat_byte_reader reader = {.bytes = bytes, .size = sizeof bytes};
   if (qmat_usd_is_text(type)) {
@@ -317,9 +230,10 @@ static qmat_status read_inlined(const qmat_usdc *c, uint64_t rep, qmat_usd_value
 
 static qmat_status read_plain(const qmat_usdc *c, uint64_t rep, qmat_usd_value *value) {
   const unsigned number = type_of(rep);
-  const bool fits = component_bytes[plain_types[number].type] <= 4 && plain_types[number].components == 1;
-  if (rep & REP_ARRAY) return read_array(c, rep, value);
-  if (rep & REP_INLINED || fits) return read_inlined(c, rep, value);
+  const bool fits = qmat_usdc_component_bytes[qmat_usdc_plain_types[number].type] <= 4 &&
+                    qmat_usdc_plain_types[number].components == 1;
+  if (rep & QMAT_USDC_REP_ARRAY) return read_array(c, rep, value);
+  if (rep & QMAT_USDC_REP_INLINED || fits) return read_inlined(c, rep, value);
   qmat_byte_reader reader;
   qmat_status status = seek(c, rep, &reader);
   if (status == QMAT_OK) status = take_elements(c, &reader, number, 1, value);
@@ -395,32 +309,33 @@ static qmat_status take_references(qmat_usdc_values *v, qmat_byte_reader *reader
   return reader->failed ? qmat_usdc_fail_short(v->crate) : QMAT_OK;
 }
 
-static qmat_status take_list(qmat_usdc_values *v, qmat_byte_reader *reader, crate_type type, uint64_t count,
+static qmat_status take_list(qmat_usdc_values *v, qmat_byte_reader *reader, qmat_usdc_type type, uint64_t count,
                              qmat_usd_value *list) {
   const qmat_usdc *c = v->crate;
   switch (type) {
-    case CRATE_TOKEN_LIST_OP:
+    case QMAT_USDC_TOKEN_LIST_OP:
       return take_texts(c, reader, QMAT_USD_TOKEN, count, list);
-    case CRATE_STRING_LIST_OP:
+    case QMAT_USDC_STRING_LIST_OP:
       return take_texts(c, reader, QMAT_USD_STRING, count, list);
-    case CRATE_PATH_LIST_OP:
+    case QMAT_USDC_PATH_LIST_OP:
       return take_texts(c, reader, QMAT_USD_PATH, count, list);
-    case CRATE_REFERENCE_LIST_OP:
+    case QMAT_USDC_REFERENCE_LIST_OP:
       return take_references(v, reader, false, count, list);
-    case CRATE_PAYLOAD_LIST_OP:
+    case QMAT_USDC_PAYLOAD_LIST_OP:
       return take_references(v, reader, true, count, list);
-    case CRATE_INT_LIST_OP:
-      return take_elements(c, reader, CRATE_INT, count, list);
-    case CRATE_INT64_LIST_OP:
-      return take_elements(c, reader, CRATE_INT64, count, list);
-    case CRATE_UINT_LIST_OP:
-      return take_elements(c, reader, CRATE_UINT, count, list);
+    case QMAT_USDC_INT_LIST_OP:
+      return take_elements(c, reader, QMAT_USDC_INT, count, list);
+    case QMAT_USDC_INT64_LIST_OP:
+      return take_elements(c, reader, QMAT_USDC_INT64, count, list);
+    case QMAT_USDC_UINT_LIST_OP:
+      return take_elements(c, reader, QMAT_USDC_UINT, count, list);
     default:
-      return take_elements(c, reader, CRATE_UINT64, count, list);
+      return take_elements(c, reader, QMAT_USDC_UINT64, count, list);
   }
 }
 
-static qmat_status take_list_op(qmat_usdc_values *v, qmat_byte_reader *reader, crate_type type, qmat_usd_value *value) {
+static qmat_status take_list_op(qmat_usdc_values *v, qmat_byte_reader *reader, qmat_usdc_type type,
+                                qmat_usd_value *value) {
   /* The lists in their order in the file, and the bits of the header that announce them. */
   static const struct {
     uint8_t bit;
@@ -486,18 +401,18 @@ static qmat_status read_choice(const qmat_usdc_values *v, uint64_t rep, const ch
 static qmat_status read_immediate(const qmat_usdc_values *v, uint64_t rep, qmat_usd_value *value) {
   static const char *const specifiers[] = {"def", "over", "class"}, *const permissions[] = {"public", "private"},
                            *const variabilities[] = {"varying", "uniform", "uniform"};
-  switch ((crate_type)type_of(rep)) {
-    case CRATE_SPECIFIER:
+  switch ((qmat_usdc_type)type_of(rep)) {
+    case QMAT_USDC_SPECIFIER:
       return read_choice(v, rep, specifiers, 3, value);
-    case CRATE_PERMISSION:
+    case QMAT_USDC_PERMISSION:
       return read_choice(v, rep, permissions, 2, value);
-    case CRATE_VARIABILITY:
+    case QMAT_USDC_VARIABILITY:
       return read_choice(v, rep, variabilities, 3, value);
-    case CRATE_VALUE_BLOCK:
+    case QMAT_USDC_VALUE_BLOCK:
       *value = (qmat_usd_value){.type = QMAT_USD_BLOCK};
       return QMAT_OK;
-    case CRATE_DICTIONARY:
-    case CRATE_VARIANT_SELECTION_MAP:
+    case QMAT_USDC_DICTIONARY:
+    case QMAT_USDC_VARIANT_SELECTION_MAP:
       *value = (qmat_usd_value){.type = QMAT_USD_DICTIONARY, .components = 1};
       return QMAT_OK;
     default:
@@ -505,48 +420,49 @@ static qmat_status read_immediate(const qmat_usdc_values *v, uint64_t rep, qmat_
   }
 }
 
-static bool is_always_inlined(crate_type type) {
-  return type == CRATE_SPECIFIER || type == CRATE_PERMISSION || type == CRATE_VARIABILITY || type == CRATE_VALUE_BLOCK;
+static bool is_always_inlined(qmat_usdc_type type) {
+  return type == QMAT_USDC_SPECIFIER || type == QMAT_USDC_PERMISSION || type == QMAT_USDC_VARIABILITY ||
+         type == QMAT_USDC_VALUE_BLOCK;
 }
 
 static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value *value) {
   const qmat_usdc *c = v->crate;
-  const crate_type type = (crate_type)type_of(rep);
+  const qmat_usdc_type type = (qmat_usdc_type)type_of(rep);
   qmat_byte_reader reader;
   if (is_plain(type)) return read_plain(c, rep, value);
-  if (rep & REP_INLINED || is_always_inlined(type)) return read_immediate(v, rep, value);
+  if (rep & QMAT_USDC_REP_INLINED || is_always_inlined(type)) return read_immediate(v, rep, value);
   qmat_status status = seek(c, rep, &reader);
   if (status != QMAT_OK) return status;
   switch (type) {
-    case CRATE_DICTIONARY:
-    case CRATE_VARIANT_SELECTION_MAP:
-      return take_dictionary(v, &reader, type == CRATE_VARIANT_SELECTION_MAP, value);
-    case CRATE_TOKEN_LIST_OP:
-    case CRATE_STRING_LIST_OP:
-    case CRATE_PATH_LIST_OP:
-    case CRATE_REFERENCE_LIST_OP:
-    case CRATE_INT_LIST_OP:
-    case CRATE_INT64_LIST_OP:
-    case CRATE_UINT_LIST_OP:
-    case CRATE_UINT64_LIST_OP:
-    case CRATE_PAYLOAD_LIST_OP:
+    case QMAT_USDC_DICTIONARY:
+    case QMAT_USDC_VARIANT_SELECTION_MAP:
+      return take_dictionary(v, &reader, type == QMAT_USDC_VARIANT_SELECTION_MAP, value);
+    case QMAT_USDC_TOKEN_LIST_OP:
+    case QMAT_USDC_STRING_LIST_OP:
+    case QMAT_USDC_PATH_LIST_OP:
+    case QMAT_USDC_REFERENCE_LIST_OP:
+    case QMAT_USDC_INT_LIST_OP:
+    case QMAT_USDC_INT64_LIST_OP:
+    case QMAT_USDC_UINT_LIST_OP:
+    case QMAT_USDC_UINT64_LIST_OP:
+    case QMAT_USDC_PAYLOAD_LIST_OP:
       return take_list_op(v, &reader, type, value);
-    case CRATE_PATH_VECTOR:
+    case QMAT_USDC_PATH_VECTOR:
       return take_texts(c, &reader, QMAT_USD_PATH, qmat_take_u64(&reader), value);
-    case CRATE_TOKEN_VECTOR:
+    case QMAT_USDC_TOKEN_VECTOR:
       return take_texts(c, &reader, QMAT_USD_TOKEN, qmat_take_u64(&reader), value);
-    case CRATE_STRING_VECTOR:
+    case QMAT_USDC_STRING_VECTOR:
       return take_texts(c, &reader, QMAT_USD_STRING, qmat_take_u64(&reader), value);
-    case CRATE_DOUBLE_VECTOR:
-      return take_elements(c, &reader, CRATE_DOUBLE, qmat_take_u64(&reader), value);
-    case CRATE_LAYER_OFFSET_VECTOR:
-      return take_elements(c, &reader, CRATE_DOUBLE2, qmat_take_u64(&reader), value);
-    case CRATE_TIME_SAMPLES:
+    case QMAT_USDC_DOUBLE_VECTOR:
+      return take_elements(c, &reader, QMAT_USDC_DOUBLE, qmat_take_u64(&reader), value);
+    case QMAT_USDC_LAYER_OFFSET_VECTOR:
+      return take_elements(c, &reader, QMAT_USDC_DOUBLE2, qmat_take_u64(&reader), value);
+    case QMAT_USDC_TIME_SAMPLES:
       return take_samples(v, &reader, value);
-    case CRATE_PAYLOAD:
+    case QMAT_USDC_PAYLOAD:
       return take_payload(v, &reader, value);
-    case CRATE_VALUE:
-    case CRATE_UNREGISTERED_VALUE: {
+    case QMAT_USDC_VALUE:
+    case QMAT_USDC_UNREGISTERED_VALUE: {
       const qmat_usd_value *inner;
       uint64_t inner_rep;
       if (!take_rep(&reader, &inner_rep)) return qmat_usdc_fail_short(v->crate);
@@ -554,12 +470,12 @@ static qmat_status read_value(qmat_usdc_values *v, uint64_t rep, qmat_usd_value 
       if (status == QMAT_OK) *value = *inner;
       return status;
     }
-    case CRATE_PATH_EXPRESSION: {
+    case QMAT_USDC_PATH_EXPRESSION: {
       const char *text;
       status = take_text(c, &reader, QMAT_USD_STRING, &text);
       return status == QMAT_OK ? qmat_usd_make_text(c->layer, QMAT_USD_STRING, text, value) : status;
     }
-    case CRATE_UNREGISTERED_VALUE_LIST_OP:
+    case QMAT_USDC_UNREGISTERED_VALUE_LIST_OP:
       return qmat_usd_make_text(c->layer, QMAT_USD_UNREAD, "list of values of unknown types", value);
     default:
       return fail_unknown(v->crate);

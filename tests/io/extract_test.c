@@ -119,17 +119,18 @@ static double largest_move(const qmat_medial *a, const qmat_medial *b) {
 
 static void test_every_form_gives_back_what_was_written_within_what_it_states(void **state) {
   (void)state;
-  static const char *const names[] = {"a.glb", "a.gltf", "a.usda", "a.usdz"};
+  static const char *const names[] = {"a.glb", "a.gltf", "a.usda", "a.usdc", "a.usdz"};
   static const size_t counts[] = {1, 3, 200};
   for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
     qmat_medial *medial = example_medial(counts[c]);
     size_t loose_spheres, loose_edges;
     count_loose(medial, &loose_spheres, &loose_edges);
     if (counts[c] == 200) assert_true(loose_spheres > 0 && loose_edges > 0 && medial->triangle_count > 0);
-    for (size_t form = 0; form < 4; form++) {
+    for (size_t form = 0; form < 5; form++) {
       qmat_context context = {0};
       const qmat_gltf_options gltf = {.binary = form == 0, .quantisation = 1e-4, .errors.epsilon = 0.01};
-      const qmat_usd_options usd = {.package = form == 3, .errors.epsilon = 0.01};
+      const qmat_usd_options usd = {.form = form < 2 ? QMAT_USD_TEXT : (qmat_usd_form)(form - 2),
+                                    .errors.epsilon = 0.01};
       qmat_file *file;
       qmat_medial *read;
       json_t *facts = json_object();

@@ -6,6 +6,8 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/save.h"
 #include "io/side_files.h"
+#include "io/usd/usdc.h"
+#include "io/usd/usdc_write.h"
 #include "tests/io/gltf/gltf_assets.h"
 
 /* A .gltf that names the given files: the first as a buffer, the others as images. `content` is in each of them. */
@@ -129,6 +131,56 @@ static void test_the_file_below_a_layer_of_usd_is_named_after_the_layer(void **s
   }
 }
 
+/* A crate over "original.usdc", with its side file of `content`. */
+static qmat_file *make_crate(const char *content) {
+  static const char *const names[] = {"original.usdc"};
+  static const char text[] =
+      "#usda 1.0\n( customLayerData = { string qmat_original = \"original.usdc\" } subLayers = [@original.usdc@] )\n";
+  qmat_context context = {0};
+  qmat_writer crate = {0};
+  qmat_file *file = make_file("{}", names, 1, content);
+  qmat_put_text(&crate, text);
+  assert_int_equal(qmat_usdc_of_text(&context, &crate), QMAT_OK);
+  file->base.sealed = false;
+  qmat_free(file->format);
+  file->format = qmat_strdup("usdc");
+  qmat_free(file->parts[0].bytes);
+  file->parts[0].bytes = crate.bytes;
+  file->parts[0].size = crate.size;
+  return file;
+}
+
+static void test_the_file_below_a_crate_is_named_after_it_and_is_its_own(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  char folder[64], path[96], side[128];
+  make_folder(folder);
+  snprintf(path, sizeof path, "%s/x@\".usdc", folder);
+  snprintf(side, sizeof side, "%s/x@\"_original.usdc", folder);
+  qmat_file *first = make_crate("one"), *second = make_crate("two");
+  write_file(side, "none", 4);
+  assert_int_equal(save(&context, first, path), QMAT_ERROR_IO); /* of something else */
+  assert_string_equal(context.error.file, side);
+  assert_int_equal(unlink(side), 0);
+  assert_int_equal(save(&context, first, path), QMAT_OK);
+  assert_int_equal(save(&context, second, path), QMAT_OK); /* the output's own from the run before */
+  const qmat_file_part kept = {.name = (char *)"", .size = 3, .bytes = (uint8_t *)(uintptr_t) "two"};
+  assert_true(qmat_file_holds(side, &kept));
+  qmat_bytes bytes;
+  qmat_usd_layer layer = {0};
+  assert_int_equal(qmat_bytes_read_file(&context, path, &bytes), QMAT_OK);
+  assert_int_equal(qmat_usdc_read(&context, &bytes, path, &layer), QMAT_OK);
+  assert_string_equal(qmat_usd_field_value(layer.root, "subLayers")->texts[0], "x@\"_original.usdc");
+  qmat_usd_layer_uninit(&layer);
+  qmat_bytes_uninit(&bytes);
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(unlink(side), 0);
+  assert_int_equal(rmdir(folder), 0);
+  qmat_value_release(&first->base);
+  qmat_value_release(&second->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_a_file_of_something_else_is_never_replaced(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -165,6 +217,7 @@ int main(void) {
       cmocka_unit_test(test_names_stay_within_what_file_systems_take),
       cmocka_unit_test(test_other_formats_and_files_without_sides_stay_as_they_are),
       cmocka_unit_test(test_the_file_below_a_layer_of_usd_is_named_after_the_layer),
+      cmocka_unit_test(test_the_file_below_a_crate_is_named_after_it_and_is_its_own),
       cmocka_unit_test(test_a_file_of_something_else_is_never_replaced),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -321,9 +321,10 @@ static void test_a_skins_vertices_have_the_colour_of_their_kind(void **state) {
 static void test_each_format_is_made(void **state) {
   (void)state;
   qmat_medial *medial = make_medial();
-  static const char *const formats[][2] = {{"glb", "glTF"}, {"gltf", "{"},           {"ma", "3 1 0"},
-                                           {"ply", "ply"},  {"usda", "#usda 1.0\n"}, {"usdz", "PK\3\4"}};
-  for (size_t i = 0; i < 6; i++) {
+  static const char *const formats[][2] = {{"glb", "glTF"},   {"gltf", "{"},           {"ma", "3 1 0"},
+                                           {"ply", "ply"},    {"usda", "#usda 1.0\n"}, {"usdc", "PXR-USDC"},
+                                           {"usdz", "PK\3\4"}};
+  for (size_t i = 0; i < 7; i++) {
     const char *const settings[][2] = {{"format", formats[i][0]}, {NULL, NULL}};
     qmat_file *file = must_write(medial, (wiring){0}, settings);
     assert_string_equal(file->format, formats[i][0]);
@@ -357,10 +358,10 @@ static void test_ma_keeps_every_number(void **state) {
 static void test_compression_does_not_apply_to_formats_that_have_none(void **state) {
   (void)state;
   static const char *const fields[][2] = {{"draco", "true"}, {"position_bits", "8"}, {"radius_bits", "8"}};
-  static const char *const formats[] = {"ma", "ply", "usda", "usdz"};
+  static const char *const formats[] = {"ma", "ply", "usda", "usdc", "usdz"};
   qmat_medial *medial = make_medial();
-  for (size_t i = 0; i < 12; i++) {
-    const char *const *field = fields[i / 4], *format = formats[i % 4];
+  for (size_t i = 0; i < 15; i++) {
+    const char *const *field = fields[i / 5], *format = formats[i % 5];
     qmat_file *with = must_write(medial, (wiring){0},
                                  (const char *const[][2]){{"format", format}, {field[0], field[1]}, {NULL, NULL}});
     qmat_file *without = must_write(medial, (wiring){0}, (const char *const[][2]){{"format", format}, {NULL, NULL}});

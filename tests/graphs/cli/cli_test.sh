@@ -132,8 +132,10 @@ expect 2 "known endings" "$qmat" extract box.glb -o back.off
 expect 2 "would overwrite" "$qmat" extract box.ma -o ./box.ma
 expect 1 "OFF does not carry" "$qmat" extract box.off -o back.ma
 expect 1 "of this name" "$qmat" extract box.glb -o back.ma --node other
-expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdz --epsilon 5% $coarse
+expect 0 "box.usdz" "$qmat" mat box.off -o box.usda -o box.usdc -o box.usdz --epsilon 5% $coarse
 expect 0 "spheres" "$qmat" extract box.usdz -o back.ma
+expect 0 "spheres" "$qmat" extract box.usdc -o back_of_crate.ma
+holds "a crate has what a text has" cmp back.ma back_of_crate.ma
 holds "a layer of USD" test "$(head -c 9 box.usda)" = "#usda 1.0"
 cp "$source/examples/game/models/"roof.* .
 expect 0 "certified" "$qmat" mat roof.gltf -o listed.gltf --epsilon 10% $coarse --report report_of_files.json

@@ -102,7 +102,7 @@ holds "its content is nowhere" test "$(grep -lx secret -r evil | wc -l)" -eq 0
 write_box box.off
 awk 'NF == 3 && NR > 2 { $1 += 400000; $3 += 5000000; printf "%.17g %.17g %.17g\n", $1, $2, $3; next } { print }' \
   box.off >far.off
-for format in glb gltf usda usdz ply; do
+for format in glb gltf usda usdc usdz ply; do
   expect 0 "(certified)" "$qmat" mat far.off -o far.$format
   expect 0 "  certified" "$qmat" info far.$format --against far.off
   holds "$format: the file states that it is certified" grep -q "qmat_certified: yes" out.txt

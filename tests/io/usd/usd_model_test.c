@@ -287,12 +287,12 @@ static void test_a_transform_is_split_into_a_rotation_and_a_plain_one(void **sta
 /* ---- layers over a scene ---- */
 
 /* Adds the same medial mesh to all meshes of a scene. The caller releases the file. */
-static qmat_file *write_layer(reading *r, const qmat_medial *medial, bool package) {
+static qmat_file *write_layer(reading *r, const qmat_medial *medial, qmat_usd_form form) {
   qmat_usd_addition additions[8] = {{0}};
   for (size_t i = 0; i < r->meshes.count; i++)
-    additions[i] = (qmat_usd_addition){
-        .medial = i == 2 ? NULL : medial,
-        .options = {.package = package, .name = "thing", .prim = r->meshes.names[i], .moved = 1e-3}};
+    additions[i] =
+        (qmat_usd_addition){.medial = i == 2 ? NULL : medial,
+                            .options = {.form = form, .name = "thing", .prim = r->meshes.names[i], .moved = 1e-3}};
   qmat_file *file;
   if (qmat_usd_write_layer(&r->context, r->scene, additions, r->meshes.count, &file) != QMAT_OK)
     fail_msg("%s", r->context.error.message);
@@ -313,11 +313,12 @@ static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
   reading before = read_all(LAYERED);
   before.scene->is_z_up = true;
   qmat_medial *medial = example_medial(5);
-  for (int package = 0; package < 2; package++) {
-    qmat_file *file = write_layer(&before, medial, package);
-    assert_int_equal(file->part_count, package ? 1 : 2);
-    assert_string_equal(file->format, package ? "usdz" : "usda");
-    if (!package) {
+  static const char *const formats[] = {"usda", "usdc", "usdz"};
+  for (qmat_usd_form form = QMAT_USD_TEXT; form <= QMAT_USD_PACKAGE; form++) {
+    qmat_file *file = write_layer(&before, medial, form);
+    assert_int_equal(file->part_count, form == QMAT_USD_PACKAGE ? 1 : 2);
+    assert_string_equal(file->format, formats[form]);
+    if (form != QMAT_USD_PACKAGE) {
       assert_string_equal(file->parts[1].name, "original.usda");
       assert_int_equal(file->parts[1].size, strlen(LAYERED));
       assert_memory_equal(file->parts[1].bytes, LAYERED, strlen(LAYERED));
@@ -373,7 +374,7 @@ static void test_the_prims_of_a_layer_are_opened_once(void **state) {
   reading r =
       read_all("#usda 1.0\n" CUBE("a", CUBE("x", "")) CUBE("a1", "") "def \"b\" { def \"a\" {" CUBE("x", "") "} }\n");
   qmat_medial *medial = example_medial(1);
-  qmat_file *file = write_layer(&r, medial, false);
+  qmat_file *file = write_layer(&r, medial, QMAT_USD_TEXT);
   char *text = qmat_alloc(file->parts[0].size + 1, 1);
   memcpy(text, file->parts[0].bytes, file->parts[0].size);
   text[file->parts[0].size] = '\0';

@@ -57,12 +57,15 @@ static void assert_same(const qmat_medial *written, const qmat_medial *read, dou
 static void test_a_medial_mesh_comes_back_as_it_was_within_what_the_file_states(void **state) {
   (void)state;
   qmat_medial *cases[] = {make_small(), example_medial(1), example_medial(3), example_medial(200)};
-  for (size_t i = 0; i < 8; i++) {
-    const qmat_medial *medial = cases[i / 2];
-    const qmat_usd_options options = {
-        .package = i % 2, .errors.epsilon = (double)NAN, .errors.error_out = 0.5, .errors.error_in = 0.25};
+  static const char *const formats[] = {"usda", "usdc", "usdz"};
+  for (size_t i = 0; i < 12; i++) {
+    const qmat_medial *medial = cases[i / 3];
+    const qmat_usd_options options = {.form = (qmat_usd_form)(i % 3),
+                                      .errors.epsilon = (double)NAN,
+                                      .errors.error_out = 0.5,
+                                      .errors.error_in = 0.25};
     qmat_file *file = must_write(medial, NULL, &options);
-    assert_string_equal(file->format, i % 2 ? "usdz" : "usda");
+    assert_string_equal(file->format, formats[i % 3]);
     json_t *facts = json_object();
     qmat_medial *read = read_back(file, facts);
     assert_same(medial, read, json_number_value(json_object_get(facts, "qmat_quantisation")));
@@ -127,7 +130,7 @@ static void test_a_scene_reader_sees_the_skin_only(void **state) {
   qmat_medial *medial = make_small();
   qmat_mesh *box = shape_seal(shape_box(1, 2, 3));
   for (int package = 0; package < 2; package++) {
-    const qmat_usd_options options = {.package = package};
+    const qmat_usd_options options = {.form = package ? QMAT_USD_PACKAGE : QMAT_USD_TEXT};
     qmat_file *file = must_write(medial, box, &options);
     qmat_context context = {0};
     qmat_soup soup = {0};
