@@ -9,9 +9,12 @@
 typedef struct all_starts {
   const qmat_simplification *prepared;
   const qmat_simplify_params *params;
-  size_t rule_count; /* 2 where creases are kept and not kept */
-  qmat_medial *bare; /* the initial medial mesh without features, where creases are not kept */
+  size_t rule_count;  /* 2 where creases are not kept and kept */
+  qmat_medial *bare;  /* the initial medial mesh without features, where creases are not kept */
+  size_t fewest_kept; /* spheres of a result that keeps creases */
   qmat_simplified *results;
+  _Atomic size_t
+      *free_counts; /* per seed: the spheres without kept creases, SIZE_MAX beyond epsilon; 0: not known yet */
   _Atomic size_t done;
 } all_starts;
 
@@ -53,16 +56,53 @@ static qmat_status leave_features(qmat_context *context, const qmat_medial *medi
   return QMAT_OK;
 }
 
-/* Starts with the same seed follow each other, creases kept first. */
+/* Corners, where a crease ends or several meet, stay where creases are kept, and another sphere fills the interior. */
+static qmat_status count_fewest_kept(qmat_context *context, const qmat_simplification *s, size_t *fewest) {
+  const qmat_medial *initial = s->initial;
+  const double *spheres = s->state.spheres;
+  uint32_t *segments = qmat_arena_calloc(&context->arena, initial->sphere_count, sizeof *segments);
+  if (!segments) return qmat_fail_memory(context, "starts");
+  for (size_t e = 0; e < initial->edge_count; e++) {
+    const size_t a = initial->edges[2 * e], b = initial->edges[2 * e + 1];
+    if (spheres[4 * a + 3] > 0 || spheres[4 * b + 3] > 0) continue;
+    segments[a]++;
+    segments[b]++;
+  }
+  *fewest = 1;
+  for (size_t v = initial->sheet_sphere_count; v < initial->sphere_count; v++)
+    *fewest += spheres[4 * v + 3] == 0 && segments[v] != 2;
+  return QMAT_OK;
+}
+
+static bool keeps_creases(const all_starts *all, size_t start) {
+  return all->rule_count == 2 && start % 2 == 1;
+}
+
+/* Whether a start that keeps creases has no fewer spheres than the one with the same seed that does not. */
+static bool is_beaten(const all_starts *all, size_t start) {
+  if (!keeps_creases(all, start)) return false;
+  const size_t count = atomic_load(&all->free_counts[start / 2]);
+  return count > 0 && count <= all->fewest_kept;
+}
+
+/* Starts with the same seed follow each other, creases kept last. */
 static qmat_status run_start(void *user, qmat_context *own, size_t start) {
   all_starts *all = user;
+  if (is_beaten(all, start)) {
+    atomic_fetch_add(&all->done, 1);
+    return QMAT_OK;
+  }
   qmat_simplification s = *all->prepared;
+  qmat_simplified *result = &all->results[start];
   s.context = own;
   s.params = *all->params;
   s.seed = start / all->rule_count;
-  if (all->rule_count == 2) s.params.features = start % 2 == 0 ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
+  if (all->rule_count == 2) s.params.features = keeps_creases(all, start) ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
   if (all->rule_count == 2 && s.params.features == QMAT_FEATURES_NONE) s.initial = all->bare;
-  const qmat_status status = qmat_simplification_run(&s, &all->results[start]);
+  const qmat_status status = qmat_simplification_run(&s, result);
+  if (status == QMAT_OK && all->rule_count == 2 && !keeps_creases(all, start))
+    atomic_store(&all->free_counts[start / 2],
+                 result->within_epsilon && result->fault <= s.params.epsilon ? result->medial->sphere_count : SIZE_MAX);
   s.surface = NULL; /* the caller's */
   qmat_simplification_uninit(&s);
   atomic_fetch_add(&all->done, 1);
@@ -86,14 +126,19 @@ qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, 
   const size_t count = (size_t)params->effort * all.rule_count;
   *best = (qmat_simplified){.fault = INFINITY};
   all.results = qmat_arena_alloc(&context->arena, count, sizeof *all.results);
-  if (!all.results) return qmat_fail_memory(context, "starts");
+  all.free_counts = qmat_arena_calloc(&context->arena, count, sizeof *all.free_counts);
+  if (!all.results || !all.free_counts) return qmat_fail_memory(context, "starts");
   for (size_t i = 0; i < count; i++) all.results[i] = *best;
-  qmat_status status = all.rule_count == 2 ? leave_features(context, prepared->initial, &all.bare) : QMAT_OK;
+  qmat_status status = QMAT_OK;
+  if (all.rule_count == 2) {
+    status = count_fewest_kept(context, prepared, &all.fewest_kept);
+    if (status == QMAT_OK) status = leave_features(context, prepared->initial, &all.bare);
+  }
   if (status == QMAT_OK)
     status = count == 1 ? run_alone(context, &all)
                         : qmat_run_side_by_side(context, count, run_start, &all, &all.done, count, "starts");
   for (size_t i = 0; i < count; i++) {
-    if (status == QMAT_OK && (i == 0 || qmat_simplified_is_better(&all.results[i], best))) {
+    if (status == QMAT_OK && (i == 0 || (!is_beaten(&all, i) && qmat_simplified_is_better(&all.results[i], best)))) {
       qmat_simplified_uninit(best);
       *best = all.results[i];
     } else {

@@ -64,6 +64,23 @@ static void test_features_auto_takes_the_better_choice(void **state) {
   }
 }
 
+/* At a coarse epsilon a box takes no more spheres than its corners and one: no result that keeps them has fewer.
+ * Whether that start still runs depends on the threads, and must not show. */
+static void test_a_start_that_cannot_win_does_not_count(void **state) {
+  (void)state;
+  creased c;
+  qmat_digest none, chosen;
+  make_creased(&c, "box", 8, "features=sharp");
+  const size_t free = count_of(&c, &c.made.medial->base, 0, "epsilon=6%", &none);
+  assert_true(free <= 9);
+  static const int threads[] = {1, 2, 8};
+  for (size_t i = 0; i < 3; i++) {
+    assert_int_equal(simplified_count(&c, threads[i], "epsilon=6% features=auto", &chosen), free);
+    assert_memory_equal(&chosen, &none, sizeof chosen);
+  }
+  free_creased(&c);
+}
+
 static void test_more_starts_are_never_worse_and_the_same_on_any_thread(void **state) {
   (void)state;
   creased c;
@@ -90,6 +107,7 @@ static void test_more_starts_are_never_worse_and_the_same_on_any_thread(void **s
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_features_auto_takes_the_better_choice),
+      cmocka_unit_test(test_a_start_that_cannot_win_does_not_count),
       cmocka_unit_test(test_more_starts_are_never_worse_and_the_same_on_any_thread),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
