@@ -40,3 +40,7 @@ const uint8_t qmat_usdc_component_bytes[QMAT_USD_TYPE_COUNT] = {
     [QMAT_USD_UINT64] = 8, [QMAT_USD_HALF] = 2,  [QMAT_USD_FLOAT] = 4, [QMAT_USD_DOUBLE] = 8, [QMAT_USD_TIMECODE] = 8,
     [QMAT_USD_STRING] = 4, [QMAT_USD_TOKEN] = 4, [QMAT_USD_ASSET] = 4, [QMAT_USD_PATH] = 4,
 };
+
+const qmat_usdc_list qmat_usdc_lists[QMAT_USD_EDIT_COUNT] = {{1, QMAT_USD_EXPLICIT},  {2, QMAT_USD_ADDED},
+                                                             {5, QMAT_USD_PREPENDED}, {6, QMAT_USD_APPENDED},
+                                                             {3, QMAT_USD_DELETED},   {4, QMAT_USD_ORDERED}};

@@ -73,6 +73,13 @@ typedef struct qmat_usdc_plain_type {
 } qmat_usdc_plain_type;
 extern const qmat_usdc_plain_type qmat_usdc_plain_types[QMAT_USDC_PLAIN_TYPES];
 
+/* The lists of a list operation in their order in the file, and the bits of its header that announce them. */
+typedef struct qmat_usdc_list {
+  uint8_t bit;
+  qmat_usd_edit edit;
+} qmat_usdc_list;
+extern const qmat_usdc_list qmat_usdc_lists[QMAT_USD_EDIT_COUNT];
+
 /* The size of a component in the file. */
 extern const uint8_t qmat_usdc_component_bytes[QMAT_USD_TYPE_COUNT];
 

@@ -336,20 +336,14 @@ static qmat_status take_list(qmat_usdc_values *v, qmat_byte_reader *reader, qmat
 
 static qmat_status take_list_op(qmat_usdc_values *v, qmat_byte_reader *reader, qmat_usdc_type type,
                                 qmat_usd_value *value) {
-  /* The lists in their order in the file, and the bits of the header that announce them. */
-  static const struct {
-    uint8_t bit;
-    qmat_usd_edit edit;
-  } lists[] = {{1, QMAT_USD_EXPLICIT}, {2, QMAT_USD_ADDED},   {5, QMAT_USD_PREPENDED},
-               {6, QMAT_USD_APPENDED}, {3, QMAT_USD_DELETED}, {4, QMAT_USD_ORDERED}};
   qmat_usd_list_op *op = qmat_usd_alloc(v->crate->layer, 1, sizeof *op);
   if (!op) return qmat_usd_layer_error(v->crate->layer);
   *value = (qmat_usd_value){.type = QMAT_USD_LIST_OP, .components = 1, .count = 1, .list_op = op};
   const uint8_t header = qmat_take_u8(reader);
   op->is_explicit = header & 1;
-  for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++) {
-    const uint64_t count = header >> lists[i].bit & 1 ? qmat_take_u64(reader) : 0;
-    qmat_status status = take_list(v, reader, type, count, &op->lists[lists[i].edit]);
+  for (size_t i = 0; i < QMAT_USD_EDIT_COUNT; i++) {
+    const uint64_t count = header >> qmat_usdc_lists[i].bit & 1 ? qmat_take_u64(reader) : 0;
+    qmat_status status = take_list(v, reader, type, count, &op->lists[qmat_usdc_lists[i].edit]);
     if (status != QMAT_OK) return status;
   }
   return QMAT_OK;

@@ -267,12 +267,6 @@ static void put_reference(crate *c, qmat_usd_layer *layer, const qmat_usd_refere
 }
 
 static uint64_t put_list_op(crate *c, qmat_usd_layer *layer, const char *field, const qmat_usd_list_op *op) {
-  /* The lists in their order in the file, and the bits of the header that announce them. */
-  static const struct {
-    uint8_t bit;
-    qmat_usd_edit edit;
-  } lists[] = {{1, QMAT_USD_EXPLICIT}, {2, QMAT_USD_ADDED},   {5, QMAT_USD_PREPENDED},
-               {6, QMAT_USD_APPENDED}, {3, QMAT_USD_DELETED}, {4, QMAT_USD_ORDERED}};
   const bool is_payload = strcmp(field, "payload") == 0;
   const qmat_usd_type items = op->lists[QMAT_USD_EXPLICIT].type;
   const unsigned type = items == QMAT_USD_TOKEN       ? QMAT_USDC_TOKEN_LIST_OP
@@ -284,11 +278,11 @@ static uint64_t put_list_op(crate *c, qmat_usd_layer *layer, const char *field, 
   if (type == 0) fail_unsupported(c, "a list of an unknown type");
   const uint64_t place = next_place(c);
   uint8_t header = op->is_explicit;
-  for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
-    if (op->lists[lists[i].edit].count > 0) header |= (uint8_t)(1 << lists[i].bit);
+  for (size_t i = 0; i < QMAT_USD_EDIT_COUNT; i++)
+    if (op->lists[qmat_usdc_lists[i].edit].count > 0) header |= (uint8_t)(1 << qmat_usdc_lists[i].bit);
   qmat_put_u8(c->out, header);
-  for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
-    const qmat_usd_value *list = &op->lists[lists[i].edit];
+  for (size_t i = 0; i < QMAT_USD_EDIT_COUNT; i++) {
+    const qmat_usd_value *list = &op->lists[qmat_usdc_lists[i].edit];
     if (list->count > 0) qmat_put_u64(c->out, list->count);
     for (size_t k = 0; k < list->count && c->status == QMAT_OK; k++) {
       if (items == QMAT_USD_REFERENCE)
@@ -562,7 +556,7 @@ static void crate_uninit(crate *c) {
   qmat_key_table_uninit(&c->path_numbers);
   integers *const lists[] = {&c->strings,    &c->field_names, &c->field_sets,
                              &c->spec_paths, &c->spec_sets,   &c->spec_types};
-  for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) qmat_free(lists[i]->items);
+  for (size_t i = 0; i < QMAT_USD_EDIT_COUNT; i++) qmat_free(lists[i]->items);
   qmat_free(c->tokens);
   qmat_free(c->field_reps);
   qmat_free(c->paths);
