@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -220,6 +222,26 @@ draco::DataType data_type_of(qmat_draco_number number) {
   }
 }
 
+/* Whether Draco can quantise an attribute. It works in single precision: neither the largest range of a component nor
+ * the number of steps divided by it may overflow. Draco 1.5 does not check this and writes outside its tables. */
+bool can_quantise(const qmat_draco_attribute &given, size_t point_count) {
+  const float *values = static_cast<const float *>(given.values);
+  const size_t components = static_cast<size_t>(given.components);
+  float range = 0;
+  for (size_t k = 0; k < components; k++) {
+    float low = values[k], high = values[k];
+    for (size_t i = 0; i < point_count; i++) {
+      const float value = values[components * i + k];
+      if (!std::isfinite(value)) return false;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    range = std::max(range, high - low);
+  }
+  const bool is_direction = given.meaning == QMAT_DRACO_NORMAL; /* not divided by its range */
+  return is_direction || range == 0 || (std::isfinite(range) && std::isfinite(std::ldexp(1.0F, given.bits) / range));
+}
+
 qmat_status encode(qmat_context *context, const qmat_draco_attribute *attributes, size_t attribute_count,
                    uint32_t point_count, const uint32_t *faces, uint32_t face_count, bool keep_order, uint8_t **bytes,
                    size_t *size) {
@@ -277,6 +299,10 @@ qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute 
     if (attributes[a].number != QMAT_DRACO_FLOAT) continue;
     if (attributes[a].bits < least || attributes[a].bits > 30)
       return qmat_fail(context, QMAT_ERROR_USAGE, "%d quantisation bits: must be %d to 30", attributes[a].bits, least);
+    if (!can_quantise(attributes[a], point_count))
+      return qmat_fail(context, QMAT_ERROR_DEPENDENCY,
+                       "Draco cannot encode attribute %zu: its numbers are not finite, too large or too close together",
+                       a);
   }
   try {
     return encode(context, attributes, attribute_count, static_cast<uint32_t>(point_count), faces,

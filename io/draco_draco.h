@@ -46,7 +46,8 @@ typedef struct qmat_draco_attribute {
  * `keep_order` (Draco's sequential method) points and faces stay in order and degenerate faces stay. Without it
  * (edgebreaker) the result is about a quarter as large, but points are reordered and split, and degenerate faces and
  * points on no face are dropped. `*bytes` is NULL on failure; free it with qmat_free. QMAT_ERROR_USAGE for bits out of
- * range, QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY. */
+ * range, QMAT_ERROR_MEMORY; QMAT_ERROR_DEPENDENCY where Draco cannot: all faces are degenerate, or an attribute's
+ * floats are not finite or their range or its inverse overflows. */
 qmat_status qmat_draco_encode(qmat_context *context, const qmat_draco_attribute *attributes, size_t attribute_count,
                               size_t point_count, const uint32_t *faces, size_t face_count, bool keep_order,
                               uint8_t **bytes, size_t *size);

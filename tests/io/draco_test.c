@@ -257,6 +257,50 @@ static void test_skins_are_packed_tighter_and_say_what_is_decoded(void **state) 
   qmat_context_uninit(&context);
 }
 
+/* Draco itself writes outside its tables for these. */
+static void test_ranges_beyond_single_precision_are_refused(void **state) {
+  (void)state;
+  enum { REFUSED = QMAT_ERROR_DEPENDENCY };
+  static const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+  static const struct {
+    qmat_draco_meaning meaning;
+    float low, high;
+    qmat_status status;
+  } cases[] = {
+      {QMAT_DRACO_TEXCOORD, 0, 1, QMAT_OK},
+      {QMAT_DRACO_TEXCOORD, -1e38F, 1e38F, QMAT_OK},
+      {QMAT_DRACO_TEXCOORD, -3e38F, 3e38F, REFUSED}, /* the range overflows */
+      {QMAT_DRACO_TEXCOORD, 0, 1e-36F, REFUSED},     /* its inverse overflows */
+      {QMAT_DRACO_TEXCOORD, 0, 1e-33F, QMAT_OK},
+      {QMAT_DRACO_TEXCOORD, 2, 2, QMAT_OK},
+      {QMAT_DRACO_TEXCOORD, NAN, 0, REFUSED},
+      {QMAT_DRACO_GENERIC, 0, INFINITY, REFUSED},
+      {QMAT_DRACO_GENERIC, -3e38F, 3e38F, REFUSED},
+      {QMAT_DRACO_NORMAL, -3e38F, 3e38F, QMAT_OK}, /* directions have no range */
+      {QMAT_DRACO_NORMAL, 0, NAN, REFUSED},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (int keep_order = 0; keep_order < 2; keep_order++) {
+      qmat_context context = {0};
+      const int components = cases[i].meaning == QMAT_DRACO_NORMAL ? 3 : 2;
+      float values[12];
+      for (size_t k = 0; k < 12; k++) values[k] = k % 3 == 0 ? cases[i].low : cases[i].high;
+      const qmat_draco_attribute attributes[2] = {
+          {.meaning = QMAT_DRACO_POSITION, .components = 3, .bits = 14, .values = positions},
+          {.meaning = cases[i].meaning, .components = components, .bits = 12, .values = values}};
+      uint8_t *bytes;
+      size_t size;
+      assert_int_equal(qmat_draco_encode(&context, attributes, 2, 4, faces, 4, keep_order, &bytes, &size),
+                       cases[i].status);
+      assert_true((bytes != NULL) == (cases[i].status == QMAT_OK));
+      if (!bytes) assert_non_null(strstr(context.error.message, "attribute 1"));
+      qmat_free(bytes);
+      qmat_context_uninit(&context);
+    }
+  }
+}
+
 static void test_a_skin_is_no_medial_mesh(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -351,6 +395,7 @@ int main(void) {
       cmocka_unit_test(test_bits_are_the_fewest_that_hold_the_error),
       cmocka_unit_test(test_bad_bits_and_empty_medial_meshes_are_refused),
       cmocka_unit_test(test_skins_are_packed_tighter_and_say_what_is_decoded),
+      cmocka_unit_test(test_ranges_beyond_single_precision_are_refused),
       cmocka_unit_test(test_a_skin_is_no_medial_mesh),
       cmocka_unit_test(test_truncated_and_noisy_data_fail_cleanly),
       cmocka_unit_test(test_noise_in_skins_fails_cleanly),
