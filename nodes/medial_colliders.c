@@ -47,7 +47,7 @@ static qmat_shape_kind kind_of(const medial_colliders_params *p) {
   return p->kind == KIND_HULLS ? QMAT_SHAPES_ANY : (qmat_shape_kind)p->kind;
 }
 
-/* Whether hulls are made around the solid's part in each shape, and joined. */
+/* Whether hulls are made around parts of the solid, and joined. */
 static bool has_hulls_of_solid(const work *w) {
   return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && qmat_surface_is_watertight(w->surface);
 }
@@ -140,9 +140,19 @@ static qmat_status fill_colliders(work *w) {
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
   const double error = w->params->hull_error * qmat_surface_frame(w->surface)->diagonal;
-  const qmat_surface *solid = has_hulls_of_solid(w) ? w->surface : NULL;
-  const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side, solid);
+  const qmat_status status = qmat_shape_hulls(w->context, c, (size_t)w->params->hull_points, error, side);
   if (status == QMAT_OK && w->params->kind == KIND_HULLS) widen_shapes(c);
+  return status;
+}
+
+/* Replaces the hulls of the shapes by those of the solid's parts. */
+static qmat_status make_hulls_of_solid(work *w) {
+  qmat_solid_part *parts = NULL;
+  qmat_status status = qmat_solid_parts_find(w->context, w->surface, &w->set, &parts);
+  if (status == QMAT_OK)
+    status = qmat_hulls_merge(w->context, w->surface, parts, (size_t)w->params->shapes, (size_t)w->params->hull_points,
+                              w->params->hull_error * qmat_surface_frame(w->surface)->diagonal, w->colliders);
+  qmat_solid_parts_free(parts, w->set.shape_count);
   return status;
 }
 
@@ -202,9 +212,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK)
     status = qmat_shape_measures_take(context, w.surface, &w.set, w.envelope, w.colliders, w.volume,
                                       (size_t)w.params->samples, &w.measures);
-  if (status == QMAT_OK && has_hulls_of_solid(&w))
-    status = qmat_hulls_merge(context, w.surface, (size_t)w.params->shapes, (size_t)w.params->hull_points,
-                              w.params->hull_error * qmat_surface_frame(w.surface)->diagonal, w.colliders);
+  if (status == QMAT_OK && has_hulls_of_solid(&w)) status = make_hulls_of_solid(&w);
   if (status == QMAT_OK) status = make_report(&w, report);
   qmat_envelope_free(w.envelope);
   qmat_surface_free(w.surface);
@@ -222,7 +230,7 @@ static const qmat_param params[] = {
     QMAT_ENUM(
         medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
         "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only; hulls: "
-        "hulls of all of these, with contain only around the solid's part in each, joined where that is convex"),
+        "hulls of all of these, with contain around the parts of the solid, joined where that is convex"),
     QMAT_LENGTH(
         medial_colliders_params, dent, 0.01, 1e-4, 1,
         "How deep the dents between the capsules or spheres may be that replace a cone or slab; deeper where that "
@@ -256,7 +264,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 7,
+    .version = 8,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -264,7 +272,7 @@ const qmat_node qmat_node_medial_colliders = {
         "shapes.\n\n"
         "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
         "branch and bound that no point of the solid is outside, and grows them where one is. Hulls then contain their "
-        "shapes. With kind=hulls they contain only the solid's part in each, which takes the least volume, and are "
+        "shapes. With kind=hulls the solid is divided among the shapes, each hull contains only its part, and they are "
         "joined where the joint hull leaves the solid by at most hull_error, or until `shapes` are left. inside "
         "changes radii and proves the opposite; otherwise hulls are inside their shapes. proved is false for open "
         "surfaces.\n\n"

@@ -3,6 +3,7 @@
 #define QMAT_CORE_GEOMETRY_VECTOR_H
 
 #include <math.h>
+#include <stddef.h>
 
 /* Vectors and points are 3 doubles. Every function evaluates in a fixed order, so results are the same everywhere. */
 
@@ -28,6 +29,16 @@ static inline void qmat_cross(const double a[3], const double b[3], double out[3
 static inline void qmat_normalize(double v[3]) {
   const double length = sqrt(qmat_dot(v, v));
   for (int k = 0; k < 3; k++) v[k] /= length;
+}
+
+/* Direction i of n that are spread evenly over the sphere, of length 1: a spiral with the golden angle between
+ * successive directions (Vogel 1979). */
+static inline void qmat_spread_direction(size_t i, size_t n, double out[3]) {
+  static const double golden_angle = 2.39996322972865332; /* pi (3 - sqrt 5) */
+  const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(1 - z * z), turn = golden_angle * (double)i;
+  out[0] = r * cos(turn);
+  out[1] = r * sin(turn);
+  out[2] = z;
 }
 
 /* A maximum and a minimum that compile to one instruction. They give the second operand when the first is NaN. */

@@ -9,8 +9,12 @@
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/tangent_hull.h"
 
-/* Before the end joint hulls may have this many times as many vertices. */
+/* Before the end hulls may have this many times as many vertices, and are within this share of the error. */
 enum { ROOM_FACTOR = 4 };
+static const double fine_share = 0.1;
+
+/* In diagonals: what rounding may do to the points of parts. */
+static const double least_margin = 2e-7;
 
 /* Pairs are compared by a coarse search; the one that is joined is searched to the end. */
 enum { FEW_HALVINGS = 3, MANY_HALVINGS = 48 };
@@ -19,12 +23,12 @@ enum { FEW_HALVINGS = 3, MANY_HALVINGS = 48 };
 static const double limit_step = 1.25;
 
 typedef struct part {
-  const double *points; /* 3 each */
+  double *points; /* 3 each; owned */
   size_t count;
   double low[3], high[3]; /* of its box */
   double volume;
   uint32_t shape; /* whose spheres it keeps */
-  bool live, is_joint;
+  bool live;
 } part;
 
 typedef struct pair {
@@ -34,25 +38,27 @@ typedef struct pair {
   bool exceeds;  /* `leaves` is above the limit of the test */
 } pair;
 
-/* Scratch of a thread: a joint hull. */
+/* Scratch of a thread: a joint hull, and a hull before the end. */
 typedef struct joint {
   size_t point_count, triangle_count;
   double *points, *unit; /* in the model, and in the unit frame */
   uint32_t *triangles;
+  qmat_tangent_hull fine;
 } joint;
 
 typedef struct merging {
   qmat_context *context;
   const qmat_surface *solid;
-  size_t room;  /* vertices of a part */
-  double limit; /* unit frame */
-  double error; /* of the vertices of joint hulls, in the model */
-  qmat_tangent_hull tangent;
+  size_t room;              /* vertices of a part */
+  double limit;             /* unit frame */
+  double error;             /* of the vertices of hulls, in the model */
+  qmat_tangent_hull coarse; /* of hulls at the end */
   part *parts;
   size_t part_count, live_count;
   pair *pairs;
   size_t pair_count, pair_capacity;
-  joint *joints; /* one per thread */
+  joint *joints;      /* one per thread */
+  uint8_t *is_vertex; /* scratch: of a joint hull's points */
 } merging;
 
 /* The volume within a closed surface. */
@@ -68,13 +74,13 @@ static double volume_of(const double *points, const uint32_t *triangles, size_t 
   return volume;
 }
 
-static void find_box(part *p) {
+static void find_box(const double *points, size_t count, double low[3], double high[3]) {
   for (int k = 0; k < 3; k++) {
-    p->low[k] = INFINITY;
-    p->high[k] = -INFINITY;
-    for (size_t i = 0; i < p->count; i++) {
-      p->low[k] = fmin(p->low[k], p->points[3 * i + (size_t)k]);
-      p->high[k] = fmax(p->high[k], p->points[3 * i + (size_t)k]);
+    low[k] = INFINITY;
+    high[k] = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      low[k] = fmin(low[k], points[3 * i + (size_t)k]);
+      high[k] = fmax(high[k], points[3 * i + (size_t)k]);
     }
   }
 }
@@ -143,6 +149,16 @@ static void test_pair(const merging *m, pair *p, int halvings, joint *j) {
   }
   p->growth = volume_of(j->points, j->triangles, j->triangle_count) - m->parts[p->a].volume - m->parts[p->b].volume;
   p->exceeds = p->leaves > m->limit;
+}
+
+static bool set_points(part *p, const double *points, size_t count) {
+  double *copy = qmat_alloc(count, 3 * sizeof *copy);
+  if (!copy) return false;
+  qmat_free(p->points);
+  p->points = memcpy(copy, points, 3 * count * sizeof *copy);
+  p->count = count;
+  find_box(copy, count, p->low, p->high);
+  return true;
 }
 
 static bool is_near(const merging *m, const part *a, const part *b) {
@@ -230,76 +246,136 @@ static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   joint *j = &m->joints[0];
   if (join(m, into, from, j) != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
   const double volume = volume_of(j->points, j->triangles, j->triangle_count);
-  uint8_t *is_vertex = qmat_arena_alloc(&m->context->arena, j->point_count, sizeof *is_vertex);
-  if (!is_vertex) return qmat_fail_memory(m->context, "the hulls");
   size_t used;
-  keep_vertices(j, is_vertex, &used);
+  keep_vertices(j, m->is_vertex, &used);
   const double *vertices = j->points;
   if (used > m->room) {
-    const qmat_status status = qmat_tangent_hull_fit_points(&m->tangent, j->points, used, 0, m->error);
+    const qmat_status status = qmat_tangent_hull_fit_points(&j->fine, j->points, used, 0, fine_share * m->error);
     if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
     if (status != QMAT_OK) {
       give_up(m, a, b);
       return QMAT_OK;
     }
-    vertices = m->tangent.points;
-    used = m->tangent.point_count;
+    vertices = j->fine.points;
+    used = j->fine.point_count;
   }
-  double *points = qmat_arena_alloc(&m->context->arena, used, 3 * sizeof *points);
-  if (!points) return qmat_fail_memory(m->context, "the hulls");
-  into->points = memcpy(points, vertices, 3 * used * sizeof *points);
-  into->count = used;
+  if (!set_points(into, vertices, used)) return qmat_fail_memory(m->context, "the hulls");
   if (from->volume > into->volume) into->shape = from->shape;
   into->volume = volume;
-  into->is_joint = true;
   from->live = false;
   m->live_count--;
-  find_box(into);
   return renew_pairs(m, a, b);
 }
 
-static qmat_status init(merging *m, const qmat_colliders *c, size_t most_points) {
+/* Finds vertices of a hull around points, farther out by `margin`. Where rounding spoils the hull, they are the corners
+ * of a box. */
+static qmat_status surround(qmat_tangent_hull *hull, const double *points, size_t count, double margin, double error) {
+  const qmat_status status = qmat_tangent_hull_fit_points(hull, points, count, margin, error);
+  if (status != QMAT_ERROR_GEOMETRY) return status;
+  double low[3], high[3];
+  find_box(points, count, low, high);
+  for (int i = 0; i < 8; i++)
+    for (int k = 0; k < 3; k++) hull->points[3 * i + k] = i >> k & 1 ? high[k] + margin : low[k] - margin;
+  hull->point_count = 8;
+  return QMAT_OK;
+}
+
+/* Makes the hull of a part, or of a box around it. Without a box it fails where the points are too near a plane. */
+static qmat_status make_part(const merging *m, const qmat_solid_part *given, bool may_be_box, joint *j, part *p) {
+  const qmat_frame *frame = qmat_surface_frame(m->solid);
+  const double margin = qmat_surface_mesh(m->solid)->deviation + least_margin * frame->diagonal;
+  qmat_tangent_hull *fine = &j->fine;
+  double *model = qmat_alloc(given->count, 3 * sizeof *model);
+  if (!model) return QMAT_ERROR_MEMORY;
+  qmat_frame_to_model(frame, given->points, given->count, model);
+  qmat_status status =
+      (may_be_box ? surround : qmat_tangent_hull_fit_points)(fine, model, given->count, margin, fine_share * m->error);
+  qmat_free(model);
+  size_t triangle_count;
+  if (status == QMAT_OK) status = qmat_convex_hull(fine->points, fine->point_count, fine->triangles, &triangle_count);
+  if (status != QMAT_OK) return status;
+  if (!set_points(p, fine->points, fine->point_count)) return QMAT_ERROR_MEMORY;
+  p->volume = volume_of(p->points, fine->triangles, triangle_count);
+  p->live = true;
+  return QMAT_OK;
+}
+
+/* The live part with the point nearest to the first one of another part. */
+static size_t nearest_part(const merging *m, const qmat_solid_part *given, size_t of) {
+  size_t best = of;
+  double least = INFINITY;
+  for (size_t i = 0; i < m->part_count; i++)
+    for (size_t k = 0; m->parts[i].live && k < given[i].count; k++) {
+      const double distance = qmat_point_distance(&given[i].points[3 * k], given[of].points);
+      if (!(distance < least)) continue;
+      least = distance;
+      best = i;
+    }
+  return best;
+}
+
+/* Gives the points of a part without a hull to the nearest one that has. */
+static qmat_status move_part(merging *m, qmat_solid_part *given, size_t from) {
+  qmat_solid_part *to = &given[nearest_part(m, given, from)];
+  double *points = qmat_alloc(to->count + given[from].count, 3 * sizeof *points);
+  if (!points) return QMAT_ERROR_MEMORY;
+  memcpy(points, to->points, 3 * to->count * sizeof *points);
+  memcpy(&points[3 * to->count], given[from].points, 3 * given[from].count * sizeof *points);
+  qmat_free(to->points);
+  to->points = points;
+  to->count += given[from].count;
+  return make_part(m, to, true, &m->joints[0], &m->parts[to - given]);
+}
+
+/* Makes the hulls of all parts, then moves parts without one. */
+static qmat_status make_parts(merging *m, qmat_solid_part *given) {
+  const int threads = qmat_threads(m->context);
+  const size_t slice = 64;
+  bool memory = true;
+  for (size_t first = 0; first < m->part_count; first += slice) {
+    const qmat_status status = qmat_progress(m->context, first, m->part_count, "hulls");
+    if (status != QMAT_OK) return status;
+    const size_t end = first + slice < m->part_count ? first + slice : m->part_count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : memory)
+    for (size_t i = first; i < end; i++) {
+      m->parts[i].shape = (uint32_t)i;
+      if (given[i].count == 0) continue;
+      joint *j = &m->joints[omp_get_thread_num()];
+      if (make_part(m, &given[i], false, j, &m->parts[i]) == QMAT_ERROR_MEMORY) memory = false;
+    }
+    if (!memory) return qmat_fail_memory(m->context, "the hulls");
+  }
+  for (size_t i = 0; i < m->part_count; i++) m->live_count += m->parts[i].live;
+  for (size_t i = 0; i < m->part_count && m->live_count > 0; i++)
+    if (!m->parts[i].live && given[i].count > 0 && move_part(m, given, i) != QMAT_OK)
+      return qmat_fail_memory(m->context, "the hulls");
+  return QMAT_OK;
+}
+
+static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t most_points) {
   qmat_arena *arena = &m->context->arena;
   const int threads = qmat_threads(m->context);
-  m->part_count = m->live_count = c->shape_count;
+  m->part_count = count;
   m->room = ROOM_FACTOR * most_points;
-  m->parts = qmat_arena_alloc(arena, m->part_count, sizeof *m->parts);
+  m->parts = qmat_arena_calloc(arena, count, sizeof *m->parts);
   m->joints = qmat_arena_alloc(arena, (size_t)threads, sizeof *m->joints);
-  if (!m->parts || !m->joints) return qmat_fail_memory(m->context, "the hulls");
-  const qmat_status status = qmat_tangent_hull_init(m->context, most_points, &m->tangent);
-  if (status != QMAT_OK) return status;
-  for (int i = 0; i < threads; i++) {
+  m->is_vertex = qmat_arena_alloc(arena, 2 * m->room, sizeof *m->is_vertex);
+  if (!m->parts || !m->joints || !m->is_vertex) return qmat_fail_memory(m->context, "the hulls");
+  qmat_status status = qmat_tangent_hull_init(m->context, most_points, &m->coarse);
+  for (int i = 0; i < threads && status == QMAT_OK; i++) {
     joint *j = &m->joints[i];
     j->points = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->points);
     j->unit = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->unit);
     j->triangles = qmat_arena_alloc(arena, 2 * m->room, 6 * sizeof *j->triangles);
     if (!j->points || !j->unit || !j->triangles) return qmat_fail_memory(m->context, "the hulls");
+    status = qmat_tangent_hull_init(m->context, m->room, &j->fine);
   }
-  for (size_t i = 0; i < m->part_count; i++) {
-    part *p = &m->parts[i];
-    const size_t first = i > 0 ? c->hull_ends[2 * i - 2] : 0, first_triangle = i > 0 ? c->hull_ends[2 * i - 1] : 0;
-    *p = (part){&c->points[3 * first], .count = c->hull_ends[2 * i] - first, .shape = (uint32_t)i, .live = true};
-    p->volume = volume_of(c->points, &c->triangles[3 * first_triangle], c->hull_ends[2 * i + 1] - first_triangle);
-    find_box(p);
-  }
-  return QMAT_OK;
-}
-
-/* The vertices of a part, most_points at most. */
-static qmat_status finish_part(merging *m, const part *p, const double **points, size_t *count) {
-  *points = p->points;
-  *count = p->count;
-  if (!p->is_joint) return QMAT_OK;
-  const qmat_status status = qmat_tangent_hull_fit_points(&m->tangent, p->points, p->count, 0, m->error);
-  if (status == QMAT_ERROR_GEOMETRY && p->count <= m->tangent.most) return QMAT_OK;
-  *points = m->tangent.points;
-  *count = m->tangent.point_count;
-  return status;
+  return status == QMAT_OK ? make_parts(m, given) : status;
 }
 
 /* Writes the live parts as the hulls, in their order. */
 static qmat_status write_parts(merging *m, qmat_colliders *c) {
-  const size_t room = m->live_count * m->tangent.most;
+  const size_t room = m->live_count * m->coarse.most;
   qmat_status status = QMAT_OK;
   double *points = qmat_alloc(room, 3 * sizeof *points);
   uint32_t *triangles = qmat_alloc(room, 6 * sizeof *triangles);
@@ -309,12 +385,13 @@ static qmat_status write_parts(merging *m, qmat_colliders *c) {
   for (size_t i = 0; i < m->part_count && status == QMAT_OK; i++) {
     const part *p = &m->parts[i];
     if (!p->live) continue;
-    const double *vertices;
-    size_t of_part, of_hull = 0;
-    status = finish_part(m, p, &vertices, &of_part);
-    if (status == QMAT_OK) status = qmat_convex_hull(vertices, of_part, &triangles[3 * triangle_count], &of_hull);
+    size_t of_hull = 0;
+    status = surround(&m->coarse, p->points, p->count, 0, m->error);
+    const size_t of_part = m->coarse.point_count;
+    if (status == QMAT_OK)
+      status = qmat_convex_hull(m->coarse.points, of_part, &triangles[3 * triangle_count], &of_hull);
     if (status != QMAT_OK) break;
-    memcpy(&points[3 * point_count], vertices, 3 * of_part * sizeof *points);
+    memcpy(&points[3 * point_count], m->coarse.points, 3 * of_part * sizeof *points);
     for (size_t k = 0; k < 3 * of_hull; k++) triangles[3 * triangle_count + k] += (uint32_t)point_count;
     memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)p->shape], 3 * sizeof *shapes);
     c->hull_ends[2 * count] = (uint32_t)(point_count += of_part);
@@ -333,17 +410,14 @@ static qmat_status write_parts(merging *m, qmat_colliders *c) {
   qmat_free(points);
   qmat_free(triangles);
   qmat_free(shapes);
-  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
-  if (status != QMAT_ERROR_GEOMETRY) return status;
-  qmat_fail(m->context, status, "rounding spoils a joint hull of so few points");
-  return qmat_fail_field(m->context, "hull_points");
+  return status == QMAT_OK ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
 }
 
-qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, size_t most, size_t most_points,
-                             double error, qmat_colliders *colliders) {
+qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, qmat_solid_part *parts, size_t most,
+                             size_t most_points, double error, qmat_colliders *colliders) {
   merging m = {
-      .context = context, .solid = solid, .limit = error / qmat_surface_frame(solid)->diagonal, .error = 0.5 * error};
-  qmat_status status = init(&m, colliders, most_points);
+      .context = context, .solid = solid, .limit = error / qmat_surface_frame(solid)->diagonal, .error = 0.2 * error};
+  qmat_status status = init(&m, parts, colliders->shape_count, most_points);
   for (size_t enough = 1; status == QMAT_OK; enough = most, m.limit *= limit_step) {
     status = find_pairs(&m);
     for (pair *p; status == QMAT_OK && m.live_count > enough && (p = best_pair(&m));) {
@@ -352,7 +426,8 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, s
     }
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }
+  if (status == QMAT_OK && m.live_count > 0) status = write_parts(&m, colliders);
+  for (size_t i = 0; m.parts && i < m.part_count; i++) qmat_free(m.parts[i].points);
   qmat_free(m.pairs);
-  if (status == QMAT_OK && m.live_count < m.part_count) status = write_parts(&m, colliders);
   return status;
 }

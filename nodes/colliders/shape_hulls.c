@@ -6,11 +6,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
-#include "nodes/colliders/solid_part.h"
 #include "nodes/colliders/tangent_hull.h"
-
-/* Of parts of the solid, in diagonals: so near to the surface a corner may count as either inside or outside. */
-static const double least_margin = 2e-7;
 
 /* Scratch of one hull: points in up to three copies of the directions. */
 typedef struct hull {
@@ -23,15 +19,6 @@ typedef struct hull {
 
 /* Fewer do not surround a point. Those of three spheres are within every limit. */
 enum { LEAST_DIRECTIONS = QMAT_LEAST_HULL_POINTS / 3 };
-
-/* Direction i of n, of length 1. */
-static void direction(size_t i, size_t n, double point[3]) {
-  static const double golden = 2.39996322972865332; /* pi (3 - sqrt 5) */
-  const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(1 - z * z), turn = golden * (double)i;
-  point[0] = r * cos(turn);
-  point[1] = r * sin(turn);
-  point[2] = z;
-}
 
 /* Finds the hull of the points. */
 static qmat_status close_hull(hull *h) {
@@ -53,7 +40,7 @@ static qmat_status make_hull(hull *h, const double *spheres, const uint32_t *ids
     const double *sphere = &spheres[4 * (size_t)ids[s]];
     for (size_t i = 0; i < n[s]; i++) {
       double unit[3], *point = &h->points[3 * h->point_count++];
-      direction(i, n[s], unit);
+      qmat_spread_direction(i, n[s], unit);
       for (int k = 0; k < 3; k++) point[k] = sphere[k] + factor[s] * sphere[3] * unit[k];
     }
   }
@@ -122,21 +109,6 @@ static qmat_status surround(hull *h, qmat_tangent_hull *tangent, const double *s
   return close_hull(h);
 }
 
-/* Makes a hull of a shape one of the solid's part in it, unless that part has no volume to speak of. */
-static qmat_status fit_to_solid(hull *h, qmat_tangent_hull *tangent, const qmat_surface *solid, double error) {
-  double *part = NULL;
-  size_t count = 0;
-  qmat_status status = qmat_solid_part(solid, h->points, h->triangles, h->triangle_count, &part, &count);
-  const double margin = qmat_surface_mesh(solid)->deviation + least_margin * qmat_surface_frame(solid)->diagonal;
-  if (status == QMAT_OK) status = qmat_tangent_hull_fit_points(tangent, part, count, margin, error);
-  qmat_free(part);
-  if (status == QMAT_ERROR_GEOMETRY) return QMAT_OK;
-  if (status != QMAT_OK) return status;
-  h->point_count = tangent->point_count;
-  memcpy(h->points, tangent->points, 3 * h->point_count * sizeof *h->points);
-  return close_hull(h);
-}
-
 /* Appends the hull to the value's arrays, which have room for it. */
 static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
   const size_t first = colliders->point_count;
@@ -152,7 +124,7 @@ static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
 }
 
 qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points, double error,
-                             qmat_hull_side side, const qmat_surface *solid) {
+                             qmat_hull_side side) {
   const size_t room = 3 * most_points, count = colliders->shape_count;
   hull h = {.points = qmat_arena_alloc(&context->arena, room, 3 * sizeof *h.points),
             .triangles = qmat_arena_alloc(&context->arena, room, 6 * sizeof *h.triangles),
@@ -172,7 +144,6 @@ qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, s
     const uint32_t *ids = &colliders->shapes[3 * i];
     status = side == QMAT_HULL_OUTSIDE ? surround(&h, &tangent, colliders->spheres, ids, error, factors)
                                        : fit_points(&h, colliders->spheres, ids, most_points, error, side, factors);
-    if (status == QMAT_OK && solid) status = fit_to_solid(&h, &tangent, solid, error);
     if (status == QMAT_OK) append(colliders, i, &h);
     if (status == QMAT_ERROR_GEOMETRY) {
       qmat_fail(context, status, "it has no hull");

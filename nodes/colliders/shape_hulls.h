@@ -16,12 +16,8 @@ enum { QMAT_LEAST_HULL_POINTS = 24 };
  * least) vertices. Outside, its facets touch the shape (nodes/colliders/tangent_hull.h); inside, its vertices are on
  * the spheres in directions that are spread evenly (a Fibonacci lattice), more of them on larger spheres.
  * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY names the shape, QMAT_CANCELLED. Cost: some hulls of `most_points` points per
- * shape.
- *
- * `solid` (a watertight surface, or NULL): hulls are to contain only what the solid has in them. Each becomes a
- * polyhedron around the part of the solid in the hull outside of its shape (solid_part.h), grown by the mesh's
- * deviation. Where the shapes contain the solid, these hulls do. */
+ * shape. */
 qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points, double error,
-                             qmat_hull_side side, const qmat_surface *solid);
+                             qmat_hull_side side);
 
 #endif
