@@ -104,7 +104,8 @@ static qmat_status bound_surface_to_envelope(evaluation *e) {
     const double interval = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
     const double tolerance = search < FIRST_CLOSE_SEARCH ? interval : interval / 16;
     qmat_hausdorff_bound bound;
-    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, &bound);
+    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, -INFINITY,
+                                          &bound);
     e->surface_to_envelope = (qmat_bounds){bound.found, fmax(bound.bound, bound.found)};
     known = bound.found;
     if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
@@ -241,7 +242,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = bound_spheres(&e);
   if (status == QMAT_OK)
     status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance, true,
-                                            (size_t)params->samples, &e.boundary);
+                                            false, (size_t)params->samples, &e.boundary);
   if (status == QMAT_OK) status = count_spheres_outside(&e);
   if (status == QMAT_OK) status = count_degenerate(&e);
   if (status == QMAT_OK) status = make_report(&e, report);

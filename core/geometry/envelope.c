@@ -397,9 +397,9 @@ qmat_status qmat_envelope_distances(qmat_context *context, const qmat_envelope *
 }
 
 double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3], const double corners[][3], int count,
-                           double *bound) {
+                           double enough, double *bound) {
   envelope_item nearest = {0, 0};
-  const double distance = search(envelope, point, INFINITY, -INFINITY, &nearest);
+  const double distance = search(envelope, point, INFINITY, enough, &nearest);
   *bound = distance < INFINITY ? -INFINITY : INFINITY;
   if (!(distance < INFINITY)) return distance;
   for (int i = 0; i < count; i++) *bound = qmat_larger(*bound, item_distance(envelope, nearest, corners[i]));

@@ -47,10 +47,10 @@ qmat_status qmat_envelope_distances(qmat_context *context, const qmat_envelope *
                                     size_t count, double *distances);
 
 /* F(point), and in `*bound` an upper bound of F over the convex hull of `count` corners (3 doubles each): the largest
- * distance of a corner to the primitive that attains F(point), since the distance to one primitive is convex. INFINITY
- * for both when there is no primitive. */
+ * distance of a corner to the primitive that attains F(point), since the distance to one primitive is convex. The first
+ * distance below `enough` may be taken for F. INFINITY for both when there is no primitive. */
 double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3], const double corners[][3], int count,
-                           double *bound);
+                           double enough, double *bound);
 
 /* F(point) and the medial sphere (4 doubles: centre, radius) that attains it. The gradient of F is the unit vector from
  * that centre to the point. `primitive` as above. Without primitives `sphere` is unchanged. */

@@ -136,7 +136,8 @@ static bool is_off_boundary(const search *s, const hull *h, const double middle[
     return qmat_envelope_holds(s->envelope, middle, reach + s->skin) ||
            qmat_envelope_distance_within(s->envelope, middle, reach) > reach;
   double bound;
-  const double f = qmat_envelope_bound(s->envelope, middle, (const double(*)[3])h->points, h->count, &bound);
+  const double f =
+      qmat_envelope_bound(s->envelope, middle, (const double(*)[3])h->points, h->count, -(reach + s->skin), &bound);
   return qmat_smaller(f + reach, bound + h->bulge) < -s->skin;
 }
 
@@ -293,7 +294,8 @@ static void set_targets(search *s, double tolerance, const qmat_boundary_distanc
   s->smallest = smallest_share * qmat_smaller(tolerated(s->lo[0], s->epsilon, tolerance), s->target[0] - s->lo[0]);
 }
 
-static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, qmat_boundary_distance *result) {
+static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, bool ends_beyond,
+                                 qmat_boundary_distance *result) {
   const size_t count = qmat_boundary_features_count(s->features);
   const bool in_space = count > MANY_FEATURES;
   const size_t most_queries = in_space ? MOST_QUERIES_OF_MANY : MOST_QUERIES;
@@ -315,6 +317,10 @@ static qmat_status search_pieces(qmat_context *context, search *s, double tolera
     if (qmat_grow((void **)&findings, &capacity, from->count, sizeof *findings))
       status = qmat_fail_memory(context, "pieces of the envelope's boundary");
     if (status == QMAT_OK) status = search_level(context, s, from, &lists[1 - (level & 1)], findings, result);
+    if (ends_beyond && result->either_side.lo > s->epsilon) {
+      result->either_side.hi = INFINITY;
+      break;
+    }
   }
   qmat_free(lists[0].items);
   qmat_free(lists[1].items);
@@ -328,7 +334,7 @@ static qmat_bounds raised(qmat_bounds b) {
 
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, bool outside, size_t sample_count,
+                                           double tolerance, bool outside, bool ends_beyond, size_t sample_count,
                                            qmat_boundary_distance *result) {
   *result = (qmat_boundary_distance){.sample_count = 0};
   qmat_boundary_features f;
@@ -342,7 +348,7 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
               .epsilon = epsilon,
               .skin = outside ? certain_skin : QMAT_BOUNDARY_SKIN,
               .wanted = outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
-  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, result);
+  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, ends_beyond, result);
   result->either_side = raised(result->either_side);
   result->outside = raised(result->outside);
   return status;

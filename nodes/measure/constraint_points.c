@@ -602,14 +602,15 @@ qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *co
   qmat_envelope_free(envelope);
   if (status != QMAT_OK) return status;
   size_t kept = extra->surface_count;
+  for (size_t i = 0; i < kept && extra->is_strict; i++) constraints->distances[i] = fmin(constraints->distances[i], 0);
   for (size_t i = kept; i < constraints->count; i++) {
-    if (!(constraints->distances[i] < 0)) continue;
+    if (!(constraints->distances[i] < 0 || extra->is_strict)) continue;
     memmove(&constraints->points[3 * kept], &constraints->points[3 * i], 3 * sizeof *constraints->points);
     memmove(&constraints->witnesses[3 * kept], &constraints->witnesses[3 * i], 3 * sizeof *constraints->witnesses);
     memmove(&constraints->weights[3 * kept], &constraints->weights[3 * i], 3 * sizeof *constraints->weights);
     constraints->distances[kept] = constraints->distances[i];
     constraints->inner_limits[kept - extra->surface_count] =
-        fmax(0.5 * constraints->distances[i], -extra->required_depth);
+        extra->is_strict ? -extra->required_depth : fmax(0.5 * constraints->distances[i], -extra->required_depth);
     kept++;
   }
   constraints->count = kept;

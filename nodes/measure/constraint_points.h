@@ -47,11 +47,13 @@ typedef struct qmat_extra_points {
   size_t surface_count, inner_count;
   const double *surface, *inner; /* 3 per point, unit frame */
   double required_depth;         /* the depth in the envelope that interior points need at most */
+  bool is_strict;                /* whether the limits are those of other points, whatever F is now */
 } qmat_extra_points;
 
 /* Makes constraint points of `extra`, each with its nearest primitive of `complex` as the witness. Points inside the
  * solid that the envelope does not contain are dropped; the others need half of their present depth, at most
- * `required_depth`. The order is that of qmat_constraint_points, without samples. QMAT_ERROR_MEMORY. All threads. */
+ * `required_depth`. Strict ones are all kept, and need all of it. The order is that of qmat_constraint_points, without
+ * samples. QMAT_ERROR_MEMORY. All threads. */
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints);
 

@@ -440,6 +440,25 @@ void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *tracker, 
   *known = qmat_smaller(*known, bound);
 }
 
+static double tightened(const qmat_envelope_to_surface *tracker, const qmat_complex *complex, const uint32_t *vertices,
+                        int count, double bound) {
+  const double *spheres[3];
+  for (int k = 0; k < count; k++) spheres[k] = &complex->spheres[4 * (size_t)vertices[k]];
+  return qmat_smaller(
+      bound, qmat_envelope_to_surface_bound(tracker->lattice.surface, spheres, count, accepted_share * tracker->limit,
+                                            (1 - squares_share) * tracker->limit));
+}
+
+void qmat_envelope_to_surface_tighten(qmat_envelope_to_surface *tracker, const qmat_complex *complex) {
+  for (size_t e = 0; e < complex->edge_count; e++)
+    if (complex->edge_alive[e] && tracker->edge_bounds[e] > tracker->limit)
+      tracker->edge_bounds[e] = tightened(tracker, complex, &complex->edges[2 * e], 2, tracker->edge_bounds[e]);
+  for (size_t t = 0; t < complex->triangle_count; t++)
+    if (complex->triangle_alive[t] && tracker->triangle_bounds[t] > tracker->limit)
+      tracker->triangle_bounds[t] =
+          tightened(tracker, complex, &complex->triangles[3 * t], 3, tracker->triangle_bounds[t]);
+}
+
 double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *tracker, const qmat_complex *complex) {
   double largest = 0;
   for (size_t v = 0; v < complex->vertex_count; v++)

@@ -62,6 +62,9 @@ void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *tracker, cons
 void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
                                              uint32_t b, uint32_t c, double bound);
 
+/* Searches the edges and triangles whose bounds exceed the limit for tighter ones. One thread. */
+void qmat_envelope_to_surface_tighten(qmat_envelope_to_surface *tracker, const qmat_complex *complex);
+
 /* An upper bound of h over all live spheres, edges and triangles. */
 double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *tracker, const qmat_complex *complex);
 

@@ -9,9 +9,12 @@
 /* Below this, rounding of F exceeds the tolerance. */
 static const double least_tolerance = 1e-6;
 
+/* Pieces up to this share of the tolerance are not split. */
+static const double least_reach = 1.0 / 32;
+
 typedef struct facet_search {
   const qmat_envelope *envelope;
-  double tolerance;
+  double tolerance, decisive;
   double found, bound;          /* the largest F found, and the largest bound of a finished piece */
   double worst, worst_point[3]; /* the largest F found on this facet */
 } facet_search;
@@ -21,14 +24,16 @@ static void search_piece(facet_search *search, double corners[3][3]) {
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
   for (int i = 0; i < 3; i++) reach = fmax(reach, qmat_point_distance(corners[i], centre));
   double bound;
-  const double f = qmat_envelope_bound(search->envelope, centre, (const double(*)[3])corners, 3, &bound);
+  const double f = qmat_envelope_bound(search->envelope, centre, (const double(*)[3])corners, 3, -INFINITY, &bound);
   if (f > search->worst) {
     search->worst = f;
     memcpy(search->worst_point, centre, sizeof centre);
   }
   search->found = fmax(search->found, f);
   bound = fmin(bound, f + reach);
-  if (bound <= search->found + search->tolerance || reach <= 0.5 * search->tolerance) {
+  const double aim = search->found < search->decisive ? fmin(search->found + search->tolerance, search->decisive)
+                                                      : search->found + search->tolerance;
+  if (bound <= aim || reach <= least_reach * search->tolerance) {
     search->bound = fmax(search->bound, bound);
     return;
   }
@@ -52,7 +57,7 @@ static void search_piece(facet_search *search, double corners[3][3]) {
 
 qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surface *surface,
                                          const qmat_envelope *envelope, double known, double tolerance,
-                                         double threshold, qmat_hausdorff_bound *result) {
+                                         double threshold, double decisive, qmat_hausdorff_bound *result) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
   const size_t count = mesh->triangle_count, slice = 1 << 12;
@@ -71,6 +76,7 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
     for (size_t t = first; t < last; t++) {
       facet_search search = {.envelope = envelope,
                              .tolerance = fmax(tolerance, least_tolerance),
+                             .decisive = decisive,
                              .found = known,
                              .bound = -INFINITY,
                              .worst = -INFINITY};

@@ -41,6 +41,9 @@ static double largest_to_surface(const qmat_surface *surface, const qmat_medial 
   return largest;
 }
 
+/* The first lower bound takes one point in so many: more take longer than they save the search. */
+enum { POINT_STRIDE = 8 };
+
 qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_surface *surface,
                                               const qmat_medial *unit, const double *points, size_t point_count,
                                               double tolerance, double enough, double threshold,
@@ -51,9 +54,10 @@ qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_
   const int threads = qmat_threads(context);
   double farthest = enough;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
-  for (size_t i = 0; i < point_count; i++)
+  for (size_t i = 0; i < point_count; i += POINT_STRIDE)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
-  status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold, &errors->bound);
+  status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold - tolerance,
+                                        threshold, &errors->bound);
   errors->surface_to_envelope = errors->bound.bound;
   qmat_envelope_free(envelope);
   return status;
@@ -82,13 +86,13 @@ static size_t keep_inside(const qmat_surface *surface, double *points, size_t co
 static const double boundary_tolerance = 0.2;
 
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                         double epsilon, qmat_medial_errors *errors) {
+                                         double epsilon, bool ends_beyond, qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   qmat_boundary_distance boundary;
-  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false, 0,
-                                          &boundary);
+  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false,
+                                          ends_beyond, 0, &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->uncovered = boundary.far_points;

@@ -20,7 +20,8 @@ typedef struct qmat_medial_errors {
 
 /* Bounds the distance from the surface to the envelope, to within `tolerance` (> 0) where it is above `enough`. Below,
  * `enough` is the answer: the maximum over a plateau of small errors takes too many queries. F at the `point_count`
- * points (3 doubles each, on the surface) is the first lower bound. `threshold` as in qmat_hausdorff_bound_measure. */
+ * points (3 doubles each, on the surface) is the first lower bound. The bound is exact enough to compare it with
+ * `threshold`, and the points of `errors->bound` have an F above it less the tolerance. */
 qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_surface *surface,
                                               const qmat_medial *unit, const double *points, size_t point_count,
                                               double tolerance, double enough, double threshold,
@@ -32,9 +33,10 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
                                                qmat_medial_errors *errors);
 
 /* Bounds the distance from the envelope's boundary to the surface on either side, closely enough to compare it with
- * `epsilon`. Where it may be more, some of the points deep in the solid are returned. */
+ * `epsilon`. Where it may be more, some of the points deep in the solid are returned. With
+ * `ends_beyond` the first of them end the search, and the bound is INFINITY. */
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                         double epsilon, qmat_medial_errors *errors);
+                                         double epsilon, bool ends_beyond, qmat_medial_errors *errors);
 
 /* Frees the points. */
 void qmat_medial_errors_uninit(qmat_medial_errors *errors);

@@ -43,7 +43,7 @@ static void measure_piece(measurement *m, double corners[3][3]) {
   size_t sphere;
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
   for (int i = 0; i < 3; i++) reach = fmax(reach, qmat_point_distance(corners[i], centre));
-  qmat_envelope_bound(m->envelope, centre, (const double(*)[3])corners, 3, &bound);
+  qmat_envelope_bound(m->envelope, centre, (const double(*)[3])corners, 3, -INFINITY, &bound);
   const double f = answering(m, centre, &sphere);
   if (sphere == SIZE_MAX) return;
   bound = fmin(fmin(bound, f + reach), m->most);

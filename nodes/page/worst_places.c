@@ -27,8 +27,8 @@ static qmat_status find_on_surface(qmat_context *context, const qmat_shown *show
                                    double known, qmat_worst_place *worst) {
   qmat_hausdorff_bound bound;
   const double from = fmax(share * known, least_error);
-  const qmat_status status =
-      qmat_hausdorff_bound_measure(context, surface, shown->envelope, from, tolerance * shown->range, from, &bound);
+  const qmat_status status = qmat_hausdorff_bound_measure(context, surface, shown->envelope, from,
+                                                          tolerance * shown->range, from, -INFINITY, &bound);
   for (size_t i = 0; status == QMAT_OK && i < bound.count; i++)
     take(&bound.points[3 * i], qmat_envelope_distance(shown->envelope, &bound.points[3 * i], NULL), worst);
   for (size_t i = 0; status == QMAT_OK && i < shown->display.vertex_count; i++)
@@ -41,7 +41,7 @@ static qmat_status find_on_envelope(qmat_context *context, const qmat_shown *sho
   qmat_boundary_distance boundary;
   const double from = fmax(known > 0 ? share * known : 0.5 * shown->range, 10 * least_error);
   const qmat_status status = qmat_boundary_distance_measure(context, surface, shown->envelope, &shown->unit, from,
-                                                            tolerance, false, SAMPLES, &boundary);
+                                                            tolerance, false, false, SAMPLES, &boundary);
   for (size_t i = 0; status == QMAT_OK && i < boundary.far_count; i++) {
     const double *at = &boundary.far_points[3 * i];
     if (qmat_envelope_holds(shown->envelope, at, rounding)) continue;

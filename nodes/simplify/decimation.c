@@ -8,6 +8,7 @@
 #include "nodes/simplify/collapse_attempt.h"
 #include "nodes/simplify/cost_rows.h"
 #include "nodes/simplify/lookahead.h"
+#include "nodes/simplify/point_repair.h"
 #include "nodes/simplify/rising_threshold.h"
 
 /* Progress interval, in cost evaluations and in attempts. The last attempts test thousands of points each. */
@@ -155,6 +156,14 @@ static qmat_status commit_placed(qmat_decimation *s, uint32_t vertex) {
   return status;
 }
 
+qmat_status qmat_decimation_accept(qmat_decimation *s, const double sphere[4]) {
+  qmat_status status = qmat_decimation_commit(s, sphere);
+  if (status == QMAT_OK) update_neighbourhood(s);
+  for (int i = 1; i < s->neighbourhood.count && status == QMAT_OK; i++)
+    status = commit_placed(s, s->neighbourhood.vertices[i]);
+  return status;
+}
+
 qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
   const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
@@ -175,15 +184,11 @@ qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
     double sphere[4];
     status = s->copy && s->copy->ahead > 0 ? qmat_lookahead_next(s, &edge, sphere, &result)
                                            : qmat_decimation_attempt(s, edge, sphere, &result);
-    if (status == QMAT_OK && result == QMAT_COLLAPSE_ALLOWED) status = qmat_decimation_commit(s, sphere);
     if (status != QMAT_OK) return status;
     if (s->copy) qmat_copy_note(s->copy, result == QMAT_COLLAPSE_ALLOWED);
     if (result == QMAT_COLLAPSE_ALLOWED) {
       s->counts.collapses++;
-      update_neighbourhood(s);
-      for (int i = 1; i < s->neighbourhood.count && status == QMAT_OK; i++)
-        status = commit_placed(s, s->neighbourhood.vertices[i]);
-      if (status != QMAT_OK) return status;
+      if ((status = qmat_decimation_accept(s, sphere)) != QMAT_OK) return status;
     } else if (result == QMAT_COLLAPSE_EXCEEDS && s->rules.on_exceed == QMAT_EXCEED_STOP) {
       *ended = !qmat_rising_threshold_raise(s);
       qmat_edge_heap_update(&s->heap, edge);
@@ -237,8 +242,10 @@ static void queue_all(qmat_decimation *s) {
 }
 
 qmat_status qmat_decimation_run(qmat_decimation *s) {
+  if (s->rules.repairs) return qmat_decimation_repair(s);
   bool ended = s->threshold > s->rules.limit; /* even the lowest threshold exceeds the limit */
   qmat_status status = s->rules.neighbourhoods ? QMAT_OK : qmat_decimation_collapse_edges(s, &ended);
+
   if (status != QMAT_OK || ended || !(s->rules.limit < INFINITY)) return status;
   for (int i = 0; i < s->rules.refits && !ended; i++) {
     const size_t collapses = s->counts.collapses;
@@ -254,5 +261,6 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
   size_t moved = s->rules.final_refit;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
     status = refit(s, QMAT_FINAL_REFIT_POINTS, &moved);
+
   return status;
 }

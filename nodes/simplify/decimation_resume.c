@@ -100,9 +100,14 @@ qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_media
   if (status != QMAT_OK) return status;
   status = qmat_constraint_points_join(context, from->constraints, from->surface_tracker.witnesses,
                                        from->surface_tracker.weights, ids, &further, constraints);
+  to->newest_surface_count = further.surface_count;
+  to->newest_inner_count = further.count - further.surface_count;
   if (status == QMAT_OK) status = qmat_decimation_init(to, constraints, depths);
   if (status != QMAT_OK) return status;
   carry_bounds(from, ids, to);
+  if (to->rules.refits > 0 && qmat_decimation_is_two_sided(to))
+    qmat_envelope_to_surface_tighten(&to->envelope_tracker, &to->complex);
   to->counts = from->counts;
+  to->moves = from->moves;
   return QMAT_OK;
 }

@@ -46,6 +46,7 @@ typedef struct qmat_decimation_rules {
   int refits;          /* passes that fit spheres to the surface after the last collapse, to make room for more */
   bool neighbourhoods; /* edges are tried with the spheres around them fitted jointly, from the end of an earlier run */
   bool final_refit;    /* spheres are fitted at the end to lower the error itself */
+  bool repairs;        /* no collapses: spheres move where the newest constraint points exceed their limits */
   const uint8_t *thin; /* per sample: whether it lies on a thin feature; read only with protection */
 } qmat_decimation_rules;
 
@@ -65,6 +66,7 @@ typedef struct qmat_decimation {
   qmat_quadric *quadrics; /* per vertex */
   qmat_edge_heap heap;
   const qmat_constraint_points *constraints;
+  size_t newest_surface_count, newest_inner_count; /* of constraint points that were added last, each the last ones */
   qmat_surface_to_envelope surface_tracker;
   qmat_envelope_to_surface envelope_tracker;
   qmat_collapse collapse;

@@ -84,16 +84,18 @@ static qmat_status place(qmat_decimation *s, uint32_t vertex, const double *sphe
   return status;
 }
 
+/* Adds a constraint point to the targets, with a margin. */
+static qmat_status add_point_target(qmat_decimation *s, size_t point) {
+  return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->surface_tracker.points[3 * point],
+                                    qmat_decimation_is_inner(s, point) ? QMAT_TARGET_INSIDE : QMAT_TARGET_SURFACE,
+                                    s->surface_tracker.limits[point] - qmat_target_margin * s->threshold);
+}
+
 /* Adds the place where the newest test failed to the targets; `*needed` is false where a fit cannot repair it. */
 static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, bool *needed) {
   const double *centre = s->refusal == QMAT_REFUSED_BY_SPHERE ? sphere : s->envelope_tracker.failed_place;
   *needed = true;
-  if (s->refusal == QMAT_REFUSED_BY_SURFACE_TO_ENVELOPE) {
-    const size_t point = s->surface_tracker.failed_point;
-    return qmat_neighbourhood_fit_add(s->context, &s->neighbourhood, &s->surface_tracker.points[3 * point],
-                                      qmat_decimation_is_inner(s, point) ? QMAT_TARGET_INSIDE : QMAT_TARGET_SURFACE,
-                                      s->surface_tracker.limits[point] - qmat_target_margin * s->threshold);
-  }
+  if (s->refusal == QMAT_REFUSED_BY_SURFACE_TO_ENVELOPE) return add_point_target(s, s->surface_tracker.failed_point);
   double closest[3];
   uint32_t triangle;
   *needed = s->refusal != QMAT_REFUSED_BY_MIDPOINT && qmat_surface_inside(s->surface, centre);
@@ -103,11 +105,18 @@ static qmat_status add_refused_target(qmat_decimation *s, const double *sphere, 
                                     (1 - qmat_target_margin) * s->threshold);
 }
 
+/* Previews the collapse of `edge`, or without one the move of the neighbourhood's first sphere. */
+static qmat_status preview(qmat_decimation *s, uint32_t edge) {
+  return edge != QMAT_NONE
+             ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
+             : qmat_complex_preview_move(s->context, &s->complex, s->neighbourhood.vertices[0], &s->collapse);
+}
+
 /* Tests a sphere of the neighbourhood, which is in place; number 0 is the sphere of the collapse. */
 static qmat_status test_in_neighbourhood(qmat_decimation *s, uint32_t edge, int number, qmat_collapse_outcome *result) {
   double needed;
   const qmat_status status =
-      number == 0 ? qmat_complex_preview(s->context, &s->complex, edge, &s->collapse)
+      number == 0 ? preview(s, edge)
                   : qmat_complex_preview_move(s->context, &s->complex, s->neighbourhood.vertices[number], &s->collapse);
   return status == QMAT_OK
              ? qmat_decimation_test_sphere(s, s->neighbourhood.spheres[number], QMAT_NONE, result, &needed)
@@ -123,7 +132,7 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
   qmat_status status = QMAT_OK;
   *result = QMAT_COLLAPSE_REFUSED;
   *again = false;
-  for (int i = -1; i < neighbourhood->count && status == QMAT_OK; i++) {
+  for (int i = removed == QMAT_NONE ? 0 : -1; i < neighbourhood->count && status == QMAT_OK; i++) {
     status = place(s, i < 0 ? removed : neighbourhood->vertices[i], neighbourhood->spheres[i < 0 ? 0 : i], &inside);
     if (!inside) return status;
   }
@@ -139,37 +148,49 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
   return status;
 }
 
-/* Tries the newest preview from its fitted sphere, refitted with its neighbours unless `alone`. If `*result` allows it,
- * the spheres are in place, and the collapse is the newest preview and test. Otherwise nothing has changed. */
-static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
+/* Starts the fit of the newest preview from `sphere`, jointly with its neighbours unless `alone`. */
+static qmat_status start_fit(qmat_decimation *s, const double sphere[4], bool alone) {
   const qmat_collapse *c = &s->collapse;
   uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];
-  const uint32_t removed = c->removed;
   size_t count = 0;
   for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_NEIGHBOURHOOD_SPHERES; n++)
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
         !(s->protecting && qmat_decimation_is_protected(s, c->neighbours[n])))
       others[count++] = c->neighbours[n];
   s->neighbourhood.keeps_radii = qmat_decimation_is_of_sheet(s, c->kept);
-  qmat_status status =
-      qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, s->fitted,
-                                   others, count, s->constraints->surface_count, s->threshold);
+  return qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, sphere,
+                                      others, count, s->constraints->surface_count, s->threshold);
+}
+
+/* Fits, places and tests the neighbourhood; the place of a refusal becomes a target of the next fit. If `*result`
+ * allows it, the spheres are in place, and the collapse is the newest preview and test. Otherwise nothing has changed.
+ */
+static qmat_status fit_and_test(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
+  const uint32_t removed = s->collapse.removed;
+  const bool is_move = edge == QMAT_NONE;
+  qmat_status status = QMAT_OK;
   bool again = true;
   int last_refused = 0;
-  for (int i = 0; i < QMAT_MOST_FITS && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
+  const int most = is_move ? QMAT_MOST_MOVE_FITS : QMAT_MOST_FITS;
+  for (int i = 0; i < most && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
     double error;
-    qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, i % 2 == 1, &error);
+    qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, is_move || i % 2 == 1, &error);
     if (!(error <= qmat_placement_ratio * s->threshold)) return status;
     s->saved_count = 0;
-    status = save_star(s, removed);
+    if (removed != QMAT_NONE) status = save_star(s, removed);
     for (int k = 0; k < s->neighbourhood.count && status == QMAT_OK; k++)
       status = save_star(s, s->neighbourhood.vertices[k]);
     if (status == QMAT_OK) status = test_neighbourhood(s, edge, removed, &last_refused, result, &again);
     if (status == QMAT_OK && *result == QMAT_COLLAPSE_ALLOWED) return status;
     qmat_decimation_restore_neighbourhood(s);
-    if (status == QMAT_OK) status = qmat_complex_preview(s->context, &s->complex, edge, &s->collapse);
+    if (status == QMAT_OK) status = preview(s, edge);
   }
   return status;
+}
+
+static qmat_status try_neighbourhood(qmat_decimation *s, uint32_t edge, bool alone, qmat_collapse_outcome *result) {
+  const qmat_status status = start_fit(s, s->fitted, alone);
+  return status == QMAT_OK ? fit_and_test(s, edge, result) : status;
 }
 
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
@@ -180,4 +201,14 @@ qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge
       s->fitted_errors[edge] <= qmat_neighbourhood_ratio * s->threshold)
     status = try_neighbourhood(s, edge, false, result);
   return status;
+}
+
+qmat_status qmat_decimation_try_move(qmat_decimation *s, uint32_t vertex, size_t point, bool alone,
+                                     qmat_collapse_outcome *result) {
+  *result = QMAT_COLLAPSE_REFUSED;
+  qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
+  if (status == QMAT_OK) status = start_fit(s, &s->complex.spheres[4 * (size_t)vertex], alone);
+  if (status == QMAT_OK) status = add_point_target(s, point);
+  s->neighbourhood.worst = s->threshold; /* all errors are near it: the fit starts with high weights */
+  return status == QMAT_OK ? fit_and_test(s, QMAT_NONE, result) : status;
 }

@@ -90,7 +90,8 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
 static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
                           uint32_t slot) {
   for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (tracker->witnesses[s] == removed || moving_index(fit, tracker->witnesses[s]) >= 0) return false;
+    if ((removed != QMAT_NONE && tracker->witnesses[s] == removed) || moving_index(fit, tracker->witnesses[s]) >= 0)
+      return false;
   return true;
 }
 
@@ -110,13 +111,14 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
     memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)vertices[i]], 4 * sizeof(double));
   }
   qmat_status status = QMAT_OK;
+  const int first_vertex = collapse->removed == QMAT_NONE ? 0 : -1;
   for (int corners = 3; corners >= 2; corners--)
-    for (int i = -1; i < fit->count && status == QMAT_OK; i++)
+    for (int i = first_vertex; i < fit->count && status == QMAT_OK; i++)
       status = add_star(context, fit, complex, collapse, i < 0 ? collapse->removed : fit->vertices[i], corners);
-  size_t slots = tracker->slot_counts[collapse->removed], first = 0;
+  size_t slots = first_vertex < 0 ? tracker->slot_counts[collapse->removed] : 0, first = 0;
   for (int i = 0; i < fit->count; i++) slots += tracker->slot_counts[fit->vertices[i]];
   const size_t stride = (slots + QMAT_FITTED_TARGETS - 1) / QMAT_FITTED_TARGETS;
-  for (int i = -1; i < fit->count && status == QMAT_OK; i++) {
+  for (int i = first_vertex; i < fit->count && status == QMAT_OK; i++) {
     const uint32_t vertex = i < 0 ? collapse->removed : fit->vertices[i];
     const size_t length = tracker->slot_counts[vertex];
     const uint32_t *list;

@@ -8,6 +8,7 @@
 #include "nodes/simplify/cavity_filling.h"
 #include "nodes/simplify/decimation_resume.h"
 #include "nodes/simplify/partitioned_collapse.h"
+#include "nodes/simplify/point_repair.h"
 #include "nodes/simplify/topology_mending.h"
 
 /* ---- constraint points found on the way ---- */
@@ -69,6 +70,15 @@ static qmat_status judge_topology(const qmat_simplification *s, const qmat_media
   return QMAT_OK;
 }
 
+/* Measures the boundary of `unit` again, after a change. The points of `first` stay those of its owner. */
+static qmat_status measure_boundary_again(const qmat_simplification *s, const qmat_medial_errors *first,
+                                          const qmat_medial *unit, bool ends_beyond, qmat_medial_errors *left) {
+  if (left->uncovered != first->uncovered) qmat_medial_errors_uninit(left);
+  left->uncovered = left->undecided = NULL;
+  left->uncovered_count = left->undecided_count = 0;
+  return qmat_medial_boundary_measure(s->context, s->surface, unit, s->params.epsilon, ends_beyond, left);
+}
+
 /* Fills uncovered interior of the envelope with spheres. `left` gets the errors afterwards, `filled` the number of
  * spheres. */
 static qmat_status fill_cavities(const qmat_simplification *s, const qmat_medial_errors *found, qmat_medial *unit,
@@ -83,31 +93,85 @@ static qmat_status fill_cavities(const qmat_simplification *s, const qmat_medial
     if (status != QMAT_OK || added == 0) break;
     *filled += added;
     left->envelope_to_surface = epsilon;
-    if (i > 0) qmat_medial_errors_uninit(left);
-    left->uncovered = left->undecided = NULL; /* `found` keeps its own */
-    left->uncovered_count = left->undecided_count = 0;
-    status = qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, left);
+    status = measure_boundary_again(s, found, unit, true, left);
+  }
+  if (status == QMAT_OK && left->boundary_to_surface == INFINITY)
+    status = measure_boundary_again(s, found, unit, false, left);
+  return status;
+}
+
+/* The next of the three rounds: neither the newest nor the one that it continues. */
+static qmat_decimation *take_round(qmat_simplification *s) {
+  int next = 0;
+  while (next == s->newest || next == s->base) next++;
+  s->newest = next;
+  qmat_decimation *round = &s->rounds[next];
+  qmat_decimation_uninit(round);
+  *round = (qmat_decimation){
+      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
+  return round;
+}
+
+/* Whether places beyond epsilon were found. */
+static bool is_beyond(const qmat_simplification *s, const qmat_medial_errors *found) {
+  return found->surface_to_envelope > s->params.epsilon || found->boundary_to_surface > s->params.epsilon;
+}
+
+/* Moves the spheres of the newest round, whose extract is `*medial`, where the errors exceed epsilon. The newest round
+ * and `*medial` are then the repaired ones. */
+static qmat_status repair_round(qmat_simplification *s, const qmat_medial_errors *found, qmat_medial **medial,
+                                bool *has_moved) {
+  qmat_extra_points extra = no_extra_points(s);
+  extra.is_strict = true;
+  qmat_status status = constrain_found_points(s, found, &extra);
+  const qmat_decimation *from = &s->rounds[s->newest];
+  qmat_decimation *round = take_round(s);
+  round->rules.repairs = true;
+  if (status == QMAT_OK)
+    status = qmat_decimation_run_copies(from, *medial, &extra, &s->dense.envelope_tracker.lattice, &s->depths,
+                                        &s->round_constraints[s->newest], round);
+  if (status != QMAT_OK) return status;
+  *has_moved = round->moves > from->moves;
+  status = qmat_decimation_drop_exceeded(round, &s->round_constraints[s->newest]);
+  qmat_value_release(&(*medial)->base);
+  *medial = qmat_medial_new();
+  if (!*medial) return qmat_fail_memory(s->context, "the medial mesh");
+  return status == QMAT_OK ? qmat_decimation_extract(round, *medial) : status;
+}
+
+/* Measures the newest round, whose extract is `*medial`, and repairs it where its errors exceed epsilon. */
+static qmat_status measure_and_repair(qmat_simplification *s, qmat_medial **medial, qmat_medial_errors *found) {
+  const int repairs = s->params.epsilon > 0 && s->params.refits > 0 ? QMAT_MOST_REPAIRS : 0;
+  qmat_status status = qmat_simplification_measure(s, *medial, repairs > 0, found);
+  bool has_moved = true;
+  for (int i = 1; i <= repairs && status == QMAT_OK && is_beyond(s, found) && has_moved; i++) {
+    status = repair_round(s, found, medial, &has_moved);
+    qmat_medial_errors_uninit(found);
+    if (status == QMAT_OK) status = qmat_simplification_measure(s, *medial, true, found);
+  }
+  if (status == QMAT_OK && repairs > 0 && found->surface_to_envelope > s->params.epsilon) {
+    qmat_medial_errors_uninit(found);
+    status = qmat_simplification_measure(s, *medial, false, found);
   }
   return status;
 }
 
 /* Extracts the newest round, fills its cavities, and measures the fault. `found` are the errors before the filling;
  * `a->figures.filled` starts with the spheres that were added before the round. */
-static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a, qmat_medial_errors *found) {
+static qmat_status judge_round(qmat_simplification *s, qmat_simplified *a, qmat_medial_errors *found) {
   const double epsilon = s->params.epsilon;
-  const qmat_decimation *round = &s->rounds[s->newest];
-  qmat_status status = qmat_decimation_extract(round, a->medial);
-  if (status == QMAT_OK) status = qmat_simplification_measure(s, a->medial, false, found);
+  qmat_status status = qmat_decimation_extract(&s->rounds[s->newest], a->medial);
+  if (status == QMAT_OK) status = measure_and_repair(s, &a->medial, found);
   qmat_medial_errors after = *found;
   size_t filled = 0;
   if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);
-  qmat_simplify_figures_of(round, &a->figures);
+  qmat_simplify_figures_of(&s->rounds[s->newest], &a->figures);
   a->figures.filled += filled;
   a->figures.surface_to_envelope = after.surface_to_envelope;
   a->figures.envelope_to_surface = after.envelope_to_surface;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
   a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
-  if (filled > 0) { /* the points that are undecided now become constraints too */
+  if (after.uncovered != found->uncovered) { /* the points that are undecided now become constraints too */
     double *const undecided = found->undecided;
     found->undecided = after.undecided;
     found->undecided_count = after.undecided_count;
@@ -116,7 +180,7 @@ static qmat_status judge_round(const qmat_simplification *s, qmat_simplified *a,
   }
   bool right = true;
   if (status == QMAT_OK) status = judge_topology(s, a->medial, &right);
-  if (!right) a->fault += qmat_topology_fault * epsilon;
+  a->has_right_topology = right;
   return status;
 }
 
@@ -136,6 +200,7 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   if (status == QMAT_OK)
     status = qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
                                          QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
+
   dense->rules.share = qmat_dense_share;
   dense->rules.refits = 0;
   if (status == QMAT_OK)
@@ -150,11 +215,8 @@ static qmat_status collapse_dense(qmat_simplification *s) {
 static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from, const qmat_medial *left,
                              const qmat_extra_points *extra, bool neighbourhoods, bool final_refit, qmat_simplified *a,
                              qmat_medial_errors *found) {
-  s->newest = 1 - s->newest;
-  qmat_decimation *round = &s->rounds[s->newest];
-  qmat_decimation_uninit(round);
-  *round = (qmat_decimation){
-      .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
+  s->base = s->newest;
+  qmat_decimation *round = take_round(s);
   a->medial = qmat_medial_new();
   if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
   round->rules.neighbourhoods = neighbourhoods;
@@ -248,7 +310,7 @@ static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *
   qmat_status status = qmat_simplification_open_voids(s, best);
   if (status == QMAT_OK) status = qmat_simplification_close_loops(s, best);
   if (status == QMAT_OK && best->within_epsilon) status = judge_topology(s, best->medial, &right);
-  if (right) best->fault = s->params.epsilon;
+  if (right) best->has_right_topology = true;
   return status;
 }
 

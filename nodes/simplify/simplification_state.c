@@ -13,7 +13,7 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
   const qmat_constraint_points *constraints = &s->round_constraints[s->newest];
   qmat_status status =
       qmat_medial_surface_bound_measure(s->context, s->surface, unit, constraints->points, constraints->surface_count,
-                                        tolerance, enough, epsilon - tolerance, errors);
+                                        tolerance, enough, epsilon, errors);
   if (status != QMAT_OK || (only_within && errors->surface_to_envelope > epsilon)) return status;
   const bool two_sided = s->params.epsilon > 0 && s->params.error == QMAT_ERROR_TWO_SIDED;
   const qmat_decimation *round = &s->rounds[s->newest];
@@ -21,19 +21,22 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
     errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->envelope_tracker, &round->complex);
   if (!two_sided || errors->envelope_to_surface > epsilon)
     status = qmat_medial_envelope_bound_measure(s->context, s->surface, unit, tolerance, enough, errors);
-  return status == QMAT_OK && two_sided ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, errors)
-                                        : status;
+  return status == QMAT_OK && two_sided
+             ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, only_within, errors)
+             : status;
 }
 
 void qmat_simplification_uninit(qmat_simplification *s) {
-  for (int i = 0; i < 2; i++) qmat_decimation_uninit(&s->rounds[i]);
+  for (int i = 0; i < 3; i++) qmat_decimation_uninit(&s->rounds[i]);
   qmat_decimation_uninit(&s->dense);
   qmat_copy_depths_uninit(&s->depths);
   qmat_surface_free(s->surface);
 }
 
 bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b) {
-  return a->fault < b->fault || (a->fault == b->fault && a->medial->sphere_count < b->medial->sphere_count);
+  if (a->fault != b->fault) return a->fault < b->fault;
+  if (a->has_right_topology != b->has_right_topology) return a->has_right_topology;
+  return a->medial->sphere_count < b->medial->sphere_count;
 }
 
 void qmat_simplified_uninit(qmat_simplified *a) {

@@ -21,30 +21,31 @@ typedef struct qmat_simplification {
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
   qmat_decimation dense;              /* the start of each round */
-  /* Of the newest round, and of the round that it continues. */
-  qmat_constraint_points round_constraints[2];
-  qmat_decimation rounds[2];
-  int newest;
+  /* Of the newest round, of the round that it continues, and of a repair. */
+  qmat_constraint_points round_constraints[3];
+  qmat_decimation rounds[3];
+  int newest, base;        /* numbers of the first two */
   qmat_copy_depths depths; /* of the copies of rounds */
 } qmat_simplification;
 
-/* A result so far, in the unit frame. `fault` is its largest error, at least epsilon, plus a share of epsilon where its
- * Betti numbers are not the solid's. */
+/* A result so far, in the unit frame. `fault` is its largest error, at least epsilon. */
 typedef struct qmat_simplified {
   qmat_medial *medial; /* unsealed; the caller releases it */
   qmat_simplify_figures figures;
   double fault;
-  bool within_epsilon; /* whether both errors are within epsilon, as far as measured */
+  bool within_epsilon;     /* whether both errors are within epsilon, as far as measured */
+  bool has_right_topology; /* whether its Betti numbers are the solid's, as far as known */
 } qmat_simplified;
 
 /* Measures both errors of a medial mesh (unit frame) that differs from the newest round at most by added spheres or
  * removed slabs. `errors` gets them and the places beyond epsilon; free with qmat_medial_errors_uninit, also after a
- * failure. With `only_within` nothing is measured after a surface-to-envelope error above epsilon. QMAT_ERROR_MEMORY,
+ * failure. With `only_within` measuring ends with the first error above epsilon; one that is not measured then is 0,
+ * or INFINITY where the search ended early. QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
                                         bool only_within, qmat_medial_errors *errors);
 
-/* Whether `a` has the smaller fault, or the same with fewer spheres. */
+/* Whether `a` is better: first by its fault, then by its topology, then by its number of spheres. */
 bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b);
 
 /* Frees what a simplification has made; the caller keeps the inputs. */

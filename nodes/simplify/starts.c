@@ -102,7 +102,7 @@ static qmat_status run_start(void *user, qmat_context *own, size_t start) {
   const qmat_status status = qmat_simplification_run(&s, result);
   if (status == QMAT_OK && all->rule_count == 2 && !keeps_creases(all, start))
     atomic_store(&all->free_counts[start / 2],
-                 result->within_epsilon && result->fault <= s.params.epsilon ? result->medial->sphere_count : SIZE_MAX);
+                 result->within_epsilon && result->has_right_topology ? result->medial->sphere_count : SIZE_MAX);
   s.surface = NULL; /* the caller's */
   qmat_simplification_uninit(&s);
   atomic_fetch_add(&all->done, 1);

@@ -17,18 +17,18 @@ static const double qmat_dense_share = 0.9;
 /* Found points inside the solid must be as deep in the envelope as this share. */
 static const double qmat_required_depth_share = 0.05;
 
-/* The fault of wrong Betti numbers: a result with the right ones may be worse by this share. */
-static const double qmat_topology_fault = 0.05;
-
 /* ---- repetitions: none was reached on a model that ended within epsilon ---- */
 
 enum {
   QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
+  QMAT_MOST_REPAIRS = 4,       /* of a round, each with the points found after the one before */
   QMAT_MOST_JOINT_REFITS = 3,  /* the same for joint refits */
   QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
   QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
   QMAT_MOST_WALLS = 12,        /* tried per void; of edges, per loop */
-  QMAT_MOST_FITS = 6           /* of a neighbourhood, each with the newest failure as a target */
+  QMAT_MOST_FITS = 6,          /* of a neighbourhood, each with the newest failure as a target */
+  QMAT_MOST_MOVE_FITS = 16,    /* the same where spheres only move, to repair a place beyond epsilon */
+  QMAT_MOST_FAILED_REPAIRS = 3 /* of places within epsilon of each other */
 };
 
 /* ---- points of a fit: the tests use all of them, so that a fit may use fewer ---- */

@@ -61,10 +61,11 @@ static qmat_status measure(qmat_context *context, const qmat_surface *surface, c
   qmat_hausdorff_bound bound = {0};
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status == QMAT_OK)
-    status = qmat_boundary_distance_measure(context, surface, envelope, unit, threshold, TOLERANCE, false, SAMPLE_COUNT,
-                                            &boundary);
+    status = qmat_boundary_distance_measure(context, surface, envelope, unit, threshold, TOLERANCE, false, false,
+                                            SAMPLE_COUNT, &boundary);
   if (status == QMAT_OK)
-    status = qmat_hausdorff_bound_measure(context, surface, envelope, 0, FINE_TOLERANCE * threshold, threshold, &bound);
+    status = qmat_hausdorff_bound_measure(context, surface, envelope, 0, FINE_TOLERANCE * threshold, threshold,
+                                          -INFINITY, &bound);
   distance->from_envelope = frame->diagonal * boundary.either_side.hi;
   distance->to_envelope = frame->diagonal * fmax(bound.bound, 0);
   if (status == QMAT_OK) status = add_points(context, frame, boundary.far_points, boundary.far_count, distance);

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SIMPLIFY_POINT_REPAIR_H
+#define QMAT_NODES_SIMPLIFY_POINT_REPAIR_H
+
+#include "nodes/simplify/decimation_state.h"
+
+/* Moves spheres so that the newest constraint points come within their limits. Each point that exceeds its limit is
+ * tried with the spheres of its witness and their neighbours, fitted jointly; all other constraint points stay within
+ * theirs. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: a joint fit or a few per point. */
+qmat_status qmat_decimation_repair(qmat_decimation *decimation);
+
+/* Lifts the limits of the newest constraint points that exceed them, here and in `constraints`, which are those of the
+ * decimation. QMAT_ERROR_MEMORY. */
+qmat_status qmat_decimation_drop_exceeded(qmat_decimation *decimation, qmat_constraint_points *constraints);
+
+#endif
