@@ -41,8 +41,8 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  *
  * The arrays of places have one point for each piece that was finished so, the farthest among them. Free them with
  * qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product is taken for
- * 1e-5 at least. `outside` false skips the inside tests. With `ends_beyond` the
- * search ends after the first level of pieces with a place farther than epsilon; hi is then INFINITY.
+ * 1e-5 at least. `outside` false skips the inside tests. With `ends_beyond` the search ends after the first level of
+ * pieces with a place farther than epsilon; hi is then INFINITY.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,

@@ -33,8 +33,8 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
                                                qmat_medial_errors *errors);
 
 /* Bounds the distance from the envelope's boundary to the surface on either side, closely enough to compare it with
- * `epsilon`. Where it may be more, some of the points deep in the solid are returned. With
- * `ends_beyond` the first of them end the search, and the bound is INFINITY. */
+ * `epsilon`. Where it may be more, some of the points deep in the solid are returned. With `ends_beyond` the first of
+ * them end the search, and the bound is INFINITY. */
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                          double epsilon, bool ends_beyond, qmat_medial_errors *errors);
 

@@ -16,10 +16,6 @@ void qmat_decimation_uninit(qmat_decimation *decimation);
  * QMAT_CANCELLED. One thread. */
 qmat_status qmat_decimation_collapse_edges(qmat_decimation *decimation, bool *ended);
 
-/* Does the newest preview, which the newest test has allowed for `sphere`, and updates costs and the queue around it.
- * The other spheres of its neighbourhood, already in place, are tested and get their witnesses. QMAT_ERROR_MEMORY. */
-qmat_status qmat_decimation_accept(qmat_decimation *decimation, const double sphere[4]);
-
 /* Collapses edges, with QMAT_EXCEED_SKIP, and fits spheres until the rules allow no more. QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED. One thread. */
 qmat_status qmat_decimation_run(qmat_decimation *decimation);

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "core/geometry/vector.h"
-#include "nodes/simplify/decimation.h"
+#include "nodes/simplify/collapse_commit.h"
 #include "nodes/simplify/fitted_collapse.h"
 
 /* The number of the newest constraint point `i`: those on the surface first. */

@@ -121,7 +121,7 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
     double corners[3][3], p[3] = {0, 0, 0}, bound;
     for (size_t c = 0; c < 3; c++)
       for (size_t k = 0; k < 3; k++) p[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
-    assert_near(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, &bound), brute(&m, p));
+    assert_near(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, -INFINITY, &bound), brute(&m, p));
     uint32_t ids[3];
     size_t primitive;
     qmat_envelope_distance(envelope, p, &primitive);
@@ -142,6 +142,29 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
       assert_true(brute(&m, between) <= bound + EXACT);
     }
   }
+  qmat_envelope_free(envelope);
+  qmat_context_uninit(&context);
+}
+
+/* A search that ends early has a primitive below `enough` or the nearest one; its bound holds in both cases. */
+static void test_a_bound_that_is_enough_ends_the_search(void **unused) {
+  (void)unused;
+  qmat_context context = {0};
+  static random_medial m;
+  fill_random(&m, 3);
+  qmat_envelope *envelope = envelope_of(&context, &m);
+  size_t early = 0;
+  for (size_t i = 0; i < 500; i++) {
+    double corners[3][3], p[3] = {0, 0, 0}, bound;
+    for (size_t c = 0; c < 3; c++)
+      for (size_t k = 0; k < 3; k++) p[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
+    const double nearest = brute(&m, p), enough = nearest + 0.02 * (double)(i % 5);
+    const double found = qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, enough, &bound);
+    assert_true(found >= nearest - 1e-12 && (found <= nearest + 1e-12 || found < enough));
+    early += found > nearest + 1e-12;
+    for (size_t c = 0; c < 3; c++) assert_true(brute(&m, corners[c]) <= bound + 1e-12);
+  }
+  assert_true(early > 0);
   qmat_envelope_free(envelope);
   qmat_context_uninit(&context);
 }
@@ -224,7 +247,8 @@ static void test_no_primitive_is_infinitely_far(void **unused) {
   assert_true(qmat_envelope_distance_within(envelope, (double[3]){0, 0, 0}, 5) == INFINITY);
   const double corners[1][3] = {{0, 0, 0}};
   double bound;
-  assert_true(qmat_envelope_bound(envelope, corners[0], corners, 1, &bound) == INFINITY && bound == INFINITY);
+  assert_true(qmat_envelope_bound(envelope, corners[0], corners, 1, -INFINITY, &bound) == INFINITY &&
+              bound == INFINITY);
   qmat_envelope_free(envelope);
   qmat_envelope_free(NULL);
   qmat_context_uninit(&context);
@@ -272,6 +296,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_minimum_matches_brute_force),
       cmocka_unit_test(test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_one_primitive),
+      cmocka_unit_test(test_a_bound_that_is_enough_ends_the_search),
       cmocka_unit_test(test_few_spheres_match_brute_force),
       cmocka_unit_test(test_primitives_are_numbered_slabs_cones_spheres),
       cmocka_unit_test(test_coincident_primitives_are_searched_through),

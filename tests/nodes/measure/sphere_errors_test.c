@@ -32,7 +32,8 @@ static double measure(qmat_mesh *mesh, const double *spheres, size_t count, cons
   const double tolerance = TOLERANCE / frame->diagonal;
   assert_int_equal(qmat_sphere_errors_measure(&context, surface, envelope, unit, count, INFINITY, tolerance, errors),
                    QMAT_OK);
-  assert_int_equal(qmat_hausdorff_bound_measure(&context, surface, envelope, 0, tolerance, INFINITY, &all), QMAT_OK);
+  assert_int_equal(qmat_hausdorff_bound_measure(&context, surface, envelope, 0, tolerance, INFINITY, INFINITY, &all),
+                   QMAT_OK);
   for (size_t i = 0; i < count; i++) errors[i] *= frame->diagonal;
   const double largest = all.found * frame->diagonal;
   qmat_envelope_free(envelope);

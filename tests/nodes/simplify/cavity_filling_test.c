@@ -118,7 +118,7 @@ static void test_cavities_are_found_and_filled(void **state) {
   make_bar(&b, false);
   qmat_medial_errors errors = {.surface_to_envelope = 0};
   const double wide = 0.1; /* what the corners of the bar need */
-  assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
+  assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, false, &errors), QMAT_OK);
   assert_true(errors.uncovered_count > 0);
   assert_true(errors.boundary_to_surface > wide);
   for (int i = 0; i < 8 && errors.uncovered_count > 0; i++) {
@@ -128,7 +128,7 @@ static void test_cavities_are_found_and_filled(void **state) {
         QMAT_OK);
     assert_true(added > 0);
     qmat_medial_errors_uninit(&errors);
-    assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, &errors), QMAT_OK);
+    assert_int_equal(qmat_medial_boundary_measure(&b.context, b.surface, b.medial, wide, false, &errors), QMAT_OK);
   }
   assert_int_equal(errors.uncovered_count, 0);
   assert_true(errors.boundary_to_surface <= wide);
