@@ -7,6 +7,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/outer_hull.h"
 #include "nodes/colliders/tangent_hull.h"
 
 /* Before the end hulls may have this many times as many vertices, and are within this share of the error. */
@@ -38,21 +39,21 @@ typedef struct pair {
   bool exceeds;  /* `leaves` is above the limit of the test */
 } pair;
 
-/* Scratch of a thread: a joint hull, and a hull before the end. */
+/* Scratch of a thread: a joint hull, and hulls before and at the end. */
 typedef struct joint {
   size_t point_count, triangle_count;
   double *points, *unit; /* in the model, and in the unit frame */
   uint32_t *triangles;
-  qmat_tangent_hull fine;
+  qmat_tangent_hull fine, coarse;
+  qmat_outer_hull outer;
 } joint;
 
 typedef struct merging {
   qmat_context *context;
   const qmat_surface *solid;
-  size_t room;              /* vertices of a part */
+  size_t room, most_points; /* vertices of a part, and of a hull at the end */
   double limit;             /* unit frame */
   double error;             /* of the vertices of hulls, in the model */
-  qmat_tangent_hull coarse; /* of hulls at the end */
   part *parts;
   size_t part_count, live_count;
   pair *pairs;
@@ -357,11 +358,12 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
   const int threads = qmat_threads(m->context);
   m->part_count = count;
   m->room = ROOM_FACTOR * most_points;
+  m->most_points = most_points;
   m->parts = qmat_arena_calloc(arena, count, sizeof *m->parts);
   m->joints = qmat_arena_alloc(arena, (size_t)threads, sizeof *m->joints);
   m->is_vertex = qmat_arena_alloc(arena, 2 * m->room, sizeof *m->is_vertex);
   if (!m->parts || !m->joints || !m->is_vertex) return qmat_fail_memory(m->context, "the hulls");
-  qmat_status status = qmat_tangent_hull_init(m->context, most_points, &m->coarse);
+  qmat_status status = QMAT_OK;
   for (int i = 0; i < threads && status == QMAT_OK; i++) {
     joint *j = &m->joints[i];
     j->points = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->points);
@@ -369,13 +371,43 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
     j->triangles = qmat_arena_alloc(arena, 2 * m->room, 6 * sizeof *j->triangles);
     if (!j->points || !j->unit || !j->triangles) return qmat_fail_memory(m->context, "the hulls");
     status = qmat_tangent_hull_init(m->context, m->room, &j->fine);
+    if (status == QMAT_OK) status = qmat_tangent_hull_init(m->context, most_points, &j->coarse);
+    if (status == QMAT_OK) status = qmat_outer_hull_init(m->context, m->room, &j->outer);
   }
   return status == QMAT_OK ? make_parts(m, given) : status;
 }
 
+/* Reduces a part to as few vertices as a hull may have: triangles or half-spaces, whichever has the smaller volume. */
+static qmat_status reduce_part(const merging *m, part *p, joint *j) {
+  const qmat_tangent_hull *coarse = &j->coarse;
+  const qmat_outer_hull *outer = &j->outer;
+  double of_outer = INFINITY;
+  size_t count;
+  qmat_status status = surround(&j->coarse, p->points, p->count, 0, m->error);
+  if (status == QMAT_OK) status = qmat_convex_hull(coarse->points, coarse->point_count, j->triangles, &count);
+  if (status != QMAT_OK) return status;
+  const double of_coarse = volume_of(coarse->points, j->triangles, count);
+  status = qmat_outer_hull_fit(&j->outer, p->points, p->count, m->most_points, fine_share * m->error);
+  if (status == QMAT_OK) status = qmat_convex_hull(outer->points, outer->point_count, j->triangles, &count);
+  if (status == QMAT_OK) of_outer = volume_of(outer->points, j->triangles, count);
+  if (status == QMAT_ERROR_MEMORY) return status;
+  const bool done = of_outer < of_coarse ? set_points(p, outer->points, outer->point_count)
+                                         : set_points(p, coarse->points, coarse->point_count);
+  return done ? QMAT_OK : QMAT_ERROR_MEMORY;
+}
+
+static qmat_status reduce_parts(merging *m) {
+  const int threads = qmat_threads(m->context);
+  bool done = true;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
+  for (size_t i = 0; i < m->part_count; i++)
+    if (m->parts[i].live && reduce_part(m, &m->parts[i], &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
+  return done ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
+}
+
 /* Writes the live parts as the hulls, in their order. */
 static qmat_status write_parts(merging *m, qmat_colliders *c) {
-  const size_t room = m->live_count * m->coarse.most;
+  const size_t room = m->live_count * m->most_points;
   qmat_status status = QMAT_OK;
   double *points = qmat_alloc(room, 3 * sizeof *points);
   uint32_t *triangles = qmat_alloc(room, 6 * sizeof *triangles);
@@ -386,15 +418,12 @@ static qmat_status write_parts(merging *m, qmat_colliders *c) {
     const part *p = &m->parts[i];
     if (!p->live) continue;
     size_t of_hull = 0;
-    status = surround(&m->coarse, p->points, p->count, 0, m->error);
-    const size_t of_part = m->coarse.point_count;
-    if (status == QMAT_OK)
-      status = qmat_convex_hull(m->coarse.points, of_part, &triangles[3 * triangle_count], &of_hull);
+    status = qmat_convex_hull(p->points, p->count, &triangles[3 * triangle_count], &of_hull);
     if (status != QMAT_OK) break;
-    memcpy(&points[3 * point_count], m->coarse.points, 3 * of_part * sizeof *points);
+    memcpy(&points[3 * point_count], p->points, 3 * p->count * sizeof *points);
     for (size_t k = 0; k < 3 * of_hull; k++) triangles[3 * triangle_count + k] += (uint32_t)point_count;
     memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)p->shape], 3 * sizeof *shapes);
-    c->hull_ends[2 * count] = (uint32_t)(point_count += of_part);
+    c->hull_ends[2 * count] = (uint32_t)(point_count += p->count);
     c->hull_ends[2 * count++ + 1] = (uint32_t)(triangle_count += of_hull);
   }
   if (status == QMAT_OK) {
@@ -426,6 +455,7 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, q
     }
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }
+  if (status == QMAT_OK) status = reduce_parts(&m);
   if (status == QMAT_OK && m.live_count > 0) status = write_parts(&m, colliders);
   for (size_t i = 0; m.parts && i < m.part_count; i++) qmat_free(m.parts[i].points);
   qmat_free(m.pairs);
