@@ -25,7 +25,107 @@ static const qmat_value_row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
                                             ARRAY(qmat_scene, placements, F64, placement_count, 16),
                                             ARRAY(qmat_scene, placement_paths, NAMES, placement_count, 1),
                                             SCALAR(qmat_scene, has_instances, BOOL),
+                                            ARRAY(qmat_scene, rig.skeleton_paths, NAMES, rig.skeleton_count, 1),
+                                            ARRAY(qmat_scene, rig.skeleton_placements, F64, rig.skeleton_count, 16),
+                                            ARRAY(qmat_scene, rig.joint_skeletons, U32, rig.joint_count, 1),
+                                            ARRAY(qmat_scene, rig.joint_parents, U32, rig.joint_count, 1),
+                                            ARRAY(qmat_scene, rig.joint_names, NAMES, rig.joint_count, 1),
+                                            ARRAY(qmat_scene, rig.joint_poses, F64, rig.joint_count, QMAT_RIG_POSE),
+                                            ARRAY(qmat_scene, rig.skin_skeletons, U32, rig.skin_count, 1),
+                                            ARRAY(qmat_scene, rig.skin_ends, U32, rig.skin_count, 1),
+                                            ARRAY(qmat_scene, rig.bound_joints, U32, rig.bound_count, 1),
+                                            ARRAY(qmat_scene, rig.bound_matrices, F64, rig.bound_count, 16),
+                                            ARRAY(qmat_scene, rig.placed_skins, U32, rig.placed_count, 1),
+                                            ARRAY(qmat_scene, rig.curves, U32, rig.curve_count, 3),
+                                            ARRAY(qmat_scene, rig.key_times, F64, rig.key_count, 1),
+                                            ARRAY(qmat_scene, rig.moved_joints, U32, rig.moved_count, 1),
+                                            ARRAY(qmat_scene, rig.values, F64, rig.value_count, 1),
                                             END};
+
+/* Ids below `count`, or UINT32_MAX for none. */
+static qmat_status check_ids_or_none(qmat_context *context, const uint32_t *ids, size_t length, size_t count,
+                                     const char *kind, const char *of) {
+  for (size_t i = 0; i < length; i++) {
+    if (ids[i] < count || ids[i] == UINT32_MAX) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it names %s %u of %zu", of, ids[i], count);
+    return qmat_fail_element(context, kind, (int64_t)i);
+  }
+  return QMAT_OK;
+}
+
+/* Parents come before their joints and are of the same skeleton. The joints of skins end in order. */
+static qmat_status check_skeletons(qmat_context *context, const qmat_rig *rig) {
+  for (size_t i = 0; i < rig->joint_count; i++) {
+    const uint32_t parent = rig->joint_parents[i], skeleton = rig->joint_skeletons[i];
+    const bool rises = i == 0 || rig->joint_skeletons[i - 1] <= skeleton;
+    if (rises && skeleton < rig->skeleton_count &&
+        (parent == UINT32_MAX || (parent < i && rig->joint_skeletons[parent] == skeleton)))
+      continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "its parent or its skeleton is out of order");
+    return qmat_fail_element(context, "joint", (int64_t)i);
+  }
+  for (size_t i = 0; i < rig->skin_count; i++) {
+    const size_t start = i > 0 ? rig->skin_ends[i - 1] : 0, end = rig->skin_ends[i];
+    if (start <= end && end <= rig->bound_count && (i + 1 < rig->skin_count || end == rig->bound_count)) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it ends at joint %zu of %zu", end, rig->bound_count);
+    return qmat_fail_element(context, "skin", (int64_t)i);
+  }
+  return QMAT_OK;
+}
+
+/* The curves use up all times, joints and values, and their times rise. */
+static qmat_status check_curves(qmat_context *context, const qmat_rig *rig) {
+  size_t keys = 0, joints = 0, values = 0, bad = SIZE_MAX;
+  for (size_t i = 0; i < rig->curve_count && bad == SIZE_MAX; i++) {
+    const uint32_t part = rig->curves[3 * i], of_curve = rig->curves[3 * i + 1], moved = rig->curves[3 * i + 2];
+    if (part >= QMAT_RIG_PART_COUNT || of_curve > rig->key_count - keys || moved > rig->moved_count - joints) bad = i;
+    for (size_t k = 0; k < of_curve && bad == SIZE_MAX; k++)
+      if (!(rig->key_times[keys + k] >= 0) || (k > 0 && !(rig->key_times[keys + k] > rig->key_times[keys + k - 1])))
+        bad = i;
+    keys += of_curve;
+    joints += moved;
+    values += (size_t)of_curve * moved * (part == QMAT_RIG_ROTATION ? 4 : 3);
+  }
+  if (bad == SIZE_MAX && keys == rig->key_count && joints == rig->moved_count && values == rig->value_count)
+    return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "its times, joints and values do not match");
+  return qmat_fail_element(context, "curve", bad == SIZE_MAX ? (int64_t)rig->curve_count - 1 : (int64_t)bad);
+}
+
+static qmat_status check_rig(qmat_context *context, const qmat_scene *scene) {
+  const qmat_rig *rig = &scene->rig;
+  const struct {
+    const double *numbers;
+    size_t count, components;
+    const char *kind, *what;
+  } arrays[] = {{rig->skeleton_placements, rig->skeleton_count, 16, "skeleton", "transform"},
+                {rig->joint_poses, rig->joint_count, QMAT_RIG_POSE, "joint", "pose"},
+                {rig->bound_matrices, rig->bound_count, 16, "joint of a skin", "matrix"},
+                {rig->key_times, rig->key_count, 1, "key", "time"},
+                {rig->values, rig->value_count, 1, "value of a curve", "number"}};
+  if (rig->placed_count != 0 && rig->placed_count != scene->placement_count)
+    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu skins for %zu placements", rig->placed_count,
+                     scene->placement_count);
+  qmat_status status = check_skeletons(context, rig);
+  for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++)
+    status = qmat_check_finite(context, arrays[i].numbers, arrays[i].count, arrays[i].components, arrays[i].kind,
+                               arrays[i].what);
+  for (size_t i = 0; i < rig->skeleton_count && status == QMAT_OK; i++)
+    status = qmat_check_utf8(context, rig->skeleton_paths[i], "path of a skeleton");
+  for (size_t i = 0; i < rig->joint_count && status == QMAT_OK; i++)
+    status = qmat_check_utf8(context, rig->joint_names[i], "name of a joint");
+  if (status == QMAT_OK)
+    status = qmat_check_ids(context, rig->skin_skeletons, rig->skin_count, rig->skeleton_count, "skin", 1, "skeleton");
+  if (status == QMAT_OK)
+    status =
+        check_ids_or_none(context, rig->bound_joints, rig->bound_count, rig->joint_count, "joint of a skin", "joint");
+  if (status == QMAT_OK)
+    status = check_ids_or_none(context, rig->placed_skins, rig->placed_count, rig->skin_count, "placement", "skin");
+  if (status == QMAT_OK)
+    status =
+        qmat_check_ids(context, rig->moved_joints, rig->moved_count, rig->joint_count, "joint of a curve", 1, "joint");
+  return status == QMAT_OK ? check_curves(context, rig) : status;
+}
 
 static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
   const qmat_scene *scene = (const qmat_scene *)value;
@@ -40,6 +140,7 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
     of_rows = qmat_check_finite(context, scene->placements, scene->placement_count, 16, "placement", "transform");
   for (size_t i = 0; i < scene->placement_count && of_rows == QMAT_OK; i++)
     of_rows = qmat_check_utf8(context, scene->placement_paths[i], "path of a mesh");
+  if (of_rows == QMAT_OK) of_rows = check_rig(context, scene);
   return of_rows != QMAT_OK ? of_rows : qmat_check_parts(context, scene->parts, scene->part_count);
 }
 

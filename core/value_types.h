@@ -11,6 +11,7 @@
 
 #include "core/cage.h"
 #include "core/digest.h"
+#include "core/rig.h"
 
 /* The types of value that travel along the edges of a graph. Each struct starts with a qmat_value. Arrays are flat,
  * 64-byte aligned and padded (qmat_alloc). Positions are double, in the units of the model; indices are uint32_t.
@@ -67,6 +68,7 @@ typedef struct qmat_scene {
   double *placements;     /* 16 * placement_count: from the mesh's space into the scene's, p' = (p, 1) * m by rows */
   char **placement_paths; /* placement_count: of the prim with the mesh */
   bool has_instances;     /* prims are marked as instanceable: the prims below them take no opinions */
+  qmat_rig rig;           /* of a USD scene */
 } qmat_scene;
 
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. The first triangles bound solids; the last ones may

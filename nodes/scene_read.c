@@ -76,7 +76,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 11,
+    .version = 12,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
@@ -88,7 +88,8 @@ const qmat_node qmat_node_scene_read = {
         "each vertex.\n\n"
         "A USD scene is read alike: equal meshes are one, wherever references, instances and point instancers place "
         "it, "
-        "and warnings name what was left out. Subdivision surfaces are control cages, for mesh.subdivide. Sphere, "
+        "and warnings name what was left out. Skeletons and their motion are kept for glTF. Subdivision surfaces are "
+        "control cages, for mesh.subdivide. Sphere, "
         "Cube, "
         "Capsule, Cylinder and Cone are solids; the mesh's deviation is that of the polygons from their circles.",
     .citation = "",

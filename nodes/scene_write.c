@@ -2,6 +2,7 @@
 /* scene.write: a medial mesh and its skin as a file in memory. */
 #include <math.h>
 
+#include "core/geometry/joint_weights.h"
 #include "core/node.h"
 #include "core/text.h"
 #include "io/gltf/gltf_colliders.h"
@@ -157,6 +158,32 @@ static unsigned collider_forms(const scene_write_params *params) {
   return forms ? forms : QMAT_GLTF_KHR;
 }
 
+/* Whether a place of the mesh has a skin. */
+static bool is_skinned(const qmat_scene *scene, size_t mesh) {
+  for (size_t i = 0; i < scene->rig.placed_count; i++)
+    if (scene->placed[i] == mesh && scene->rig.placed_skins[i] != UINT32_MAX) return true;
+  return false;
+}
+
+/* What the vertices of a skin have besides their places, in the arena. */
+static qmat_status add_vertex_data(qmat_context *context, const scene_write_params *params, bool has_joints,
+                                   qmat_gltf_addition *addition) {
+  const qmat_medial *medial = addition->medial;
+  const qmat_mesh *skin = addition->skin;
+  if (!medial || !skin) return QMAT_OK;
+  if (params->skin_colours) {
+    const qmat_status status = qmat_skin_colours(context, medial, skin, &addition->vertices.colours);
+    if (status != QMAT_OK) return status;
+  }
+  if (!has_joints || medial->skinned_count == 0) return QMAT_OK;
+  uint32_t *joints = qmat_arena_alloc(&context->arena, 4 * skin->vertex_count, sizeof *joints);
+  double *weights = qmat_arena_alloc(&context->arena, 4 * skin->vertex_count, sizeof *weights);
+  if (!joints || !weights) return qmat_fail_memory(context, "the joints of a skin");
+  addition->vertices.joints = joints;
+  addition->vertices.weights = weights;
+  return qmat_skin_envelope(context, medial, skin, joints, weights);
+}
+
 /* All inputs of one mesh, or lists of one length. `stated` has one element a medial mesh. */
 static qmat_status write_gltf(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
                               json_t *report, qmat_stated_errors *stated, qmat_file **file) {
@@ -184,8 +211,8 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
     additions[i].colliders = (const qmat_colliders *)given_for(inputs[IN_COLLIDERS], i);
     additions[i].collider_forms = collider_forms(params);
     additions[i].dynamic = !params->fixed;
-    if (params->skin_colours && additions[i].skin && additions[i].medial && status == QMAT_OK)
-      status = qmat_skin_colours(context, additions[i].medial, additions[i].skin, &additions[i].colours);
+    if (status == QMAT_OK)
+      status = add_vertex_data(context, params, placed && !kept && is_skinned(scene, i), &additions[i]);
   }
   if (status == QMAT_OK)
     status = kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
@@ -525,13 +552,15 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 14,
+    .version = 15,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
         "gain its medial mesh. Any other model becomes a new asset that shows the skin; one in other units than "
         "metres, or "
-        "with z up, below a node that converts it. A .glb contains the scene's "
+        "with z up, below a node that converts it. The skeletons of a USD scene and their motion are in it, and move "
+        "the "
+        "skin as they move the spheres. A .glb contains the scene's "
         "buffers and images; those of a .gltf are files named after it.\n\n"
         "qmat_data in the extras is the medial mesh, by Draco and in base64; qmat_flat is the same as plain numbers, "
         "which "

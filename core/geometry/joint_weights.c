@@ -6,6 +6,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
+#include "core/geometry/medial_primitive.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/value.h"
@@ -233,4 +234,42 @@ qmat_status qmat_skin_spheres(qmat_context *context, const qmat_mesh *mesh, qmat
   if (!medial->joints || !medial->weights) return qmat_fail_memory(context, "the joints of spheres");
   medial->skinned_count = medial->sphere_count;
   return sum_up(context, &points, medial);
+}
+
+/* ---- the envelope ---- */
+
+/* The joints of the primitive nearest to a point, blended by the weights of its spheres at the foot. */
+static void blend_joints(const qmat_envelope *envelope, const qmat_medial *medial, const double *point,
+                         uint32_t strongest[4], double strengths[4]) {
+  size_t primitive;
+  uint32_t ids[3], joints[12];
+  double feet[3] = {1, 0, 0}, weights[12];
+  qmat_envelope_distance(envelope, point, &primitive);
+  const int count = qmat_envelope_primitive(envelope, primitive, ids);
+  if (count > 1) {
+    const double *spheres[3];
+    for (int k = 0; k < count; k++) spheres[k] = medial->spheres + 4 * (size_t)ids[k];
+    qmat_primitive prepared;
+    qmat_primitive_ball ball;
+    qmat_primitive_prepare(spheres, count, &prepared, &ball);
+    qmat_primitive_foot(&prepared, point, feet);
+  }
+  for (size_t k = 0; k < 4 * (size_t)count; k++) {
+    joints[k] = medial->joints[4 * (size_t)ids[k / 4] + k % 4];
+    weights[k] = feet[k / 4] * medial->weights[4 * (size_t)ids[k / 4] + k % 4];
+  }
+  qmat_strongest_joints(joints, weights, 4 * (size_t)count, strongest, strengths);
+}
+
+qmat_status qmat_skin_envelope(qmat_context *context, const qmat_medial *medial, const qmat_mesh *mesh,
+                               uint32_t *joints, double *weights) {
+  qmat_envelope *envelope;
+  const qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);
+  if (status != QMAT_OK) return status;
+  const int threads = qmat_threads(context);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+  for (size_t v = 0; v < mesh->vertex_count; v++)
+    blend_joints(envelope, medial, mesh->positions + 3 * v, joints + 4 * v, weights + 4 * v);
+  qmat_envelope_free(envelope);
+  return qmat_progress(context, 0, 0, "joints");
 }

@@ -57,8 +57,23 @@ static void area_normals(const qmat_mesh *skin, double *sums, float *normals) {
   }
 }
 
-static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals, const uint8_t *colours,
-                           qmat_gltf_skin *data, qmat_writer *buffer) {
+/* Appends what is given of the vertices after positions, normals and indices. Joints start at a multiple of 4. */
+static void put_vertex_data(size_t vertex_count, const qmat_gltf_vertex_data *more, qmat_gltf_skin *data,
+                            qmat_writer *buffer) {
+  if (more->colours) {
+    data->sizes[QMAT_GLTF_SKIN_COLOURS] = 4 * vertex_count;
+    qmat_put_bytes(buffer, more->colours, 4 * vertex_count);
+  }
+  if (!more->joints) return;
+  qmat_gltf_pad(buffer, 0);
+  for (size_t i = 0; i < 4 * vertex_count; i++) qmat_put_u16(buffer, (uint16_t)more->joints[i]);
+  for (size_t i = 0; i < 4 * vertex_count; i++) qmat_put_f32(buffer, (float)more->weights[i]);
+  data->sizes[QMAT_GLTF_SKIN_JOINTS] = 8 * vertex_count;
+  data->sizes[QMAT_GLTF_SKIN_WEIGHTS] = 16 * vertex_count;
+}
+
+static void put_plain_skin(const qmat_mesh *skin, const float *positions, const float *normals,
+                           const qmat_gltf_vertex_data *more, qmat_gltf_skin *data, qmat_writer *buffer) {
   size_t count = 3 * skin->vertex_count;
   data->vertex_count = skin->vertex_count;
   data->index_count = 3 * skin->triangle_count;
@@ -80,10 +95,11 @@ static void put_plain_skin(const qmat_mesh *skin, const float *positions, const 
   }
   data->sizes[0] = data->sizes[1] = count * sizeof(float);
   data->sizes[2] = data->index_count * (data->wide ? 4 : 2);
-  if (!colours) return;
-  data->coloured = true;
-  data->sizes[3] = 4 * skin->vertex_count;
-  qmat_put_bytes(buffer, colours, data->sizes[3]);
+  put_vertex_data(skin->vertex_count, more, data, buffer);
+  for (int i = 1; i < QMAT_GLTF_SKIN_VIEWS; i++) {
+    data->offsets[i] = data->offsets[i - 1] + data->sizes[i - 1];
+    if (i == QMAT_GLTF_SKIN_JOINTS) data->offsets[i] = (data->offsets[i] + 3) / 4 * 4;
+  }
 }
 
 static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, const float *positions,
@@ -116,7 +132,8 @@ static qmat_status put_draco_skin(qmat_context *context, const qmat_mesh *skin, 
 }
 
 qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, const double origin[3],
-                               const uint8_t *colours, double moved, qmat_gltf_skin *data, qmat_writer *buffer) {
+                               const qmat_gltf_vertex_data *more, double moved, qmat_gltf_skin *data,
+                               qmat_writer *buffer) {
   float *positions = qmat_alloc(skin->vertex_count, 3 * sizeof *positions);
   float *normals = qmat_alloc(skin->vertex_count, 3 * sizeof *normals);
   double *sums = qmat_calloc(skin->vertex_count, 3 * sizeof *sums);
@@ -128,7 +145,7 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
     if (moved > 0) {
       status = put_draco_skin(context, skin, positions, normals, moved, data, buffer);
     } else {
-      put_plain_skin(skin, positions, normals, colours, data, buffer);
+      put_plain_skin(skin, positions, normals, more, data, buffer);
     }
     qmat_gltf_pad(buffer, 0);
     if (status == QMAT_OK && buffer->failed) status = qmat_fail_memory(context, "the skin");
@@ -143,46 +160,68 @@ qmat_status qmat_gltf_skin_put(qmat_context *context, const qmat_mesh *skin, con
 
 /* json_pack fails on a NULL argument and frees the others, so one check at the end suffices. */
 
+/* The attribute of each view; NULL: it has the indices. */
+static const char *const attributes[QMAT_GLTF_SKIN_VIEWS] = {"POSITION", "NORMAL",   NULL,
+                                                             "COLOR_0",  "JOINTS_0", "WEIGHTS_0"};
+
+static bool has_view(const qmat_gltf_skin *data, int view) {
+  return data->compressed ? view <= QMAT_GLTF_SKIN_INDICES : data->sizes[view] > 0;
+}
+
 /* Adds the buffer views of a skin whose data start at `offset`. `*first` gets the number of the first view. */
 static bool add_views(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset, json_int_t *first) {
-  static const int targets[4] = {ARRAY_BUFFER, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, ARRAY_BUFFER};
-  for (int i = 0; i < (data->compressed ? 1 : data->coloured ? 4 : 3); i++) {
+  for (int i = 0; i < (data->compressed ? 1 : QMAT_GLTF_SKIN_VIEWS); i++) {
+    if (!has_view(data, i)) continue;
     json_int_t number;
-    json_t *view = json_pack("{s:I, s:I, s:I}", "buffer", buffer, "byteOffset", (json_int_t)offset, "byteLength",
-                             (json_int_t)data->sizes[i]);
-    if (view && !data->compressed && !qmat_gltf_set(view, "target", json_integer(targets[i]))) {
+    json_t *view = json_pack("{s:I, s:I, s:I}", "buffer", buffer, "byteOffset", (json_int_t)(offset + data->offsets[i]),
+                             "byteLength", (json_int_t)data->sizes[i]);
+    if (view && !data->compressed &&
+        !qmat_gltf_set(view, "target", json_integer(attributes[i] ? ARRAY_BUFFER : ELEMENT_ARRAY_BUFFER))) {
       json_decref(view);
       view = NULL;
     }
     if (!qmat_gltf_add(root, "bufferViews", view, &number)) return false;
     if (i == 0) *first = number;
-    offset += data->sizes[i];
   }
   return true;
 }
 
-/* Adds the accessors of positions, normals, indices and colours, in this order. */
-static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t first_view, json_int_t *first) {
-  json_t *position =
-      json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", QMAT_GLTF_FLOAT, "count",
-                (json_int_t)data->vertex_count, "type", "VEC3", "min", (double)data->min[0], (double)data->min[1],
-                (double)data->min[2], "max", (double)data->max[0], (double)data->max[1], (double)data->max[2]);
-  json_t *normal = json_pack("{s:i, s:I, s:s}", "componentType", QMAT_GLTF_FLOAT, "count",
-                             (json_int_t)data->vertex_count, "type", "VEC3");
-  json_t *indices =
-      json_pack("{s:i, s:I, s:s}", "componentType", data->wide ? QMAT_GLTF_UNSIGNED_INT : QMAT_GLTF_UNSIGNED_SHORT,
-                "count", (json_int_t)data->index_count, "type", "SCALAR");
-  json_t *accessors[4] = {position, normal, indices};
-  if (data->coloured)
-    accessors[3] = json_pack("{s:i, s:b, s:I, s:s}", "componentType", QMAT_GLTF_UNSIGNED_BYTE, "normalized", 1, "count",
-                             (json_int_t)data->vertex_count, "type", "VEC4");
+static json_t *make_accessor(const qmat_gltf_skin *data, int view) {
+  const json_int_t vertices = (json_int_t)data->vertex_count;
+  switch (view) {
+    case QMAT_GLTF_SKIN_POSITIONS:
+      return json_pack("{s:i, s:I, s:s, s:[f,f,f], s:[f,f,f]}", "componentType", QMAT_GLTF_FLOAT, "count", vertices,
+                       "type", "VEC3", "min", (double)data->min[0], (double)data->min[1], (double)data->min[2], "max",
+                       (double)data->max[0], (double)data->max[1], (double)data->max[2]);
+    case QMAT_GLTF_SKIN_NORMALS:
+      return json_pack("{s:i, s:I, s:s}", "componentType", QMAT_GLTF_FLOAT, "count", vertices, "type", "VEC3");
+    case QMAT_GLTF_SKIN_INDICES:
+      return json_pack("{s:i, s:I, s:s}", "componentType",
+                       data->wide ? QMAT_GLTF_UNSIGNED_INT : QMAT_GLTF_UNSIGNED_SHORT, "count",
+                       (json_int_t)data->index_count, "type", "SCALAR");
+    case QMAT_GLTF_SKIN_COLOURS:
+      return json_pack("{s:i, s:b, s:I, s:s}", "componentType", QMAT_GLTF_UNSIGNED_BYTE, "normalized", 1, "count",
+                       vertices, "type", "VEC4");
+    default:
+      return json_pack("{s:i, s:I, s:s}", "componentType",
+                       view == QMAT_GLTF_SKIN_JOINTS ? QMAT_GLTF_UNSIGNED_SHORT : QMAT_GLTF_FLOAT, "count", vertices,
+                       "type", "VEC4");
+  }
+}
+
+/* Adds the accessors of the views, in their order, and refers to them in the primitive. */
+static bool add_accessors(json_t *root, const qmat_gltf_skin *data, json_int_t first_view, json_t *primitive) {
+  json_t *named = json_object_get(primitive, "attributes");
   bool done = true;
-  for (int i = 0; i < (data->coloured ? 4 : 3); i++) {
+  json_int_t view = first_view;
+  for (int i = 0; i < QMAT_GLTF_SKIN_VIEWS && done; i++) {
+    if (!has_view(data, i)) continue;
     json_int_t number;
-    if (accessors[i] && !data->compressed)
-      done = qmat_gltf_set(accessors[i], "bufferView", json_integer(first_view + i)) && done;
-    done = qmat_gltf_add(root, "accessors", accessors[i], &number) && done;
-    if (i == 0) *first = number;
+    json_t *accessor = make_accessor(data, i);
+    if (accessor && !data->compressed) done = qmat_gltf_set(accessor, "bufferView", json_integer(view++));
+    done = qmat_gltf_add(root, "accessors", accessor, &number) && done;
+    done = done && (attributes[i] ? qmat_gltf_set(named, attributes[i], json_integer(number))
+                                  : qmat_gltf_set(primitive, "indices", json_integer(number)));
   }
   return done;
 }
@@ -208,14 +247,13 @@ static json_t *extras_of(const qmat_gltf_skin *data, bool mark) {
 
 bool qmat_gltf_skin_add(json_t *root, const qmat_gltf_skin *data, json_int_t buffer, size_t offset,
                         json_int_t *material, const char *name, bool mark, json_int_t *mesh_number) {
-  json_int_t view = 0, accessor = 0;
-  if (!add_material(root, data->coloured, material) || !add_views(root, data, buffer, offset, &view) ||
-      !add_accessors(root, data, view, &accessor))
+  json_int_t view = 0;
+  if (!add_material(root, data->sizes[QMAT_GLTF_SKIN_COLOURS] > 0, material) ||
+      !add_views(root, data, buffer, offset, &view))
     return false;
-  json_t *primitive = json_pack("{s:{s:I, s:I}, s:I, s:I}", "attributes", "POSITION", accessor, "NORMAL", accessor + 1,
-                                "indices", accessor + 2, "material", *material);
-  bool done = !primitive || !data->coloured ||
-              qmat_gltf_set(json_object_get(primitive, "attributes"), "COLOR_0", json_integer(accessor + 3));
+  json_t *primitive = json_pack("{s:{}}", "attributes");
+  bool done = primitive && add_accessors(root, data, view, primitive) &&
+              qmat_gltf_set(primitive, "material", json_integer(*material));
   if (primitive && data->compressed) {
     json_t *extension = json_pack("{s:{s:I, s:{s:I, s:I}}}", QMAT_GLTF_DRACO, "bufferView", view, "attributes",
                                   "POSITION", (json_int_t)data->position_id, "NORMAL", (json_int_t)data->normal_id);

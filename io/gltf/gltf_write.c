@@ -16,8 +16,9 @@
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
+#include "io/gltf/gltf_place.h"
+#include "io/gltf/gltf_rig.h"
 #include "io/gltf/gltf_skin.h"
-#include "io/placement.h"
 
 #define DATA_URI "data:application/octet-stream;base64,"
 
@@ -192,6 +193,8 @@ typedef struct document {
   const qmat_scene *places;        /* of a new asset: where the meshes are; NULL: one mesh, where it is */
   size_t nodes_given;              /* of the asset that was read */
   json_t *converter;               /* of a new asset: the node that turns units and axes; NULL: none yet */
+  qmat_gltf_rig rig;               /* of the places */
+  json_int_t *skins;               /* per place: its skin in the asset, -1: none; NULL: no place has one */
 } document;
 
 /* The bytes as a data URI; NULL when out of memory. */
@@ -301,48 +304,80 @@ static bool add_node(document *document, const json_t *extras, const double *ori
   return is_new ? add_converted(document, options, number) : add_root(document->root, number);
 }
 
-/* Sets a node's matrix, unless it is the identity. */
-static bool set_matrix(json_t *node, const double m[16]) {
-  bool is_identity = true;
-  json_t *matrix = json_array();
-  bool done = matrix != NULL;
-  for (int i = 0; i < 16 && done; i++) {
-    is_identity = is_identity && m[i] == (i % 5 == 0);
-    done = json_array_append_new(matrix, json_real(m[i])) == 0;
+/* Turns a transform into a new asset's space into one into metres with y up. */
+static void convert(const qmat_gltf_options *options, double m[16]) {
+  const double unit = options->meters_per_unit > 0 ? options->meters_per_unit : 1;
+  for (int i = 0; i < 16; i += 4) {
+    const double y = unit * m[i + 1], z = unit * m[i + 2];
+    m[i] *= unit;
+    m[i + 1] = options->is_z_up ? z : y;
+    m[i + 2] = options->is_z_up ? 0 - y : z; /* no -0 */
   }
-  if (done && !is_identity) return qmat_gltf_set(node, "matrix", matrix);
-  json_decref(matrix);
-  return done;
 }
 
-/* Adds a node at each place of a mesh. A place that shears gets two: glTF has no matrix for it. */
+/* Adds the node of a skinned mesh, which no transform moves but those of its joints, and makes `top` its child: the
+ * place of the medial mesh where nothing is skinned. */
+static bool add_skinned(document *document, const char *name, json_int_t mesh, json_int_t skin, json_int_t top) {
+  json_int_t number;
+  json_t *node = json_pack("{s:I, s:I, s:[I]}", "mesh", mesh, "skin", skin, "children", top);
+  bool done = node && qmat_gltf_set(node, "name", json_sprintf("%s skin", name));
+  done = qmat_gltf_add(document->root, "nodes", node, &number) && done;
+  return done && add_root(document->root, number);
+}
+
+/* Adds a node at each place of a mesh. */
 static bool add_places(document *document, size_t mesh, const json_t *extras, const double *origin, json_int_t skin,
                        const qmat_gltf_options *options) {
   const qmat_scene *scene = document->places;
   bool done = true;
   for (size_t i = 0; i < scene->placement_count && done; i++) {
     if (scene->placed[i] != mesh) continue;
-    const char *path = scene->placement_paths[i], *slash = strrchr(path, '/');
-    double m[16], inner[16], outer[16];
+    const bool is_skinned = skin >= 0 && document->skins && document->skins[i] >= 0;
+    const char *path = scene->placement_paths[i], *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    double m[16];
+    json_int_t number, top;
     memcpy(m, scene->placements + 16 * i, sizeof m);
     for (int k = 0; k < 3; k++) m[12 + k] += origin[0] * m[k] + origin[1] * m[4 + k] + origin[2] * m[8 + k];
-    const bool is_plain = qmat_placement_is_plain(m);
-    if (!is_plain) qmat_placement_split(m, inner, outer);
-    json_t *node = json_pack("{s:s}", "name", slash ? slash + 1 : path);
-    done = node && set_matrix(node, is_plain ? m : inner);
-    if (skin >= 0) done = done && qmat_gltf_set(node, "mesh", json_integer(skin));
+    if (is_skinned) convert(options, m);
+    json_t *node = json_pack("{s:s}", "name", name);
+    if (!qmat_gltf_place(document->root, node, m, &number, &top)) return false;
+    if (skin >= 0 && !is_skinned) done = qmat_gltf_set(node, "mesh", json_integer(skin));
     done = done && set_extras(node, extras);
     done = done && qmat_gltf_set(json_object_get(node, "extras"), "qmat_prim", json_string(path));
-    json_int_t number;
-    done = qmat_gltf_add(document->root, "nodes", node, &number) && done;
-    if (!is_plain) {
-      json_t *above = json_pack("{s:[I]}", "children", number);
-      done = done && above && set_matrix(above, outer);
-      done = qmat_gltf_add(document->root, "nodes", above, &number) && done;
-    }
-    done = done && add_converted(document, options, number);
+    done = done && (is_skinned ? add_skinned(document, name, skin, document->skins[i], top)
+                               : add_converted(document, options, top));
   }
   return done;
+}
+
+/* ---- skeletons ---- */
+
+/* Adds the skeletons of the places, and their motion. */
+static qmat_status add_rig(qmat_context *context, document *document, const qmat_gltf_options *options) {
+  const qmat_rig *rig = &document->places->rig;
+  if (rig->placed_count == 0) return QMAT_OK;
+  document->skins = qmat_alloc(rig->placed_count, sizeof *document->skins);
+  if (!document->skins) return qmat_fail_memory(context, "a glTF file");
+  for (size_t i = 0; i < rig->placed_count; i++) document->skins[i] = -1;
+  const qmat_status status = qmat_gltf_rig_init(context, document->root, rig, document->buffer, document->data_start,
+                                                &document->data, &document->rig);
+  for (size_t i = 0; i < rig->skeleton_count && status == QMAT_OK; i++)
+    if (document->rig.tops[i] >= 0 && !add_converted(document, options, document->rig.tops[i]))
+      return qmat_fail_memory(context, "a glTF file");
+  return status;
+}
+
+/* Adds the skins of a mesh and notes them for its places. */
+static qmat_status add_skins(qmat_context *context, document *document, size_t mesh) {
+  const qmat_scene *places = document->places;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < places->rig.placed_count && status == QMAT_OK; i++) {
+    const uint32_t skin = places->rig.placed_skins[i];
+    if (places->placed[i] == mesh && skin != UINT32_MAX)
+      status = qmat_gltf_rig_skin(context, document->root, &document->rig, skin, document->buffer, document->data_start,
+                                  &document->data, &document->skins[i]);
+  }
+  return status;
 }
 
 /* ---- the document ---- */
@@ -387,6 +422,8 @@ static void close_document(document *document) {
   json_decref(document->root);
   qmat_gltf_asset_uninit(&document->asset);
   qmat_gltf_compressed_uninit(&document->compressed);
+  qmat_gltf_rig_uninit(&document->rig);
+  qmat_free(document->skins);
   qmat_free(document->embedded);
 }
 
@@ -433,26 +470,42 @@ static qmat_gltf_options options_after(const qmat_gltf_options *options, double 
   return after;
 }
 
+/* The node with the skin of a node: itself, or its parent where a skinned mesh is above. SIZE_MAX: there is none. */
+static size_t skinned_node(const json_t *nodes, size_t id) {
+  if (json_object_get(json_array_get(nodes, id), "skin")) return id;
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *node = json_array_get(nodes, i), *children = json_object_get(node, "children");
+    for (size_t k = 0; k < json_array_size(children); k++)
+      if (json_number_value(json_array_get(children, k)) == (double)id)
+        return json_object_get(node, "skin") ? i : SIZE_MAX;
+  }
+  return SIZE_MAX;
+}
+
 /* Adds colliders to a node with the mesh, or to the joints of its skin. */
 static qmat_status attach_colliders(qmat_context *context, const qmat_scene *scene, const qmat_medial *medial,
                                     document *document, const qmat_gltf_colliders *added, size_t id,
                                     const double shift[3]) {
-  const json_t *nodes = json_object_get(document->root, "nodes"), *node = json_array_get(nodes, id);
-  const json_t *skin = json_object_get(node, "skin");
+  const json_t *nodes = json_object_get(document->root, "nodes");
+  const size_t carrier = medial->skinned_count > 0 ? skinned_node(nodes, id) : SIZE_MAX;
+  const double *bound = NULL;
   double *matrices = NULL;
   bool done = true;
-  if (scene && skin && medial->skinned_count > 0) {
-    for (size_t i = 0; i < id; i++) { /* nodes that share mesh and skin are in one place */
+  if (carrier != SIZE_MAX) {
+    const json_t *node = json_array_get(nodes, carrier), *skin = json_object_get(node, "skin");
+    for (size_t i = 0; i < carrier; i++) { /* nodes that share mesh and skin are in one place */
       const json_t *other = json_array_get(nodes, i);
       if (qmat_gltf_mesh_of(other) == qmat_gltf_mesh_of(node) && json_equal(json_object_get(other, "skin"), skin))
         return QMAT_OK;
     }
+    const size_t number = (size_t)json_number_value(skin);
     const qmat_status status =
-        qmat_gltf_bind_matrices(context, scene, &document->asset, (size_t)json_number_value(skin), &matrices);
+        scene ? qmat_gltf_bind_matrices(context, scene, &document->asset, number, &matrices) : QMAT_OK;
     if (status != QMAT_OK) return status;
+    bound = scene ? matrices : qmat_gltf_rig_matrices(&document->rig, number);
   }
-  done = matrices ? qmat_gltf_colliders_attach_to_joints(document->root, (json_int_t)id, added, medial, matrices)
-                  : qmat_gltf_colliders_attach(document->root, (json_int_t)id, added, shift);
+  done = bound ? qmat_gltf_colliders_attach_to_joints(document->root, (json_int_t)id, added, medial, bound)
+               : qmat_gltf_colliders_attach(document->root, (json_int_t)id, added, shift);
   qmat_free(matrices);
   return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
 }
@@ -491,18 +544,24 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   /* JSON must be UTF-8, but a file's name may be anything. */
   const char *name = options.name && options.name[0] && qmat_is_utf8(options.name) ? options.name : NULL;
   const qmat_mesh *mesh = addition->skin && addition->skin->triangle_count > 0 ? addition->skin : NULL;
-  const size_t offset = document->data_start + document->data.size;
   medial_text text = {0};
   qmat_gltf_skin data = {0};
   json_int_t skin = -1;
   const size_t nodes_before = json_array_size(json_object_get(document->root, "nodes"));
   double origin[3];
+  qmat_status status = QMAT_OK;
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
-  qmat_status status = make_medial_text(context, addition->medial, origin, of_mesh, &options, &text);
+  static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
+  const bool has_rig = mesh && document->skins && addition->vertices.joints;
+  if (has_rig) status = add_skins(context, document, index);
+  if (status == QMAT_OK)
+    status = make_medial_text(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
-  const double skin_moved = options.compress_skin ? fmax(options.quantisation, DBL_MIN) : 0;
+  const double skin_moved = options.compress_skin && !has_rig ? fmax(options.quantisation, DBL_MIN) : 0;
+  const size_t offset = document->data_start + document->data.size;
   if (status == QMAT_OK && mesh)
-    status = qmat_gltf_skin_put(context, mesh, origin, addition->colours, skin_moved, &data, &document->data);
+    status = qmat_gltf_skin_put(context, mesh, has_rig ? in_place : origin, &addition->vertices, skin_moved, &data,
+                                &document->data);
   json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, &stated) : NULL;
   bool done = extras && (!mesh || qmat_gltf_skin_add(document->root, &data, document->buffer, offset,
                                                      &document->material, name, scene != NULL, &skin));
@@ -600,6 +659,7 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
   *file = NULL;
   qmat_status status = open_document(context, scene, &additions[0].options, &document);
   if (status == QMAT_OK && draco_meshes) status = compress_meshes(context, scene, additions, count, &document, report);
+  if (status == QMAT_OK && places) status = add_rig(context, &document, &additions[0].options);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
     if (additions[i].medial) status = add_medial(context, scene, i, &additions[i], &document);
   if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "io/gltf/gltf_skin.h"
 #include "io/stored_medial.h"
 
 /* How the plain form of a medial mesh (qmat_flat) stores coordinates and radii. */
@@ -67,9 +68,9 @@ qmat_status qmat_gltf_write(qmat_context *context, const qmat_medial *medial, co
 
 /* A medial mesh to add to a scene, or to a new asset. */
 typedef struct qmat_gltf_addition {
-  const qmat_medial *medial; /* NULL, in a scene: nothing is added for this mesh */
-  const qmat_mesh *skin;     /* added as a mesh; NULL: none */
-  const uint8_t *colours;    /* of the skin's vertices, 4 bytes each (linear RGBA); NULL: none; not compressed */
+  const qmat_medial *medial;      /* NULL, in a scene: nothing is added for this mesh */
+  const qmat_mesh *skin;          /* added as a mesh; NULL: none */
+  qmat_gltf_vertex_data vertices; /* of the skin; not compressed */
   qmat_gltf_options options;
   const qmat_colliders *colliders; /* added to the nodes that get the medial mesh; NULL: none */
   unsigned collider_forms;         /* of io/gltf/gltf_colliders.h */
@@ -78,7 +79,9 @@ typedef struct qmat_gltf_addition {
 
 /* Makes a glTF 2.0 file of the medial meshes of a USD scene, with the places that `scene` lists. `additions` has one
  * element per mesh of the scene, in that mesh's space. Each place is a node with the mesh's skin and extras, and with
- * the path of the prim as qmat_prim; a place that shears has a node above it. Otherwise as qmat_gltf_write. */
+ * the path of the prim as qmat_prim; a place that shears has a node above it. A place with a skin has it, on a node
+ * with a mesh whose vertices have joints, which Draco does not compress. Skeletons are nodes named after
+ * their prims with their joints below, and one animation, "motion", has all curves. Otherwise as qmat_gltf_write. */
 qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                    size_t count, qmat_file **file);
 

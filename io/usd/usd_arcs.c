@@ -24,6 +24,7 @@ qmat_status qmat_usd_new_node(qmat_usd_composer *c, node *parent, qmat_usd_arc a
   **made = (node){.arc = arc,
                   .introduced = c->prim->depth,
                   .arcs_deep = parent ? parent->arcs_deep + 1 : 0,
+                  .time = parent ? parent->time : (qmat_usd_time){.scale = 1},
                   .stack = stack,
                   .specs = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_spec *)),
                   .layers = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_layer *)),
@@ -169,13 +170,17 @@ static bool is_on_the_way(const node *at, const qmat_usd_spec *spec) {
   return false;
 }
 
-/* Adds the prim at `path` in a layer stack as a child of `at`, with its own arcs. */
+/* Adds the prim at `path` in a layer stack as a child of `at`, with its own arcs. `time` turns its times into those of
+ * `at`; NULL: they are the same. */
 static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, size_t stack, const char *path,
-                              const char *what) {
+                              const qmat_usd_time *time, const char *what) {
   const qmat_usd_stack *layers = &c->files->stacks[stack];
   node *made;
   qmat_status status = qmat_usd_new_node(c, at, arc, stack, layers->count, &made);
   if (status != QMAT_OK) return status;
+  if (time)
+    made->time = (qmat_usd_time){.offset = at->time.offset + at->time.scale * time->offset,
+                                 .scale = at->time.scale * time->scale};
   for (size_t i = 0; i < layers->count; i++) {
     const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
     if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
@@ -199,21 +204,24 @@ static const qmat_usd_layer *layer_with(const qmat_usd_composer *c, const node *
 static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
                                  const qmat_usd_reference *reference, const char *what) {
   size_t stack = at->stack;
+  const qmat_usd_layer *from = layer_with(c, at, field);
   if (reference->asset[0]) {
-    qmat_status status =
-        qmat_usd_files_find(c->files, c->prim, layer_with(c, at, field), reference->asset, what, &stack);
+    qmat_status status = qmat_usd_files_find(c->files, c->prim, from, reference->asset, what, &stack);
     if (status != QMAT_OK || stack == SIZE_MAX) return status;
   }
-  if (reference->path[0]) return add_target(c, at, arc, stack, reference->path, what);
   char path[256];
   const qmat_usd_layer *layer = c->files->stacks[stack].layers[0];
+  const qmat_usd_time time = {
+      .offset = reference->offset,
+      .scale = reference->scale * qmat_usd_codes_per_second(from) / qmat_usd_codes_per_second(layer)};
+  if (reference->path[0]) return add_target(c, at, arc, stack, reference->path, &time, what);
   const char *name = qmat_usd_text(qmat_usd_field_value(layer->root, "defaultPrim"));
   if (!name || !*name || strlen(name) > 254) {
     return qmat_usd_warn(c->prim, "the %s @%s@ is skipped: it has no path, and the file no default prim", what,
                          qmat_usd_shown(reference->asset));
   }
   snprintf(path, sizeof path, "%s%s", name[0] == '/' ? "" : "/", name);
-  return add_target(c, at, arc, stack, path, what);
+  return add_target(c, at, arc, stack, path, &time, what);
 }
 
 static qmat_status add_references(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
@@ -245,7 +253,7 @@ static qmat_status add_classes(qmat_usd_composer *c, node *at, qmat_usd_arc arc,
   edited_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_PATH, &list);
   for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
-    status = add_target(c, at, arc, at->stack, list.items[i], what);
+    status = add_target(c, at, arc, at->stack, list.items[i], NULL, what);
     if (status == QMAT_OK) status = warn_of_class(c, at, list.items[i]);
   }
   qmat_free(list.items);

@@ -20,8 +20,9 @@ typedef enum qmat_usd_arc {
 /* The specs of one prim or variant in one layer stack. */
 typedef struct qmat_usd_node {
   qmat_usd_arc arc;
-  int introduced;    /* the depth of the prim that has the arc */
-  int arcs_deep;     /* arcs between this node and the root */
+  int introduced; /* the depth of the prim that has the arc */
+  int arcs_deep;  /* arcs between this node and the root */
+  qmat_usd_time time;
   size_t stack;      /* the number of its layer stack */
   size_t spec_count; /* of layers of the stack that have a spec, strongest first */
   const qmat_usd_spec **specs;

@@ -237,11 +237,16 @@ static qmat_status add_to_stack(qmat_usd_files *files, const qmat_usd_prim *prim
     return fail_memory(prim);
   stack->layers[stack->count++] = layer;
   const qmat_usd_value *names = qmat_usd_field_value(layer->root, "subLayers");
+  const qmat_usd_value *times = qmat_usd_field_value(layer->root, "subLayerOffsets");
   if (!names || !names->is_array || !qmat_usd_is_text(names->type)) return QMAT_OK;
+  if (times && (!times->is_array || times->components != 2 || !qmat_usd_is_number(times->type))) times = NULL;
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < names->count && status == QMAT_OK; i++) {
     file *sublayer;
+    const double *time = times && i < times->count ? times->numbers + 2 * i : NULL;
     status = find_asset(files, prim, layer, names->texts[i], "sublayer", &sublayer);
+    if (status == QMAT_OK && time && (time[0] != 0 || time[1] != 1))
+      status = qmat_usd_warn(prim, "the time offset of the sublayer @%s@ is ignored", qmat_usd_shown(names->texts[i]));
     if (status == QMAT_OK && sublayer) status = add_to_stack(files, prim, stack, &sublayer->layer, depth + 1);
   }
   return status;

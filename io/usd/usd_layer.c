@@ -200,6 +200,12 @@ bool qmat_usd_is_text(qmat_usd_type type) {
   return type >= QMAT_USD_STRING && type <= QMAT_USD_PATH;
 }
 
+double qmat_usd_codes_per_second(const qmat_usd_layer *layer) {
+  const double frames = qmat_usd_number(qmat_usd_field_value(layer->root, "framesPerSecond"), 24),
+               codes = qmat_usd_number(qmat_usd_field_value(layer->root, "timeCodesPerSecond"), frames);
+  return codes > 0 && isfinite(codes) ? codes : 24;
+}
+
 static bool is_single(const qmat_usd_value *value) {
   return value && !value->is_array && value->count == 1 && value->components == 1;
 }

@@ -141,6 +141,9 @@ double qmat_usd_number(const qmat_usd_value *value, double otherwise);
 /* Whether the value is `true` or a number other than 0; `otherwise` for other values and for NULL. */
 bool qmat_usd_truth(const qmat_usd_value *value, bool otherwise);
 
+/* The time codes of a second, as the layer states them; 24 where it does not. */
+double qmat_usd_codes_per_second(const qmat_usd_layer *layer);
+
 /* The class of a type. */
 bool qmat_usd_is_integer(qmat_usd_type type);
 bool qmat_usd_is_number(qmat_usd_type type);

@@ -114,6 +114,20 @@ static qmat_status list_places(qmat_context *context, const qmat_usd_scene *from
   return QMAT_OK;
 }
 
+/* Gives the scene the rig, which leaves `from`, and its places their skins. Call it when they are listed. */
+static qmat_status list_skins(qmat_context *context, qmat_usd_scene *from, const bool *chosen, qmat_scene *scene) {
+  size_t at = 0;
+  if (from->rig.rig.skin_count == 0) return QMAT_OK;
+  scene->rig = from->rig.rig;
+  from->rig.rig = (qmat_rig){0};
+  scene->rig.placed_skins = qmat_alloc(scene->placement_count, sizeof *scene->rig.placed_skins);
+  if (!scene->rig.placed_skins) return fail_shortage(context);
+  scene->rig.placed_count = scene->placement_count;
+  for (size_t i = 0; i < from->placement_count; i++)
+    if (chosen[from->placements[i].mesh]) scene->rig.placed_skins[at++] = from->placements[i].skin;
+  return QMAT_OK;
+}
+
 static qmat_status read_merged(qmat_context *context, const qmat_usd_scene *from, const char *path,
                                qmat_usd_meshes *meshes) {
   meshes->soups = qmat_calloc(1, sizeof *meshes->soups);
@@ -137,6 +151,7 @@ qmat_status qmat_usd_read_meshes(qmat_context *context, const qmat_bytes *bytes,
     status = chosen && items ? choose(context, &from, path, choice, chosen) : fail_shortage(context);
     if (status == QMAT_OK) status = list_meshes(context, &from, chosen, items, meshes);
     if (status == QMAT_OK) status = list_places(context, &from, chosen, items, meshes, scene);
+    if (status == QMAT_OK) status = list_skins(context, &from, chosen, scene);
     if (status == QMAT_OK) status = qmat_usd_keep(context, from.stage, bytes, scene);
     scene->has_instances = from.instances > 0;
   }

@@ -160,6 +160,34 @@ qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name,
   return QMAT_OK;
 }
 
+void qmat_usd_prim_samples(const qmat_usd_prim *prim, const char *name, const qmat_usd_samples **samples,
+                           qmat_usd_time *time, const qmat_usd_value **fixed) {
+  *samples = NULL;
+  *fixed = NULL;
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    const qmat_usd_spec *spec = qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_ATTRIBUTE, name);
+    const qmat_usd_value *value = spec ? qmat_usd_field_value(spec, "default") : NULL,
+                         *sampled = spec ? qmat_usd_field_value(spec, "timeSamples") : NULL;
+    *time = opinion->time;
+    if (sampled && sampled->type == QMAT_USD_TIME_SAMPLES && sampled->samples->count > 0) {
+      *samples = sampled->samples;
+      return;
+    }
+    if (!value) continue;
+    if (value->type != QMAT_USD_BLOCK) *fixed = value;
+    return;
+  }
+}
+
+const qmat_usd_prim *qmat_usd_prim_above(const qmat_usd_prim *prim, qmat_usd_kind kind, const char *name) {
+  for (; prim; prim = prim->parent) {
+    for (size_t i = 0; i < prim->opinion_count; i++)
+      if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, kind, name)) return prim;
+  }
+  return NULL;
+}
+
 const qmat_usd_value *qmat_usd_prim_metadata(const qmat_usd_prim *prim, const char *attribute, const char *field) {
   for (size_t i = 0; i < prim->opinion_count; i++) {
     const qmat_usd_opinion *opinion = &prim->opinions[i];

@@ -8,12 +8,18 @@
 
 /* A composed prim: the specs that have opinions about it, and messages about it. io/usd/usd_stage.h makes prims. */
 
+/* How times of a layer become those of the scene, both in time codes: offset + scale * time. */
+typedef struct qmat_usd_time {
+  double offset, scale;
+} qmat_usd_time;
+
 /* A spec with opinions about a prim, and its layer. */
 typedef struct qmat_usd_opinion {
   const qmat_usd_layer *layer;
   const qmat_usd_spec *spec;
   bool is_inherited; /* through an inherit or specialize arc */
   int introduced;    /* the depth of the prim with the arc that brings the spec's paths into the scene; 0: none does */
+  qmat_usd_time time;
 } qmat_usd_opinion;
 
 /* Where the messages about the prims of a stage go. */
@@ -61,6 +67,14 @@ const char *qmat_usd_prim_specifier(const qmat_usd_prim *prim);
 /* The strongest value of an attribute, or NULL for none. An attribute that changes over time has its default, or else
  * its first sample, with a warning. */
 qmat_status qmat_usd_prim_attribute(const qmat_usd_prim *prim, const char *name, const qmat_usd_value **value);
+
+/* The strongest opinion about an attribute: its samples over time with the way to the scene's times, or else its
+ * default value; NULL for what it does not have. */
+void qmat_usd_prim_samples(const qmat_usd_prim *prim, const char *name, const qmat_usd_samples **samples,
+                           qmat_usd_time *time, const qmat_usd_value **fixed);
+
+/* The nearest prim from `prim` upwards that has an attribute or a relationship of this name; NULL: none. */
+const qmat_usd_prim *qmat_usd_prim_above(const qmat_usd_prim *prim, qmat_usd_kind kind, const char *name);
 
 /* The strongest value of a field of an attribute ("interpolation"), or NULL. */
 const qmat_usd_value *qmat_usd_prim_metadata(const qmat_usd_prim *prim, const char *attribute, const char *field);

@@ -70,10 +70,11 @@ static qmat_status add_placement(const reader *r, const qmat_usd_prim *prim, con
   return QMAT_OK;
 }
 
-/* Places the mesh of this number at the prim. */
-static qmat_status place_mesh(const reader *r, const qmat_usd_prim *prim, uint32_t mesh, const inherited *state) {
+/* Places the mesh of this number at the prim. `skin` as in qmat_usd_placement. */
+static qmat_status place_mesh(const reader *r, const qmat_usd_prim *prim, uint32_t mesh, uint32_t skin,
+                              const inherited *state) {
   const qmat_usd_placement placement = {
-      .mesh = mesh, .world = state->world, .path = qmat_usd_prim_path(prim, &r->scene->arena)};
+      .mesh = mesh, .world = state->world, .skin = skin, .path = qmat_usd_prim_path(prim, &r->scene->arena)};
   return placement.path ? add_placement(r, prim, &placement) : qmat_usd_fail_prim_memory(prim);
 }
 
@@ -97,17 +98,22 @@ static qmat_status read_mesh(const reader *r, const qmat_usd_prim *prim, const i
   if (status != QMAT_OK) return status;
   const char *lacks = qmat_usd_mesh_lacks(&mesh);
   if (lacks) return qmat_usd_warn(prim, "the mesh has no %s", lacks);
-  if (qmat_usd_prim_has_relationship(prim, "skel:skeleton"))
-    status = qmat_usd_warn(prim, "its skeleton is ignored: the mesh keeps its modelled pose");
-  if (status == QMAT_OK) status = warn_if_flattened(prim, state, &flattened);
+  status = warn_if_flattened(prim, state, &flattened);
   if (status != QMAT_OK || flattened) return status;
+  uint32_t skin = UINT32_MAX;
+  if (state->instancers == 0) {
+    status = qmat_usd_rig_bind(&r->scene->rig, r->stage, prim, &mesh, &skin);
+  } else if (mesh.joints) {
+    status = qmat_usd_warn(prim, "its skeleton is ignored where a point instancer places it");
+  }
+  if (status != QMAT_OK) return status;
   if (qmat_usd_mesh_digest(&mesh, &digest) != QMAT_OK) return qmat_usd_fail_prim_memory(prim);
   uint32_t number = find_mesh(r->scene, &digest);
   if (number == UINT32_MAX) {
     number = (uint32_t)r->scene->mesh_count;
     status = add_mesh(r->scene, prim, &mesh, &digest);
   }
-  return status == QMAT_OK ? place_mesh(r, prim, number, state) : status;
+  return status == QMAT_OK ? place_mesh(r, prim, number, skin, state) : status;
 }
 
 static qmat_status read_shape(const reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
@@ -130,7 +136,7 @@ static qmat_status read_shape(const reader *r, const qmat_usd_prim *prim, const 
     if (scene->shape_elements > FREE_ELEMENTS) return fail_too_many(r, prim, "different shapes");
     status = add_mesh(scene, prim, &mesh, &digest);
   }
-  return status == QMAT_OK ? place_mesh(r, prim, number, state) : status;
+  return status == QMAT_OK ? place_mesh(r, prim, number, UINT32_MAX, state) : status;
 }
 
 /* ---- prims ---- */
@@ -208,22 +214,15 @@ static qmat_status read_children(reader *r, qmat_usd_prim *prim, const inherited
 
 /* ---- point instancers ---- */
 
-/* Reads the prim that `path` names below `above`; nothing, with a warning about the instancer, where there is none. */
-static qmat_status read_prototype(reader *r, const qmat_usd_prim *instancer, qmat_usd_prim *above, const char *path,
-                                  const inherited *state) {
-  if (*path == '\0') return read_prim(r, above, *state);
-  const size_t length = strcspn(++path, "/");
-  const char *const *names;
-  size_t count, at = 0;
-  qmat_status status = qmat_usd_prim_children(above, &names, &count);
-  if (status != QMAT_OK) return status;
-  while (at < count && (strlen(names[at]) != length || memcmp(names[at], path, length) != 0)) at++;
-  if (at == count) return qmat_usd_warn(instancer, "a prototype is skipped: there is no such prim");
-  qmat_usd_prim child;
-  status = qmat_usd_prim_child(r->stage, above, names[at], &child);
-  if (status == QMAT_OK) status = read_prototype(r, instancer, &child, path + length, state);
-  qmat_usd_prim_uninit(&child);
-  return status;
+/* What a prototype is read with. */
+typedef struct prototype {
+  reader *r;
+  const inherited *state;
+} prototype;
+
+static qmat_status read_prototype(void *user, qmat_usd_prim *prim) {
+  const prototype *p = user;
+  return read_prim(p->r, prim, *p->state);
 }
 
 /* Places what a prototype has, the places from `first` on, at each of its instances instead. */
@@ -253,7 +252,6 @@ static qmat_status place_instances(const reader *r, const qmat_usd_prim *prim, c
 
 static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherited *state) {
   qmat_usd_instancer instancer;
-  qmat_usd_prim root = {0};
   if (state->instancers >= DEEPEST_INSTANCERS)
     return qmat_usd_prim_fail(prim, "instancers are nested more than %d deep", DEEPEST_INSTANCERS);
   qmat_status status = qmat_usd_instancer_read(prim, &prim->arena, &instancer);
@@ -262,13 +260,14 @@ static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherite
   /* Prototypes inherit neither the instancer's purpose nor, twice, its place. */
   const inherited own = {
       .world = qmat_usd_identity(), .purpose = "default", .instancers = state->instancers + 1, .is_prototype = true};
-  status = qmat_usd_stage_root(r->stage, &root);
+  prototype p = {.r = r, .state = &own};
   for (size_t i = 0; i < instancer.prototype_count && status == QMAT_OK; i++) {
     const size_t first = r->scene->placement_count;
-    status = read_prototype(r, prim, &root, instancer.prototypes[i], &own);
+    bool found;
+    status = qmat_usd_stage_visit(r->stage, instancer.prototypes[i], read_prototype, &p, &found);
+    if (status == QMAT_OK && !found) status = qmat_usd_warn(prim, "a prototype is skipped: there is no such prim");
     if (status == QMAT_OK) status = place_instances(r, prim, &instancer, i, state, first);
   }
-  qmat_usd_prim_uninit(&root);
   return status;
 }
 
@@ -340,6 +339,7 @@ qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, 
   uint32_t *numbers = status == QMAT_OK ? qmat_alloc(scene->mesh_count, sizeof *numbers) : NULL;
   if (status == QMAT_OK && !numbers) status = qmat_fail_memory(context, "a USD scene");
   if (status == QMAT_OK) drop_unplaced(scene, numbers);
+  if (status == QMAT_OK) qmat_usd_rig_finish(&scene->rig, scene->stage);
   qmat_free(numbers);
   return status;
 }
@@ -349,6 +349,7 @@ void qmat_usd_scene_close(qmat_usd_scene *scene) {
   qmat_free(scene->meshes);
   qmat_free(scene->digests);
   qmat_free(scene->placements);
+  qmat_usd_rig_uninit(&scene->rig);
   qmat_arena_uninit(&scene->arena);
   *scene = (qmat_usd_scene){0};
 }

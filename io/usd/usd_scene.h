@@ -4,12 +4,14 @@
 
 #include "io/bytes.h"
 #include "io/usd/usd_mesh.h"
+#include "io/usd/usd_rig.h"
 #include "io/usd/usd_stage.h"
 
 /* One place of a mesh in the scene. */
 typedef struct qmat_usd_placement {
   uint32_t mesh;
   qmat_usd_transform world; /* from the mesh's own space into that of the scene */
+  uint32_t skin;            /* of the rig; UINT32_MAX: none */
   const char *path;         /* of the prim with the mesh; for a point instance, of its prototype's prim */
 } qmat_usd_placement;
 
@@ -21,8 +23,9 @@ typedef struct qmat_usd_scene {
   qmat_digest *digests;  /* per mesh */
   size_t placement_count, placement_capacity;
   qmat_usd_placement *placements; /* in the order of the scene */
-  qmat_arena arena;               /* of the shapes' arrays, and of paths */
-  size_t shape_elements;          /* vertices and corners of the shapes' meshes */
+  qmat_usd_rig rig;
+  qmat_arena arena;      /* of the shapes' arrays, and of paths */
+  size_t shape_elements; /* vertices and corners of the shapes' meshes */
   size_t prims, cages, holes, instances, point_instances, shapes, prims_skipped, shapes_skipped;
 } qmat_usd_scene;
 
@@ -31,8 +34,9 @@ typedef struct qmat_usd_scene {
  * prims that only have an "over" are read too. Equal meshes are one mesh with several places; a PointInstancer places
  * the meshes of its prototypes. Transforms are in double precision, in the order of xformOpOrder, with every operation,
  * !invert! and !resetXformStack!. Left-handed meshes reverse their faces, and faces that are holes are skipped.
- * Subdivision surfaces are read as their control cages. What a transform flattens is left out. io/usd/usd_stage.h
- * describes what is composed and what is skipped. `bytes` must outlive the scene.
+ * Subdivision surfaces are read as their control cages. What a transform flattens is left out. Skinned meshes keep
+ * their modelled pose and are bound to the skeletons of the rig, except at the places of a point instancer.
+ * io/usd/usd_stage.h describes what is composed and what is skipped. `bytes` must outlive the scene.
  *
  * QMAT_ERROR_FORMAT with file, line and column for what is not USD, and with the prim for a broken mesh: negative face
  * counts, face counts whose sum differs from the number of indices, indices out of range, values of the wrong type.

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_stage.h"
 
+#include <string.h>
+
 #include "io/usd/usd_arcs.h"
 
 typedef qmat_usd_node node;
@@ -73,6 +75,7 @@ static qmat_status copy_tree(composer *c, const node *from, node *parent, const 
   qmat_status status = qmat_usd_new_node(c, parent, from->arc, from->stack, from->spec_count, made);
   if (status != QMAT_OK) return status;
   (*made)->introduced = from->introduced;
+  (*made)->time = from->time;
   for (size_t i = 0; i < from->spec_count; i++) {
     const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
     if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
@@ -121,8 +124,11 @@ static void list_opinions(const node *at, bool inherited, bool specialized, bool
   specialized = specialized || at->arc == QMAT_USD_ARC_SPECIALIZE;
   if (at->arc != QMAT_USD_ARC_VARIANT) introduced = at->introduced; /* variants have the paths of their prim */
   for (size_t i = 0; i < at->spec_count && specialized == wanted; i++)
-    opinions[(*count)++] = (qmat_usd_opinion){
-        .layer = at->layers[i], .spec = at->specs[i], .is_inherited = inherited, .introduced = introduced};
+    opinions[(*count)++] = (qmat_usd_opinion){.layer = at->layers[i],
+                                              .spec = at->specs[i],
+                                              .is_inherited = inherited,
+                                              .introduced = introduced,
+                                              .time = at->time};
   for (const node *child = at->first_child; child; child = child->next)
     list_opinions(child, inherited, specialized, wanted, introduced, opinions, count);
 }
@@ -160,4 +166,37 @@ qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *pare
   if (status == QMAT_OK) status = add_arcs_of_copies(&c, child->tree);
   if (status == QMAT_OK) status = qmat_usd_add_variants(&c);
   return status == QMAT_OK ? finish_prim(&c) : status;
+}
+
+/* ---- prims by path ---- */
+
+/* Visits the prim at the rest of a path below `above`. */
+static qmat_status visit_below(qmat_usd_stage *stage, qmat_usd_prim *above, const char *path, qmat_usd_visit visit,
+                               void *user, bool *found) {
+  if (*path == '\0') {
+    *found = true;
+    return visit(user, above);
+  }
+  const size_t length = strcspn(++path, "/");
+  const char *const *names;
+  size_t count, at = 0;
+  qmat_status status = qmat_usd_prim_children(above, &names, &count);
+  if (status != QMAT_OK) return status;
+  while (at < count && (strlen(names[at]) != length || memcmp(names[at], path, length) != 0)) at++;
+  if (at == count) return QMAT_OK;
+  qmat_usd_prim child;
+  status = qmat_usd_prim_child(stage, above, names[at], &child);
+  if (status == QMAT_OK) status = visit_below(stage, &child, path + length, visit, user, found);
+  qmat_usd_prim_uninit(&child);
+  return status;
+}
+
+qmat_status qmat_usd_stage_visit(qmat_usd_stage *stage, const char *path, qmat_usd_visit visit, void *user,
+                                 bool *found) {
+  qmat_usd_prim root = {0};
+  *found = false;
+  qmat_status status = qmat_usd_stage_root(stage, &root);
+  if (status == QMAT_OK && *path == '/') status = visit_below(stage, &root, path, visit, user, found);
+  qmat_usd_prim_uninit(&root);
+  return status;
 }

@@ -41,4 +41,10 @@ qmat_status qmat_usd_stage_root(qmat_usd_stage *stage, qmat_usd_prim *prim);
 qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *parent, const char *name,
                                 qmat_usd_prim *child);
 
+/* Composes the prim at an absolute path of the scene and calls `visit` with it, while the prims above it last. Without
+ * such a prim nothing is called, and `*found` is false. The status is that of the visit. */
+typedef qmat_status (*qmat_usd_visit)(void *user, qmat_usd_prim *prim);
+qmat_status qmat_usd_stage_visit(qmat_usd_stage *stage, const char *path, qmat_usd_visit visit, void *user,
+                                 bool *found);
+
 #endif

@@ -276,6 +276,14 @@ static void write_usd_arm(const char *path, const char *scheme, const char *bind
     fputs("] (elementSize = 2\ninterpolation = \"vertex\")\n", file);
   }
   fputs("}\n}\n", file);
+  /* Joint 1 turns by 90 degrees about z within a second. */
+  fputs(
+      "def Skeleton \"s\" {\nrel skel:animationSource = </turn>\nuniform token[] joints = [\"arm\", \"arm/fore\"]\n"
+      "uniform matrix4d[] bindTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)), ((1,0,0,0),(0,1,0,0),(0,0,1,0),"
+      "(0.25,-0.5,0,1))]\nuniform matrix4d[] restTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)), ((1,0,0,0),"
+      "(0,1,0,0),(0,0,1,0),(0.25,-0.5,0,1))]\n}\ndef SkelAnimation \"turn\" {\nuniform token[] joints = "
+      "[\"arm/fore\"]\nquatf[] rotations.timeSamples = {0: [(1,0,0,0)], 24: [(1,0,0,1)]}\n}\n",
+      file);
   assert_int_equal(fclose(file), 0);
   qmat_writer_uninit(&data);
 }
@@ -343,6 +351,105 @@ static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **s
   pipeline_free(&p);
 }
 
+/* `count` numbers of an accessor in the chunk of an asset, of `bytes` bytes each: floats or short integers. */
+static void read_numbers(const qmat_gltf_asset *asset, const json_t *number, size_t bytes, size_t count, double *to) {
+  const json_t *accessor = json_array_get(json_object_get(asset->root, "accessors"), (size_t)json_number_value(number));
+  const json_t *view = json_array_get(json_object_get(asset->root, "bufferViews"),
+                                      (size_t)json_number_value(json_object_get(accessor, "bufferView")));
+  size_t at = (size_t)json_number_value(json_object_get(accessor, "byteOffset")) +
+              (size_t)json_number_value(json_object_get(view, "byteOffset"));
+  assert_true(at + bytes * count <= asset->chunk_size);
+  for (size_t i = 0; i < count; i++, at += bytes) {
+    float single;
+    uint16_t whole;
+    memcpy(&single, asset->chunk + at, bytes == 4 ? sizeof single : 0);
+    memcpy(&whole, asset->chunk + at, bytes == 2 ? sizeof whole : 0);
+    to[i] = bytes == 4 ? (double)single : (double)whole;
+  }
+}
+
+/* Where the file's matrices take a point of the arm with this joint at the end of the motion. */
+static void pose_at_end(const qmat_gltf_asset *asset, size_t joint, const double p[2], double posed[2]) {
+  const json_t *skin = json_array_get(json_object_get(asset->root, "skins"), 0);
+  const json_t *animation = json_array_get(json_object_get(asset->root, "animations"), 0);
+  const json_t *sampler = json_array_get(json_object_get(animation, "samplers"), 0);
+  const size_t id = (size_t)number_at(json_object_get(skin, "joints"), joint);
+  const json_t *place = json_object_get(json_array_get(json_object_get(asset->root, "nodes"), id), "translation");
+  double binds[32], turns[8] = {0, 0, 0, 1};
+  read_numbers(asset, json_object_get(skin, "inverseBindMatrices"), 4, 32, binds);
+  if (joint == 1) read_numbers(asset, json_object_get(sampler, "output"), 4, 8, turns);
+  const double *q = joint == 1 ? turns + 4 : turns, *m = binds + 16 * joint;
+  const double x = m[0] * p[0] + m[4] * p[1] + m[12], y = m[1] * p[0] + m[5] * p[1] + m[13];
+  const double c = 1 - 2 * q[2] * q[2], s = 2 * q[2] * q[3];
+  posed[0] = c * x - s * y + number_at(place, 0);
+  posed[1] = s * x + c * y + number_at(place, 1);
+}
+
+static void test_a_skinned_usd_model_moves_as_gltf(void **state) {
+  (void)state;
+  qmat_value *read[PIPELINE_MOST_PORTS], *simple[PIPELINE_MOST_PORTS], *skin[PIPELINE_MOST_PORTS],
+      *written[PIPELINE_MOST_PORTS];
+  read_usd_arm("none", "", read);
+  pipeline p;
+  pipeline_make(&p, (qmat_mesh *)qmat_value_retain(read[1]), "", "");
+  pipeline_must_run(1, "medial.simplify", "epsilon=0.02",
+                    (const qmat_value *[]){read[1], &p.thickness->base, &p.samples->base, &p.medial->base}, simple);
+  pipeline_must_run(1, "medial.skin", "", (const qmat_value *[]){simple[0]}, skin);
+  const qmat_node *write = qmat_node_find("scene.write");
+  const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
+  inputs[qmat_input_find(write, "medial")] = simple[0];
+  inputs[qmat_input_find(write, "scene")] = read[0];
+  inputs[qmat_input_find(write, "skin")] = skin[0];
+  pipeline_must_run(1, "scene.write", "format=glb", inputs, written);
+  const qmat_file *file = (const qmat_file *)written[0];
+  qmat_context context = {0};
+  qmat_gltf_asset asset;
+  assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "arm", &asset), QMAT_OK);
+  /* The vertices of the visible mesh follow the joints as the spheres do. */
+  const json_t *mesh = json_array_get(json_object_get(asset.root, "meshes"), 0);
+  const json_t *attributes = json_object_get(json_array_get(json_object_get(mesh, "primitives"), 0), "attributes");
+  const size_t count = ((const qmat_mesh *)skin[0])->vertex_count;
+  double *places = calloc(count, 11 * sizeof *places), *joints = places + 3 * count, *weights = joints + 4 * count;
+  assert_non_null(places);
+  read_numbers(&asset, json_object_get(attributes, "POSITION"), 4, 3 * count, places);
+  read_numbers(&asset, json_object_get(attributes, "JOINTS_0"), 2, 4 * count, joints);
+  read_numbers(&asset, json_object_get(attributes, "WEIGHTS_0"), 4, 4 * count, weights);
+  size_t turned = 0;
+  for (size_t v = 0; v < count; v++) {
+    const double *at = places + 3 * v;
+    double sum = 0, posed[2];
+    for (size_t k = 4 * v; k < 4 * v + 4; k++) sum += weights[k];
+    assert_near(sum, 1, 2e-7);
+    if (fabs(at[0]) < 1) continue;
+    assert_near(joints[4 * v], at[0] > 0, 0);
+    assert_near(weights[4 * v], 1, 1e-6);
+    pose_at_end(&asset, at[0] > 0, at, posed);
+    const bool is_lower = at[0] > 0;
+    turned += is_lower;
+    assert_near(posed[0], is_lower ? joint_x - (at[1] - joint_y) : at[0], 1e-6);
+    assert_near(posed[1], is_lower ? joint_y + (at[0] - joint_x) : at[1], 1e-6);
+  }
+  assert_true(turned > 0 && turned < count);
+  size_t length = 0;
+  qmr_medial medial;
+  const char *text = qmr_find(file->parts[0].bytes, file->parts[0].size, NULL, &length);
+  assert_non_null(text);
+  assert_int_equal(qmr_decode_base64(text, length, &medial), 0);
+  assert_non_null(medial.joints);
+  for (uint32_t i = 0; i < medial.sphere_count; i++) {
+    const double x = medial.spheres[4 * (size_t)i];
+    if (fabs(x) > 1) assert_int_equal(medial.joints[4 * (size_t)i], x > 0);
+  }
+  qmr_free(&medial);
+  free(places);
+  qmat_gltf_asset_uninit(&asset);
+  qmat_context_uninit(&context);
+  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
+  for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
+  qmat_value_release(skin[0]);
+  pipeline_free(&p);
+}
+
 static void test_a_subdivided_cage_keeps_its_joints(void **state) {
   (void)state;
   qmat_value *read[PIPELINE_MOST_PORTS], *fine[PIPELINE_MOST_PORTS];
@@ -397,6 +504,7 @@ int main(void) {
       cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints),
       cmocka_unit_test(test_colliders_of_a_skinned_model_follow_its_joints),
       cmocka_unit_test(test_joints_of_usd_meshes_reach_their_spheres_and_the_layer),
+      cmocka_unit_test(test_a_skinned_usd_model_moves_as_gltf),
       cmocka_unit_test(test_a_subdivided_cage_keeps_its_joints),
       cmocka_unit_test(test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_aloud),
   };

@@ -18,6 +18,10 @@ def SkelRoot "man"
     uniform token[] xformOpOrder = ["xformOp:translate"]
     def Skeleton "bones" {
         uniform token[] joints = ["hip", "hip/head"]
+        uniform matrix4d[] bindTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)),
+            ((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,200,1))]
+        uniform matrix4d[] restTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)),
+            ((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,200,1))]
     }
     def Mesh "body"
     {

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
 static void test_the_strongest_four_are_kept_and_sum_to_one(void **state) {
@@ -115,11 +116,54 @@ static void test_a_mesh_without_a_skin_leaves_spheres_as_they_are(void **state) 
   qmat_context_uninit(&context);
 }
 
+static void test_points_of_the_envelope_follow_the_spheres_beside_them(void **state) {
+  (void)state;
+  /* A cone, a slab and a sphere, all of radius 1. Sphere i follows joint 10 + i; sphere 1 half joint 10. */
+  static const double spheres[] = {0, 0, 0, 1, 8, 0, 0, 1, 0, 20, 0, 1, 6, 20, 0, 1, 0, 26, 0, 1, 0, 0, 30, 1};
+  const uint32_t edge[] = {0, 1}, triangle[] = {2, 3, 4};
+  qmat_medial *medial = medial_mesh(spheres, 6, edge, 1, triangle, 1);
+  medial->skinned_count = 6;
+  medial->joints = qmat_calloc(4 * 6, sizeof *medial->joints);
+  medial->weights = qmat_calloc(4 * 6, sizeof *medial->weights);
+  assert_true(medial->joints && medial->weights);
+  for (uint32_t i = 0; i < 6; i++) {
+    medial->joints[4 * i] = 10 + i;
+    medial->weights[4 * i] = 1;
+  }
+  medial->joints[5] = 10;
+  medial->weights[4] = medial->weights[5] = 0.5;
+  double points[] = {2, 1, 0, -1, 0, 0, 8, 0, 1.5, 2, 22, 1, 0, 0, 31};
+  qmat_mesh mesh = {.vertex_count = 5, .positions = points};
+  static const struct {
+    uint32_t joints[3];
+    double weights[3];
+  } expected[] = {{{10, 11, 0}, {0.875, 0.125, 0}}, /* a quarter of the way to sphere 1 */
+                  {{10, 0, 0}, {1, 0, 0}},
+                  {{10, 11, 0}, {0.5, 0.5, 0}},
+                  {{12, 13, 14}, {1. / 3, 1. / 3, 1. / 3}},
+                  {{15, 0, 0}, {1, 0, 0}}};
+  uint32_t joints[20];
+  double weights[20];
+  qmat_context context = {.threads = 2};
+  assert_int_equal(qmat_skin_envelope(&context, medial, &mesh, joints, weights), QMAT_OK);
+  for (size_t v = 0; v < 5; v++) {
+    for (size_t e = 0; e < 3; e++) {
+      double found = 0;
+      for (size_t k = 4 * v; k < 4 * v + 4; k++)
+        if (joints[k] == expected[v].joints[e]) found += weights[k];
+      if (expected[v].weights[e] > 0) assert_near(found, expected[v].weights[e], 1e-9);
+    }
+  }
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_strongest_four_are_kept_and_sum_to_one),
       cmocka_unit_test(test_a_turn_of_a_joint_moves_the_spheres_of_its_side),
       cmocka_unit_test(test_a_mesh_without_a_skin_leaves_spheres_as_they_are),
+      cmocka_unit_test(test_points_of_the_envelope_follow_the_spheres_beside_them),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
