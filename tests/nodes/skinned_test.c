@@ -360,8 +360,8 @@ static void read_numbers(const qmat_gltf_asset *asset, const json_t *number, siz
               (size_t)json_number_value(json_object_get(view, "byteOffset"));
   assert_true(at + bytes * count <= asset->chunk_size);
   for (size_t i = 0; i < count; i++, at += bytes) {
-    float single;
-    uint16_t whole;
+    float single = 0;
+    uint16_t whole = 0;
     memcpy(&single, asset->chunk + at, bytes == 4 ? sizeof single : 0);
     memcpy(&whole, asset->chunk + at, bytes == 2 ? sizeof whole : 0);
     to[i] = bytes == 4 ? (double)single : (double)whole;
