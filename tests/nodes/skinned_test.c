@@ -446,7 +446,7 @@ static void test_a_skinned_usd_model_moves_as_gltf(void **state) {
   qmat_context_uninit(&context);
   for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
   for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
-  qmat_value_release(skin[0]);
+  for (int i = 0; i < 2; i++) qmat_value_release(skin[i]);
   pipeline_free(&p);
 }
 
