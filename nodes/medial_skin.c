@@ -234,9 +234,9 @@ static qmat_status count_components(skin *s, size_t *components) {
   return QMAT_OK;
 }
 
-/* A contour above this number of triangles is made again with cells twice as large: the decimation would take minutes
- * for shells that are thin everywhere. */
-enum { MOST_CONTOUR_TRIANGLES = 200000 };
+/* A contour above this number of triangles is made again with cells twice as large: the decimation would take long for
+ * shells that are thin everywhere. */
+enum { MOST_CONTOUR_TRIANGLES = 400000 };
 /* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
  */
 static const double CONTOUR_SHARE = 0.3;
@@ -561,7 +561,7 @@ static const qmat_param params[] = {
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
     QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
-             "often where that makes more than 200,000 triangles to decimate"),
+             "often where that makes more than 400,000 triangles to decimate"),
     QMAT_LENGTH(
         medial_skin_params, error, 2e-3, 0, 0.1,
         "envelope: the distance from the envelope that the mesh may have; 0: no decimation, and nothing is measured"),
@@ -587,27 +587,27 @@ static const qmat_port outputs[] = {
     {0},
 };
 
-static const qmat_library *const libraries[] = {&qmat_library_cgal, NULL};
+static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_meshoptimizer, NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 7,
+    .version = 8,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
         "signed distance. Only cells that the surface crosses are visited. They are halved where medial radii are "
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
         "the report counts them. The mesh is a closed 2-manifold. Crevices narrower than a cell fill: cells are halved "
-        "where that makes more than a third of `error`, up to `detail` times. Edges are then collapsed (CGAL) as far "
-        "as "
-        "`error` and the topology allow. Both distances between the mesh and the envelope are bounded at the end "
+        "where that makes more than a third of `error`, up to `detail` times. The mesh is then thinned out "
+        "(meshoptimizer), and edges are collapsed (CGAL) as far as `error` and the topology allow. Both distances "
+        "between the mesh and the envelope are bounded at the end "
         "(mesh_to_envelope, envelope_to_mesh), files state the larger, and a warning says when it exceeds `error`.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
         "as prisms of three sides. The counts and distances of the report are without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
         "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
         "The report has the largest distance from the envelope at vertices, at triangle centroids and at 15 points of "
-        "each triangle (error_at_samples), and that from the vertices before decimation to the mesh "
+        "each triangle (error_at_samples), and that from the vertices before edges collapse to the mesh "
         "(error_from_contour), as fractions of the diagonal of the envelope's bounding box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "

@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/skin/skin_thin.h"
+
+#include <string.h>
+
+#include <meshoptimizer.h>
+
+#include "core/disjoint_sets.h"
+#include "core/node.h"
+
+/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Each round doubles them. */
+enum { MOST_ROUNDS = 6, FIRST_RINGS = 2 };
+
+typedef struct thinning {
+  qmat_context *context;
+  const qmat_skin_triangles *surface;
+  float *positions;     /* 3 per vertex */
+  bool *locked, *grown; /* per vertex: its triangles stay */
+  uint32_t *thinned;    /* 3 per triangle */
+  size_t thinned_count; /* triangles */
+  uint32_t *open;       /* 3 per triangle: those that may go */
+  size_t *firsts;       /* per vertex, and the end: its corners in `corners` */
+  uint32_t *corners;    /* corners of the thinned surface by their vertices */
+  uint32_t *leaders;    /* disjoint sets of vertices: the components of the surface */
+} thinning;
+
+static qmat_status start(qmat_context *context, const qmat_skin_triangles *surface, thinning *t) {
+  qmat_arena *arena = &context->arena;
+  const size_t vertices = surface->vertex_count, corners = 3 * surface->triangle_count;
+  *t = (thinning){.context = context,
+                  .surface = surface,
+                  .positions = qmat_arena_alloc(arena, 3 * vertices, sizeof *t->positions),
+                  .locked = qmat_arena_calloc(arena, vertices, sizeof *t->locked),
+                  .grown = qmat_arena_alloc(arena, vertices, sizeof *t->grown),
+                  .thinned = qmat_arena_alloc(arena, corners, sizeof *t->thinned),
+                  .open = qmat_arena_alloc(arena, corners, sizeof *t->open),
+                  .firsts = qmat_arena_alloc(arena, vertices + 1, sizeof *t->firsts),
+                  .corners = qmat_arena_alloc(arena, corners, sizeof *t->corners),
+                  .leaders = qmat_sets_new(context, vertices)};
+  if (!t->leaders || !t->positions || !t->locked || !t->grown || !t->thinned || !t->open || !t->firsts || !t->corners)
+    return qmat_fail_memory(context, "the skin");
+  for (size_t i = 0; i < 3 * vertices; i++) t->positions[i] = (float)surface->positions[i];
+  for (size_t i = 0; i < corners; i++) qmat_sets_join(t->leaders, surface->triangles[i], surface->triangles[i - i % 3]);
+  return QMAT_OK;
+}
+
+/* Thins out the triangles without a locked vertex; their border stays. */
+static void thin(thinning *t, double error) {
+  const qmat_skin_triangles *surface = t->surface;
+  size_t count = 0;
+  t->thinned_count = 0;
+  for (size_t i = 0; i < surface->triangle_count; i++) {
+    const uint32_t *from = surface->triangles + 3 * i;
+    const bool stays = t->locked[from[0]] || t->locked[from[1]] || t->locked[from[2]];
+    memcpy(stays ? t->thinned + 3 * t->thinned_count++ : t->open + 3 * count++, from, 3 * sizeof *from);
+  }
+  if (count == 0) return;
+  const size_t stride = 3 * sizeof *t->positions;
+  const float scale = meshopt_simplifyScale(t->positions, surface->vertex_count, stride);
+  t->thinned_count +=
+      meshopt_simplify(t->thinned + 3 * t->thinned_count, t->open, 3 * count, t->positions, surface->vertex_count,
+                       stride, 0, (float)error / scale, meshopt_SimplifyLockBorder, NULL) /
+      3;
+}
+
+static void sort_corners(thinning *t) {
+  const size_t vertices = t->surface->vertex_count, corners = 3 * t->thinned_count;
+  memset(t->firsts, 0, (vertices + 1) * sizeof *t->firsts);
+  for (size_t i = 0; i < corners; i++) t->firsts[t->thinned[i] + 1]++;
+  for (size_t v = 0; v < vertices; v++) t->firsts[v + 1] += t->firsts[v];
+  for (size_t i = corners; i-- > 0;) t->corners[--t->firsts[t->thinned[i] + 1]] = (uint32_t)i;
+  /* Now firsts[v + 1] is where those of v start. */
+  memmove(t->firsts, t->firsts + 1, vertices * sizeof *t->firsts);
+  t->firsts[vertices] = corners;
+}
+
+/* The vertex after a corner's in its triangle. */
+static uint32_t after(const thinning *t, uint32_t corner, uint32_t steps) {
+  return t->thinned[corner - corner % 3 + (corner % 3 + steps) % 3];
+}
+
+/* Whether the triangles around a vertex are one closed fan. */
+static bool is_fan(const thinning *t, size_t vertex) {
+  const size_t first = t->firsts[vertex], count = t->firsts[vertex + 1] - first;
+  if (count == 0) return true;
+  const uint32_t start = after(t, t->corners[first], 1);
+  uint32_t at = start;
+  for (size_t step = 0; step < count; step++) {
+    size_t found = 0, next = 0;
+    for (size_t i = first; i < first + count; i++) {
+      if (after(t, t->corners[i], 1) != at) continue;
+      found++;
+      next = i;
+    }
+    if (found != 1) return false;
+    at = after(t, t->corners[next], 2);
+    if (at == start) return step + 1 == count && count > 2;
+  }
+  return false;
+}
+
+/* Locks the components of which nothing is left. False where there are none. */
+static bool lock_lost_components(thinning *t) {
+  const size_t count = t->surface->vertex_count;
+  bool any = false, *is_left = t->grown;
+  memset(is_left, 0, count * sizeof *is_left);
+  for (size_t i = 0; i < 3 * t->thinned_count; i++) is_left[qmat_set_leader(t->leaders, t->thinned[i])] = true;
+  for (uint32_t v = 0; v < count; v++) {
+    if (is_left[qmat_set_leader(t->leaders, v)]) continue;
+    t->locked[v] = any = true;
+  }
+  return any;
+}
+
+/* Locks the vertices within some rings of those that are no fan. False where there are none. */
+static bool lock_faults(thinning *t, int rings) {
+  const qmat_skin_triangles *surface = t->surface;
+  bool any = false;
+  for (size_t v = 0; v < surface->vertex_count; v++) {
+    if (is_fan(t, v)) continue;
+    t->locked[v] = any = true;
+  }
+  for (int ring = 0; ring < rings && any; ring++) {
+    memcpy(t->grown, t->locked, surface->vertex_count * sizeof *t->grown);
+    for (size_t i = 0; i < 3 * surface->triangle_count; i++)
+      if (t->locked[surface->triangles[i]])
+        for (size_t k = 0; k < 3; k++) t->grown[surface->triangles[i - i % 3 + k]] = true;
+    memcpy(t->locked, t->grown, surface->vertex_count * sizeof *t->grown);
+  }
+  return any;
+}
+
+/* The number of components, and V - E + F, of triangles that are a closed 2-manifold. */
+static qmat_status topology_of(qmat_context *context, const uint32_t *triangles, size_t triangle_count,
+                               size_t vertex_count, size_t *components, int64_t *euler) {
+  uint32_t *leaders = qmat_sets_new(context, vertex_count);
+  bool *used = qmat_arena_calloc(&context->arena, vertex_count, sizeof *used);
+  if (!leaders || !used) return qmat_fail_memory(context, "the skin");
+  size_t joined = 0, vertices = 0;
+  for (size_t i = 0; i < 3 * triangle_count; i++) {
+    vertices += !used[triangles[i]];
+    used[triangles[i]] = true;
+    joined += qmat_sets_join(leaders, triangles[i], triangles[i - i % 3]);
+  }
+  *components = vertices - joined;
+  *euler = (int64_t)vertices - (int64_t)(triangle_count / 2);
+  return QMAT_OK;
+}
+
+/* Whether the thinned surface has the topology of the given one. */
+static qmat_status compare_topology(const thinning *t, bool *is_same) {
+  const qmat_skin_triangles *surface = t->surface;
+  size_t components[2];
+  int64_t euler[2];
+  qmat_status status = topology_of(t->context, surface->triangles, surface->triangle_count, surface->vertex_count,
+                                   &components[0], &euler[0]);
+  if (status == QMAT_OK)
+    status = topology_of(t->context, t->thinned, t->thinned_count, surface->vertex_count, &components[1], &euler[1]);
+  *is_same = status == QMAT_OK && components[0] == components[1] && euler[0] == euler[1];
+  return status;
+}
+
+/* Makes the surface the thinned one, without vertices that are not used. */
+static void take(const thinning *t, qmat_skin_triangles *surface) {
+  size_t count = 0;
+  uint32_t *ids = t->open; /* it has more elements than there are vertices */
+  for (size_t v = 0; v < surface->vertex_count; v++) {
+    if (t->firsts[v + 1] == t->firsts[v]) continue;
+    memmove(surface->positions + 3 * count, surface->positions + 3 * v, 3 * sizeof *surface->positions);
+    ids[v] = (uint32_t)count++;
+  }
+  for (size_t i = 0; i < 3 * t->thinned_count; i++) surface->triangles[i] = ids[t->thinned[i]];
+  surface->vertex_count = count;
+  surface->triangle_count = t->thinned_count;
+}
+
+qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triangles *surface) {
+  thinning t;
+  qmat_status status = start(context, surface, &t);
+  for (int round = 0; round < MOST_ROUNDS && status == QMAT_OK; round++) {
+    thin(&t, error);
+    sort_corners(&t);
+    status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
+    const bool has_lost = lock_lost_components(&t), has_faults = lock_faults(&t, FIRST_RINGS << round);
+    if (status != QMAT_OK || has_lost || has_faults) continue;
+    bool is_same;
+    status = compare_topology(&t, &is_same);
+    if (status == QMAT_OK && is_same) take(&t, surface);
+    return status;
+  }
+  return status;
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_SKIN_SKIN_THIN_H
+#define QMAT_NODES_SKIN_SKIN_THIN_H
+
+#include "core/context.h"
+#include "nodes/skin/skin_triangles.h"
+
+/* Removes vertices of a closed, oriented 2-manifold (meshoptimizer) while its quadric error stays below `error` (above
+ * 0, in the unit of the positions), which is an estimate and no bound. It stays such a manifold, of the same topology:
+ * meshoptimizer does not promise that, so parts of the surface where it fails are left as they were, and after some
+ * rounds all of it. `surface` keeps the vertices that are left, in their order. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One
+ * thread; deterministic. Cost: some 1 microsecond a triangle. */
+qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triangles *surface);
+
+#endif
