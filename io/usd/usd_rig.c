@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_rig.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +34,7 @@ static qmat_status read_geometry_bind(const qmat_usd_prim *prim, transform *bind
   if (value->is_array || value->components != 16 || !qmat_usd_is_number(value->type))
     return qmat_usd_prim_fail(owner, "%s has a value of the wrong type", name);
   memcpy(bind->m, value->numbers, sizeof bind->m);
+  for (int i = 0; i < 4; i++) bind->m[4 * i + 3] = i == 3; /* glTF has no other ones */
   return QMAT_OK;
 }
 
@@ -122,11 +124,14 @@ static qmat_status bind_to(qmat_usd_rig *rig, const qmat_usd_stage *stage, const
   const int64_t unknown = unknown_joint(mesh, count, &has_unknown);
   if (has_unknown)
     return qmat_usd_warn(prim, "not bound to its skeleton: it names joint %lld of %zu", (long long)unknown, count);
-  for (int i = 0; i < 16; i++)
-    if (!isfinite(bind.m[i])) return qmat_usd_warn(prim, "not bound to its skeleton: its bind transform is not finite");
   status = qmat_usd_rig_justify(rig, stage, prim, 17 * count);
   if (status == QMAT_OK) status = add_bound(rig, prim, skeleton, names, count, &bind);
-  return status == QMAT_OK ? find_skin(rig, prim, skeleton->number, count, skin) : status;
+  if (status != QMAT_OK) return status;
+  const double *matrices = rig->rig.bound_matrices + 16 * rig->rig.bound_count;
+  for (size_t i = 0; i < 16 * count; i++)
+    if (!(fabs(matrices[i]) <= FLT_MAX)) /* glTF has single precision */
+      return qmat_usd_warn(prim, "not bound to its skeleton: its bind transform is not finite");
+  return find_skin(rig, prim, skeleton->number, count, skin);
 }
 
 qmat_status qmat_usd_rig_bind(qmat_usd_rig *rig, qmat_usd_stage *stage, const qmat_usd_prim *prim,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_skeleton.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,6 +48,13 @@ static size_t parent_of(const qmat_usd_skeleton *skeleton, const char *name) {
 
 /* ---- transforms ---- */
 
+/* Whether glTF can have the numbers: it has them in single precision. */
+static bool is_single(const double *numbers, size_t count) {
+  for (size_t i = 0; i < count; i++)
+    if (!(fabs(numbers[i]) <= FLT_MAX)) return false;
+  return true;
+}
+
 /* One matrix for each joint; NULL without them, with a warning where there is something else. */
 static qmat_status read_matrices(const qmat_usd_prim *prim, const char *name, size_t count, const double **matrices) {
   const qmat_usd_value *value;
@@ -55,9 +63,7 @@ static qmat_status read_matrices(const qmat_usd_prim *prim, const char *name, si
   if (status != QMAT_OK || !value) return status;
   if (!value->is_array || value->components != 16 || !qmat_usd_is_number(value->type))
     return qmat_usd_prim_fail(prim, "%s has a value of the wrong type", name);
-  bool good = value->count == count;
-  for (size_t i = 0; i < 16 * count && good; i++) good = isfinite(value->numbers[i]);
-  if (!good)
+  if (value->count != count || !is_single(value->numbers, 16 * count))
     return qmat_usd_warn(prim, "its %s are left out: they are not finite, or not one for each of %zu joints", name,
                          count);
   *matrices = value->numbers;
@@ -70,15 +76,9 @@ static transform matrix_at(const double *matrices, size_t i) {
   return result;
 }
 
-static bool is_finite(const transform *t) {
-  for (int i = 0; i < 16; i++)
-    if (!isfinite(t->m[i])) return false;
-  return true;
-}
-
 /* The inverse of an affine transform; false where there is none. */
 static bool invert(const transform *t, transform *inverse) {
-  if (!qmat_usd_inverse(t, inverse) || !is_finite(inverse)) return false;
+  if (!qmat_usd_inverse(t, inverse) || !is_single(inverse->m, 16)) return false;
   for (int i = 0; i < 4; i++) inverse->m[4 * i + 3] = i == 3; /* which it is up to rounding */
   return true;
 }
@@ -217,7 +217,7 @@ static qmat_status read_transforms(const request *r, const qmat_usd_prim *prim, 
       bound[i] = is_root ? locals[i] : qmat_usd_product(&locals[i], &bound[parents[i]]);
     if (!invert(&bound[i], &inverses[i])) *why = "a bind transform has no inverse";
     if (!rests && !*why) locals[i] = is_root ? bound[i] : qmat_usd_product(&bound[i], &inverses[parents[i]]);
-    if (!*why && !is_finite(&locals[i])) *why = "a transform is not finite";
+    if (!*why && !is_single(locals[i].m, 16)) *why = "a transform is not finite";
   }
   r->skeleton->inverse_binds = inverses;
   if (*why || (binds && rests)) return QMAT_OK;
@@ -249,7 +249,7 @@ static qmat_status read_skeleton(void *user, qmat_usd_prim *prim) {
   }
   if (!why) status = read_transforms(r, prim, parents, locals, &why);
   if (status == QMAT_OK && !why) status = read_world(prim, &world);
-  if (status == QMAT_OK && !why && !is_finite(&world)) why = "its transform is not finite";
+  if (status == QMAT_OK && !why && !is_single(world.m, 16)) why = "its transform is not finite";
   if (status != QMAT_OK || why) return status == QMAT_OK ? leave_out(prim, why) : status;
   status = add_skeleton(r, prim, joints, &world, locals, parents);
   return status == QMAT_OK ? qmat_usd_motion_read(r->rig, r->stage, prim, r->skeleton) : status;

@@ -326,6 +326,28 @@ static void write_usd_layer(const qmat_scene *scene) {
   qmat_context_uninit(&context);
 }
 
+/* Any scene can be written as glTF, with a small mesh for each of its own that follows joint 0. */
+static void write_usd_places(const qmat_scene *scene) {
+  static double positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, weights[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  static uint32_t triangle[] = {0, 1, 2}, joints[12];
+  const qmat_mesh mesh = {.vertex_count = 3, .triangle_count = 1, .positions = positions, .triangles = triangle};
+  qmat_context context = {0};
+  qmat_file *file = NULL;
+  qmat_medial *medial = example_medial(3);
+  qmat_gltf_addition *additions = calloc(scene->mesh_count, sizeof *additions);
+  require(additions);
+  for (size_t i = 0; i < scene->mesh_count; i++)
+    additions[i] = (qmat_gltf_addition){.medial = medial,
+                                        .skin = &mesh,
+                                        .vertices = {.joints = joints, .weights = weights},
+                                        .options = {.binary = true, .quantisation = 0.01, .errors = {.diagonal = 1}}};
+  require(qmat_gltf_write_places(&context, scene, additions, scene->mesh_count, &file) == QMAT_OK);
+  free(additions);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 /* The meshes of a scene one by one, and their places. */
 static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
   qmat_context context = {0};
@@ -340,6 +362,7 @@ static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
     require(meshes.count > 0 && scene->mesh_count == meshes.count && scene->placement_count >= meshes.count);
     require(qmat_value_seal(&context, &scene->base) == QMAT_OK);
     if (scene->part_count > 0) write_usd_layer(scene);
+    write_usd_places(scene);
   }
   qmat_usd_meshes_uninit(&meshes);
   qmat_value_release(&scene->base);

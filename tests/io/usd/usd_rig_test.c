@@ -244,6 +244,12 @@ static void test_what_cannot_be_used_is_left_out_with_one_warning(void **state) 
                 MESH("int[] primvars:skel:jointIndices = [2] (interpolation = \"constant\")\n"
                      "float[] primvars:skel:jointWeights = [1] (interpolation = \"constant\")\n")),
        "/r/m: not bound to its skeleton: it names joint 2 of 2", 0, 0},
+      {ROOT(SKELETON(JOINTS BINDS RESTS)
+                MESH(BINDING "matrix4d primvars:skel:geomBindTransform = " MOVED(1e300, 0, 0) "\n")),
+       "/r/m: not bound to its skeleton: its bind transform is not finite", 0, 0},
+      {ROOT(SKELETON(JOINTS "uniform matrix4d[] bindTransforms = [" MOVED(
+           0, 0, 0) ", ((1e-30,0,0,0),(0,1e-30,0,0),(0,0,1e-300,0),(0,0,0,1))]\n" RESTS) MESH(BINDING)),
+       "/r/s: the skeleton is left out: a bind transform has no inverse", 0, 0},
       {ROOT(SKELETON(JOINTS BINDS RESTS "rel skel:animationSource = </r/none>\n") MESH(BINDING)),
        "/r/s: it does not move: there is no prim </r/none>", 1, 0},
       {ROOT(SKELETON(JOINTS BINDS RESTS "rel skel:animationSource = </r/m>\n") MESH(BINDING)),
