@@ -29,6 +29,7 @@ typedef struct part {
   double low[3], high[3]; /* of its box */
   double volume;
   uint32_t shape; /* whose spheres it keeps */
+  uint32_t last;  /* of the chain of given parts in it, which begins with its own */
   bool live;
 } part;
 
@@ -55,6 +56,8 @@ typedef struct merging {
   double limit;             /* unit frame */
   double error;             /* of the vertices of hulls, in the model */
   part *parts;
+  const qmat_solid_part *given;
+  uint32_t *following; /* of given parts: the next one in the same part */
   size_t part_count, live_count;
   pair *pairs;
   size_t pair_count, pair_capacity;
@@ -262,6 +265,8 @@ static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   }
   if (!set_points(into, vertices, used)) return qmat_fail_memory(m->context, "the hulls");
   if (from->volume > into->volume) into->shape = from->shape;
+  m->following[into->last] = b;
+  into->last = from->last;
   into->volume = volume;
   from->live = false;
   m->live_count--;
@@ -281,10 +286,15 @@ static qmat_status surround(qmat_tangent_hull *hull, const double *points, size_
   return QMAT_OK;
 }
 
+/* By how much a hull contains the points of the solid's part. */
+static double margin_of(const merging *m) {
+  return qmat_surface_mesh(m->solid)->deviation + least_margin * qmat_surface_frame(m->solid)->diagonal;
+}
+
 /* Makes the hull of a part, or of a box around it. Without a box it fails where the points are too near a plane. */
 static qmat_status make_part(const merging *m, const qmat_solid_part *given, bool may_be_box, joint *j, part *p) {
   const qmat_frame *frame = qmat_surface_frame(m->solid);
-  const double margin = qmat_surface_mesh(m->solid)->deviation + least_margin * frame->diagonal;
+  const double margin = margin_of(m);
   qmat_tangent_hull *fine = &j->fine;
   double *model = qmat_alloc(given->count, 3 * sizeof *model);
   if (!model) return QMAT_ERROR_MEMORY;
@@ -339,7 +349,7 @@ static qmat_status make_parts(merging *m, qmat_solid_part *given) {
     const size_t end = first + slice < m->part_count ? first + slice : m->part_count;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : memory)
     for (size_t i = first; i < end; i++) {
-      m->parts[i].shape = (uint32_t)i;
+      m->parts[i].shape = m->parts[i].last = m->following[i] = (uint32_t)i;
       if (given[i].count == 0) continue;
       joint *j = &m->joints[omp_get_thread_num()];
       if (make_part(m, &given[i], false, j, &m->parts[i]) == QMAT_ERROR_MEMORY) memory = false;
@@ -359,10 +369,12 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
   m->part_count = count;
   m->room = ROOM_FACTOR * most_points;
   m->most_points = most_points;
+  m->given = given;
   m->parts = qmat_arena_calloc(arena, count, sizeof *m->parts);
+  m->following = qmat_arena_alloc(arena, count, sizeof *m->following);
   m->joints = qmat_arena_alloc(arena, (size_t)threads, sizeof *m->joints);
   m->is_vertex = qmat_arena_alloc(arena, 2 * m->room, sizeof *m->is_vertex);
-  if (!m->parts || !m->joints || !m->is_vertex) return qmat_fail_memory(m->context, "the hulls");
+  if (!m->parts || !m->following || !m->joints || !m->is_vertex) return qmat_fail_memory(m->context, "the hulls");
   qmat_status status = QMAT_OK;
   for (int i = 0; i < threads && status == QMAT_OK; i++) {
     joint *j = &m->joints[i];
@@ -372,36 +384,81 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
     if (!j->points || !j->unit || !j->triangles) return qmat_fail_memory(m->context, "the hulls");
     status = qmat_tangent_hull_init(m->context, m->room, &j->fine);
     if (status == QMAT_OK) status = qmat_tangent_hull_init(m->context, most_points, &j->coarse);
-    if (status == QMAT_OK) status = qmat_outer_hull_init(m->context, m->room, &j->outer);
   }
   return status == QMAT_OK ? make_parts(m, given) : status;
 }
 
-/* Reduces a part to as few vertices as a hull may have: triangles or half-spaces, whichever has the smaller volume. */
-static qmat_status reduce_part(const merging *m, part *p, joint *j) {
+/* The number of points of the given parts in a part. */
+static size_t count_points(const merging *m, size_t i) {
+  size_t count = 0;
+  for (uint32_t g = (uint32_t)i;; g = m->following[g]) {
+    count += m->given[g].count;
+    if (g == m->parts[i].last) return count;
+  }
+}
+
+/* The vertices of the hull of all points of a part; `model` has room for them. */
+static qmat_status collect_points(const merging *m, size_t i, double *model, size_t *count) {
+  *count = 0;
+  for (uint32_t g = (uint32_t)i;; g = m->following[g]) {
+    qmat_frame_to_model(qmat_surface_frame(m->solid), m->given[g].points, m->given[g].count, &model[3 * *count]);
+    *count += m->given[g].count;
+    if (g == m->parts[i].last) break;
+  }
+  uint32_t *triangles = qmat_alloc(*count, 6 * sizeof *triangles);
+  uint8_t *is_vertex = qmat_calloc(*count, sizeof *is_vertex);
+  size_t triangle_count = 0, used = 0;
+  qmat_status status = triangles && is_vertex ? QMAT_OK : QMAT_ERROR_MEMORY;
+  if (status == QMAT_OK) status = qmat_convex_hull(model, *count, triangles, &triangle_count);
+  for (size_t k = 0; status == QMAT_OK && k < 3 * triangle_count; k++) is_vertex[triangles[k]] = 1;
+  for (size_t k = 0; status == QMAT_OK && k < *count; k++)
+    if (is_vertex[k]) memmove(&model[3 * used++], &model[3 * k], 3 * sizeof *model);
+  if (status == QMAT_OK) *count = used;
+  qmat_free(triangles);
+  qmat_free(is_vertex);
+  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+}
+
+/* Makes the hull of a part with as few vertices as it may have: triangles or half-spaces, whichever has the smaller
+ * volume. */
+static qmat_status reduce_part(const merging *m, size_t i, joint *j) {
   const qmat_tangent_hull *coarse = &j->coarse;
   const qmat_outer_hull *outer = &j->outer;
+  const double margin = margin_of(m);
   double of_outer = INFINITY;
-  size_t count;
-  qmat_status status = surround(&j->coarse, p->points, p->count, 0, m->error);
-  if (status == QMAT_OK) status = qmat_convex_hull(coarse->points, coarse->point_count, j->triangles, &count);
-  if (status != QMAT_OK) return status;
-  const double of_coarse = volume_of(coarse->points, j->triangles, count);
-  status = qmat_outer_hull_fit(&j->outer, p->points, p->count, m->most_points, fine_share * m->error);
-  if (status == QMAT_OK) status = qmat_convex_hull(outer->points, outer->point_count, j->triangles, &count);
-  if (status == QMAT_OK) of_outer = volume_of(outer->points, j->triangles, count);
-  if (status == QMAT_ERROR_MEMORY) return status;
-  const bool done = of_outer < of_coarse ? set_points(p, outer->points, outer->point_count)
-                                         : set_points(p, coarse->points, coarse->point_count);
-  return done ? QMAT_OK : QMAT_ERROR_MEMORY;
+  size_t count, triangles;
+  double *model = qmat_alloc(count_points(m, i), 3 * sizeof *model);
+  qmat_status status = model ? collect_points(m, i, model, &count) : QMAT_ERROR_MEMORY;
+  if (status == QMAT_OK) status = surround(&j->coarse, model, count, margin, m->error);
+  if (status == QMAT_OK) status = qmat_convex_hull(coarse->points, coarse->point_count, j->triangles, &triangles);
+  if (status == QMAT_OK) {
+    const double of_coarse = volume_of(coarse->points, j->triangles, triangles);
+    status = qmat_outer_hull_fit(&j->outer, model, count, margin, fine_share * m->error);
+    if (status == QMAT_OK) status = qmat_convex_hull(outer->points, outer->point_count, j->triangles, &triangles);
+    if (status == QMAT_OK) of_outer = volume_of(outer->points, j->triangles, triangles);
+    if (status == QMAT_ERROR_GEOMETRY) status = QMAT_OK;
+    const bool is_outer = of_outer < of_coarse;
+    if (status == QMAT_OK && !set_points(&m->parts[i], is_outer ? outer->points : coarse->points,
+                                         is_outer ? outer->point_count : coarse->point_count))
+      status = QMAT_ERROR_MEMORY;
+  }
+  qmat_free(model);
+  return status;
 }
 
 static qmat_status reduce_parts(merging *m) {
   const int threads = qmat_threads(m->context);
+  size_t room = 4;
   bool done = true;
+  for (size_t i = 0; i < m->part_count; i++)
+    if (m->parts[i].live && count_points(m, i) > room) room = count_points(m, i);
+  for (int i = 0; i < threads; i++) {
+    const qmat_status status = qmat_outer_hull_init(m->context, room, m->most_points, &m->joints[i].outer);
+    if (status != QMAT_OK) return status;
+  }
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
   for (size_t i = 0; i < m->part_count; i++)
-    if (m->parts[i].live && reduce_part(m, &m->parts[i], &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
+    if (m->parts[i].live && reduce_part(m, i, &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
   return done ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
 }
 

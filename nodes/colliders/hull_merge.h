@@ -9,9 +9,9 @@
 /* Makes hulls around the parts of a solid, and joins them: two become the convex hull of both, where that leaves the
  * solid by at most `error`, and the pair that gains the least volume comes first. While more than `most` (0: any
  * number) are left, the limit rises. A hull has at most `most_points` vertices, and is within a fifth of `error` of
- * what it contains where that allows it; the mesh's deviation is added. Of the hulls of outer_hull.h and tangent_hull.h
- * it is the one with the smaller volume. A joint hull keeps the three spheres of the larger of the two. A part without
- * a volume joins the nearest one.
+ * the points of its parts where that allows it; the mesh's deviation is added. Of the hulls of outer_hull.h and
+ * tangent_hull.h it is the one with the smaller volume. A joint hull keeps the three spheres of the larger of the two.
+ * A part without a volume joins the nearest one.
  *
  * `colliders` has the hulls of qmat_shape_hulls, outside, in units of the model. They are replaced, unless no part has
  * a volume. `parts`: those of qmat_solid_parts_find for its shapes; their points may change. `solid` is watertight.

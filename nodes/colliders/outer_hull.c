@@ -15,8 +15,8 @@ static const double worth = 0.5;
 
 /* The first sweeps go half of the way, so that all vertices get their share. Sweeps end when one gains less than this
  * share of the volume. */
-enum { HALF_SWEEPS = 12, MOST_SWEEPS = 30 };
-static const double least_gain = 1e-4;
+enum { HALF_SWEEPS = 8, MOST_SWEEPS = 20 };
+static const double least_gain = 2e-4;
 
 /* In half sizes of the cloud: what counts as in a plane, and the least length. Of planes: the square of the sine of the
  * least angle between two that meet in a line, and that of a line and a plane that meet. */
@@ -30,19 +30,20 @@ typedef struct program {
   size_t count;
 } program;
 
-qmat_status qmat_outer_hull_init(qmat_context *context, size_t room, qmat_outer_hull *h) {
+qmat_status qmat_outer_hull_init(qmat_context *context, size_t room, size_t most, qmat_outer_hull *h) {
   qmat_arena *arena = &context->arena;
   *h = (qmat_outer_hull){.room = room,
-                         .points = qmat_arena_alloc(arena, room, 3 * sizeof *h->points),
+                         .most = most,
+                         .points = qmat_arena_alloc(arena, most, 3 * sizeof *h->points),
                          .cloud = qmat_arena_alloc(arena, room, 3 * sizeof *h->cloud),
-                         .tangents = qmat_arena_alloc(arena, room, 6 * 4 * sizeof *h->tangents),
-                         .scores = qmat_arena_alloc(arena, room, 2 * sizeof *h->scores),
-                         .triangles = qmat_arena_alloc(arena, room, 6 * sizeof *h->triangles),
-                         .twins = qmat_arena_alloc(arena, room, 6 * sizeof *h->twins),
-                         .scratch = qmat_arena_alloc(arena, room, 6 * sizeof *h->scratch),
-                         .leaving = qmat_arena_alloc(arena, room, sizeof *h->leaving),
-                         .farthest = qmat_arena_alloc(arena, room, 2 * sizeof *h->farthest),
-                         .known = qmat_arena_alloc(arena, room, 6 * sizeof *h->known),
+                         .tangents = qmat_arena_alloc(arena, most, 6 * 4 * sizeof *h->tangents),
+                         .scores = qmat_arena_alloc(arena, most, 2 * sizeof *h->scores),
+                         .triangles = qmat_arena_alloc(arena, most, 6 * sizeof *h->triangles),
+                         .twins = qmat_arena_alloc(arena, most, 6 * sizeof *h->twins),
+                         .scratch = qmat_arena_alloc(arena, most, 6 * sizeof *h->scratch),
+                         .leaving = qmat_arena_alloc(arena, most, sizeof *h->leaving),
+                         .farthest = qmat_arena_alloc(arena, most, 2 * sizeof *h->farthest),
+                         .known = qmat_arena_alloc(arena, most, 6 * sizeof *h->known),
                          .chosen = qmat_arena_alloc(arena, room, sizeof *h->chosen)};
   if (h->points && h->cloud && h->tangents && h->scores && h->triangles && h->twins && h->scratch && h->leaving &&
       h->farthest && h->known && h->chosen)
@@ -232,20 +233,20 @@ static bool connect(qmat_outer_hull *hull, size_t half_edges) {
   return true;
 }
 
-/* The largest factor by which a facet must move away from the origin so that the cloud is inside of all. */
-static double find_factor(const qmat_outer_hull *hull, size_t triangles) {
+/* The largest factor by which a facet must move away from the origin so that the cloud is inside of all by `margin`. */
+static double find_factor(const qmat_outer_hull *hull, size_t triangles, double margin) {
   double factor = 0;
   for (uint32_t t = 0; t < triangles; t++) {
     double normal[3], reach = 0;
     if (!find_normal(hull, 3 * t, normal)) continue;
     for (size_t i = 0; i < hull->cloud_count; i++) reach = fmax(reach, qmat_dot(normal, &hull->cloud[3 * i]));
-    factor = fmax(factor, reach / fmax(qmat_dot(normal, start_of(hull, 3 * t)), 0));
+    factor = fmax(factor, (reach + margin) / fmax(qmat_dot(normal, start_of(hull, 3 * t)), 0));
   }
   return factor;
 }
 
 /* Adds points of the cloud that are far outside of the hull so far. How many. */
-static size_t add_points(qmat_outer_hull *hull, size_t triangles, size_t most, double error) {
+static size_t add_points(qmat_outer_hull *hull, size_t triangles, double error) {
   double top = 0;
   for (uint32_t t = 0; t < triangles; t++) {
     double normal[3], u[3], v[3], away = error;
@@ -266,7 +267,7 @@ static size_t add_points(qmat_outer_hull *hull, size_t triangles, size_t most, d
     top = fmax(top, hull->scores[t]);
   }
   size_t added = 0;
-  for (uint32_t t = 0; t < triangles && hull->point_count < most; t++) {
+  for (uint32_t t = 0; t < triangles && hull->point_count < hull->most; t++) {
     if (!(hull->scores[t] > 0) || hull->scores[t] < worth * top || hull->chosen[hull->farthest[t]]) continue;
     hull->chosen[hull->farthest[t]] = 1;
     memcpy(&hull->points[3 * hull->point_count++], &hull->cloud[3 * (size_t)hull->farthest[t]],
@@ -277,7 +278,7 @@ static size_t add_points(qmat_outer_hull *hull, size_t triangles, size_t most, d
 }
 
 /* Chooses points of the cloud whose hull is nearly that of all. */
-static qmat_status choose(qmat_outer_hull *hull, size_t most, double error, size_t *triangles) {
+static qmat_status choose(qmat_outer_hull *hull, double error, size_t *triangles) {
   memset(hull->chosen, 0, hull->cloud_count);
   hull->point_count = 0;
   for (size_t d = 0; d < DIRECTIONS; d++) {
@@ -297,7 +298,7 @@ static qmat_status choose(qmat_outer_hull *hull, size_t most, double error, size
   for (;;) {
     if (hull->point_count < 4) return QMAT_ERROR_GEOMETRY;
     const qmat_status status = qmat_convex_hull(hull->points, hull->point_count, hull->triangles, triangles);
-    if (status != QMAT_OK || add_points(hull, *triangles, most, error) == 0) return status;
+    if (status != QMAT_OK || add_points(hull, *triangles, error) == 0) return status;
   }
 }
 
@@ -330,22 +331,24 @@ static void keep_vertices(qmat_outer_hull *hull, size_t triangles) {
   hull->point_count = kept;
 }
 
-qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, size_t count, size_t most, double error) {
+qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, size_t count, double margin,
+                                double error) {
   double centre[3] = {0}, scale;
   size_t triangles;
   hull->cloud_count = count;
   if (count < 4 || count > hull->room || !take_cloud(hull, points, centre, &scale)) return QMAT_ERROR_GEOMETRY;
-  qmat_status status = choose(hull, most, error / scale, &triangles);
+  qmat_status status = choose(hull, error / scale, &triangles);
   if (status != QMAT_OK) return status;
   if (!connect(hull, 3 * triangles)) return QMAT_ERROR_GEOMETRY;
-  const double growth = find_factor(hull, triangles) * (1 + on_plane);
+  const double growth = find_factor(hull, triangles, 0) * (1 + on_plane);
   if (!isfinite(growth)) return QMAT_ERROR_GEOMETRY;
   for (size_t i = 0; i < 3 * hull->point_count; i++) hull->points[i] *= growth;
   shrink(hull, triangles);
   status = qmat_convex_hull(hull->points, hull->point_count, hull->triangles, &triangles);
   if (status != QMAT_OK) return status;
-  const double factor = fmax(find_factor(hull, triangles), 1);
-  if (!(factor < 1.001)) return QMAT_ERROR_GEOMETRY;
+  if (!(find_factor(hull, triangles, 0) < 1.001)) return QMAT_ERROR_GEOMETRY;
+  const double factor = fmax(find_factor(hull, triangles, margin / scale), 1);
+  if (!isfinite(factor)) return QMAT_ERROR_GEOMETRY;
   keep_vertices(hull, triangles);
   for (size_t i = 0; i < 3 * hull->point_count; i++)
     hull->points[i] = centre[i % 3] + factor * (1 + 1e-12) * scale * hull->points[i];

@@ -48,11 +48,15 @@ static void test_the_corners_of_a_box_are_its_hull(void **state) {
     points[3 * i + 1] = (double)(i / 3 % 3);
     points[3 * i + 2] = 0.01 * (double)(i / 9);
   }
-  assert_int_equal(qmat_outer_hull_init(&context, ROOM, &h), QMAT_OK);
-  assert_int_equal(qmat_outer_hull_fit(&h, points, 27, 24, 1e-4), QMAT_OK);
+  assert_int_equal(qmat_outer_hull_init(&context, ROOM, 24, &h), QMAT_OK);
+  assert_int_equal(qmat_outer_hull_fit(&h, points, 27, 0, 1e-4), QMAT_OK);
   assert_int_equal(h.point_count, 8);
   assert_true(outside_of(&h, points, 27, &volume) <= 1e-12);
   assert_near(volume, 4 * 2 * 0.02, 1e-6);
+  /* The sides of 4 x 2 are 0.01 from the middle: a margin of 0.0001 makes all a hundredth larger. */
+  assert_int_equal(qmat_outer_hull_fit(&h, points, 27, 1e-4, 1e-4), QMAT_OK);
+  assert_true(outside_of(&h, points, 27, &volume) <= -1e-4);
+  assert_near(volume, 4 * 2 * 0.02 * 1.01 * 1.01 * 1.01, 1e-5);
   qmat_context_uninit(&context);
 }
 
@@ -63,8 +67,8 @@ static void test_a_ball_is_met_by_triangles(void **state) {
   qmat_outer_hull h;
   double points[3 * ROOM], volume;
   for (size_t i = 0; i < ROOM; i++) qmat_spread_direction(i, ROOM, &points[3 * i]);
-  assert_int_equal(qmat_outer_hull_init(&context, ROOM, &h), QMAT_OK);
-  assert_int_equal(qmat_outer_hull_fit(&h, points, ROOM, 128, 1e-4), QMAT_OK);
+  assert_int_equal(qmat_outer_hull_init(&context, ROOM, 128, &h), QMAT_OK);
+  assert_int_equal(qmat_outer_hull_fit(&h, points, ROOM, 0, 1e-4), QMAT_OK);
   assert_true(h.point_count <= 128);
   assert_true(outside_of(&h, points, ROOM, &volume) <= 1e-12);
   assert_true(volume < 1.02 * 4 / 3 * pi);
@@ -81,8 +85,8 @@ static void test_random_points_are_inside(void **state) {
     const size_t count = 4 + random_index(&random, ROOM - 4), most = 24 + 2 * round;
     const double flat = round % 3 == 0 ? 1e-3 : 1; /* some are plates */
     for (size_t i = 0; i < 3 * count; i++) points[i] = random_between(&random, -1, 1) * (i % 3 == 2 ? flat : 1);
-    assert_int_equal(qmat_outer_hull_init(&context, ROOM, &h), QMAT_OK);
-    assert_int_equal(qmat_outer_hull_fit(&h, points, count, most, 1e-4), QMAT_OK);
+    assert_int_equal(qmat_outer_hull_init(&context, ROOM, most, &h), QMAT_OK);
+    assert_int_equal(qmat_outer_hull_fit(&h, points, count, 0, 1e-4), QMAT_OK);
     assert_true(h.point_count >= 4 && h.point_count <= most);
     assert_true(outside_of(&h, points, count, &volume) <= 1e-12);
     assert_true(volume < 12 * flat);
@@ -100,10 +104,10 @@ static void test_points_in_a_plane_have_no_hull(void **state) {
     points[3 * i + 1] = (double)(i / 5);
     points[3 * i + 2] = 1;
   }
-  assert_int_equal(qmat_outer_hull_init(&context, ROOM, &h), QMAT_OK);
-  assert_int_equal(qmat_outer_hull_fit(&h, points, 25, 24, 1e-4), QMAT_ERROR_GEOMETRY);
-  assert_int_equal(qmat_outer_hull_fit(&h, points, 3, 24, 1e-4), QMAT_ERROR_GEOMETRY);
-  assert_int_equal(qmat_outer_hull_fit(&h, same, 4, 24, 1e-4), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(qmat_outer_hull_init(&context, ROOM, 24, &h), QMAT_OK);
+  assert_int_equal(qmat_outer_hull_fit(&h, points, 25, 0, 1e-4), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(qmat_outer_hull_fit(&h, points, 3, 0, 1e-4), QMAT_ERROR_GEOMETRY);
+  assert_int_equal(qmat_outer_hull_fit(&h, same, 4, 0, 1e-4), QMAT_ERROR_GEOMETRY);
   qmat_context_uninit(&context);
 }
 
