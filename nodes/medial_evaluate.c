@@ -7,7 +7,6 @@
 #include "core/geometry/medial_distance.h"
 #include "core/json_text.h"
 #include "core/node.h"
-#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/area_samples.h"
 #include "nodes/measure/boundary_distance.h"
@@ -229,11 +228,14 @@ static qmat_status make_report(const evaluation *e, qmat_report *report) {
   return qmat_topology_report(e->context, &e->unit, e->surface, report->root);
 }
 
+/* Without an epsilon, errors from this one on are bounded to a share of the error itself. */
+static const double least_resolved = 0.001;
+
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const medial_evaluate_params *params = data;
   evaluation e = {
-      .context = context, .params = params, .epsilon = params->epsilon > 0 ? params->epsilon : QMAT_DEFAULT_EPSILON};
+      .context = context, .params = params, .epsilon = params->epsilon > 0 ? params->epsilon : least_resolved};
   qmat_report *report = qmat_report_new();
   qmat_status status = report ? QMAT_OK : qmat_fail_memory(context, "the report");
   if (status == QMAT_OK) status = prepare(&e, (const qmat_mesh *)inputs[0], (const qmat_medial *)inputs[1]);
@@ -256,7 +258,8 @@ static const qmat_param params[] = {
     QMAT_LENGTH(medial_evaluate_params, epsilon, 0.01, 0, 1,
                 "Both errors must be at most this for the result to be certified; 0: nothing is certified"),
     QMAT_FLOAT(medial_evaluate_params, tolerance, "epsilon", 0.05, 0.001, 1,
-               "The largest gap between the bounds of an error, relative to epsilon or to the error, the larger"),
+               "The largest gap between the bounds of an error, relative to epsilon (0.1 % without one) or to the "
+               "error, the larger"),
     QMAT_INT(medial_evaluate_params, samples, "points", 20000, 1, 1e9,
              "Points on the surface, and as many on the primitives, for sampled figures and means"),
     {0},
