@@ -25,9 +25,8 @@ typedef struct medial_evaluate_params {
 /* Centres this close to the surface count as inside. */
 static const double beside_surface = 1e-5;
 
-/* The surface is searched up to four times, each time from the F found before. A search may find an F so close to
- * epsilon that its tolerance crosses it; the third and fourth resolve a sixteenth of the remaining interval. */
-enum { MOST_SEARCHES = 4, FIRST_CLOSE_SEARCH = 2 };
+/* The surface is searched up to so many times, each time from the F found before. */
+enum { MOST_SEARCHES = 4 };
 
 typedef struct evaluation {
   qmat_context *context;
@@ -95,16 +94,16 @@ static qmat_status sample_surface(evaluation *e) {
   return status;
 }
 
-/* Bounds max(0, F) over the surface. */
+/* Bounds max(0, F) over the surface, more closely where that decides whether it is within epsilon. */
 static qmat_status bound_surface_to_envelope(evaluation *e) {
   double known = e->largest_gap;
+  const double decisive = e->params->epsilon - e->deviation;
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
-    const double interval = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
-    const double tolerance = search < FIRST_CLOSE_SEARCH ? interval : interval / 16;
+    const double tolerance = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
     qmat_hausdorff_bound bound;
-    status = qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, -INFINITY,
-                                          &bound);
+    status =
+        qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, decisive, &bound);
     e->surface_to_envelope = (qmat_bounds){bound.found, fmax(bound.bound, bound.found)};
     known = bound.found;
     if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
