@@ -71,7 +71,7 @@ run_ctest() {
   shift
   report=$PWD/build/$preset/ctest.xml
   rm -f "$report"
-  ctest --preset "$preset" -j "$(nproc)" --timeout 1200 --output-junit "$report" "$@"
+  ctest --preset "$preset" -j "$(nproc)" --timeout 1800 --output-junit "$report" "$@"
   result=$?
   if [ ! -s "$report" ] || [ -z "$(attribute "$report" tests)" ]; then
     echo "ctest wrote no report (exit code $result)"
