@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/geometry/vector.h"
+#include "io/placement.h"
 
 int qmat_collider_width(const uint32_t shape[3]) {
   return shape[1] == shape[0] ? 1 : shape[2] == shape[1] ? 2 : 3;
@@ -33,30 +34,9 @@ void qmat_capsule_frame(const double first[4], const double second[4], double mi
   normalise(rotation);
 }
 
-/* The quaternion of a rotation matrix, by its largest component. */
-static void quaternion_of(double m[3][3], double q[4]) {
-  const double trace = m[0][0] + m[1][1] + m[2][2];
-  int largest = 3;
-  for (int k = 0; k < 3; k++)
-    if (m[k][k] > (largest == 3 ? trace : m[largest][largest])) largest = k;
-  if (largest == 3) {
-    q[0] = m[2][1] - m[1][2];
-    q[1] = m[0][2] - m[2][0];
-    q[2] = m[1][0] - m[0][1];
-    q[3] = 1 + trace;
-  } else {
-    const int i = largest, j = (i + 1) % 3, k = (i + 2) % 3;
-    q[i] = 1 + m[i][i] - m[j][j] - m[k][k];
-    q[j] = m[j][i] + m[i][j];
-    q[k] = m[k][i] + m[i][k];
-    q[3] = m[k][j] - m[j][k];
-  }
-  normalise(q);
-}
-
 void qmat_principal_inertia(const double body[10], double moments[3], double rotation[4]) {
   double a[3][3] = {{body[4], body[7], body[8]}, {body[7], body[5], body[9]}, {body[8], body[9], body[6]}};
-  double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; /* columns */
+  double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int sweep = 0; sweep < 32; sweep++)
     for (int p = 0; p < 2; p++)
       for (int q = p + 1; q < 3; q++) {
@@ -70,13 +50,13 @@ void qmat_principal_inertia(const double body[10], double moments[3], double rot
           a[k][q] = s * kp + c * kq;
         }
         for (int k = 0; k < 3; k++) {
-          const double pk = a[p][k], qk = a[q][k], ap = axes[k][p], aq = axes[k][q];
+          const double pk = a[p][k], qk = a[q][k], ap = axes[p][k], aq = axes[q][k];
           a[p][k] = c * pk - s * qk;
           a[q][k] = s * pk + c * qk;
-          axes[k][p] = c * ap - s * aq;
-          axes[k][q] = s * ap + c * aq;
+          axes[p][k] = c * ap - s * aq;
+          axes[q][k] = s * ap + c * aq;
         }
       }
   for (int k = 0; k < 3; k++) moments[k] = a[k][k];
-  quaternion_of(axes, rotation); /* Jacobi rotations keep the determinant 1 */
+  qmat_placement_quaternion(axes, rotation); /* Jacobi rotations keep the determinant 1 */
 }

@@ -47,3 +47,22 @@ void qmat_placement_split(const double m[16], double inner[16], double outer[16]
     }
   }
 }
+
+void qmat_placement_quaternion(double a[3][3], double q[4]) {
+  const double trace = a[0][0] + a[1][1] + a[2][2];
+  int largest = 3;
+  for (int k = 0; k < 3; k++)
+    if (a[k][k] > (largest == 3 ? trace : a[largest][largest])) largest = k;
+  if (largest == 3) {
+    for (int i = 0; i < 3; i++) q[i] = a[(i + 1) % 3][(i + 2) % 3] - a[(i + 2) % 3][(i + 1) % 3];
+    q[3] = 1 + trace;
+  } else {
+    const int i = largest, j = (i + 1) % 3, k = (i + 2) % 3;
+    q[i] = 1 + a[i][i] - a[j][j] - a[k][k];
+    q[j] = a[i][j] + a[j][i];
+    q[k] = a[i][k] + a[k][i];
+    q[3] = a[j][k] - a[k][j];
+  }
+  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  for (int k = 0; k < 4; k++) q[k] /= length;
+}

@@ -15,4 +15,8 @@ bool qmat_placement_is_plain(const double m[16]);
 /* Splits a transform into a rotation `inner` and, after it, a plain transform `outer`. */
 void qmat_placement_split(const double m[16], double inner[16], double outer[16]);
 
+/* The quaternion x y z w, of length 1, of the rotation that turns the axes x, y and z of space into `axes`, which are
+ * orthonormal and right-handed up to rounding. By its largest component (Shepperd's method). */
+void qmat_placement_quaternion(double axes[3][3], double quaternion[4]);
+
 #endif

@@ -83,25 +83,6 @@ static bool invert(const transform *t, transform *inverse) {
   return true;
 }
 
-/* The quaternion, x y z w, of a rotation by its rows, which are the images of the axes. Source: Shepperd's method. */
-static void quaternion_of(double r[3][3], double q[4]) {
-  const double trace = r[0][0] + r[1][1] + r[2][2];
-  if (trace > 0) {
-    const double s = 2 * sqrt(1 + trace);
-    for (int i = 0; i < 3; i++) q[i] = (r[(i + 1) % 3][(i + 2) % 3] - r[(i + 2) % 3][(i + 1) % 3]) / s;
-    q[3] = s / 4;
-    return;
-  }
-  int i = r[1][1] > r[0][0];
-  if (r[2][2] > r[i][i]) i = 2;
-  const int j = (i + 1) % 3, k = (i + 2) % 3;
-  const double s = 2 * sqrt(fmax(1 + r[i][i] - r[j][j] - r[k][k], 0));
-  q[i] = s / 4;
-  q[j] = (r[i][j] + r[j][i]) / s;
-  q[k] = (r[i][k] + r[k][i]) / s;
-  q[3] = (r[j][k] - r[k][j]) / s;
-}
-
 /* Divides a row by its length, which it returns. */
 static double normalise(double row[3]) {
   const double length = sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
@@ -126,7 +107,7 @@ static void pose_of(const transform *t, double pose[QMAT_RIG_POSE]) {
   for (int k = 0; k < 3; k++) r[1][k] -= along * r[0][k];
   const bool is_flat = !(fabs(pose[7]) > 0) || !(normalise(r[1]) > 0);
   for (int k = 0; k < 3; k++) r[2][k] = r[0][(k + 1) % 3] * r[1][(k + 2) % 3] - r[0][(k + 2) % 3] * r[1][(k + 1) % 3];
-  quaternion_of(r, pose + 3);
+  qmat_placement_quaternion(r, pose + 3);
   if (is_flat) memcpy(pose + 3, (const double[]){0, 0, 0, 1}, 4 * sizeof *pose);
 }
 
