@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/disjoint_sets.h"
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
 #include "core/node.h"
@@ -13,6 +12,7 @@
 #include "nodes/skin/skin_decimate.h"
 #include "nodes/skin/skin_distance.h"
 #include "nodes/skin/skin_surface_cgal.h"
+#include "nodes/skin/skin_topology.h"
 
 /* The limit of balls for CGAL: so many may take 45 seconds. */
 static const size_t MOST_BALLS = 3000;
@@ -222,16 +222,6 @@ static qmat_status make_skin_surface(skin *s) {
   }
   qmat_free(list.balls);
   return status;
-}
-
-static qmat_status count_components(skin *s, size_t *components) {
-  const qmat_skin_triangles *surface = &s->surface;
-  uint32_t *parents = qmat_sets_new(s->context, surface->vertex_count);
-  if (!parents) return qmat_fail_memory(s->context, "surface vertices");
-  *components = surface->vertex_count;
-  for (size_t i = 0; i < 3 * surface->triangle_count; i++)
-    *components -= qmat_sets_join(parents, surface->triangles[i], surface->triangles[i - i % 3]);
-  return QMAT_OK;
 }
 
 /* A contour above this number of triangles is made again with cells twice as large: the decimation would take long for
@@ -469,8 +459,10 @@ static int add_warning(const skin *s, json_t *root) {
 static qmat_status fill_report(skin *s, qmat_report *report) {
   const qmat_skin_triangles *surface = &s->surface;
   size_t components = 0;
+  int64_t euler = 0;
   double at_vertices = 0, at_centroids = 0;
-  qmat_status status = count_components(s, &components);
+  qmat_status status = qmat_skin_topology(s->context, surface->triangles, surface->triangle_count,
+                                          surface->vertex_count, &components, &euler);
   if (status == QMAT_OK) status = measure(s, &at_vertices, &at_centroids);
   if (status != QMAT_OK) return status;
   json_int_t vertices = (json_int_t)surface->vertex_count, triangles = (json_int_t)surface->triangle_count;
@@ -478,7 +470,7 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
   json_t *root = json_pack(
       "{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I}", "method", envelope ? "envelope" : "skin_surface",
       "vertices", vertices, "triangles", triangles, "components", (json_int_t)components, "euler_characteristic",
-      vertices - triangles / 2, "diagonal", s->frame.diagonal, "error_at_vertices", at_vertices, "error_at_centroids",
+      (json_int_t)euler, "diagonal", s->frame.diagonal, "error_at_vertices", at_vertices, "error_at_centroids",
       at_centroids, "flat_slabs", (json_int_t)s->flat.triangle_count, "flat_cones", (json_int_t)s->flat.edge_count);
   json_t *details = envelope
                         ? json_pack("{s:f, s:f, s:f, s:I, s:I, s:f, s:I}", "cell_size", s->grid.base, "cell_size_model",

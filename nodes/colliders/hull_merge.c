@@ -7,6 +7,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_vertices.h"
 #include "nodes/colliders/outer_hull.h"
 #include "nodes/colliders/tangent_hull.h"
 
@@ -214,15 +215,6 @@ static pair *best_pair(const merging *m) {
   return best;
 }
 
-/* Keeps the points that are vertices of the hull: the first `*used`. */
-static void keep_vertices(joint *j, uint8_t *is_vertex, size_t *used) {
-  memset(is_vertex, 0, j->point_count);
-  for (size_t i = 0; i < 3 * j->triangle_count; i++) is_vertex[j->triangles[i]] = 1;
-  *used = 0;
-  for (size_t i = 0; i < j->point_count; i++)
-    if (is_vertex[i]) memmove(&j->points[3 * (*used)++], &j->points[3 * i], 3 * sizeof *j->points);
-}
-
 static void give_up(merging *m, uint32_t a, uint32_t b) {
   size_t kept = 0;
   for (size_t i = 0; i < m->pair_count; i++)
@@ -250,8 +242,7 @@ static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   joint *j = &m->joints[0];
   if (join(m, into, from, j) != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
   const double volume = volume_of(j->points, j->triangles, j->triangle_count);
-  size_t used;
-  keep_vertices(j, m->is_vertex, &used);
+  size_t used = qmat_hull_vertices_keep(j->points, j->point_count, j->triangles, j->triangle_count, m->is_vertex);
   const double *vertices = j->points;
   if (used > m->room) {
     const qmat_status status = qmat_tangent_hull_fit_points(&j->fine, j->points, used, 0, fine_share * m->error);
@@ -406,14 +397,11 @@ static qmat_status collect_points(const merging *m, size_t i, double *model, siz
     if (g == m->parts[i].last) break;
   }
   uint32_t *triangles = qmat_alloc(*count, 6 * sizeof *triangles);
-  uint8_t *is_vertex = qmat_calloc(*count, sizeof *is_vertex);
-  size_t triangle_count = 0, used = 0;
+  uint8_t *is_vertex = qmat_alloc(*count, sizeof *is_vertex);
+  size_t triangle_count = 0;
   qmat_status status = triangles && is_vertex ? QMAT_OK : QMAT_ERROR_MEMORY;
   if (status == QMAT_OK) status = qmat_convex_hull(model, *count, triangles, &triangle_count);
-  for (size_t k = 0; status == QMAT_OK && k < 3 * triangle_count; k++) is_vertex[triangles[k]] = 1;
-  for (size_t k = 0; status == QMAT_OK && k < *count; k++)
-    if (is_vertex[k]) memmove(&model[3 * used++], &model[3 * k], 3 * sizeof *model);
-  if (status == QMAT_OK) *count = used;
+  if (status == QMAT_OK) *count = qmat_hull_vertices_keep(model, *count, triangles, triangle_count, is_vertex);
   qmat_free(triangles);
   qmat_free(is_vertex);
   return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;

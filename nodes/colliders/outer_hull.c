@@ -6,6 +6,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_vertices.h"
 
 /* Vertices with more triangles around stay. The points farthest along some directions come first. */
 enum { MOST_AROUND = 48, DIRECTIONS = 14 };
@@ -321,16 +322,6 @@ static void shrink(qmat_outer_hull *hull, size_t triangles) {
     if (sweep(hull, i < HALF_SWEEPS ? 0.5 : 1) < least_gain * volume && i >= HALF_SWEEPS) break;
 }
 
-/* Drops points that are no vertices of the hull. */
-static void keep_vertices(qmat_outer_hull *hull, size_t triangles) {
-  size_t kept = 0;
-  memset(hull->chosen, 0, hull->point_count);
-  for (size_t i = 0; i < 3 * triangles; i++) hull->chosen[hull->triangles[i]] = 1;
-  for (size_t i = 0; i < hull->point_count; i++)
-    if (hull->chosen[i]) memmove(&hull->points[3 * kept++], &hull->points[3 * i], 3 * sizeof *hull->points);
-  hull->point_count = kept;
-}
-
 qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, size_t count, double margin,
                                 double error) {
   double centre[3] = {0}, scale;
@@ -349,7 +340,8 @@ qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, siz
   if (!(find_factor(hull, triangles, 0) < 1.001)) return QMAT_ERROR_GEOMETRY;
   const double factor = fmax(find_factor(hull, triangles, margin / scale), 1);
   if (!isfinite(factor)) return QMAT_ERROR_GEOMETRY;
-  keep_vertices(hull, triangles);
+  hull->point_count =
+      qmat_hull_vertices_keep(hull->points, hull->point_count, hull->triangles, triangles, hull->chosen);
   for (size_t i = 0; i < 3 * hull->point_count; i++)
     hull->points[i] = centre[i % 3] + factor * (1 + 1e-12) * scale * hull->points[i];
   return QMAT_OK;

@@ -7,6 +7,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/node.h"
+#include "nodes/skin/skin_topology.h"
 
 /* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Each round doubles them. */
 enum { MOST_ROUNDS = 6, FIRST_RINGS = 2 };
@@ -130,32 +131,16 @@ static bool lock_faults(thinning *t, int rings) {
   return any;
 }
 
-/* The number of components, and V - E + F, of triangles that are a closed 2-manifold. */
-static qmat_status topology_of(qmat_context *context, const uint32_t *triangles, size_t triangle_count,
-                               size_t vertex_count, size_t *components, int64_t *euler) {
-  uint32_t *leaders = qmat_sets_new(context, vertex_count);
-  bool *used = qmat_arena_calloc(&context->arena, vertex_count, sizeof *used);
-  if (!leaders || !used) return qmat_fail_memory(context, "the skin");
-  size_t joined = 0, vertices = 0;
-  for (size_t i = 0; i < 3 * triangle_count; i++) {
-    vertices += !used[triangles[i]];
-    used[triangles[i]] = true;
-    joined += qmat_sets_join(leaders, triangles[i], triangles[i - i % 3]);
-  }
-  *components = vertices - joined;
-  *euler = (int64_t)vertices - (int64_t)(triangle_count / 2);
-  return QMAT_OK;
-}
-
 /* Whether the thinned surface has the topology of the given one. */
 static qmat_status compare_topology(const thinning *t, bool *is_same) {
   const qmat_skin_triangles *surface = t->surface;
   size_t components[2];
   int64_t euler[2];
-  qmat_status status = topology_of(t->context, surface->triangles, surface->triangle_count, surface->vertex_count,
-                                   &components[0], &euler[0]);
+  qmat_status status = qmat_skin_topology(t->context, surface->triangles, surface->triangle_count,
+                                          surface->vertex_count, &components[0], &euler[0]);
   if (status == QMAT_OK)
-    status = topology_of(t->context, t->thinned, t->thinned_count, surface->vertex_count, &components[1], &euler[1]);
+    status =
+        qmat_skin_topology(t->context, t->thinned, t->thinned_count, surface->vertex_count, &components[1], &euler[1]);
   *is_same = status == QMAT_OK && components[0] == components[1] && euler[0] == euler[1];
   return status;
 }

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_COLLIDERS_HULL_VERTICES_H
+#define QMAT_NODES_COLLIDERS_HULL_VERTICES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Keeps those of `count` points (3 doubles each) that are corners of the triangles of their hull (3 ids each), in their
+ * order. Returns their number. `is_vertex` is scratch, one per point. Linear. */
+size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
+                               uint8_t *is_vertex);
+
+#endif
