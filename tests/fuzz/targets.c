@@ -304,7 +304,6 @@ static void read_base64(const uint8_t *content, size_t size) {
   qmat_context_uninit(&context);
 }
 
-/* A text layer, a crate or a package, told apart by the first bytes. */
 /* A layer over any scene can be read. */
 static void write_usd_layer(const qmat_scene *scene) {
   qmat_context context = {0};
@@ -370,6 +369,7 @@ static void read_usd_meshes(const qmat_bytes *bytes, const char *path) {
   qmat_context_uninit(&context);
 }
 
+/* A text layer, a crate or a package, told apart by the first bytes. */
 static void read_usd(const uint8_t *content, size_t size) {
   static const char path[] = "/no such folder/file.usd";
   qmat_context context = {0};

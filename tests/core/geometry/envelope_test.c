@@ -110,6 +110,14 @@ static void test_the_minimum_matches_brute_force(void **unused) {
   qmat_context_uninit(&context);
 }
 
+/* The corners of triangle `i` and its centre. */
+static void random_triangle(size_t i, double corners[3][3], double centre[3]) {
+  for (size_t k = 0; k < 3; k++) {
+    centre[k] = 0;
+    for (size_t c = 0; c < 3; c++) centre[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
+  }
+}
+
 /* The bound belongs to the primitive nearest to the point, so that it holds at every point between the corners. */
 static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_one_primitive(void **unused) {
   (void)unused;
@@ -118,9 +126,8 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
   fill_random(&m, 3);
   qmat_envelope *envelope = envelope_of(&context, &m);
   for (size_t i = 0; i < 500; i++) {
-    double corners[3][3], p[3] = {0, 0, 0}, bound;
-    for (size_t c = 0; c < 3; c++)
-      for (size_t k = 0; k < 3; k++) p[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
+    double corners[3][3], p[3], bound;
+    random_triangle(i, corners, p);
     assert_near(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, -INFINITY, &bound), brute(&m, p));
     uint32_t ids[3];
     size_t primitive;
@@ -155,9 +162,8 @@ static void test_a_bound_that_is_enough_ends_the_search(void **unused) {
   qmat_envelope *envelope = envelope_of(&context, &m);
   size_t early = 0;
   for (size_t i = 0; i < 500; i++) {
-    double corners[3][3], p[3] = {0, 0, 0}, bound;
-    for (size_t c = 0; c < 3; c++)
-      for (size_t k = 0; k < 3; k++) p[k] += (corners[c][k] = number(5 * i + c, k, 0)) / 3;
+    double corners[3][3], p[3], bound;
+    random_triangle(i, corners, p);
     const double nearest = brute(&m, p), enough = nearest + 0.02 * (double)(i % 5);
     const double found = qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, enough, &bound);
     assert_true(found >= nearest - 1e-12 && (found <= nearest + 1e-12 || found < enough));
