@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "core/geometry/vector.h"
+
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
                                uint8_t *is_vertex) {
   size_t kept = 0;
@@ -11,4 +13,16 @@ size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *tri
   for (size_t i = 0; i < count; i++)
     if (is_vertex[i]) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
   return kept;
+}
+
+bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plane[4]) {
+  const double *corner = &points[3 * (size_t)triangle[0]];
+  double u[3], v[3];
+  qmat_subtract(&points[3 * (size_t)triangle[1]], corner, u);
+  qmat_subtract(&points[3 * (size_t)triangle[2]], corner, v);
+  qmat_cross(u, v, plane);
+  if (!(qmat_dot(plane, plane) > 0)) return false;
+  qmat_normalize(plane);
+  plane[3] = qmat_dot(plane, corner);
+  return true;
 }

@@ -2,6 +2,7 @@
 #ifndef QMAT_NODES_COLLIDERS_HULL_VERTICES_H
 #define QMAT_NODES_COLLIDERS_HULL_VERTICES_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -9,5 +10,9 @@
  * order. Returns their number. `is_vertex` is scratch, one per point. Linear. */
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
                                uint8_t *is_vertex);
+
+/* The plane of a triangle (3 ids of points): its unit normal, outward for a triangle of a hull, and its offset from the
+ * origin. False for a triangle without an area. */
+bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plane[4]);
 
 #endif

@@ -240,7 +240,7 @@ static double find_factor(const qmat_outer_hull *hull, size_t triangles, double 
   for (uint32_t t = 0; t < triangles; t++) {
     double normal[3], reach = 0;
     if (!find_normal(hull, 3 * t, normal)) continue;
-    for (size_t i = 0; i < hull->cloud_count; i++) reach = fmax(reach, qmat_dot(normal, &hull->cloud[3 * i]));
+    for (size_t i = 0; i < hull->cloud_count; i++) reach = qmat_larger(reach, qmat_dot(normal, &hull->cloud[3 * i]));
     factor = fmax(factor, (reach + margin) / fmax(qmat_dot(normal, start_of(hull, 3 * t)), 0));
   }
   return factor;

@@ -6,6 +6,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_vertices.h"
 #include "nodes/colliders/tangent_hull.h"
 
 /* Scratch of one hull: points in up to three copies of the directions. */
@@ -55,14 +56,8 @@ static qmat_status circumscribe(hull *h, size_t n, double *factor) {
   const qmat_status status = make_hull(h, unit, &id, 1, &n, &one);
   double nearest = 1;
   for (size_t t = 0; t < h->triangle_count && status == QMAT_OK; t++) {
-    const uint32_t *row = &h->triangles[3 * t];
-    const double *a = &h->points[3 * (size_t)row[0]];
-    double ab[3], ac[3], normal[3];
-    qmat_subtract(&h->points[3 * (size_t)row[1]], a, ab);
-    qmat_subtract(&h->points[3 * (size_t)row[2]], a, ac);
-    qmat_cross(ab, ac, normal);
-    qmat_normalize(normal);
-    nearest = fmin(nearest, qmat_dot(normal, a));
+    double plane[4];
+    if (qmat_hull_plane(h->points, &h->triangles[3 * t], plane)) nearest = fmin(nearest, plane[3]);
   }
   *factor = (1 + 1e-9) / nearest;
   return status;

@@ -4,18 +4,17 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
-#include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/extreme_points.h"
 #include "nodes/colliders/solid_cubes.h"
 
 /* Half the edge of the cubes between two parts. */
 static const double smallest = 1.0 / 512 * (1 + 1e-3);
 
-/* So many points of a part are reduced, by so many directions. */
-enum { MANY_POINTS = 4096, DIRECTIONS = 64 };
+/* So many points of a part are reduced. */
+enum { MANY_POINTS = 4096 };
 
-/* Points are dropped only so far inside of a hull, because of rounding. */
-static const double least_depth = 1e-9;
+/* Points may be dropped so far outside of the hull of the others. */
+static const double dropped = 1e-9;
 
 /* The points that one shape has so far. */
 typedef struct heap {
@@ -30,44 +29,6 @@ typedef struct region {
   bool failed;
 } region;
 
-/* Drops points inside of the hull of those that reach farthest in some directions (Akl and Toussaint 1978). Points in a
- * plane stay. */
-static qmat_status reduce(double *points, size_t *count) {
-  double farthest[3 * DIRECTIONS], planes[4 * 2 * DIRECTIONS];
-  uint32_t triangles[6 * DIRECTIONS];
-  size_t plane_count, kept = 0;
-  if (*count <= DIRECTIONS) return QMAT_OK;
-  for (size_t d = 0; d < DIRECTIONS; d++) {
-    double direction[3], most = -INFINITY;
-    qmat_spread_direction(d, DIRECTIONS, direction);
-    for (size_t i = 0; i < *count; i++) {
-      const double height = qmat_dot(direction, &points[3 * i]);
-      if (!(height > most)) continue;
-      most = height;
-      memcpy(&farthest[3 * d], &points[3 * i], 3 * sizeof *farthest);
-    }
-  }
-  const qmat_status status = qmat_convex_hull(farthest, DIRECTIONS, triangles, &plane_count);
-  if (status != QMAT_OK) return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
-  for (size_t t = 0; t < plane_count; t++) {
-    const double *corner = &farthest[3 * (size_t)triangles[3 * t]];
-    double u[3], v[3], *plane = &planes[4 * t];
-    qmat_subtract(&farthest[3 * (size_t)triangles[3 * t + 1]], corner, u);
-    qmat_subtract(&farthest[3 * (size_t)triangles[3 * t + 2]], corner, v);
-    qmat_cross(u, v, plane);
-    qmat_normalize(plane);
-    plane[3] = qmat_dot(plane, corner) - least_depth;
-  }
-  for (size_t i = 0; i < *count; i++) {
-    bool is_inside = true;
-    for (size_t t = 0; t < plane_count && is_inside; t++)
-      is_inside = qmat_dot(&planes[4 * t], &points[3 * i]) < planes[4 * t + 3];
-    if (!is_inside) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
-  }
-  *count = kept;
-  return QMAT_OK;
-}
-
 static heap *find_heap(region *r, uint32_t shape) {
   for (size_t i = 0; i < r->count; i++)
     if (r->heaps[i].shape == shape) return &r->heaps[i];
@@ -79,7 +40,7 @@ static heap *find_heap(region *r, uint32_t shape) {
 static bool add_points(heap *h, const double *points, size_t count) {
   if (count == 0) return true;
   if (h->count + count > h->limit) {
-    if (reduce(h->points, &h->count) != QMAT_OK) return false;
+    if (qmat_extreme_points_keep(h->points, &h->count, dropped) != QMAT_OK) return false;
     h->limit = 2 * (h->count + count) > MANY_POINTS ? 2 * (h->count + count) : MANY_POINTS;
   }
   if (qmat_grow((void **)&h->points, &h->capacity, 3 * (h->count + count), sizeof *h->points) != 0) return false;
@@ -112,7 +73,7 @@ static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
 static void finish(void *data) {
   region *r = data;
   for (size_t i = 0; i < r->count; i++)
-    if (reduce(r->heaps[i].points, &r->heaps[i].count) != QMAT_OK) r->failed = true;
+    if (qmat_extreme_points_keep(r->heaps[i].points, &r->heaps[i].count, dropped) != QMAT_OK) r->failed = true;
 }
 
 static qmat_status gather(void *data, void *found) {
@@ -130,6 +91,7 @@ static qmat_status gather(void *data, void *found) {
 qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                   qmat_solid_part **parts) {
   const size_t count = set->shape_count;
+  const int threads = qmat_threads(context);
   heap *all = qmat_arena_calloc(&context->arena, count, sizeof *all);
   *parts = qmat_arena_calloc(&context->arena, count, sizeof **parts);
   if (!all || !*parts) return qmat_fail_memory(context, "the parts of the solid");
@@ -141,12 +103,13 @@ qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *sur
                                      .what = "regions divided"};
   for (size_t i = 0; i < count; i++) all[i].limit = MANY_POINTS;
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
+  bool done = status == QMAT_OK;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
   for (size_t i = 0; i < count; i++) {
-    if (status == QMAT_OK && reduce(all[i].points, &all[i].count) != QMAT_OK)
-      status = qmat_fail_memory(context, "the parts of the solid");
+    if (done && qmat_extreme_points_keep(all[i].points, &all[i].count, dropped) != QMAT_OK) done = false;
     (*parts)[i] = (qmat_solid_part){all[i].count, all[i].points};
   }
-  return status;
+  return status != QMAT_OK || done ? status : qmat_fail_memory(context, "the parts of the solid");
 }
 
 void qmat_solid_parts_free(qmat_solid_part *parts, size_t count) {

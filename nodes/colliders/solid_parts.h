@@ -14,7 +14,7 @@ typedef struct qmat_solid_part {
 /* Divides a solid among shapes: each point belongs to the shape that is nearest to the centre of a cube around the
  * point. The hulls of all parts together contain the solid. Cubes are small, down to 1/256, only where shapes meet. The
  * solid's part in a cube is within the hull of the corners of the cube that are inside the solid and of the surface in
- * the cube: these are the points of a part, as far as they are vertices of its hull.
+ * the cube: these are the points of a part, as far as they are vertices of its hull, to 1e-9 (extreme_points.h).
  *
  * `*parts` receives one part per shape, in the context's arena; free it with qmat_solid_parts_free. `surface` is
  * watertight. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. Cost: linear

@@ -6,6 +6,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_vertices.h"
 
 /* A round adds a plane at vertices that are farther out than this share of the farthest, unless its normal is within
  * this cosine of one that the round has added: that plane may serve both. */
@@ -29,8 +30,9 @@ qmat_status qmat_tangent_hull_init(qmat_context *context, size_t most, qmat_tang
                               .normals = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->normals),
                               .duals = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->duals),
                               .points = qmat_arena_alloc(&context->arena, most, 3 * sizeof *hull->points),
+                              .ways = qmat_arena_alloc(&context->arena, most, 4 * sizeof *hull->ways),
                               .triangles = qmat_arena_alloc(&context->arena, most, 6 * sizeof *hull->triangles)};
-  if (hull->normals && hull->duals && hull->points && hull->triangles) return QMAT_OK;
+  if (hull->normals && hull->duals && hull->points && hull->ways && hull->triangles) return QMAT_OK;
   return qmat_fail_memory(context, "the hulls");
 }
 
@@ -40,7 +42,7 @@ static double reach(const target *t, const double normal[3]) {
   for (size_t i = 0; i < t->point_count; i++) {
     double to[3];
     qmat_subtract(&t->cloud[3 * i], t->centre, to);
-    most = fmax(most, qmat_dot(normal, to) + t->margin);
+    most = qmat_larger(most, qmat_dot(normal, to) + t->margin);
   }
   for (int k = 0; k < t->shape.count; k++) {
     const double *s = &t->spheres[4 * (size_t)t->ids[k]];
@@ -140,21 +142,24 @@ static double outside_by(const target *t, const double *vertex, double way[3]) {
 /* Adds planes where vertices are far out. How many. */
 static size_t refine(qmat_tangent_hull *h, const target *t, double error, size_t most_planes) {
   const size_t before = h->plane_count;
-  double farthest = INFINITY;
+  double farthest = -INFINITY;
+  for (size_t i = 0; i < h->point_count; i++) {
+    h->ways[4 * i + 3] = outside_by(t, &h->points[3 * i], &h->ways[4 * i]);
+    farthest = qmat_larger(farthest, h->ways[4 * i + 3]);
+  }
   while (h->plane_count < most_planes) {
-    double best = error, normal[3] = {0};
+    double best = error;
+    const double *normal = NULL;
     for (size_t i = 0; i < h->point_count; i++) {
-      double way[3];
-      const double away = outside_by(t, &h->points[3 * i], way);
-      if (!(away > best) || (isfinite(farthest) && away < worth * farthest)) continue;
+      const double *way = &h->ways[4 * i], away = way[3];
+      if (!(away > best) || away < worth * farthest) continue;
       bool served = false;
       for (size_t j = before; j < h->plane_count && !served; j++) served = qmat_dot(way, &h->normals[3 * j]) > apart;
       if (served) continue;
       best = away;
-      memcpy(normal, way, sizeof normal);
+      normal = way;
     }
-    if (best <= error) break;
-    if (!isfinite(farthest)) farthest = best;
+    if (!normal) break;
     add_plane(h, t, normal);
   }
   return h->plane_count - before;
@@ -167,13 +172,8 @@ static qmat_status finish(qmat_tangent_hull *h, const target *t) {
   if (status != QMAT_OK) return status;
   double factor = 1;
   for (size_t i = 0; i < count; i++) {
-    const double *p = &h->points[3 * (size_t)h->triangles[3 * i]];
-    double u[3], v[3], normal[3];
-    qmat_subtract(&h->points[3 * (size_t)h->triangles[3 * i + 1]], p, u);
-    qmat_subtract(&h->points[3 * (size_t)h->triangles[3 * i + 2]], p, v);
-    qmat_cross(u, v, normal);
-    qmat_normalize(normal);
-    factor = fmax(factor, reach(t, normal) / qmat_dot(normal, p));
+    double plane[4];
+    if (qmat_hull_plane(h->points, &h->triangles[3 * i], plane)) factor = fmax(factor, reach(t, plane) / plane[3]);
   }
   if (!(factor < 1.001)) return QMAT_ERROR_GEOMETRY;
   for (size_t i = 0; i < 3 * h->point_count; i++) h->points[i] = t->centre[i % 3] + factor * (1 + 1e-12) * h->points[i];
@@ -205,13 +205,8 @@ static qmat_status find_facets(target *t, uint32_t *triangles, double *facets) {
   for (size_t i = 0; i < t->point_count; i++)
     for (int k = 0; k < 3; k++) t->centre[k] += t->cloud[3 * i + (size_t)k] / (double)t->point_count;
   for (size_t i = 0; i < count; i++) {
-    const double *p = &t->cloud[3 * (size_t)triangles[3 * i]];
-    double u[3], v[3], *facet = &facets[4 * t->facet_count];
-    qmat_subtract(&t->cloud[3 * (size_t)triangles[3 * i + 1]], p, u);
-    qmat_subtract(&t->cloud[3 * (size_t)triangles[3 * i + 2]], p, v);
-    qmat_cross(u, v, facet);
-    if (!(qmat_dot(facet, facet) > 0)) continue;
-    qmat_normalize(facet);
+    double *facet = &facets[4 * t->facet_count];
+    if (!qmat_hull_plane(t->cloud, &triangles[3 * i], facet)) continue;
     facet[3] = reach(t, facet);
     t->facet_count++;
   }

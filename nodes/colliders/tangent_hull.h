@@ -10,6 +10,7 @@ typedef struct qmat_tangent_hull {
   double *normals;     /* 3 per plane */
   double *duals;       /* 3 per plane */
   double *points;      /* 3 per vertex, most at most: the result */
+  double *ways;        /* 4 per vertex: the normal of the plane that would cut it off, and how far outside it is */
   uint32_t *triangles; /* of a hull of `most` points at most; also the caller's scratch */
 } qmat_tangent_hull;
 

@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/colliders/extreme_points.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+#include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_vertices.h"
+
+/* The first points are the farthest along so many directions. */
+enum { DIRECTIONS = 64 };
+
+/* The points: those chosen, those left that may be outside of the hull of these, and those dropped. */
+typedef struct cloud {
+  double *points;
+  size_t chosen, left; /* left: the end of those that are */
+  double *planes;      /* of the facets of the hull: normal, offset */
+  uint32_t *triangles;
+  size_t *farthest; /* of each facet: the number of its farthest point, or `none` */
+  double *heights;
+  size_t plane_count, room; /* room: points whose hull fits in the arrays */
+} cloud;
+
+static const size_t none = SIZE_MAX;
+
+static void swap_points(cloud *c, size_t i, size_t j) {
+  double kept[3];
+  memcpy(kept, &c->points[3 * i], sizeof kept);
+  memmove(&c->points[3 * i], &c->points[3 * j], sizeof kept);
+  memcpy(&c->points[3 * j], kept, sizeof kept);
+}
+
+/* Chooses the farthest points along directions. */
+static void start(cloud *c) {
+  for (size_t d = 0; d < DIRECTIONS; d++) {
+    double direction[3], most = -INFINITY;
+    size_t best = 0;
+    qmat_spread_direction(d, DIRECTIONS, direction);
+    for (size_t i = 0; i < c->left; i++) {
+      const double height = qmat_dot(direction, &c->points[3 * i]);
+      if (!(height > most)) continue;
+      most = height;
+      best = i;
+    }
+    if (best >= c->chosen) swap_points(c, best, c->chosen++);
+  }
+}
+
+static bool make_room(cloud *c) {
+  if (c->chosen <= c->room) return true;
+  c->room = 2 * c->chosen;
+  qmat_free(c->planes);
+  qmat_free(c->triangles);
+  qmat_free(c->farthest);
+  qmat_free(c->heights);
+  c->planes = qmat_alloc(c->room, 8 * sizeof *c->planes);
+  c->triangles = qmat_alloc(c->room, 6 * sizeof *c->triangles);
+  c->farthest = qmat_alloc(c->room, 2 * sizeof *c->farthest);
+  c->heights = qmat_alloc(c->room, 2 * sizeof *c->heights);
+  return c->planes && c->triangles && c->farthest && c->heights;
+}
+
+/* The planes of the hull of the points chosen. */
+static qmat_status find_planes(cloud *c) {
+  size_t count;
+  if (!make_room(c)) return QMAT_ERROR_MEMORY;
+  const qmat_status status = qmat_convex_hull(c->points, c->chosen, c->triangles, &count);
+  if (status != QMAT_OK) return status;
+  c->plane_count = 0;
+  for (size_t t = 0; t < count; t++) {
+    if (!qmat_hull_plane(c->points, &c->triangles[3 * t], &c->planes[4 * c->plane_count])) continue;
+    c->farthest[c->plane_count] = none;
+    c->heights[c->plane_count++] = 0;
+  }
+  return QMAT_OK;
+}
+
+/* Drops points inside of all planes, and finds the farthest of each plane among the points that it is the farthest
+ * plane of. */
+static void drop_points(cloud *c, double tolerance) {
+  for (size_t i = c->chosen; i < c->left;) {
+    double most = tolerance;
+    size_t plane = none;
+    for (size_t t = 0; t < c->plane_count; t++) {
+      const double height = qmat_dot(&c->planes[4 * t], &c->points[3 * i]) - c->planes[4 * t + 3];
+      if (!(height > most)) continue;
+      most = height;
+      plane = t;
+    }
+    if (plane == none) {
+      swap_points(c, i, --c->left);
+      continue;
+    }
+    if (most > c->heights[plane]) {
+      c->heights[plane] = most;
+      c->farthest[plane] = i;
+    }
+    i++;
+  }
+}
+
+static int compare_numbers(const void *left, const void *right) {
+  const size_t a = *(const size_t *)left, b = *(const size_t *)right;
+  return (a > b) - (a < b);
+}
+
+/* Chooses the farthest points of the planes, in ascending order: so none has changed its place before it is chosen. */
+static void choose_points(cloud *c) {
+  qsort(c->farthest, c->plane_count, sizeof *c->farthest, compare_numbers);
+  for (size_t t = 0; t < c->plane_count && c->farthest[t] != none; t++) swap_points(c, c->farthest[t], c->chosen++);
+}
+
+qmat_status qmat_extreme_points_keep(double *points, size_t *count, double tolerance) {
+  cloud c = {.points = points, .left = *count};
+  if (*count <= DIRECTIONS) return QMAT_OK;
+  start(&c);
+  qmat_status status = QMAT_OK;
+  while (status == QMAT_OK && c.chosen >= 4) {
+    status = find_planes(&c);
+    if (status != QMAT_OK) break;
+    drop_points(&c, tolerance);
+    if (c.chosen == c.left) break;
+    choose_points(&c);
+  }
+  if (status == QMAT_OK && c.chosen >= 4) *count = c.chosen;
+  qmat_free(c.planes);
+  qmat_free(c.triangles);
+  qmat_free(c.farthest);
+  qmat_free(c.heights);
+  return status == QMAT_ERROR_MEMORY ? status : QMAT_OK;
+}
