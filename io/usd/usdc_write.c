@@ -346,7 +346,8 @@ static uint64_t put_typed(crate *c, const qmat_usd_value *v, unsigned type) {
                            *const permissions[] = {"public", "private", NULL},
                            *const variabilities[] = {"varying", "uniform", NULL};
   const double number = qmat_usd_number(v, NAN);
-  const int64_t integer = (int64_t)number;
+  const bool is_integer = fabs(number) < 0x1p31;
+  const int64_t integer = is_integer ? (int64_t)number : 0;
   qmat_usd_value changed = *v;
   switch (type) {
     case QMAT_USDC_SPECIFIER:
@@ -362,7 +363,7 @@ static uint64_t put_typed(crate *c, const qmat_usd_value *v, unsigned type) {
       return type == QMAT_USDC_TOKEN ? put_plain(c, &changed, "") : put_vector(c, &changed, type);
     case QMAT_USDC_INT:
     case QMAT_USDC_DOUBLE:
-      if (isnan(number)) fail_unsupported(c, "a field that is no number");
+      if (isnan(number) || (type == QMAT_USDC_INT && !is_integer)) fail_unsupported(c, "a field that is no number");
       changed.type = type == QMAT_USDC_INT ? QMAT_USD_INT : QMAT_USD_DOUBLE;
       if (type == QMAT_USDC_INT)
         changed.integers = &integer;

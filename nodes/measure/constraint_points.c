@@ -386,12 +386,14 @@ static shell_place shell_place_below(const double *corners, const double *normal
 }
 
 /* Spreads points almost epsilon below the surface, wherever the solid is thick enough and the initial medial mesh
- * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. */
+ * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. No solid is as thick as an
+ * infinite epsilon. */
 static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
                               shell_points *shell) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = a->mesh;
   const double *positions = qmat_surface_positions(surface);
+  if (isinf(epsilon)) return QMAT_OK;
   const double spacing = epsilon, depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
   size_t capacity = 0;
   const size_t facets = qmat_solid_triangle_count(mesh);
