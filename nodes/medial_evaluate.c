@@ -27,6 +27,9 @@ static const double beside_surface = 1e-5;
 
 /* The surface is searched up to so many times, each time from the F found before. */
 enum { MOST_SEARCHES = 4 };
+/* Where epsilon is between the bounds, they come as close as it is to the lower one, down to this share of their gap.
+ */
+static const double LEAST_TOLERANCE = 1.0 / 256;
 
 typedef struct evaluation {
   qmat_context *context;
@@ -98,15 +101,18 @@ static qmat_status sample_surface(evaluation *e) {
 static qmat_status bound_surface_to_envelope(evaluation *e) {
   double known = e->largest_gap;
   const double decisive = e->params->epsilon - e->deviation;
+  bool is_open = false; /* epsilon is between the bounds */
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
-    const double tolerance = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    const double most = qmat_bound_target(known, e->epsilon, e->params->tolerance) - known;
+    const double tolerance = is_open ? fmax(fmin(most, decisive - known), LEAST_TOLERANCE * most) : most;
     qmat_hausdorff_bound bound;
     status =
         qmat_hausdorff_bound_measure(e->context, e->surface, e->envelope, known, tolerance, INFINITY, decisive, &bound);
     e->surface_to_envelope = (qmat_bounds){bound.found, fmax(bound.bound, bound.found)};
     known = bound.found;
-    if (bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
+    is_open = known <= decisive && bound.bound > decisive;
+    if (!is_open && bound.bound <= qmat_bound_target(known, e->epsilon, e->params->tolerance)) break;
   }
   return status;
 }
@@ -279,7 +285,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 11,
+    .version = 12,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

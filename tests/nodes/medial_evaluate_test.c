@@ -246,6 +246,28 @@ static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
   }
 }
 
+/* The farthest place, as far from both balls, is on a long edge. Pieces as small as the tolerance allows do not tell an
+ * epsilon slightly above it from it. */
+static void test_an_epsilon_just_above_the_error_is_certified(void **state) {
+  (void)state;
+  const double x = 0.137, left = sqrt((x + 0.9) * (x + 0.9) + 2), right = sqrt((x - 0.9) * (x - 0.9) + 2);
+  const double balls[] = {-0.9, 0, 0, 0.7, 0.9, 0, 0, 0.7 + right - left};
+  subject s = subject_of(box_around(1.5, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
+  const double truth = (left - 0.7) / s.diagonal;
+  for (double above = 1e-4; above > 4e-6; above /= 2) {
+    char params[64];
+    snprintf(params, sizeof params, "epsilon=%.12f", truth * (1 + above));
+    qmat_report *report = evaluate(&s, params, 0);
+    assert_true(pipeline_number(report, "surface_to_envelope") >= truth - ROUNDING);
+    if (above > 1e-5) assert_true(pipeline_number(report, "surface_to_envelope") <= truth * (1 + above));
+    qmat_value_release(&report->base);
+  }
+  qmat_report *report = evaluate(&s, "epsilon=0.2", 0);
+  check_bounds(&s, report, "surface_to_envelope", truth * s.diagonal, 0.05);
+  qmat_value_release(&report->base);
+  subject_free(&s);
+}
+
 static void test_an_open_surface_is_never_certified(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
@@ -532,6 +554,7 @@ int main(void) {
       cmocka_unit_test(test_certified_exactly_where_epsilon_holds),
       cmocka_unit_test(test_the_deviation_of_the_mesh_is_part_of_both_errors),
       cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
+      cmocka_unit_test(test_an_epsilon_just_above_the_error_is_certified),
       cmocka_unit_test(test_an_open_surface_is_never_certified),
       cmocka_unit_test(test_odd_spheres_cones_and_slabs_are_counted),
       cmocka_unit_test(test_random_medial_meshes_against_dense_samples),
