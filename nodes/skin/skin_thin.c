@@ -9,14 +9,17 @@
 #include "core/node.h"
 #include "nodes/skin/skin_topology.h"
 
-/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Each round doubles them. */
-enum { MOST_ROUNDS = 6, FIRST_RINGS = 2 };
+/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Each round doubles them.
+ * The first rounds leave them around their own faults only; the others, around all that was left before, too: on a
+ * plane, faults come again along its border. */
+enum { MOST_ROUNDS = 6, NARROW_ROUNDS = 3, FIRST_RINGS = 2 };
 
 typedef struct thinning {
   qmat_context *context;
   const qmat_skin_triangles *surface;
   float *positions;     /* 3 per vertex */
-  bool *locked, *grown; /* per vertex: its triangles stay */
+  bool *locked;         /* per vertex: its triangles stay */
+  uint8_t *rings;       /* per vertex: one more than its rings from a fault; 0: far from any */
   uint32_t *thinned;    /* 3 per triangle */
   size_t thinned_count; /* triangles */
   uint32_t *open;       /* 3 per triangle: those that may go */
@@ -32,13 +35,13 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
                   .surface = surface,
                   .positions = qmat_arena_alloc(arena, 3 * vertices, sizeof *t->positions),
                   .locked = qmat_arena_calloc(arena, vertices, sizeof *t->locked),
-                  .grown = qmat_arena_alloc(arena, vertices, sizeof *t->grown),
+                  .rings = qmat_arena_alloc(arena, vertices, sizeof *t->rings),
                   .thinned = qmat_arena_alloc(arena, corners, sizeof *t->thinned),
                   .open = qmat_arena_alloc(arena, corners, sizeof *t->open),
                   .firsts = qmat_arena_alloc(arena, vertices + 1, sizeof *t->firsts),
                   .corners = qmat_arena_alloc(arena, corners, sizeof *t->corners),
                   .leaders = qmat_sets_new(context, vertices)};
-  if (!t->leaders || !t->positions || !t->locked || !t->grown || !t->thinned || !t->open || !t->firsts || !t->corners)
+  if (!t->leaders || !t->positions || !t->locked || !t->rings || !t->thinned || !t->open || !t->firsts || !t->corners)
     return qmat_fail_memory(context, "the skin");
   for (size_t i = 0; i < 3 * vertices; i++) t->positions[i] = (float)surface->positions[i];
   for (size_t i = 0; i < corners; i++) qmat_sets_join(t->leaders, surface->triangles[i], surface->triangles[i - i % 3]);
@@ -103,9 +106,10 @@ static bool is_fan(const thinning *t, size_t vertex) {
 /* Locks the components of which nothing is left. False where there are none. */
 static bool lock_lost_components(thinning *t) {
   const size_t count = t->surface->vertex_count;
-  bool any = false, *is_left = t->grown;
+  bool any = false;
+  uint8_t *is_left = t->rings;
   memset(is_left, 0, count * sizeof *is_left);
-  for (size_t i = 0; i < 3 * t->thinned_count; i++) is_left[qmat_set_leader(t->leaders, t->thinned[i])] = true;
+  for (size_t i = 0; i < 3 * t->thinned_count; i++) is_left[qmat_set_leader(t->leaders, t->thinned[i])] = 1;
   for (uint32_t v = 0; v < count; v++) {
     if (is_left[qmat_set_leader(t->leaders, v)]) continue;
     t->locked[v] = any = true;
@@ -113,21 +117,27 @@ static bool lock_lost_components(thinning *t) {
   return any;
 }
 
-/* Locks the vertices within some rings of those that are no fan. False where there are none. */
-static bool lock_faults(thinning *t, int rings) {
+/* Locks the vertices within some rings of those that are no fan, and of the locked ones if they grow. False where all
+ * are fans. */
+static bool lock_faults(thinning *t, int rings, bool grow) {
   const qmat_skin_triangles *surface = t->surface;
   bool any = false;
   for (size_t v = 0; v < surface->vertex_count; v++) {
+    t->rings[v] = grow && t->locked[v];
     if (is_fan(t, v)) continue;
-    t->locked[v] = any = true;
+    t->rings[v] = any = true;
   }
-  for (int ring = 0; ring < rings && any; ring++) {
-    memcpy(t->grown, t->locked, surface->vertex_count * sizeof *t->grown);
-    for (size_t i = 0; i < 3 * surface->triangle_count; i++)
-      if (t->locked[surface->triangles[i]])
-        for (size_t k = 0; k < 3; k++) t->grown[surface->triangles[i - i % 3 + k]] = true;
-    memcpy(t->locked, t->grown, surface->vertex_count * sizeof *t->grown);
+  for (int ring = 1; ring <= rings && any; ring++) {
+    for (size_t i = 0; i < 3 * surface->triangle_count; i++) {
+      const int here = t->rings[surface->triangles[i]];
+      if (here == 0 || here > ring) continue;
+      for (size_t k = 0; k < 3; k++) {
+        uint8_t *other = &t->rings[surface->triangles[i - i % 3 + k]];
+        if (*other == 0) *other = (uint8_t)(ring + 1);
+      }
+    }
   }
+  for (size_t v = 0; v < surface->vertex_count && any; v++) t->locked[v] |= t->rings[v] > 0;
   return any;
 }
 
@@ -166,7 +176,8 @@ qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triang
     thin(&t, error);
     sort_corners(&t);
     status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
-    const bool has_lost = lock_lost_components(&t), has_faults = lock_faults(&t, FIRST_RINGS << round);
+    const bool has_lost = lock_lost_components(&t);
+    const bool has_faults = lock_faults(&t, FIRST_RINGS << round, round >= NARROW_ROUNDS);
     if (status != QMAT_OK || has_lost || has_faults) continue;
     bool is_same;
     status = compare_topology(&t, &is_same);

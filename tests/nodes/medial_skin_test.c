@@ -354,6 +354,25 @@ static void test_the_error_holds_in_a_crevice_narrower_than_a_cell(void **unused
   qmat_context_uninit(&context);
 }
 
+/* No cell is small enough for the gap between two bars, so the mesh fills it, and says how far it is then. */
+static void test_a_gap_narrower_than_all_cells_is_filled_and_stated(void **unused) {
+  (void)unused;
+  const double spheres[] = {0, 0, 0, 0.5, 4, 0, 0, 0.5, 0, 1.002, 0, 0.5, 4, 1.002, 0, 0.5};
+  const uint32_t edges[] = {0, 1, 2, 3};
+  qmat_context context = {0};
+  qmat_medial *medial = medial_mesh(spheres, 4, edges, 2, NULL, 0);
+  skin_result result = skin(medial_mesh(spheres, 4, edges, 2, NULL, 0), "error=0.2%");
+  assert_manifold(result.mesh);
+  const double found = farthest_from_mesh(&context, medial, result.mesh) / number_of(result, "diagonal");
+  assert_true(found > 2e-3 && number_of(result, "envelope_to_mesh") >= found);
+  assert_true(number_of(result, "mesh_to_envelope") <= 2e-3);
+  assert_true((double)result.mesh->triangle_count < 0.1 * number_of(result, "contour_triangles"));
+  assert_int_equal(json_array_size(json_object_get(result.report->root, "warnings")), 1);
+  release(result);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_a_number_of_triangles_comes_before_the_error(void **unused) {
   (void)unused;
   skin_result free_of_it = skin(ring(), "error=0.2%"), enough = skin(ring(), "error=0.2% triangles=1000000");
@@ -704,6 +723,7 @@ int main(void) {
       cmocka_unit_test(test_a_sphere_has_its_area_and_volume),
       cmocka_unit_test(test_decimation_leaves_few_triangles_within_its_error),
       cmocka_unit_test(test_the_error_holds_in_a_crevice_narrower_than_a_cell),
+      cmocka_unit_test(test_a_gap_narrower_than_all_cells_is_filled_and_stated),
       cmocka_unit_test(test_a_number_of_triangles_comes_before_the_error),
       cmocka_unit_test(test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology),
       cmocka_unit_test(test_decimation_does_not_shorten_a_hair),

@@ -144,6 +144,14 @@ static void test_a_component_stays_where_it_is_smaller_than_the_error(void **sta
   drop(&surface);
 }
 
+/* A tube thinner than the error folds in places. These alone keep their triangles: the rest is thinned out. */
+static void test_faults_keep_few_triangles(void **state) {
+  (void)state;
+  qmat_skin_triangles surface = thinned(shape_seal(shape_torus(1, 0.05, 256, 24)), 0.064);
+  assert_in_range(surface.triangle_count, 14, 256 * 24 * 2 / 4);
+  drop(&surface);
+}
+
 static bool cancel(void *user, const char *id, const char *type, uint64_t done, uint64_t total, const char *unit) {
   (void)user, (void)id, (void)type, (void)done, (void)total, (void)unit;
   return false;
@@ -166,6 +174,7 @@ int main(void) {
       cmocka_unit_test(test_a_gridded_box_keeps_its_corners_alone),
       cmocka_unit_test(test_any_error_leaves_a_manifold_of_the_same_topology),
       cmocka_unit_test(test_a_component_stays_where_it_is_smaller_than_the_error),
+      cmocka_unit_test(test_faults_keep_few_triangles),
       cmocka_unit_test(test_a_cancel_is_obeyed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
