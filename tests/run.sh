@@ -117,8 +117,8 @@ fi
 step "Build with the address and undefined-behaviour sanitizers"
 if build asan -DQMAT_WERROR=ON; then
   step "Tests with these sanitizers"
-  # Tests that build the tree once more, the long ones, and those of the sources ran above.
-  run_ctest asan -LE "builds|long|house"
+  # Tests that build the tree once more, the long ones, and those of the sources and of other languages ran above.
+  run_ctest asan -LE "builds|long|house|not_c"
 fi
 
 step "Build with clang and the thread sanitizer"

@@ -346,7 +346,7 @@ static void test_number_of_vertices_alone_finds_the_least_error(void **state) {
   static const struct {
     model_name model;
     size_t count;
-  } cases[] = {{TORUS, 12}};
+  } cases[] = {{TORUS, 8}};
   for (size_t i = 0; i < COUNT(cases); i++) {
     const pipeline *p = model(cases[i].model);
     char text[64];
@@ -643,7 +643,7 @@ static void test_medial_mesh_without_regions_works(void **state) {
 /* An epsilon that comes first is a warning too, with all rules. */
 static void test_a_number_of_vertices_that_epsilon_prevents_is_a_warning(void **state) {
   (void)state;
-  static const char *const settings[] = {"epsilon=4% vertices=2", "epsilon=4% vertices=2 on_exceed=raise"};
+  static const char *const settings[] = {"epsilon=4% vertices=2", "epsilon=4% vertices=2 on_exceed=raise finest=2%"};
   for (size_t i = 0; i < COUNT(settings); i++) {
     result r = simplify(model(RING), settings[i]);
     assert_true(r.medial->sphere_count > 2);
@@ -679,7 +679,7 @@ static void test_a_number_of_vertices_that_is_not_reached_is_a_warning(void **st
   (void)state;
   const pipeline *p = model(SMALL);
   qmat_medial *loose = copy_of(p->medial, false, false);
-  result r = simplify_medial(p, loose, "epsilon=0 vertices=3");
+  result r = simplify_medial(p, loose, "epsilon=0 vertices=3 finest=8%");
   assert_int_equal(r.medial->sphere_count, loose->sphere_count);
   assert_int_equal(json_array_size(json_object_get(r.report->root, "warnings")), 1);
   release(&r);
@@ -689,7 +689,7 @@ static void test_a_number_of_vertices_that_is_not_reached_is_a_warning(void **st
 static void test_spheres_without_edges_stay_as_they_are(void **state) {
   (void)state;
   const pipeline *p = model(SMALL);
-  static const char *const settings[] = {"epsilon=8%", "epsilon=0", "epsilon=0 vertices=3"};
+  static const char *const settings[] = {"epsilon=8%", "epsilon=0", "epsilon=0 vertices=3 finest=8%"};
   for (size_t i = 0; i < COUNT(settings); i++) {
     qmat_medial *loose = copy_of(p->medial, false, i == 0);
     result r = simplify_medial(p, loose, settings[i]);
