@@ -329,7 +329,8 @@ static qmat_status read_usd(qmat_context *context, const char *path, const qmat_
   const double unit = unit_of_usd(report);
   for (size_t k = 0; k < scene->placement_count && status == QMAT_OK; k++) {
     qmat_soup *soup = &meshes.soups[scene->placed[k]];
-    soup->meters_per_unit = fmax(soup->meters_per_unit, unit * qmat_largest_stretch(scene->placements + 16 * k));
+    const double stretch = qmat_rounded_stretch(qmat_largest_stretch(scene->placements + 16 * k));
+    soup->meters_per_unit = fmax(soup->meters_per_unit, unit * stretch);
   }
   for (size_t i = 0; i < meshes.count && status == QMAT_OK; i++) { /* merged, or flattened by what places them */
     const double found = meshes.soups[i].meters_per_unit;

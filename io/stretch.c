@@ -21,3 +21,10 @@ double qmat_largest_stretch(const double *m) {
   const double half = fmax(-1, fmin(1, determinant / (spread * spread * spread) / 2));
   return sqrt(fmax(mean + 2 * spread * cos(acos(half) / 3), 0));
 }
+
+double qmat_rounded_stretch(double stretch) {
+  if (!(stretch > 1e-100 && stretch < 1e100)) return stretch;
+  /* Powers of ten up to 1e22 are exact, so that what has six digits stays. */
+  const double places = 5 - floor(log10(stretch)), power = pow(10, fabs(places));
+  return places > 0 ? round(stretch * power) / power : round(stretch / power) * power;
+}

@@ -424,7 +424,7 @@ class Reader {
     return matrices;
   }
 
-  /* The largest length that the nodes of a mesh, or its joints, make of a unit. */
+  /* The largest length that the nodes of a mesh, or its joints, make of a unit, to six digits. */
   double scale_of(size_t mesh) {
     double scale = 0;
     for (size_t i = 0; i < model_.nodes.size(); i++) {
@@ -437,7 +437,7 @@ class Reader {
       for (const Matrix &m : joint_matrices(model_.skins[static_cast<size_t>(node.skin)]))
         scale = std::max(scale, qmat_largest_stretch(m.data()));
     }
-    return scale > 0 && std::isfinite(scale) ? scale : 1;
+    return scale > 0 && std::isfinite(scale) ? qmat_rounded_stretch(scale) : 1;
   }
 
   /* The number of joints that every skin of the mesh has; 0: it has none. */

@@ -55,10 +55,51 @@ static void test_no_direction_is_stretched_by_more(void **state) {
   }
 }
 
+static void test_a_stretch_has_six_digits(void **state) {
+  (void)state;
+  const struct {
+    double stretch, rounded;
+  } cases[] = {
+      {1, 1},
+      {1.0000000000000002, 1},
+      {0.99999975, 1},
+      {0.0253999981790781, 0.0254}, /* an inch, by the matrices of six copies of a box */
+      {0.0254000057488679, 0.0254},
+      {0.3048, 0.3048},
+      {0.00117809845673732, 0.0011781},
+      {1.2345649, 1.23456},
+      {1.2345651, 1.23457},
+      {999999.6, 1000000},
+      {123456789, 123457000},
+      {1e22, 1e22},
+      {0, 0},
+      {1e-310, 1e-310},
+      {1e200, 1e200},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    const double found = qmat_rounded_stretch(cases[i].stretch);
+    if (found != cases[i].rounded) fail_msg("%.17g became %.17g", cases[i].stretch, found);
+  }
+  assert_true(qmat_rounded_stretch((double)INFINITY) == (double)INFINITY);
+  assert_true(isnan(qmat_rounded_stretch((double)NAN)));
+}
+
+/* What is rounded is near and stays when it is rounded again, over the range of what is rounded. */
+static void test_rounding_is_near_and_final(void **state) {
+  (void)state;
+  for (double stretch = 1.1e-100; stretch < 1e100; stretch *= 1.37) {
+    const double found = qmat_rounded_stretch(stretch);
+    assert_true(fabs(found - stretch) <= 5.001e-6 * stretch);
+    assert_true(fabs(qmat_rounded_stretch(found) - found) <= 1e-15 * found);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_largest_stretch_is_the_largest_singular_value),
       cmocka_unit_test(test_no_direction_is_stretched_by_more),
+      cmocka_unit_test(test_a_stretch_has_six_digits),
+      cmocka_unit_test(test_rounding_is_near_and_final),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
