@@ -11,8 +11,8 @@ extern "C" {
  * "Eigenvalues of a symmetric 3 x 3 matrix", 1961. */
 double qmat_largest_stretch(const double *m);
 
-/* A stretch rounded to six digits, which is what transforms in single precision determine: the copies of an object, each
- * turned another way, have the same one. Zero and what is not a finite number stay, as do numbers beyond 1e100. */
+/* A stretch rounded to six digits, which is what transforms in single precision determine: the copies of an object,
+ * each turned another way, have the same one. Zero and what is not a finite number stay, as do numbers beyond 1e100. */
 double qmat_rounded_stretch(double stretch);
 
 #ifdef __cplusplus
