@@ -8,6 +8,7 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_keep.h"
 #include "io/mesh/mesh_formats.h"
+#include "io/near_copies.h"
 #include "io/scanner.h"
 #include "io/stretch.h"
 #include "io/usd/usd_model.h"
@@ -262,6 +263,7 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const se
     context->error = first_error;
     status = qmat_fail_within(context, list->names[0]);
   }
+  if (status == QMAT_OK) status = qmat_near_copies_merge(context, list, json_object_get(report, "meshes"));
   if (status == QMAT_OK) status = qmat_value_seal(context, &list->base);
   if (status == QMAT_OK) {
     *mesh = &list->base;

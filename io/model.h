@@ -48,8 +48,8 @@ qmat_status qmat_model_read(qmat_context *context, const char *path, const qmat_
  * "merged", with the same result. `*mesh` is a mesh, or a list of several named meshes, each in its local frame. The
  * scene stores a glTF asset with the files that it refers to, the numbers of the chosen meshes, and the places of USD
  * meshes. For several meshes the report has a list "meshes", each with its "name", its number "mesh", the number of
- * "nodes" that carry it, and the keys of qmat_soup_to_mesh. "warnings" lists files that are not copied and nodes with
- * unusual extras. QMAT_ERROR_USAGE: an invalid choice. */
+ * "nodes" that carry it, and the keys of qmat_soup_to_mesh and qmat_near_copies_merge. "warnings" lists files that are
+ * not copied and nodes with unusual extras. QMAT_ERROR_USAGE: an invalid choice. */
 qmat_status qmat_model_read_meshes(qmat_context *context, const char *path, const qmat_read_options *options,
                                    const char *choice, qmat_scene **scene, qmat_value **mesh, qmat_report **report);
 

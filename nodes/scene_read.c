@@ -76,14 +76,16 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 13,
+    .version = 14,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
         "removed, and triangles oriented, outward where the surface is closed. The report counts all of this.\n\n"
         "A glTF scene is kept whole for scene.write, with its files; outside of its folder only images are read. Its "
         "meshes are read one by one, in their own spaces and in bind pose, and later nodes run once for each. Meshes "
-        "on no node and meshes without triangles are left out. With mesh=merged all meshes are one surface in world "
+        "on no node and meshes without triangles are left out. Meshes that differ by the rounding of single precision "
+        "are "
+        "one, with a deviation that covers it. With mesh=merged all meshes are one surface in world "
         "space, skins in their current pose. Skinned meshes, also those of UsdSkel, keep the four strongest joints of "
         "each vertex.\n\n"
         "A USD scene is read alike: equal meshes are one, wherever references, instances and point instancers place "
