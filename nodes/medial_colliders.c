@@ -264,7 +264,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 11,
+    .version = 12,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -273,7 +273,9 @@ const qmat_node qmat_node_medial_colliders = {
         "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
         "branch and bound that no point of the solid is outside, and grows them where one is. Hulls then contain their "
         "shapes. With kind=hulls the solid is divided among the shapes, each hull contains only its part, and they are "
-        "joined where the joint hull leaves the solid by at most hull_error, or until `shapes` are left. inside "
+        "joined where the joint hull leaves the solid by at most hull_error, or until `shapes` are left. Their number "
+        "then "
+        "stays: one is divided by a plane and two others are joined, as long as the union's volume falls. inside "
         "changes radii and proves the opposite; otherwise hulls are inside their shapes. proved is false for open "
         "surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "

@@ -8,8 +8,8 @@
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_vertices.h"
 
-/* The first points are the farthest along so many directions. */
-enum { DIRECTIONS = 64 };
+/* So many points of a heap are reduced. */
+enum { MANY_POINTS = 4096 };
 
 /* The points: those chosen, those left that may be outside of the hull of these, and those dropped. */
 typedef struct cloud {
@@ -24,27 +24,28 @@ typedef struct cloud {
 
 static const size_t none = SIZE_MAX;
 
-static void swap_points(cloud *c, size_t i, size_t j) {
+static void swap_points(double *points, size_t i, size_t j) {
   double kept[3];
-  memcpy(kept, &c->points[3 * i], sizeof kept);
-  memmove(&c->points[3 * i], &c->points[3 * j], sizeof kept);
-  memcpy(&c->points[3 * j], kept, sizeof kept);
+  memcpy(kept, &points[3 * i], sizeof kept);
+  memmove(&points[3 * i], &points[3 * j], sizeof kept);
+  memcpy(&points[3 * j], kept, sizeof kept);
 }
 
-/* Chooses the farthest points along directions. */
-static void start(cloud *c) {
-  for (size_t d = 0; d < DIRECTIONS; d++) {
+size_t qmat_extreme_points_first(double *points, size_t count, size_t directions) {
+  size_t chosen = 0;
+  for (size_t d = 0; d < directions && count > 0; d++) {
     double direction[3], most = -INFINITY;
     size_t best = 0;
-    qmat_spread_direction(d, DIRECTIONS, direction);
-    for (size_t i = 0; i < c->left; i++) {
-      const double height = qmat_dot(direction, &c->points[3 * i]);
+    qmat_spread_direction(d, directions, direction);
+    for (size_t i = 0; i < count; i++) {
+      const double height = qmat_dot(direction, &points[3 * i]);
       if (!(height > most)) continue;
       most = height;
       best = i;
     }
-    if (best >= c->chosen) swap_points(c, best, c->chosen++);
+    if (best >= chosen) swap_points(points, best, chosen++);
   }
+  return chosen;
 }
 
 static bool make_room(cloud *c) {
@@ -89,7 +90,7 @@ static void drop_points(cloud *c, double tolerance) {
       plane = t;
     }
     if (plane == none) {
-      swap_points(c, i, --c->left);
+      swap_points(c->points, i, --c->left);
       continue;
     }
     if (most > c->heights[plane]) {
@@ -108,13 +109,14 @@ static int compare_numbers(const void *left, const void *right) {
 /* Chooses the farthest points of the planes, in ascending order: so none has changed its place before it is chosen. */
 static void choose_points(cloud *c) {
   qsort(c->farthest, c->plane_count, sizeof *c->farthest, compare_numbers);
-  for (size_t t = 0; t < c->plane_count && c->farthest[t] != none; t++) swap_points(c, c->farthest[t], c->chosen++);
+  for (size_t t = 0; t < c->plane_count && c->farthest[t] != none; t++)
+    swap_points(c->points, c->farthest[t], c->chosen++);
 }
 
 qmat_status qmat_extreme_points_keep(double *points, size_t *count, double tolerance) {
   cloud c = {.points = points, .left = *count};
-  if (*count <= DIRECTIONS) return QMAT_OK;
-  start(&c);
+  if (*count <= QMAT_EXTREME_DIRECTIONS) return QMAT_OK;
+  c.chosen = qmat_extreme_points_first(points, *count, QMAT_EXTREME_DIRECTIONS);
   qmat_status status = QMAT_OK;
   while (status == QMAT_OK && c.chosen >= 4) {
     status = find_planes(&c);
@@ -129,4 +131,18 @@ qmat_status qmat_extreme_points_keep(double *points, size_t *count, double toler
   qmat_free(c.farthest);
   qmat_free(c.heights);
   return status == QMAT_ERROR_MEMORY ? status : QMAT_OK;
+}
+
+bool qmat_point_heap_add(qmat_point_heap *heap, const double *points, size_t count, double tolerance) {
+  if (count == 0) return true;
+  if (heap->limit == 0) heap->limit = MANY_POINTS;
+  if (heap->count + count > heap->limit) {
+    if (qmat_extreme_points_keep(heap->points, &heap->count, tolerance) != QMAT_OK) return false;
+    heap->limit = 2 * (heap->count + count) > MANY_POINTS ? 2 * (heap->count + count) : MANY_POINTS;
+  }
+  if (qmat_grow((void **)&heap->points, &heap->capacity, 3 * (heap->count + count), sizeof *heap->points) != 0)
+    return false;
+  memcpy(&heap->points[3 * heap->count], points, 3 * count * sizeof *points);
+  heap->count += count;
+  return true;
 }

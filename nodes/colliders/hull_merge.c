@@ -7,6 +7,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
+#include "nodes/colliders/hull_exchange.h"
 #include "nodes/colliders/hull_vertices.h"
 #include "nodes/colliders/outer_hull.h"
 #include "nodes/colliders/tangent_hull.h"
@@ -58,26 +59,15 @@ typedef struct merging {
   double error;             /* of the vertices of hulls, in the model */
   part *parts;
   const qmat_solid_part *given;
-  uint32_t *following; /* of given parts: the next one in the same part */
+  qmat_hull_pieces *hulls; /* at the end: what they are around */
+  part *ends;              /* and they themselves */
+  uint32_t *following;     /* of given parts: the next one in the same part */
   size_t part_count, live_count;
   pair *pairs;
   size_t pair_count, pair_capacity;
   joint *joints;      /* one per thread */
   uint8_t *is_vertex; /* scratch: of a joint hull's points */
 } merging;
-
-/* The volume within a closed surface. */
-static double volume_of(const double *points, const uint32_t *triangles, size_t count) {
-  const double *origin = &points[3 * (size_t)triangles[0]];
-  double volume = 0;
-  for (size_t i = 0; i < count; i++) {
-    double corners[3][3], across[3];
-    for (size_t k = 0; k < 3; k++) qmat_subtract(&points[3 * (size_t)triangles[3 * i + k]], origin, corners[k]);
-    qmat_cross(corners[0], corners[1], across);
-    volume += qmat_dot(across, corners[2]) / 6;
-  }
-  return volume;
-}
 
 static void find_box(const double *points, size_t count, double low[3], double high[3]) {
   for (int k = 0; k < 3; k++) {
@@ -152,7 +142,8 @@ static void test_pair(const merging *m, pair *p, int halvings, joint *j) {
     }
     if (of_first % 3 != 0) search_triangle(m, corners, halvings, &p->leaves);
   }
-  p->growth = volume_of(j->points, j->triangles, j->triangle_count) - m->parts[p->a].volume - m->parts[p->b].volume;
+  p->growth =
+      qmat_hull_volume(j->points, j->triangles, j->triangle_count) - m->parts[p->a].volume - m->parts[p->b].volume;
   p->exceeds = p->leaves > m->limit;
 }
 
@@ -241,7 +232,7 @@ static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   part *into = &m->parts[a], *from = &m->parts[b];
   joint *j = &m->joints[0];
   if (join(m, into, from, j) != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
-  const double volume = volume_of(j->points, j->triangles, j->triangle_count);
+  const double volume = qmat_hull_volume(j->points, j->triangles, j->triangle_count);
   size_t used = qmat_hull_vertices_keep(j->points, j->point_count, j->triangles, j->triangle_count, m->is_vertex);
   const double *vertices = j->points;
   if (used > m->room) {
@@ -297,7 +288,7 @@ static qmat_status make_part(const merging *m, const qmat_solid_part *given, boo
   if (status == QMAT_OK) status = qmat_convex_hull(fine->points, fine->point_count, fine->triangles, &triangle_count);
   if (status != QMAT_OK) return status;
   if (!set_points(p, fine->points, fine->point_count)) return QMAT_ERROR_MEMORY;
-  p->volume = volume_of(p->points, fine->triangles, triangle_count);
+  p->volume = qmat_hull_volume(p->points, fine->triangles, triangle_count);
   p->live = true;
   return QMAT_OK;
 }
@@ -326,7 +317,10 @@ static qmat_status move_part(merging *m, qmat_solid_part *given, size_t from) {
   qmat_free(to->points);
   to->points = points;
   to->count += given[from].count;
-  return make_part(m, to, true, &m->joints[0], &m->parts[to - given]);
+  part *p = &m->parts[to - given];
+  m->following[p->last] = (uint32_t)from;
+  p->last = (uint32_t)from;
+  return make_part(m, to, true, &m->joints[0], p);
 }
 
 /* Makes the hulls of all parts, then moves parts without one. */
@@ -379,79 +373,93 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
   return status == QMAT_OK ? make_parts(m, given) : status;
 }
 
-/* The number of points of the given parts in a part. */
-static size_t count_points(const merging *m, size_t i) {
+/* What the hulls of the live parts are around, in the order of the parts. */
+static qmat_status collect_pieces(merging *m) {
   size_t count = 0;
-  for (uint32_t g = (uint32_t)i;; g = m->following[g]) {
-    count += m->given[g].count;
-    if (g == m->parts[i].last) return count;
+  m->hulls = qmat_arena_calloc(&m->context->arena, m->live_count + 1, sizeof *m->hulls);
+  if (!m->hulls) return qmat_fail_memory(m->context, "the hulls");
+  for (size_t i = 0; i < m->part_count; i++) {
+    const part *p = &m->parts[i];
+    if (!p->live) continue;
+    qmat_hull_pieces *h = &m->hulls[count++];
+    h->shape = p->shape;
+    for (int fill = 0; fill < 2; fill++) {
+      h->count = 0;
+      for (uint32_t g = (uint32_t)i;; g = m->following[g]) {
+        if (fill) h->pieces[h->count] = qmat_part_whole(g);
+        h->count++;
+        if (g == p->last) break;
+      }
+      if (!fill && !(h->pieces = qmat_alloc(h->count, sizeof *h->pieces)))
+        return qmat_fail_memory(m->context, "the hulls");
+    }
   }
+  return QMAT_OK;
 }
 
-/* The vertices of the hull of all points of a part; `model` has room for them. */
-static qmat_status collect_points(const merging *m, size_t i, double *model, size_t *count) {
-  *count = 0;
-  for (uint32_t g = (uint32_t)i;; g = m->following[g]) {
-    qmat_frame_to_model(qmat_surface_frame(m->solid), m->given[g].points, m->given[g].count, &model[3 * *count]);
-    *count += m->given[g].count;
-    if (g == m->parts[i].last) break;
-  }
-  uint32_t *triangles = qmat_alloc(*count, 6 * sizeof *triangles);
-  uint8_t *is_vertex = qmat_alloc(*count, sizeof *is_vertex);
+/* The points that a hull at the end is around, as far as they are its vertices. */
+static qmat_status collect_points(const merging *m, const qmat_hull_pieces *pieces, part *p) {
+  qmat_status status = qmat_hull_pieces_points(m->given, pieces, false, &p->points, &p->count);
+  if (status != QMAT_OK) return status;
+  qmat_frame_to_model(qmat_surface_frame(m->solid), p->points, p->count, p->points);
+  uint32_t *triangles = qmat_alloc(p->count, 6 * sizeof *triangles);
+  uint8_t *is_vertex = qmat_alloc(p->count, sizeof *is_vertex);
   size_t triangle_count = 0;
-  qmat_status status = triangles && is_vertex ? QMAT_OK : QMAT_ERROR_MEMORY;
-  if (status == QMAT_OK) status = qmat_convex_hull(model, *count, triangles, &triangle_count);
-  if (status == QMAT_OK) *count = qmat_hull_vertices_keep(model, *count, triangles, triangle_count, is_vertex);
+  if (!triangles || !is_vertex) status = QMAT_ERROR_MEMORY;
+  if (status == QMAT_OK) status = qmat_convex_hull(p->points, p->count, triangles, &triangle_count);
+  if (status == QMAT_OK) p->count = qmat_hull_vertices_keep(p->points, p->count, triangles, triangle_count, is_vertex);
   qmat_free(triangles);
   qmat_free(is_vertex);
   return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
 }
 
-/* Makes the hull of a part with as few vertices as it may have: triangles or half-spaces, whichever has the smaller
+/* Makes of points a hull with as few vertices as it may have: triangles or half-spaces, whichever has the smaller
  * volume. */
-static qmat_status reduce_part(const merging *m, size_t i, joint *j) {
+static qmat_status reduce_points(const merging *m, part *p, joint *j) {
   const qmat_tangent_hull *coarse = &j->coarse;
   const qmat_outer_hull *outer = &j->outer;
   const double margin = margin_of(m);
   double of_outer = INFINITY;
-  size_t count, triangles;
-  double *model = qmat_alloc(count_points(m, i), 3 * sizeof *model);
-  qmat_status status = model ? collect_points(m, i, model, &count) : QMAT_ERROR_MEMORY;
-  if (status == QMAT_OK) status = surround(&j->coarse, model, count, margin, m->error);
+  size_t triangles;
+  qmat_status status = surround(&j->coarse, p->points, p->count, margin, m->error);
   if (status == QMAT_OK) status = qmat_convex_hull(coarse->points, coarse->point_count, j->triangles, &triangles);
-  if (status == QMAT_OK) {
-    const double of_coarse = volume_of(coarse->points, j->triangles, triangles);
-    status = qmat_outer_hull_fit(&j->outer, model, count, margin, fine_share * m->error);
-    if (status == QMAT_OK) status = qmat_convex_hull(outer->points, outer->point_count, j->triangles, &triangles);
-    if (status == QMAT_OK) of_outer = volume_of(outer->points, j->triangles, triangles);
-    if (status == QMAT_ERROR_GEOMETRY) status = QMAT_OK;
-    const bool is_outer = of_outer < of_coarse;
-    if (status == QMAT_OK && !set_points(&m->parts[i], is_outer ? outer->points : coarse->points,
-                                         is_outer ? outer->point_count : coarse->point_count))
-      status = QMAT_ERROR_MEMORY;
-  }
-  qmat_free(model);
-  return status;
+  if (status != QMAT_OK) return status;
+  const double of_coarse = qmat_hull_volume(coarse->points, j->triangles, triangles);
+  status = qmat_outer_hull_fit(&j->outer, p->points, p->count, margin, fine_share * m->error);
+  if (status == QMAT_OK) status = qmat_convex_hull(outer->points, outer->point_count, j->triangles, &triangles);
+  if (status == QMAT_OK) of_outer = qmat_hull_volume(outer->points, j->triangles, triangles);
+  if (status != QMAT_OK && status != QMAT_ERROR_GEOMETRY) return status;
+  const bool is_outer = of_outer < of_coarse;
+  return set_points(p, is_outer ? outer->points : coarse->points, is_outer ? outer->point_count : coarse->point_count)
+             ? QMAT_OK
+             : QMAT_ERROR_MEMORY;
 }
 
-static qmat_status reduce_parts(merging *m) {
+/* Makes the hulls around the pieces in place of the parts. */
+static qmat_status make_hulls(merging *m) {
   const int threads = qmat_threads(m->context);
+  const size_t count = m->live_count;
   size_t room = 4;
   bool done = true;
-  for (size_t i = 0; i < m->part_count; i++)
-    if (m->parts[i].live && count_points(m, i) > room) room = count_points(m, i);
+  m->ends = qmat_arena_calloc(&m->context->arena, count + 1, sizeof *m->ends);
+  if (!m->ends) return qmat_fail_memory(m->context, "the hulls");
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
+  for (size_t i = 0; i < count; i++)
+    if (collect_points(m, &m->hulls[i], &m->ends[i]) != QMAT_OK) done = false;
+  for (size_t i = 0; i < count; i++) room = m->ends[i].count > room ? m->ends[i].count : room;
+  if (!done) return qmat_fail_memory(m->context, "the hulls");
   for (int i = 0; i < threads; i++) {
     const qmat_status status = qmat_outer_hull_init(m->context, room, m->most_points, &m->joints[i].outer);
     if (status != QMAT_OK) return status;
   }
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
-  for (size_t i = 0; i < m->part_count; i++)
-    if (m->parts[i].live && reduce_part(m, i, &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
+  for (size_t i = 0; i < count; i++)
+    if (reduce_points(m, &m->ends[i], &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
   return done ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
 }
 
-/* Writes the live parts as the hulls, in their order. */
-static qmat_status write_parts(merging *m, qmat_colliders *c) {
+/* Writes the hulls. */
+static qmat_status write_hulls(merging *m, qmat_colliders *c) {
   const size_t room = m->live_count * m->most_points;
   qmat_status status = QMAT_OK;
   double *points = qmat_alloc(room, 3 * sizeof *points);
@@ -459,15 +467,14 @@ static qmat_status write_parts(merging *m, qmat_colliders *c) {
   uint32_t *shapes = qmat_alloc(m->live_count, 3 * sizeof *shapes);
   if (!points || !triangles || !shapes) status = QMAT_ERROR_MEMORY;
   size_t count = 0, point_count = 0, triangle_count = 0;
-  for (size_t i = 0; i < m->part_count && status == QMAT_OK; i++) {
-    const part *p = &m->parts[i];
-    if (!p->live) continue;
+  for (size_t i = 0; i < m->live_count && status == QMAT_OK; i++) {
+    const part *p = &m->ends[i];
     size_t of_hull = 0;
     status = qmat_convex_hull(p->points, p->count, &triangles[3 * triangle_count], &of_hull);
     if (status != QMAT_OK) break;
     memcpy(&points[3 * point_count], p->points, 3 * p->count * sizeof *points);
     for (size_t k = 0; k < 3 * of_hull; k++) triangles[3 * triangle_count + k] += (uint32_t)point_count;
-    memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)p->shape], 3 * sizeof *shapes);
+    memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)m->hulls[i].shape], 3 * sizeof *shapes);
     c->hull_ends[2 * count] = (uint32_t)(point_count += p->count);
     c->hull_ends[2 * count++ + 1] = (uint32_t)(triangle_count += of_hull);
   }
@@ -500,8 +507,14 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, q
     }
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }
-  if (status == QMAT_OK) status = reduce_parts(&m);
-  if (status == QMAT_OK && m.live_count > 0) status = write_parts(&m, colliders);
+  if (status == QMAT_OK) status = collect_pieces(&m);
+  if (status == QMAT_OK) status = qmat_hulls_exchange(context, parts, m.hulls, m.live_count);
+  if (status == QMAT_OK) status = make_hulls(&m);
+  if (status == QMAT_OK && m.live_count > 0) status = write_hulls(&m, colliders);
+  for (size_t i = 0; m.hulls && i < m.live_count; i++) {
+    qmat_free(m.hulls[i].pieces);
+    if (m.ends) qmat_free(m.ends[i].points);
+  }
   for (size_t i = 0; m.parts && i < m.part_count; i++) qmat_free(m.parts[i].points);
   qmat_free(m.pairs);
   return status;

@@ -26,3 +26,15 @@ bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plan
   plane[3] = qmat_dot(plane, corner);
   return true;
 }
+
+double qmat_hull_volume(const double *points, const uint32_t *triangles, size_t triangle_count) {
+  const double *origin = &points[3 * (size_t)triangles[0]];
+  double volume = 0;
+  for (size_t i = 0; i < triangle_count; i++) {
+    double corners[3][3], across[3];
+    for (size_t k = 0; k < 3; k++) qmat_subtract(&points[3 * (size_t)triangles[3 * i + k]], origin, corners[k]);
+    qmat_cross(corners[0], corners[1], across);
+    volume += qmat_dot(across, corners[2]) / 6;
+  }
+  return volume;
+}

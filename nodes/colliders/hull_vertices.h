@@ -15,4 +15,7 @@ size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *tri
  * origin. False for a triangle without an area. */
 bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plane[4]);
 
+/* The volume within the triangles (3 ids of points each, one at least) of a closed surface. Linear. */
+double qmat_hull_volume(const double *points, const uint32_t *triangles, size_t triangle_count);
+
 #endif

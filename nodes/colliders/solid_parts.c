@@ -7,20 +7,20 @@
 #include "nodes/colliders/extreme_points.h"
 #include "nodes/colliders/solid_cubes.h"
 
-/* Half the edge of the cubes between two parts. */
-static const double smallest = 1.0 / 512 * (1 + 1e-3);
+/* Half the edge of the cubes between two parts, and of the largest ones. */
+static const double smallest = 1.0 / 512 * (1 + 1e-3), largest = 0.5 / QMAT_SOLID_CELLS * (1 + 1e-3);
 
-/* So many points of a part are reduced. */
-enum { MANY_POINTS = 4096 };
+/* So many points of a cell are reduced: at once, and when it ends. */
+enum { MANY_IN_CELL = 512, FEW_IN_CELL = 128 };
 
-/* Points may be dropped so far outside of the hull of the others. */
-static const double dropped = 1e-9;
-
-/* The points that one shape has so far. */
+/* The points that one shape has so far, and its cells with theirs. */
 typedef struct heap {
   uint32_t shape;
-  size_t count, capacity, limit; /* limit: of points, before they are reduced */
-  double *points;
+  qmat_point_heap hull;
+  size_t cell_count, cell_capacity, point_count, point_capacity;
+  qmat_solid_cell *cells;
+  double *cell_points;
+  size_t limit; /* of points of the last cell, before they are reduced */
 } heap;
 
 typedef struct region {
@@ -33,38 +33,74 @@ static heap *find_heap(region *r, uint32_t shape) {
   for (size_t i = 0; i < r->count; i++)
     if (r->heaps[i].shape == shape) return &r->heaps[i];
   if (qmat_grow((void **)&r->heaps, &r->capacity, r->count + 1, sizeof *r->heaps) != 0) return NULL;
-  r->heaps[r->count] = (heap){.shape = shape, .limit = MANY_POINTS};
+  r->heaps[r->count] = (heap){.shape = shape};
   return &r->heaps[r->count++];
 }
 
-static bool add_points(heap *h, const double *points, size_t count) {
-  if (count == 0) return true;
-  if (h->count + count > h->limit) {
-    if (qmat_extreme_points_keep(h->points, &h->count, dropped) != QMAT_OK) return false;
-    h->limit = 2 * (h->count + count) > MANY_POINTS ? 2 * (h->count + count) : MANY_POINTS;
-  }
-  if (qmat_grow((void **)&h->points, &h->capacity, 3 * (h->count + count), sizeof *h->points) != 0) return false;
-  memcpy(&h->points[3 * h->count], points, 3 * count * sizeof *points);
-  h->count += count;
+static bool add_cells(heap *h, const qmat_solid_cell *cells, size_t cell_count, const double *points, size_t count) {
+  if (qmat_grow((void **)&h->cells, &h->cell_capacity, h->cell_count + cell_count, sizeof *h->cells) != 0 ||
+      qmat_grow((void **)&h->cell_points, &h->point_capacity, 3 * (h->point_count + count), sizeof *points) != 0)
+    return false;
+  if (cell_count > 0) memcpy(&h->cells[h->cell_count], cells, cell_count * sizeof *cells);
+  if (count > 0) memcpy(&h->cell_points[3 * h->point_count], points, 3 * count * sizeof *points);
+  h->cell_count += cell_count;
+  h->point_count += count;
   return true;
+}
+
+/* Drops points of the last cell, where there are many. */
+static bool reduce_cell(heap *h, size_t many) {
+  qmat_solid_cell *last = h->cell_count > 0 ? &h->cells[h->cell_count - 1] : NULL;
+  if (!last || last->count <= many) return true;
+  size_t count = last->count;
+  h->point_count -= count;
+  if (qmat_extreme_points_keep(&h->cell_points[3 * h->point_count], &count, qmat_solid_dropped) != QMAT_OK)
+    return false;
+  h->point_count += count;
+  last->count = (uint32_t)count;
+  h->limit = 2 * count > MANY_IN_CELL ? 2 * count : MANY_IN_CELL;
+  return true;
+}
+
+/* Gives the points of the last cell to the hull. */
+static bool end_cell(heap *h) {
+  if (h->cell_count == 0) return true;
+  if (!reduce_cell(h, FEW_IN_CELL)) return false;
+  qmat_solid_cell *last = &h->cells[h->cell_count - 1];
+  double *points = &h->cell_points[3 * (h->point_count - last->count)];
+  last->first = (uint32_t)qmat_extreme_points_first(points, last->count, QMAT_EXTREME_DIRECTIONS);
+  return qmat_point_heap_add(&h->hull, points, last->count, qmat_solid_dropped);
+}
+
+/* Adds points of a cube. The cubes of a cell come one after the other. */
+static bool add_points(heap *h, const qmat_solid_cube *c, const double *points, size_t count) {
+  qmat_solid_cell cell = {.count = (uint32_t)count};
+  for (int k = 0; k < 3; k++) cell.at[k] = (uint8_t)((c->centre[k] + 0.5) * QMAT_SOLID_CELLS);
+  qmat_solid_cell *last = h->cell_count > 0 ? &h->cells[h->cell_count - 1] : NULL;
+  if (!last || memcmp(last->at, cell.at, sizeof cell.at) != 0) {
+    h->limit = MANY_IN_CELL;
+    return end_cell(h) && add_cells(h, &cell, 1, points, count);
+  }
+  last->count += cell.count;
+  return add_cells(h, NULL, 0, points, count) && reduce_cell(h, h->limit);
 }
 
 /* Divides a cube that several shapes share, or gives it to the first. */
 static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
   region *r = s->region;
-  if (c->candidate_count > 1 && c->half > smallest) return true;
+  if (c->half > (c->candidate_count > 1 ? smallest : largest)) return true;
   heap *h = r->failed ? NULL : find_heap(r, c->candidates[0]);
   bool done = h != NULL;
   for (size_t f = 0; f < c->facet_count && done; f++) {
     double polygon[QMAT_CUBE_MOST_CORNERS][3];
     const int count = qmat_cube_clip(s, c, c->facets[f], polygon);
-    done = add_points(h, polygon[0], (size_t)count);
+    done = add_points(h, c, polygon[0], (size_t)count);
   }
   for (int i = 0; i < 8 && done; i++) {
     double corner[3];
     if (c->facet_count > 0 && !qmat_cube_corner_counts(s, c, i)) continue;
     qmat_cube_corner(c, i, corner);
-    done = add_points(h, corner, 1);
+    done = add_points(h, c, corner, 1);
   }
   r->failed = !done;
   return false;
@@ -72,8 +108,11 @@ static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
 
 static void finish(void *data) {
   region *r = data;
-  for (size_t i = 0; i < r->count; i++)
-    if (qmat_extreme_points_keep(r->heaps[i].points, &r->heaps[i].count, dropped) != QMAT_OK) r->failed = true;
+  for (size_t i = 0; i < r->count; i++) {
+    heap *h = &r->heaps[i];
+    if (!end_cell(h) || qmat_extreme_points_keep(h->hull.points, &h->hull.count, qmat_solid_dropped) != QMAT_OK)
+      r->failed = true;
+  }
 }
 
 static qmat_status gather(void *data, void *found) {
@@ -81,8 +120,12 @@ static qmat_status gather(void *data, void *found) {
   region *r = found;
   bool done = !r->failed;
   for (size_t i = 0; i < r->count; i++) {
-    done = done && add_points(&all[r->heaps[i].shape], r->heaps[i].points, r->heaps[i].count);
-    qmat_free(r->heaps[i].points);
+    heap *from = &r->heaps[i], *to = &all[from->shape];
+    done = done && qmat_point_heap_add(&to->hull, from->hull.points, from->hull.count, qmat_solid_dropped) &&
+           add_cells(to, from->cells, from->cell_count, from->cell_points, from->point_count);
+    qmat_free(from->hull.points);
+    qmat_free(from->cells);
+    qmat_free(from->cell_points);
   }
   qmat_free(r->heaps);
   return done ? QMAT_OK : QMAT_ERROR_MEMORY;
@@ -101,17 +144,21 @@ qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *sur
                                      .gather = gather,
                                      .all = all,
                                      .what = "regions divided"};
-  for (size_t i = 0; i < count; i++) all[i].limit = MANY_POINTS;
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
   bool done = status == QMAT_OK;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
   for (size_t i = 0; i < count; i++) {
-    if (done && qmat_extreme_points_keep(all[i].points, &all[i].count, dropped) != QMAT_OK) done = false;
-    (*parts)[i] = (qmat_solid_part){all[i].count, all[i].points};
+    heap *h = &all[i];
+    if (done && qmat_extreme_points_keep(h->hull.points, &h->hull.count, qmat_solid_dropped) != QMAT_OK) done = false;
+    (*parts)[i] = (qmat_solid_part){h->hull.count, h->cell_count, h->hull.points, h->cells, h->cell_points};
   }
   return status != QMAT_OK || done ? status : qmat_fail_memory(context, "the parts of the solid");
 }
 
 void qmat_solid_parts_free(qmat_solid_part *parts, size_t count) {
-  for (size_t i = 0; parts && i < count; i++) qmat_free(parts[i].points);
+  for (size_t i = 0; parts && i < count; i++) {
+    qmat_free(parts[i].points);
+    qmat_free(parts[i].cells);
+    qmat_free(parts[i].cell_points);
+  }
 }

@@ -14,7 +14,8 @@
 
 static const double finest = 1.0 / 256; /* the edge of the smallest cubes */
 
-/* Two balls in a bar of 4 x 1 x 1 own one half each: its far face exactly, and the middle to a cube. */
+/* Two balls in a bar of 4 x 1 x 1 own one half each: its far face exactly, and the middle to a cube. The points of a
+ * cell are in it. */
 static void test_two_balls_halve_a_bar(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -39,6 +40,17 @@ static void test_two_balls_halve_a_bar(void **state) {
         low[k] = fmin(low[k], x);
         high[k] = fmax(high[k], x);
       }
+    const double *at = parts[p].cell_points;
+    for (size_t c = 0; c < parts[p].cell_count; c++) {
+      const qmat_solid_cell *cell = &parts[p].cells[c];
+      assert_true(cell->count >= 8 && cell->first >= 8 && cell->first <= cell->count);
+      for (size_t i = 0; i < 3 * (size_t)cell->count; i++) {
+        const double from = (double)cell->at[i % 3] / QMAT_SOLID_CELLS - 0.5;
+        assert_true(at[i] >= from - 1e-6 && at[i] <= from + 1.0 / QMAT_SOLID_CELLS + 1e-6);
+      }
+      at += 3 * (size_t)cell->count;
+    }
+    assert_true(parts[p].cell_count > 0);
     assert_near(high[0], reach, 1e-6);
     assert_true(low[0] <= 1e-6 && low[0] >= -2 * finest);
     for (size_t k = 1; k < 3; k++) {
