@@ -27,8 +27,8 @@ static const double beside_surface = 1e-5;
 
 /* The surface is searched up to so many times, each time from the F found before. */
 enum { MOST_SEARCHES = 4 };
-/* Where epsilon is between the bounds, they come as close as it is to the lower one, down to this share of their gap.
- */
+/* Where epsilon is between the bounds, the tolerance is its distance from the lower one, at least this share of the
+ * usual tolerance. */
 static const double LEAST_TOLERANCE = 1.0 / 256;
 
 typedef struct evaluation {
