@@ -262,26 +262,13 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
   return node->check != NULL && !has_meters(node, params) ? node->check(context, params) : QMAT_OK;
 }
 
-/* The diagonal of the box of the vertices that triangles use, in model units. */
-static double diagonal_of(const qmat_mesh *mesh) {
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-    const double *vertex = mesh->positions + 3 * (size_t)mesh->triangles[i];
-    for (size_t k = 0; k < 3; k++) {
-      low[k] = fmin(low[k], vertex[k]);
-      high[k] = fmax(high[k], vertex[k]);
-    }
-  }
-  return mesh->triangle_count > 0 ? hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]) : 0;
-}
-
 /* The diagonal of the first input that is a mesh or a chain, in metres; 0: not known. */
 static double find_diagonal(const qmat_node *node, const qmat_value *const inputs[]) {
   for (size_t i = 0; i < qmat_input_count(node); i++) {
     if (inputs[i] && inputs[i]->type == QMAT_CHAIN) return ((const qmat_chain *)inputs[i])->meters_per_diagonal;
     if (!inputs[i] || inputs[i]->type != QMAT_MESH) continue;
     const qmat_mesh *mesh = (const qmat_mesh *)inputs[i];
-    return mesh->meters_per_unit > 0 ? diagonal_of(mesh) * mesh->meters_per_unit : 0;
+    return mesh->meters_per_unit > 0 ? qmat_mesh_diagonal(mesh) * mesh->meters_per_unit : 0;
   }
   return 0;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/value.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "core/value_table.h"
@@ -134,4 +135,16 @@ void qmat_value_counts(const qmat_value *value, size_t counts[QMAT_MOST_COUNTS])
     const qmat_value_count_row *rows = qmat_value_count_rows(item->type);
     for (size_t k = 0; rows[k].name; k++) counts[k] += *(const size_t *)((const char *)item + rows[k].offset);
   }
+}
+
+double qmat_mesh_diagonal(const qmat_mesh *mesh) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
+    const double *vertex = mesh->positions + 3 * (size_t)mesh->triangles[i];
+    for (size_t k = 0; k < 3; k++) {
+      low[k] = fmin(low[k], vertex[k]);
+      high[k] = fmax(high[k], vertex[k]);
+    }
+  }
+  return mesh->triangle_count > 0 ? hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]) : 0;
 }

@@ -62,4 +62,7 @@ const qmat_value_count_row *qmat_value_count_rows(qmat_value_type type);
 /* Those counts of one value, in that order; of a list their sums. Unused counts are 0. */
 void qmat_value_counts(const qmat_value *value, size_t counts[QMAT_MOST_COUNTS]);
 
+/* The diagonal of the box of the vertices that the triangles of a mesh use, in model units; 0 without triangles. */
+double qmat_mesh_diagonal(const qmat_mesh *mesh);
+
 #endif

@@ -10,15 +10,6 @@
  * that copies went through lose some bits. */
 static const double nearness = 2e-6;
 
-static double diagonal_of(const qmat_mesh *mesh) {
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (size_t i = 0; i < 3 * mesh->vertex_count; i++) {
-    low[i % 3] = fmin(low[i % 3], mesh->positions[i]);
-    high[i % 3] = fmax(high[i % 3], mesh->positions[i]);
-  }
-  return qmat_point_distance(low, high);
-}
-
 static bool are_equal(const void *a, const void *b, size_t bytes) {
   return bytes == 0 || memcmp(a, b, bytes) == 0;
 }
@@ -105,7 +96,7 @@ static size_t find_originals(const qmat_list *list, original *originals, size_t 
     }
     if (of[i] < SIZE_MAX) continue;
     of[i] = count;
-    originals[count++] = (original){.item = i, .nearest = nearness * diagonal_of(mesh)};
+    originals[count++] = (original){.item = i, .nearest = nearness * qmat_mesh_diagonal(mesh)};
   }
   return count;
 }
