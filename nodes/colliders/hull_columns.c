@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/colliders/convex_hull_cgal.h"
 
 enum { LINES = 256 };
 
@@ -87,6 +88,18 @@ qmat_status qmat_hull_columns_make(const double *points, const uint32_t *triangl
   return QMAT_OK;
 }
 
+qmat_status qmat_hull_columns_around(const double *points, size_t count, qmat_hull_columns *columns) {
+  size_t triangle_count;
+  *columns = (qmat_hull_columns){0};
+  if (count < 4) return QMAT_OK;
+  uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
+  if (!triangles) return QMAT_ERROR_MEMORY;
+  qmat_status status = qmat_convex_hull(points, count, triangles, &triangle_count);
+  if (status == QMAT_OK) status = qmat_hull_columns_make(points, triangles, triangle_count, columns);
+  qmat_free(triangles);
+  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+}
+
 void qmat_hull_columns_free(qmat_hull_columns *columns) {
   qmat_free(columns->z);
   *columns = (qmat_hull_columns){0};
@@ -114,22 +127,22 @@ double qmat_hull_columns_beyond(const qmat_hull_columns *of, const qmat_hull_col
       const double *z = column_at(of, i, j);
       if (!z) continue;
       for (double at = z[0]; at < z[1];) {
-        /* From here either others go on to `covered`, or none does before `free`. */
-        double covered = at, free = z[1];
+        /* From here either others go on to `covered`, or none does before `next`. */
+        double covered = at, next = z[1];
         for (size_t k = 0; k < count; k++) {
           const double *other = column_at(others[k], i, j);
           if (!other || other[1] <= at) continue;
           if (other[0] <= at)
             covered = qmat_larger(covered, other[1]);
           else
-            free = qmat_smaller(free, other[0]);
+            next = qmat_smaller(next, other[0]);
         }
         if (covered > at) {
           at = covered;
           continue;
         }
-        sum += free - at;
-        at = free;
+        sum += next - at;
+        at = next;
       }
     }
   return sum / ((double)LINES * LINES);

@@ -15,6 +15,10 @@ typedef struct qmat_hull_columns {
 qmat_status qmat_hull_columns_make(const double *points, const uint32_t *triangles, size_t triangle_count,
                                    qmat_hull_columns *columns);
 
+/* The columns of the convex hull of points (3 doubles each); none where they are in a plane. QMAT_ERROR_MEMORY. Cost: a
+ * hull, and as above. */
+qmat_status qmat_hull_columns_around(const double *points, size_t count, qmat_hull_columns *columns);
+
 void qmat_hull_columns_free(qmat_hull_columns *columns);
 
 /* Whether some line may meet both. */

@@ -5,7 +5,6 @@
 #include <omp.h>
 #include <string.h>
 
-#include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_columns.h"
 #include "nodes/colliders/hull_split.h"
 
@@ -70,21 +69,9 @@ static void free_member(member *m) {
   *m = (member){0};
 }
 
-/* The columns of the hull of points. QMAT_ERROR_GEOMETRY: they are in a plane. */
-static qmat_status cut_hull(const double *points, size_t count, qmat_hull_columns *columns) {
-  size_t triangle_count;
-  if (count < 4) return QMAT_ERROR_GEOMETRY;
-  uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
-  if (!triangles) return QMAT_ERROR_MEMORY;
-  qmat_status status = qmat_convex_hull(points, count, triangles, &triangle_count);
-  if (status == QMAT_OK) status = qmat_hull_columns_make(points, triangles, triangle_count, columns);
-  qmat_free(triangles);
-  return status;
-}
-
 /* Makes the hull of its pieces. Points in a plane have no columns. */
 static qmat_status make_hull(const qmat_solid_part *parts, hull *h) {
-  qmat_status status = qmat_hull_pieces_points(parts, &h->pieces, true, &h->points, &h->count);
+  const qmat_status status = qmat_hull_pieces_points(parts, &h->pieces, true, &h->points, &h->count);
   if (status != QMAT_OK) return status;
   for (int k = 0; k < 3; k++) {
     h->low[k] = INFINITY;
@@ -94,8 +81,7 @@ static qmat_status make_hull(const qmat_solid_part *parts, hull *h) {
       h->high[k] = fmax(h->high[k], h->points[3 * i + (size_t)k]);
     }
   }
-  status = cut_hull(h->points, h->count, &h->columns);
-  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+  return qmat_hull_columns_around(h->points, h->count, &h->columns);
 }
 
 /* The live members but one that may meet a hull, in the scratch of this thread, which has room for another one. */
@@ -205,12 +191,12 @@ static qmat_status set_growth(const exchange *x, pair *p) {
   if (!points) return QMAT_ERROR_MEMORY;
   memcpy(points, a->points, 3 * a->count * sizeof *points);
   memcpy(&points[3 * a->count], b->points, 3 * b->count * sizeof *points);
-  const qmat_status status = cut_hull(points, a->count + b->count, &columns);
-  p->growth = status == QMAT_OK ? volume_beyond(x, &columns, SIZE_MAX, NULL) : INFINITY;
+  const qmat_status status = qmat_hull_columns_around(points, a->count + b->count, &columns);
+  p->growth = columns.z ? volume_beyond(x, &columns, SIZE_MAX, NULL) : INFINITY;
   p->round = x->round;
   qmat_hull_columns_free(&columns);
   qmat_free(points);
-  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+  return status;
 }
 
 /* Adds the pairs of the members from one on with those before. */

@@ -3,9 +3,7 @@
 
 #include <string.h>
 
-#include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/extreme_points.h"
-#include "nodes/colliders/hull_vertices.h"
 
 enum { DIRECTIONS = QMAT_EXTREME_DIRECTIONS, ROOM = 2 * DIRECTIONS };
 
@@ -33,14 +31,8 @@ static void add(few_points *all, const double *points, size_t count) {
 
 /* The columns of the hull; none where there is no hull. */
 static qmat_status make_columns(few_points *points, qmat_hull_columns *columns) {
-  uint32_t triangles[6 * ROOM];
-  size_t count;
-  *columns = (qmat_hull_columns){0};
   if (points->count > DIRECTIONS) points->count = qmat_extreme_points_first(points->at, points->count, DIRECTIONS);
-  if (points->count < 4) return QMAT_OK;
-  qmat_status status = qmat_convex_hull(points->at, points->count, triangles, &count);
-  if (status == QMAT_OK) status = qmat_hull_columns_make(points->at, triangles, count, columns);
-  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+  return qmat_hull_columns_around(points->at, points->count, columns);
 }
 
 static void fill_sides(const qmat_solid_part *parts, const qmat_hull_pieces *hull, int axis, sides *s) {
