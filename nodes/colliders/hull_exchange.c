@@ -7,6 +7,7 @@
 
 #include "nodes/colliders/hull_columns.h"
 #include "nodes/colliders/hull_split.h"
+#include "nodes/colliders/hull_vertices.h"
 
 /* A step gains this share of the volume of the union at least. */
 static const double least_share = 1e-5;
@@ -73,14 +74,7 @@ static void free_member(member *m) {
 static qmat_status make_hull(const qmat_solid_part *parts, hull *h) {
   const qmat_status status = qmat_hull_pieces_points(parts, &h->pieces, true, &h->points, &h->count);
   if (status != QMAT_OK) return status;
-  for (int k = 0; k < 3; k++) {
-    h->low[k] = INFINITY;
-    h->high[k] = -INFINITY;
-    for (size_t i = 0; i < h->count; i++) {
-      h->low[k] = fmin(h->low[k], h->points[3 * i + (size_t)k]);
-      h->high[k] = fmax(h->high[k], h->points[3 * i + (size_t)k]);
-    }
-  }
+  qmat_hull_box(h->points, h->count, h->low, h->high);
   return qmat_hull_columns_around(h->points, h->count, &h->columns);
 }
 

@@ -69,17 +69,6 @@ typedef struct merging {
   uint8_t *is_vertex; /* scratch: of a joint hull's points */
 } merging;
 
-static void find_box(const double *points, size_t count, double low[3], double high[3]) {
-  for (int k = 0; k < 3; k++) {
-    low[k] = INFINITY;
-    high[k] = -INFINITY;
-    for (size_t i = 0; i < count; i++) {
-      low[k] = fmin(low[k], points[3 * i + (size_t)k]);
-      high[k] = fmax(high[k], points[3 * i + (size_t)k]);
-    }
-  }
-}
-
 /* The hull of two parts. */
 static qmat_status join(const merging *m, const part *a, const part *b, joint *j) {
   j->point_count = a->count + b->count;
@@ -153,7 +142,7 @@ static bool set_points(part *p, const double *points, size_t count) {
   qmat_free(p->points);
   p->points = memcpy(copy, points, 3 * count * sizeof *copy);
   p->count = count;
-  find_box(copy, count, p->low, p->high);
+  qmat_hull_box(copy, count, p->low, p->high);
   return true;
 }
 
@@ -261,7 +250,7 @@ static qmat_status surround(qmat_tangent_hull *hull, const double *points, size_
   const qmat_status status = qmat_tangent_hull_fit_points(hull, points, count, margin, error);
   if (status != QMAT_ERROR_GEOMETRY) return status;
   double low[3], high[3];
-  find_box(points, count, low, high);
+  qmat_hull_box(points, count, low, high);
   for (int i = 0; i < 8; i++)
     for (int k = 0; k < 3; k++) hull->points[3 * i + k] = i >> k & 1 ? high[k] + margin : low[k] - margin;
   hull->point_count = 8;

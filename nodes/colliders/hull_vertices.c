@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/colliders/hull_vertices.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "core/geometry/vector.h"
@@ -13,6 +14,17 @@ size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *tri
   for (size_t i = 0; i < count; i++)
     if (is_vertex[i]) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
   return kept;
+}
+
+void qmat_hull_box(const double *points, size_t count, double low[3], double high[3]) {
+  for (int k = 0; k < 3; k++) {
+    low[k] = INFINITY;
+    high[k] = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      low[k] = fmin(low[k], points[3 * i + (size_t)k]);
+      high[k] = fmax(high[k], points[3 * i + (size_t)k]);
+    }
+  }
 }
 
 bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plane[4]) {

@@ -11,6 +11,9 @@
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
                                uint8_t *is_vertex);
 
+/* The box of points (3 doubles each), which is that of their hull; from infinity to -infinity for none. */
+void qmat_hull_box(const double *points, size_t count, double low[3], double high[3]);
+
 /* The plane of a triangle (3 ids of points): its unit normal, outward for a triangle of a hull, and its offset from the
  * origin. False for a triangle without an area. */
 bool qmat_hull_plane(const double *points, const uint32_t *triangle, double plane[4]);
