@@ -10,8 +10,9 @@
 #include "nodes/initial/medial_vertices.h"
 #include "nodes/measure/topology.h"
 
-/* The largest distance between the surface and the incentre of a tetrahedron that changes sides, in diagonals. The
- * nearest change first, so a larger value only adds work. */
+/* The largest distance between the surface and the incentre of a tetrahedron that changes sides, in diagonals, and
+ * between the solid and the middles of the edges of one that is kept then. The nearest change first, so a larger value
+ * only adds work. */
 static const double most_gap = 0.005;
 
 /* Searches for the outside end after this number of samples, as if they had found it. Pockets have a handful. */
@@ -29,7 +30,7 @@ typedef struct mending {
   qmat_dual_complex *d;
   betti now, wanted;
   uint8_t *before;        /* per tetrahedron: its kind at first */
-  double *gaps;           /* per tetrahedron: the distance of its incentre from the surface; negative: not known yet */
+  double *gaps;           /* per tetrahedron: its gap; negative: not known yet */
   size_t *starts;         /* per sample: where its tetrahedra start in `around` */
   uint32_t *around;       /* 4 per tetrahedron */
   uint8_t *on_hull;       /* per sample */
@@ -237,10 +238,24 @@ static bool opens(mending *m, uint32_t cell, cell_link link) {
   return link.parts == 2 && link.loops == 0 && m->now.loops > m->wanted.loops && is_bridged(m, cell, link);
 }
 
+static double distance_from_surface(const mending *m, const double *point) {
+  return qmat_surface_distance(m->d->surface, point, most_gap, NULL, NULL);
+}
+
+/* The distance of a tetrahedron's incentre from the surface. A needle between distant parts of the surface leaves the
+ * solid far while its incentre does not, so the middles of the edges count too, where the tetrahedron is outside. */
 static double gap_of(const mending *m, uint32_t cell) {
-  double centre[3];
-  qmat_medial_vertex_incentre(m->d, cell, centre);
-  return qmat_surface_distance(m->d->surface, centre, most_gap, NULL, NULL);
+  const qmat_dual_complex *d = m->d;
+  double place[3];
+  qmat_medial_vertex_incentre(d, cell, place);
+  double gap = distance_from_surface(m, place);
+  for (int e = 0; e < 6 && gap <= most_gap && !m->before[cell]; e++) {
+    const uint32_t *corners = &d->cells.corners[4 * (size_t)cell];
+    const double *a = &d->points[3 * (size_t)corners[edges[e][0]]], *b = &d->points[3 * (size_t)corners[edges[e][1]]];
+    for (int k = 0; k < 3; k++) place[k] = 0.5 * (a[k] + b[k]);
+    if (!qmat_surface_inside(d->surface, place)) gap = fmax(gap, distance_from_surface(m, place));
+  }
+  return gap;
 }
 
 /* Queues the tetrahedra of one side that have a neighbour on the other. */

@@ -11,6 +11,7 @@
 #include "core/geometry/surface.h"
 #include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
+#include "tests/random.h"
 
 /* The spheres of the tetrahedra, without merging, halving or thinning. */
 #define PLAIN "merge=0 max_envelope_error=0 thinning_tolerance=0"
@@ -632,6 +633,55 @@ static void test_loops_are_those_of_the_solid(void **state) {
   }
 }
 
+/* How far the middle of a medial edge leaves the solid, in diagonals. */
+static double farthest_middle(const pipeline *p) {
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, p->mesh, &surface), QMAT_OK);
+  const qmat_frame *frame = qmat_surface_frame(surface);
+  double farthest = 0;
+  for (size_t e = 0; e < p->medial->edge_count; e++) {
+    double middle[3];
+    for (size_t k = 0; k < 3; k++)
+      middle[k] = 0.5 * (p->medial->spheres[4 * (size_t)p->medial->edges[2 * e] + k] +
+                         p->medial->spheres[4 * (size_t)p->medial->edges[2 * e + 1] + k]);
+    qmat_frame_to_unit(frame, middle, 1, middle);
+    farthest = fmax(farthest, qmat_surface_signed_distance(surface, middle));
+  }
+  qmat_surface_free(surface);
+  qmat_context_uninit(&context);
+  return farthest;
+}
+
+/* L-brackets and tori that reach into each other have more loops than the solid of their surfaces, which starts a
+ * search for tetrahedra outside that close them. Needles between distant parts have their incentres beside the surface
+ * too. */
+static void test_no_needle_closes_a_loop(void **state) {
+  (void)state;
+  static const uint64_t seeds[] = {20, 38};
+  for (size_t s = 0; s < sizeof seeds / sizeof *seeds; s++) {
+    qmat_mesh *mesh = shape_new();
+    random_numbers random = {.seed = seeds[s]};
+    for (int i = 0; i < 8; i++) {
+      qmat_mesh *part = pipeline_model(i % 2 ? "torus" : "l-bracket", 6);
+      shape_map(part, random_between(&random, 0.1, 0.3), 0, 0, 0);
+      const double x = random_between(&random, -1, 1), y = random_between(&random, -1, 1);
+      const double z = random_between(&random, -1, 1), flatness = random_between(&random, 0.02, 1);
+      const uint32_t first = (uint32_t)mesh->vertex_count, *corners = part->triangles;
+      for (const double *p = part->positions; p < part->positions + 3 * part->vertex_count; p += 3)
+        shape_vertex(mesh, x + p[0], y + flatness * p[1], z + p[2]);
+      for (size_t t = 0; t < part->triangle_count; t++, corners += 3)
+        shape_triangle(mesh, first + corners[0], first + corners[1], first + corners[2]);
+      qmat_value_release(&part->base);
+    }
+    pipeline p;
+    pipeline_make(&p, mesh, "spacing=0", "");
+    assert_true(pipeline_count(p.report, "kept_for_topology") > 0);
+    assert_true(farthest_middle(&p) < 0.005);
+    pipeline_free(&p);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_regular_tetrahedron),
@@ -658,6 +708,7 @@ int main(void) {
       cmocka_unit_test(test_inputs_that_do_not_fit_are_named),
       cmocka_unit_test(test_progress_function_cancels),
       cmocka_unit_test(test_loops_are_those_of_the_solid),
+      cmocka_unit_test(test_no_needle_closes_a_loop),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
