@@ -291,7 +291,7 @@ static const qmat_param params[] = {
     QMAT_LENGTH(
         medial_refine_params, epsilon, 0.01, 0, 1,
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
-    QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 1, 0.1, 1,
+    QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.75, 0.1, 1,
                "Refinement starts only if some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),

@@ -12,9 +12,9 @@
 #include "nodes/initial/facet_relaxation.h"
 #include "nodes/initial/sample_spacing.h"
 
-/* Least area of a neighbour in eq. 7, as a share of the median area. Without it a sliver would force thousands of
- * samples on its neighbours. */
-#define SMALLEST_NEIGHBOUR 1e-3
+/* Neighbours count in eq. 7 as a square whose side is at least this share of the spacing. Otherwise a few slivers would
+ * force dozens of samples, far closer than any epsilon needs, on each facet around them. */
+#define LEAST_NEIGHBOUR_SIDE 0.15
 /* Facets that are equal up to rounding get no sample for their area. */
 #define AREA_TOLERANCE 1e-9
 
@@ -49,46 +49,6 @@ typedef struct sample_counts {
 
 /* --- how many: eq. 7 and 8 -------------------------------------------------------------------------------------- */
 
-static void exchange(double *a, double *b) {
-  const double kept = *a;
-  *a = *b;
-  *b = kept;
-}
-
-/* The number at `rank` in sorted order; reorders the numbers. Pivots come from a hash, so no input order is slow. */
-static double select_number(double *numbers, size_t count, size_t rank) {
-  size_t low = 0, high = count;
-  while (high - low > 1) {
-    const double pivot = numbers[low + qmat_hash3(count, low, high) % (high - low)];
-    size_t less = low, i = low, more = high;
-    while (i < more) {
-      if (numbers[i] < pivot) {
-        exchange(numbers + less++, numbers + i++);
-      } else if (numbers[i] > pivot) {
-        exchange(numbers + i, numbers + --more);
-      } else {
-        i++;
-      }
-    }
-    if (rank >= less && rank < more) return pivot;
-    if (rank < less) {
-      high = less;
-    } else {
-      low = more;
-    }
-  }
-  return numbers[low];
-}
-
-/* The median of the positive areas; 0 without any. */
-static double median_area(const double *areas, size_t count, double *scratch) {
-  size_t positive = 0;
-  for (size_t i = 0; i < count; i++) {
-    if (areas[i] > 0) scratch[positive++] = areas[i];
-  }
-  return positive > 0 ? select_number(scratch, positive, positive / 2) : 0;
-}
-
 static void note_area(smallest_areas *smallest, double area, uint32_t facet) {
   if (area < smallest->area[0]) {
     smallest->area[1] = smallest->area[0];
@@ -104,13 +64,13 @@ static void note_area(smallest_areas *smallest, double area, uint32_t facet) {
 /* The first term of eq. 7: the ratio of a facet's area to its smallest neighbour's, rounded up, minus one. Degenerate
  * neighbours are ignored. */
 static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_t ids[3], uint32_t facet, double area,
-                                double floor_area, int64_t most) {
+                                double least_area, int64_t most) {
   double smallest = INFINITY;
   for (int k = 0; k < 3; k++) {
     const smallest_areas *here = at_vertices + ids[k];
     smallest = fmin(smallest, here->facet[0] == facet ? here->area[1] : here->area[0]);
   }
-  const double count = ceil(area / fmax(smallest, floor_area) * (1 - AREA_TOLERANCE)) - 1;
+  const double count = ceil(area / fmax(smallest, least_area) * (1 - AREA_TOLERANCE)) - 1;
   return (int64_t)fmin(fmax(count, 0), (double)most);
 }
 
@@ -118,16 +78,15 @@ static int64_t samples_for_area(const smallest_areas *at_vertices, const uint32_
 static qmat_status count_samples(qmat_context *context, const mesh_sample_params *params, const qmat_mesh *mesh,
                                  const double *unit_positions, const qmat_field *thickness, const double *areas,
                                  uint64_t *offsets, spaced_points *spaced, sample_counts *counts) {
-  double *scratch = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *scratch);
   smallest_areas *at_vertices = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *at_vertices);
-  if (!scratch || !at_vertices) return qmat_fail_memory(context, "the areas around vertices");
+  if (!at_vertices) return qmat_fail_memory(context, "the areas around vertices");
   for (size_t i = 0; i < mesh->vertex_count; i++)
     at_vertices[i] = (smallest_areas){{INFINITY, INFINITY}, {UINT32_MAX, UINT32_MAX}};
   for (size_t i = 0; i < mesh->triangle_count; i++) {
     const uint32_t *ids = mesh->triangles + 3 * i;
     for (int k = 0; k < 3 && areas[i] > 0; k++) note_area(at_vertices + ids[k], areas[i], (uint32_t)i);
   }
-  const double floor_area = SMALLEST_NEIGHBOUR * median_area(areas, mesh->triangle_count, scratch);
+  const double least_side = LEAST_NEIGHBOUR_SIDE * params->spacing;
   counts->threshold = qmat_thickness_threshold(mesh, thickness, params->theta);
   if (params->spacing > 0) {
     spaced->on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *spaced->on_sides);
@@ -152,8 +111,8 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     }
     /* One more than the cap, so that `capped` counts it. */
     const int64_t by_thickness = thin ? params->n_f : 0;
-    const int64_t by_area = samples_for_area(at_vertices, mesh->triangles + 3 * i, (uint32_t)i, areas[i], floor_area,
-                                             params->max_per_facet + 1);
+    const int64_t by_area = samples_for_area(at_vertices, mesh->triangles + 3 * i, (uint32_t)i, areas[i],
+                                             least_side * least_side, params->max_per_facet + 1);
     const int64_t wanted = by_area + by_thickness;
     const int64_t count = wanted < params->max_per_facet ? wanted : params->max_per_facet;
     if (spaced->in_rows) {
@@ -389,13 +348,13 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_mesh_sample = {
     .name = "mesh.sample",
-    .version = 2,
+    .version = 3,
     .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
         "Every vertex is a sample. Sheets have no other samples. A facet of a solid gets further samples for its area "
         "relative to its smallest neighbour, and "
-        "n_f more if it is thin. Neighbours count as at least a thousandth of the median area; degenerate facets are "
-        "ignored.\n\n"
+        "n_f more if it is thin. Neighbours count as at least a square whose side is 0.15 of the spacing; "
+        "degenerate facets are ignored.\n\n"
         "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "
         "facet's bounded Voronoi diagram, with fixed corners.\n\n"
         "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "

@@ -4,10 +4,12 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
 
+#include "core/geometry/frame.h"
 #include "core/node.h"
 #include "tests/shapes.h"
 
@@ -225,27 +227,33 @@ static qmat_mesh *fan(const double *areas, size_t count) {
   return shape_seal(mesh);
 }
 
-static void test_slivers_count_as_a_thousandth_of_the_median(void **state) {
+/* A sliver is as small a neighbour as a square of 0.15 of the spacing: here 1/64 in the model's unit. */
+static void test_slivers_count_as_a_square_of_a_share_of_the_spacing(void **state) {
   (void)state;
-  static const double areas[7] = {1, 1, 1, 1, 0.03, 0.0205, 1e-6};
-  qmat_mesh *mesh = fan(areas, 7);
-  qmat_field *thickness = field_of(7, NULL, 1);
-  result made = sample(mesh, thickness, "");
-  assert_int_equal(count_on(made.samples, 4), 29); /* 0.03 / 0.001 - 1 */
-  assert_int_equal(count_on(made.samples, 5), 20); /* ceil(20.5) - 1 */
-  assert_int_equal(count_on(made.samples, 6), 0);
-  for (uint32_t i = 0; i < 4; i++) assert_int_equal(count_on(made.samples, i), 64);
-  assert_int_equal(reported(&made, "capped"), 4);
+  static const double areas[5] = {0.11, 0.13, 0.125, 1e-6, 0.01};
+  qmat_mesh *mesh = fan(areas, 5);
+  qmat_frame frame;
+  qmat_context context = {0};
+  assert_int_equal(qmat_frame_of_mesh(&context, mesh, &frame), QMAT_OK);
+  qmat_context_uninit(&context);
+  qmat_field *thickness = field_of(5, NULL, 1);
+  char text[64];
+  snprintf(text, sizeof text, "spacing=%.17g", 0.125 / 0.15 / frame.diagonal);
+  result made = sample(mesh, thickness, text);
+  assert_int_equal(count_on(made.samples, 0), 7); /* ceil(7.04) - 1 */
+  assert_int_equal(count_on(made.samples, 1), 8); /* ceil(8.32) - 1 */
+  assert_int_equal(count_on(made.samples, 2), 7);
+  assert_int_equal(count_on(made.samples, 3), 0);
+  assert_int_equal(count_on(made.samples, 4), 0);
+  assert_int_equal(reported(&made, "capped"), 0);
   release(&made);
   made = sample(mesh, thickness, "max_per_facet=20");
-  assert_int_equal(count_on(made.samples, 0), 20);
-  assert_int_equal(count_on(made.samples, 4), 20);
-  assert_int_equal(count_on(made.samples, 5), 20);
-  assert_int_equal(reported(&made, "capped"), 5);
+  for (uint32_t i = 0; i < 5; i++) assert_int_equal(count_on(made.samples, i), i == 3 ? 0 : 20);
+  assert_int_equal(reported(&made, "capped"), 4);
   release(&made);
   made = sample(mesh, thickness, "max_per_facet=0 theta=1");
-  assert_int_equal(made.samples->count, 15);
-  assert_int_equal(reported(&made, "capped"), 7);
+  assert_int_equal(made.samples->count, 11);
+  assert_int_equal(reported(&made, "capped"), 5);
   release(&made);
   qmat_value_release(&thickness->base);
   qmat_value_release(&mesh->base);
@@ -684,7 +692,7 @@ int main(void) {
       cmocka_unit_test(test_thin_facets_add_n_f),
       cmocka_unit_test(test_facet_is_not_its_own_neighbour),
       cmocka_unit_test(test_equal_areas_add_nothing_whatever_their_rounding),
-      cmocka_unit_test(test_slivers_count_as_a_thousandth_of_the_median),
+      cmocka_unit_test(test_slivers_count_as_a_square_of_a_share_of_the_spacing),
       cmocka_unit_test(test_degenerate_facets_get_none_and_are_no_neighbours),
       cmocka_unit_test(test_limit_on_samples_thins_all_facets_evenly),
       cmocka_unit_test(test_random_points_are_uniform_on_a_facet),
