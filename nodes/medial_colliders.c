@@ -8,6 +8,7 @@
 #include "core/node.h"
 #include "nodes/colliders/cover_fit.h"
 #include "nodes/colliders/hull_merge.h"
+#include "nodes/colliders/hull_outside.h"
 #include "nodes/colliders/inside_fit.h"
 #include "nodes/colliders/rigid_body.h"
 #include "nodes/colliders/shape_hulls.h"
@@ -36,8 +37,9 @@ typedef struct work {
   qmat_envelope *envelope;
   qmat_shape_set set;
   qmat_colliders *colliders;
-  double volume; /* of the solid, in the unit frame; 0: not known */
-  double dent;   /* of rows of capsules or spheres */
+  double volume;          /* of the solid, in the unit frame; 0: not known */
+  double dent;            /* of rows of capsules or spheres */
+  double hull_protrusion; /* of hulls of the solid */
   bool proved;
   qmat_shape_measures measures;
 } work;
@@ -153,6 +155,7 @@ static qmat_status make_hulls_of_solid(work *w) {
     status = qmat_hulls_merge(w->context, w->surface, parts, (size_t)w->params->shapes, (size_t)w->params->hull_points,
                               w->params->hull_error * qmat_surface_frame(w->surface)->diagonal, w->colliders);
   qmat_solid_parts_free(parts, w->set.shape_count);
+  if (status == QMAT_OK) status = qmat_hulls_protrusion(w->context, w->surface, w->colliders, &w->hull_protrusion);
   return status;
 }
 
@@ -190,6 +193,7 @@ static qmat_status make_report(const work *w, qmat_report *report) {
   bad |= qmat_json_set_counts(report->root, counts, sizeof counts / sizeof *counts);
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     bad |= json_object_set_new(report->root, numbers[i].key, json_real(numbers[i].value));
+  if (has_hulls_of_solid(w)) bad |= json_object_set_new(report->root, "hull_protrusion", json_real(w->hull_protrusion));
   if (w->colliders->body_count > 0) {
     const double *b = w->colliders->body;
     bad |= json_object_set_new(report->root, "mass", json_real(b[0]));
@@ -264,7 +268,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 12,
+    .version = 13,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -273,14 +277,16 @@ const qmat_node qmat_node_medial_colliders = {
         "contain moves and grows spheres so that their union has little volume beyond the solid's, then proves by "
         "branch and bound that no point of the solid is outside, and grows them where one is. Hulls then contain their "
         "shapes. With kind=hulls the solid is divided among the shapes, each hull contains only its part, and they are "
-        "joined where the joint hull leaves the solid by at most hull_error, or until `shapes` are left. Their number "
-        "then stays: one is divided by a plane and two others are joined, as long as the union's volume falls. inside "
+        "joined where the facets between both leave the solid by at most hull_error, or until `shapes` are left. Their "
+        "number then stays: one is divided by a plane and two others are joined, as long as the union's volume falls "
+        "and the facets between these leave the solid by at most twice hull_error. A part that is not convex leaves "
+        "it, too: hull_protrusion in the report bounds how far any hull does, to 1e-4 diagonals. inside "
         "changes radii and proves the opposite; otherwise hulls are inside their shapes. proved is false for open "
         "surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
         "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
         "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. They are "
-        "those of the shapes, not of hulls.",
+        "those of the shapes, not of hulls, but for hull_protrusion.",
     .citation = "",
     .params_size = sizeof(medial_colliders_params),
     .params = params,

@@ -5,7 +5,9 @@
 #include <omp.h>
 #include <string.h>
 
+#include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_columns.h"
+#include "nodes/colliders/hull_outside.h"
 #include "nodes/colliders/hull_split.h"
 #include "nodes/colliders/hull_vertices.h"
 
@@ -14,6 +16,13 @@ static const double least_share = 1e-5;
 
 /* Boxes of two hulls so near to each other may be joined; in the unit frame. */
 static const double near = 1e-3;
+
+/* The facets between two joint hulls may leave the solid by this many times the limit: a step that gains may need one
+ * that was too far outside before. */
+static const double limit_factor = 2;
+
+/* Triangles between two hulls are halved this often at most, to find how far they leave the solid. */
+enum { MOST_HALVINGS = 48 };
 
 /* So many steps in a row may be taken back. */
 enum { MOST_FAILURES = 5 };
@@ -40,12 +49,15 @@ typedef struct member {
 
 typedef struct pair {
   uint32_t a, b;
-  double growth; /* the volume of the union that the joint hull adds */
+  double growth; /* the volume of the union that the joint hull adds; INFINITY: it leaves the solid by too much */
   int round;     /* of the growth */
+  bool tested;   /* whether it leaves the solid by too much */
 } pair;
 
 typedef struct exchange {
   qmat_context *context;
+  const qmat_surface *solid;
+  double limit; /* of how far the facets between joint hulls leave the solid */
   const qmat_solid_part *parts;
   member *members;
   size_t count, room;
@@ -177,19 +189,44 @@ static bool are_near(const hull *a, const hull *b) {
   return true;
 }
 
-/* The volume of the union that a joint hull adds. */
-static qmat_status set_growth(const exchange *x, pair *p) {
+/* The points of a joint hull: those of the one, then those of the other. The caller frees them; NULL: no memory. */
+static double *joint_points(const exchange *x, const pair *p) {
   const hull *a = &x->members[p->a].all, *b = &x->members[p->b].all;
-  qmat_hull_columns columns = {0};
   double *points = qmat_alloc(a->count + b->count, 3 * sizeof *points);
-  if (!points) return QMAT_ERROR_MEMORY;
+  if (!points) return NULL;
   memcpy(points, a->points, 3 * a->count * sizeof *points);
   memcpy(&points[3 * a->count], b->points, 3 * b->count * sizeof *points);
-  const qmat_status status = qmat_hull_columns_around(points, a->count + b->count, &columns);
+  return points;
+}
+
+/* The volume of the union that a joint hull adds. */
+static qmat_status set_growth(const exchange *x, pair *p) {
+  qmat_hull_columns columns = {0};
+  double *points = joint_points(x, p);
+  if (!points) return QMAT_ERROR_MEMORY;
+  const size_t count = x->members[p->a].all.count + x->members[p->b].all.count;
+  const qmat_status status = qmat_hull_columns_around(points, count, &columns);
   p->growth = columns.z ? volume_beyond(x, &columns, SIZE_MAX, NULL) : INFINITY;
   p->round = x->round;
   qmat_hull_columns_free(&columns);
   qmat_free(points);
+  return status;
+}
+
+/* Tests how far a joint hull leaves the solid. That does not depend on the other hulls. */
+static qmat_status test_pair(const exchange *x, pair *p) {
+  const size_t first = x->members[p->a].all.count, count = first + x->members[p->b].all.count;
+  double *points = joint_points(x, p);
+  uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
+  size_t triangle_count = 0;
+  qmat_status status =
+      points && triangles ? qmat_convex_hull(points, count, triangles, &triangle_count) : QMAT_ERROR_MEMORY;
+  if (status == QMAT_OK &&
+      qmat_joint_protrusion(x->solid, points, first, triangles, triangle_count, x->limit, MOST_HALVINGS) > x->limit)
+    p->growth = INFINITY;
+  p->tested = true;
+  qmat_free(points);
+  qmat_free(triangles);
   return status;
 }
 
@@ -225,8 +262,8 @@ static pair *best_pair(exchange *x, qmat_status *status) {
       pair *p = &x->pairs[i];
       if (x->members[p->a].live && x->members[p->b].live && p->growth < (best ? best->growth : INFINITY)) best = p;
     }
-    if (!best || best->round == x->round) return best;
-    *status = set_growth(x, best);
+    if (!best || (best->round == x->round && best->tested)) return best;
+    *status = best->round == x->round ? test_pair(x, best) : set_growth(x, best);
     if (*status != QMAT_OK) return NULL;
   }
 }
@@ -322,9 +359,14 @@ static qmat_status init(exchange *x, qmat_hull_pieces *hulls, size_t count) {
   return done ? add_pairs(x, 1) : qmat_fail_memory(x->context, "the hulls");
 }
 
-qmat_status qmat_hulls_exchange(qmat_context *context, const qmat_solid_part *parts, qmat_hull_pieces *hulls,
-                                size_t count) {
-  exchange x = {.context = context, .parts = parts, .round = 1, .most_steps = count};
+qmat_status qmat_hulls_exchange(qmat_context *context, const qmat_surface *solid, double limit,
+                                const qmat_solid_part *parts, qmat_hull_pieces *hulls, size_t count) {
+  exchange x = {.context = context,
+                .solid = solid,
+                .limit = limit_factor * limit,
+                .parts = parts,
+                .round = 1,
+                .most_steps = count};
   if (count < 2) return QMAT_OK;
   qmat_status status = init(&x, hulls, count);
   const double least = status == QMAT_OK ? least_share * volume_of_union(&x) : 0;

@@ -8,6 +8,7 @@
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_exchange.h"
+#include "nodes/colliders/hull_outside.h"
 #include "nodes/colliders/hull_vertices.h"
 #include "nodes/colliders/outer_hull.h"
 #include "nodes/colliders/tangent_hull.h"
@@ -78,61 +79,14 @@ static qmat_status join(const merging *m, const part *a, const part *b, joint *j
   return qmat_convex_hull(j->points, j->point_count, j->triangles, &j->triangle_count);
 }
 
-/* Raises `*found` to the largest distance outside of the solid over a triangle, to half of the limit, until it exceeds
- * the limit. The triangle is halved `halvings` times at most. */
-static void search_triangle(const merging *m, double corners[3][3], int halvings, double *found) {
-  double centre[3], reach = 0, longest = -1, to_triangle = 0;
-  int a = 0;
-  uint32_t nearest;
-  for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
-  const double distance = qmat_surface_distance(m->solid, centre, INFINITY, NULL, &nearest);
-  for (int i = 0; i < 3; i++) {
-    reach = fmax(reach, qmat_point_distance(corners[i], centre));
-    to_triangle = fmax(to_triangle, qmat_surface_distance_to_triangle(m->solid, corners[i], nearest));
-    const double length = qmat_point_distance(corners[i], corners[(i + 1) % 3]);
-    if (length > longest) {
-      longest = length;
-      a = i;
-    }
-  }
-  double bound = fmin(to_triangle, distance + reach);
-  if (distance > *found) {
-    if (qmat_surface_inside(m->solid, centre))
-      bound = fmin(bound, reach - distance);
-    else
-      *found = distance;
-  }
-  if (*found > m->limit || halvings == 0 || reach <= 0.5 * m->limit || bound <= fmax(*found, 0.5 * m->limit)) return;
-  const int b = (a + 1) % 3;
-  double low[3][3], high[3][3];
-  memcpy(low, corners, sizeof low);
-  memcpy(high, corners, sizeof high);
-  for (int k = 0; k < 3; k++) low[b][k] = high[a][k] = 0.5 * (corners[a][k] + corners[b][k]);
-  search_triangle(m, low, halvings - 1, found);
-  if (!(*found > m->limit)) search_triangle(m, high, halvings - 1, found);
-}
-
 /* How far the facets between two parts leave the solid. */
 static void test_pair(const merging *m, pair *p, int halvings, joint *j) {
-  const size_t first = m->parts[p->a].count;
-  p->leaves = 0;
+  const part *a = &m->parts[p->a], *b = &m->parts[p->b];
+  p->leaves = INFINITY;
   p->exceeds = true;
-  if (join(m, &m->parts[p->a], &m->parts[p->b], j) != QMAT_OK) {
-    p->leaves = INFINITY;
-    return;
-  }
-  for (size_t t = 0; t < j->triangle_count && !(p->leaves > m->limit); t++) {
-    const uint32_t *ids = &j->triangles[3 * t];
-    int of_first = 0;
-    double corners[3][3];
-    for (int i = 0; i < 3; i++) {
-      of_first += ids[i] < first;
-      memcpy(corners[i], &j->unit[3 * (size_t)ids[i]], sizeof corners[i]);
-    }
-    if (of_first % 3 != 0) search_triangle(m, corners, halvings, &p->leaves);
-  }
-  p->growth =
-      qmat_hull_volume(j->points, j->triangles, j->triangle_count) - m->parts[p->a].volume - m->parts[p->b].volume;
+  if (join(m, a, b, j) != QMAT_OK) return;
+  p->leaves = qmat_joint_protrusion(m->solid, j->unit, a->count, j->triangles, j->triangle_count, m->limit, halvings);
+  p->growth = qmat_hull_volume(j->points, j->triangles, j->triangle_count) - a->volume - b->volume;
   p->exceeds = p->leaves > m->limit;
 }
 
@@ -497,7 +451,7 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, q
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }
   if (status == QMAT_OK) status = collect_pieces(&m);
-  if (status == QMAT_OK) status = qmat_hulls_exchange(context, parts, m.hulls, m.live_count);
+  if (status == QMAT_OK) status = qmat_hulls_exchange(context, solid, m.limit, parts, m.hulls, m.live_count);
   if (status == QMAT_OK) status = make_hulls(&m);
   if (status == QMAT_OK && m.live_count > 0) status = write_hulls(&m, colliders);
   for (size_t i = 0; m.hulls && i < m.live_count; i++) {

@@ -318,10 +318,12 @@ static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
   assert_int_equal(r.colliders->point_count, 8);
   assert_near(hull_volume(r.colliders, 0), 48, 1e-3);
   assert_true(hull_volume(r.colliders, 0) > 48);
+  assert_near(pipeline_number(r.report, "hull_protrusion"), 1e-4, 2e-6);
   result_free(&r);
 }
 
-/* Hulls of parts of a box become the box. Those of two boxes stay two, unless only one is allowed. */
+/* Hulls of parts of a box become the box. Those of two boxes stay two, unless only one is allowed, which is 1 away from
+ * both boxes in the middle of its facets. */
 static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
   (void)state;
   const double spheres[8] = {0, 0, 1.5, 3, 0, 0, -1.5, 3};
@@ -340,6 +342,8 @@ static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
     r = make(mesh, sealed_medial_mesh((double[]){0, 0, 0, 2, 4, 0, 0, 2}, 2, NULL, 0, NULL, 0), params, 0);
     assert_int_equal(r.colliders->shape_count, most == 1 ? 1 : 2);
     assert_near(hull_volume(r.colliders, 0), most == 1 ? 24 : 8, 1e-3);
+    const double outside = most == 1 ? 1 / sqrt(44) : 0, bound = pipeline_number(r.report, "hull_protrusion");
+    assert_true(bound >= outside && bound <= outside + 1.02e-4);
     result_free(&r);
   }
 }

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/surface.h"
 #include "core/hash.h"
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_columns.h"
@@ -86,10 +87,20 @@ static double volume_of(const solid *s) {
   return volume;
 }
 
-static void exchange(solid *s, int threads) {
+/* Takes the mesh over: what joint hulls leave by at most twice the limit. */
+static void exchange_within(solid *s, qmat_mesh *mesh, double limit, int threads) {
   qmat_context context = {.threads = threads};
-  assert_int_equal(qmat_hulls_exchange(&context, s->parts, s->hulls, s->count), QMAT_OK);
+  qmat_surface *surface;
+  shape_seal(mesh);
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  assert_int_equal(qmat_hulls_exchange(&context, surface, limit, s->parts, s->hulls, s->count), QMAT_OK);
+  qmat_surface_free(surface);
+  qmat_value_release(&mesh->base);
   qmat_context_uninit(&context);
+}
+
+static void exchange(solid *s, int threads) {
+  exchange_within(s, shape_box(1, 1, 1), INFINITY, threads);
 }
 
 /* An L has one hull, a bar has two. Then the L has two, which are its arms, and the bar has one. */
@@ -104,6 +115,37 @@ static void test_an_l_takes_the_hull_that_a_bar_does_not_need(void **state) {
   exchange(&s, 1);
   assert_near(volume_of(&s), 20 * 4 * 4 + 16 * 4 * 4 + 20 * 4 * 4, 1e-3);
   free_solid(&s);
+}
+
+/* Adds a box of cells to a part and to the surface. */
+static void add_box(solid *s, size_t part, qmat_mesh *mesh, const int low[3], const int end[3]) {
+  double corner[6];
+  for (int k = 0; k < 6; k++) corner[k] = (double)(k < 3 ? low[k] : end[k - 3]) / QMAT_SOLID_CELLS - 0.5;
+  add_cells(s, part, low, end);
+  shape_add_box(mesh, corner[0], corner[1], corner[2], corner[3], corner[4], corner[5], false);
+}
+
+/* An L has one hull, and each arm of a flatter L has one. The joint hull of these arms adds 256 cells and leaves the
+ * solid by 8 of 64; the first L saves 512. That is an exchange where twice the limit is more than 1/8. */
+static void test_joint_hulls_stay_near_the_solid(void **state) {
+  (void)state;
+  const double limits[] = {0.03, 0.1}, after[] = {1088 + 66, 576 + 66 + 256};
+  for (int i = 0; i < 2; i++) {
+    solid s = {0};
+    qmat_mesh *mesh = shape_new();
+    add_box(&s, 0, mesh, (int[]){14, 14, 14}, (int[]){34, 18, 18});
+    add_box(&s, 0, mesh, (int[]){14, 18, 14}, (int[]){18, 34, 18});
+    add_box(&s, 1, mesh, (int[]){14, 14, 30}, (int[]){31, 15, 32});
+    add_box(&s, 2, mesh, (int[]){14, 15, 30}, (int[]){15, 31, 32});
+    /* So that the unit frame is that of the cells. */
+    const double far = 0.5 / sqrt(3), near = far - 1e-3;
+    shape_add_box(mesh, -far, -far, -far, -near, -near, -near, false);
+    shape_add_box(mesh, near, near, near, far, far, far, false);
+    assert_near(volume_of(&s), 1088 + 66, 20);
+    exchange_within(&s, mesh, limits[i], 1);
+    assert_near(volume_of(&s), after[i], 20);
+    free_solid(&s);
+  }
 }
 
 /* No division gains where all hulls are boxes, and all stay. */
@@ -171,6 +213,7 @@ static void test_random_solids_lose_volume(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_an_l_takes_the_hull_that_a_bar_does_not_need),
+      cmocka_unit_test(test_joint_hulls_stay_near_the_solid),
       cmocka_unit_test(test_boxes_stay),
       cmocka_unit_test(test_flat_hulls_and_a_single_one_stay),
       cmocka_unit_test(test_random_solids_lose_volume),

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/colliders/hull_outside.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+
+/* Facets between two looks whether the run is cancelled. */
+enum { SLICE = 4096 };
+
+/* The largest distance outside of a solid over triangles. A search ends where it exceeds the limit. It misses distances
+ * that are below `least`, or above what is found by at most `slack`, or by at most the reach of triangles that are not
+ * divided. */
+typedef struct search {
+  const qmat_surface *solid;
+  double limit, least, slack, reach;
+  double found;
+} search;
+
+static void search_triangle(search *s, double corners[3][3], int halvings) {
+  double centre[3], reach = 0, longest = -1, to_triangle = 0;
+  int a = 0;
+  uint32_t nearest;
+  for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
+  const double distance = qmat_surface_distance(s->solid, centre, INFINITY, NULL, &nearest);
+  for (int i = 0; i < 3; i++) {
+    reach = fmax(reach, qmat_point_distance(corners[i], centre));
+    to_triangle = fmax(to_triangle, qmat_surface_distance_to_triangle(s->solid, corners[i], nearest));
+    const double length = qmat_point_distance(corners[i], corners[(i + 1) % 3]);
+    if (length > longest) {
+      longest = length;
+      a = i;
+    }
+  }
+  double bound = fmin(to_triangle, distance + reach);
+  if (distance > s->found) {
+    if (qmat_surface_inside(s->solid, centre))
+      bound = fmin(bound, reach - distance);
+    else
+      s->found = distance;
+  }
+  if (s->found > s->limit || halvings == 0 || reach <= s->reach || bound <= fmax(s->found + s->slack, s->least)) return;
+  const int b = (a + 1) % 3;
+  double low[3][3], high[3][3];
+  memcpy(low, corners, sizeof low);
+  memcpy(high, corners, sizeof high);
+  for (int k = 0; k < 3; k++) low[b][k] = high[a][k] = 0.5 * (corners[a][k] + corners[b][k]);
+  search_triangle(s, low, halvings - 1);
+  if (!(s->found > s->limit)) search_triangle(s, high, halvings - 1);
+}
+
+static void get_corners(const double *points, const uint32_t *ids, double corners[3][3]) {
+  for (int i = 0; i < 3; i++) memcpy(corners[i], &points[3 * (size_t)ids[i]], sizeof corners[i]);
+}
+
+double qmat_joint_protrusion(const qmat_surface *solid, const double *points, size_t first, const uint32_t *triangles,
+                             size_t triangle_count, double limit, int halvings) {
+  search s = {.solid = solid, .limit = limit, .least = 0.5 * limit, .reach = 0.5 * limit};
+  for (size_t t = 0; t < triangle_count && !(s.found > limit); t++) {
+    const uint32_t *ids = &triangles[3 * t];
+    double corners[3][3];
+    int of_first = 0;
+    for (int i = 0; i < 3; i++) of_first += ids[i] < first;
+    get_corners(points, ids, corners);
+    if (of_first % 3 != 0) search_triangle(&s, corners, halvings);
+  }
+  return s.found;
+}
+
+qmat_status qmat_hulls_protrusion(qmat_context *context, const qmat_surface *solid, const qmat_colliders *colliders,
+                                  double *bound) {
+  const int threads = qmat_threads(context);
+  const size_t count = colliders->point_count;
+  double *points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *points), of_points = 0;
+  if (!points) return qmat_fail_memory(context, "points of hulls");
+  qmat_frame_to_unit(qmat_surface_frame(solid), colliders->points, count, points);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : of_points)
+  for (size_t i = 0; i < count; i++) of_points = fmax(of_points, qmat_surface_signed_distance(solid, &points[3 * i]));
+  double most = of_points;
+  for (size_t first = 0; first < colliders->triangle_count; first += SLICE) {
+    const size_t rest = colliders->triangle_count - first, end = first + (rest < SLICE ? rest : SLICE);
+    const qmat_status status = qmat_progress(context, first, colliders->triangle_count, "facets of hulls measured");
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : most)
+    for (size_t t = first; t < end; t++) {
+      search s = {.solid = solid, .limit = INFINITY, .found = of_points};
+      double corners[3][3];
+      s.slack = s.reach = qmat_protrusion_slack;
+      get_corners(points, &colliders->triangles[3 * t], corners);
+      search_triangle(&s, corners, -1);
+      most = fmax(most, s.found);
+    }
+  }
+  *bound = most + qmat_protrusion_slack;
+  return QMAT_OK;
+}
