@@ -1,13 +1,13 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Drops the colliders of models (OFF, OBJ, STL) on a plane and down a staircase, in Rapier, Jolt and Bullet, for ten
-# seconds:
-#   engines.sh [--epsilon E] [--kind K] [MODEL...]      default: all of ../shared/data/surfaces at 0.5 %, any kind
+# Drops the colliders of models (OFF, OBJ, STL, and glTF of one mesh) on a plane and down a staircase, in Rapier, Jolt and
+# Bullet, for ten seconds:
+#   engines.sh [--epsilon E] [--kind K] [MODEL...]      default: all of ../shared/data/surfaces at 0.5 %, hulls
 # A line a model: how far its surface ends from what it lies on, in percent of the diagonal, or what went wrong. Needs
 # node and npm, which fetches the engines.
 set -eu
 epsilon=0.5%
-kind=any
+kind=hulls
 . "$(dirname "$0")/functions.sh"
 if [ "${1:-}" = --kind ]; then kind=$2 && shift 2; fi
 if [ $# -eq 0 ]; then set -- "$top"/../shared/data/surfaces/*; fi
@@ -23,7 +23,8 @@ cp "$top/tests/engines/package.json" "$top/tests/engines/drop.mjs" "$top/tests/e
 bad=0
 for model in "$@"; do
   if "$build/qmat" run "$top/graphs/colliders.yaml" --set model="$model" --set epsilon="$epsilon" --set kind="$kind" --quiet -o "$work/out.glb"; then
-    node "$work/drop.mjs" "$top/examples/readers" "$work/out.glb" "$model" | sed "s|^[^:]*|$(basename "$model")|" || bad=1
+    node "$work/drop.mjs" "$top/examples/readers" "$work/out.glb" "$model" >"$work/line" || bad=1
+    sed "s|^[^:]*|$(basename "$model")|" "$work/line"
   else
     bad=1
   fi

@@ -29,6 +29,23 @@ source=$1
 shift 2
 node "$packages/drop.mjs" "$source/examples/readers" "$@" || die "a body does not come to rest as it should"
 
+# A glTF file has the same triangles as the OFF file that it is made of.
+cat >"$packages/gltf.mjs" <<'END'
+import { writeFileSync } from 'node:fs';
+import { surfaceOf } from './surface.mjs';
+const { points, rows } = surfaceOf('capsule.off');
+const data = Buffer.concat([Buffer.from(new Float32Array(points.flat()).buffer), Buffer.from(new Uint16Array(rows.flat()).buffer)]);
+const json = { asset: { version: '2.0' }, buffers: [{ byteLength: data.length, uri: `data:;base64,${data.toString('base64')}` }],
+  bufferViews: [{ buffer: 0, byteLength: 12 * points.length }, { buffer: 0, byteOffset: 12 * points.length, byteLength: 6 * rows.length }],
+  accessors: [{ bufferView: 0, componentType: 5126, count: points.length, type: 'VEC3' },
+    { bufferView: 1, componentType: 5123, count: 3 * rows.length, type: 'SCALAR' }],
+  meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }], nodes: [{ mesh: 0 }] };
+writeFileSync('capsule.gltf', JSON.stringify(json));
+const read = surfaceOf('capsule.gltf'), off = Math.max(...read.points.flat().map((v, i) => Math.abs(v - points.flat()[i])));
+process.exit(JSON.stringify(read.rows) === JSON.stringify(rows) && read.points.length === points.length && off < 1e-6 ? 0 : 1);
+END
+node "$packages/gltf.mjs" || die "a surface differs as glTF"
+
 # Colliders that do not fit the surface are found: those of the capsule under the bracket.
 if node "$packages/drop.mjs" "$source/examples/readers" capsule.glb l-bracket.off >out.txt; then
   die "colliders of another model pass"
