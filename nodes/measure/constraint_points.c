@@ -18,7 +18,7 @@ enum { FINEST_GRID = 256 };
 
 /* The grid's spacing as a share of epsilon. The error between the points is bounded afterwards
  * (nodes/measure/medial_errors.h). */
-static const double spacing_share = 0.4;
+static const double spacing_share = 0.6;
 
 /* The number of equal divisions of a length. */
 static uint32_t divisions_of(double length, double spacing) {

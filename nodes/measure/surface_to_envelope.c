@@ -152,6 +152,7 @@ qmat_status qmat_surface_to_envelope_prepare(qmat_context *context, qmat_surface
   qmat_status status = QMAT_OK;
   tracker->star.count = tracker->link.count = 0;
   tracker->link_known = false;
+  tracker->nearest = QMAT_NONE;
   for (size_t t = 0; t < collapse->triangle_count && status == QMAT_OK; t++)
     status = add_simplex(context, &tracker->star, complex, collapse, sphere, collapse->kept,
                          collapse->triangle_pairs[2 * t], collapse->triangle_pairs[2 * t + 1]);
@@ -256,8 +257,7 @@ static qmat_status test_point(qmat_context *context, qmat_surface_to_envelope *t
   new_witness *witness = &tracker->found[tracker->found_count];
   witness->point = point;
   const double *p = &tracker->points[3 * (size_t)point];
-  uint32_t nearest = QMAT_NONE;
-  const double star = search_star(tracker, collapse, sphere, p, &nearest, witness);
+  const double star = search_star(tracker, collapse, sphere, p, &tracker->nearest, witness);
   if (star <= limit) {
     tracker->found_count++;
     return QMAT_OK;

@@ -40,7 +40,8 @@ typedef struct qmat_surface_to_envelope {
   /* The primitives of the merged vertex's star, prepared on demand, and those at the vertices of its link. */
   qmat_star_primitives star, link;
   bool prepared, link_known;
-  uint32_t failed_point;  /* where the newest test failed */
+  uint32_t nearest;      /* of the star: the primitive nearest to the point tested last, tried first; QMAT_NONE: none */
+  uint32_t failed_point; /* where the newest test failed */
   double failed_distance; /* F there */
 } qmat_surface_to_envelope;
 
