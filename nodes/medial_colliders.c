@@ -49,9 +49,12 @@ static qmat_shape_kind kind_of(const medial_colliders_params *p) {
   return p->kind == KIND_HULLS ? QMAT_SHAPES_ANY : (qmat_shape_kind)p->kind;
 }
 
-/* Whether hulls are made around parts of the solid, and joined. */
+/* Whether hulls are made around parts of the solid and of sheets, and joined. Thick sheets have hulls of their shapes.
+ */
 static bool has_hulls_of_solid(const work *w) {
-  return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && qmat_surface_is_watertight(w->surface);
+  const qmat_mesh *mesh = qmat_surface_mesh(w->surface);
+  const bool is_thick = mesh->sheet_triangle_count > 0 && mesh->sheet_thickness > 0;
+  return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && mesh->closed && mesh->oriented && !is_thick;
 }
 
 static int compare_numbers(const void *left, const void *right) {
@@ -150,7 +153,7 @@ static qmat_status fill_colliders(work *w) {
 /* Replaces the hulls of the shapes by those of the solid's parts. */
 static qmat_status make_hulls_of_solid(work *w) {
   qmat_solid_part *parts = NULL;
-  qmat_status status = qmat_solid_parts_find(w->context, w->surface, &w->set, &parts);
+  qmat_status status = qmat_solid_parts_find(w->context, w->surface, &w->set, w->params->least_radius, &parts);
   if (status == QMAT_OK)
     status = qmat_hulls_merge(w->context, w->surface, parts, (size_t)w->params->shapes, (size_t)w->params->hull_points,
                               w->params->hull_error * qmat_surface_frame(w->surface)->diagonal, w->colliders);
@@ -268,7 +271,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 13,
+    .version = 14,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -280,7 +283,11 @@ const qmat_node qmat_node_medial_colliders = {
         "joined where the facets between both leave the solid by at most hull_error, or until `shapes` are left. Their "
         "number then stays: one is divided by a plane and two others are joined, as long as the union's volume falls "
         "and the facets between these leave the solid by at most twice hull_error. A part that is not convex leaves "
-        "it, too: hull_protrusion in the report bounds how far any hull does, to 1e-4 diagonals. inside "
+        "it, too: hull_protrusion in the report bounds how far any hull does, to 1e-4 diagonals. Sheets are divided "
+        "and "
+        "joined likewise; their hulls reach beyond them by least_radius. Open surfaces, and sheets with a thickness, "
+        "keep "
+        "the hulls of the shapes. inside "
         "changes radii and proves the opposite; otherwise hulls are inside their shapes. proved is false for open "
         "surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
 #include "nodes/colliders/extreme_points.h"
 #include "nodes/colliders/solid_cubes.h"
 
@@ -28,6 +29,13 @@ typedef struct region {
   size_t count, capacity;
   bool failed;
 } region;
+
+/* What the search fills. */
+typedef struct gathered {
+  heap *heaps;        /* one per shape */
+  size_t solid_count; /* the triangles from here on are sheets */
+  double reach;       /* of the octahedra around the points of sheets */
+} gathered;
 
 static heap *find_heap(region *r, uint32_t shape) {
   for (size_t i = 0; i < r->count; i++)
@@ -85,16 +93,28 @@ static bool add_points(heap *h, const qmat_solid_cube *c, const double *points, 
   return add_cells(h, NULL, 0, points, count) && reduce_cell(h, h->limit);
 }
 
+/* Adds octahedra around points of a sheet. */
+static bool add_octahedra(heap *h, const qmat_solid_cube *c, double points[][3], size_t count, double reach) {
+  double corners[6 * QMAT_CUBE_MOST_CORNERS][3];
+  for (size_t i = 0; i < 6 * count; i++) {
+    memcpy(corners[i], points[i / 6], sizeof corners[i]);
+    corners[i][i % 3] += i % 6 < 3 ? reach : -reach;
+  }
+  return add_points(h, c, corners[0], 6 * count);
+}
+
 /* Divides a cube that several shapes share, or gives it to the first. */
 static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
   region *r = s->region;
+  const gathered *all = s->visitor->all;
   if (c->half > (c->candidate_count > 1 ? smallest : largest)) return true;
   heap *h = r->failed ? NULL : find_heap(r, c->candidates[0]);
   bool done = h != NULL;
   for (size_t f = 0; f < c->facet_count && done; f++) {
     double polygon[QMAT_CUBE_MOST_CORNERS][3];
-    const int count = qmat_cube_clip(s, c, c->facets[f], polygon);
-    done = add_points(h, c, polygon[0], (size_t)count);
+    const size_t count = (size_t)qmat_cube_clip(s, c, c->facets[f], polygon);
+    done = c->facets[f] < all->solid_count ? add_points(h, c, polygon[0], count)
+                                           : add_octahedra(h, c, polygon, count, all->reach);
   }
   for (int i = 0; i < 8 && done; i++) {
     double corner[3];
@@ -116,11 +136,11 @@ static void finish(void *data) {
 }
 
 static qmat_status gather(void *data, void *found) {
-  heap *all = data;
+  const gathered *all = data;
   region *r = found;
   bool done = !r->failed;
   for (size_t i = 0; i < r->count; i++) {
-    heap *from = &r->heaps[i], *to = &all[from->shape];
+    heap *from = &r->heaps[i], *to = &all->heaps[from->shape];
     done = done && qmat_point_heap_add(&to->hull, from->hull.points, from->hull.count, qmat_solid_dropped) &&
            add_cells(to, from->cells, from->cell_count, from->cell_points, from->point_count);
     qmat_free(from->hull.points);
@@ -132,23 +152,26 @@ static qmat_status gather(void *data, void *found) {
 }
 
 qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
-                                  qmat_solid_part **parts) {
+                                  double sheet_reach, qmat_solid_part **parts) {
   const size_t count = set->shape_count;
   const int threads = qmat_threads(context);
-  heap *all = qmat_arena_calloc(&context->arena, count, sizeof *all);
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  gathered all = {.heaps = qmat_arena_calloc(&context->arena, count, sizeof *all.heaps),
+                  .solid_count = qmat_solid_triangle_count(mesh),
+                  .reach = sheet_reach};
   *parts = qmat_arena_calloc(&context->arena, count, sizeof **parts);
-  if (!all || !*parts) return qmat_fail_memory(context, "the parts of the solid");
+  if (!all.heaps || !*parts) return qmat_fail_memory(context, "the parts of the solid");
   const qmat_cube_visitor visitor = {.region_size = sizeof(region),
                                      .visit = visit,
                                      .finish = finish,
                                      .gather = gather,
-                                     .all = all,
+                                     .all = &all,
                                      .what = "regions divided"};
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
   bool done = status == QMAT_OK;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
   for (size_t i = 0; i < count; i++) {
-    heap *h = &all[i];
+    heap *h = &all.heaps[i];
     if (done && qmat_extreme_points_keep(h->hull.points, &h->hull.count, qmat_solid_dropped) != QMAT_OK) done = false;
     (*parts)[i] = (qmat_solid_part){h->hull.count, h->cell_count, h->hull.points, h->cells, h->cell_points};
   }

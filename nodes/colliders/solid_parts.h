@@ -31,11 +31,15 @@ typedef struct qmat_solid_part {
  * solid and of the surface in the cube: these are the points of a cell. Those of the part are the vertices of its hull,
  * to 1e-9 (extreme_points.h).
  *
- * `*parts` receives one part per shape, in the context's arena; free it with qmat_solid_parts_free. `surface` is
- * watertight. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. Cost: linear
- * in the triangles, in the cells, and in the area between the parts. */
+ * Sheets are divided likewise. An octahedron that reaches by `sheet_reach` (above 0, in the unit frame) stands for each
+ * of their points, so that their parts have a volume.
+ *
+ * `*parts` receives one part per shape, in the context's arena; free it with qmat_solid_parts_free. The triangles of
+ * `surface` that bound solids are closed and oriented, and its sheets have no thickness. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. All threads; the result does not depend on their number. Cost: linear in the triangles, in the cells,
+ * and in the area between the parts. */
 qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
-                                  qmat_solid_part **parts);
+                                  double sheet_reach, qmat_solid_part **parts);
 
 /* Frees the points and cells of `count` parts. NULL is allowed. */
 void qmat_solid_parts_free(qmat_solid_part *parts, size_t count);

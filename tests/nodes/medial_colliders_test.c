@@ -348,6 +348,66 @@ static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
   }
 }
 
+static void assert_in_bounds(double value, double low, double high) {
+  assert_true(value >= low && value <= high);
+}
+
+static void place_wall(double u, double v, double point[3]) {
+  point[0] = 3, point[1] = 2 * u - 1, point[2] = 2 * v - 1;
+}
+
+/* A sheet beside a box has a hull of its own, as thin as least_radius lets it be: by hand, the plate, prisms along its
+ * four sides, and a quarter of an octahedron at each corner. The hull of the box stays the box. A thick sheet keeps the
+ * hulls of its shapes. */
+static void test_a_sheet_beside_a_box_has_a_hull_of_its_own(void **state) {
+  (void)state;
+  const double spheres[20] = {0, 0, 0, 2, 3, -1, -1, 0, 3, 1, -1, 0, 3, -1, 1, 0, 3, 1, 1, 0};
+  const uint32_t triangles[6] = {1, 2, 4, 1, 3, 4}, edges[10] = {1, 2, 1, 3, 1, 4, 2, 4, 3, 4};
+  for (int thick = 0; thick < 2; thick++) {
+    qmat_mesh *mesh = box_around(1, 1, 1);
+    shape_add_sheet(mesh, 2, 3, place_wall);
+    mesh->closed = mesh->oriented = true;
+    mesh->sheet_thickness = thick ? 0.2 : 0;
+    result r = make(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2),
+                    "fit=contain kind=hulls hull_error=0.001", 0);
+    assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+    assert_int_equal(r.colliders->shape_count, 2 + thick);
+    assert_int_equal(json_object_get(r.report->root, "hull_protrusion") != NULL, !thick);
+    const size_t wall = hull_volume(r.colliders, 0) > 6 ? 1 : 0;
+    const double reach = 0.0005 * sqrt(24), volume = 8 * reach + 8 * reach * reach + 4 * reach * reach * reach / 3;
+    if (!thick) {
+      assert_near(hull_volume(r.colliders, 1 - wall), 8, 1e-3);
+      assert_in_bounds(hull_volume(r.colliders, wall), volume, 1.05 * volume);
+      assert_in_bounds(pipeline_number(r.report, "hull_protrusion"), 0.0005, 0.0005 + 2e-4);
+      for (uint64_t i = 0; i < 10000; i++) {
+        double point[3];
+        place_wall(qmat_hash_unit(qmat_hash3(5, i, 0)), qmat_hash_unit(qmat_hash3(5, i, 1)), point);
+        assert_true(is_in_hull(r.colliders, wall, point, 0));
+      }
+    }
+    result_free(&r);
+  }
+}
+
+/* A needle of a sheet, without area, has a hull, too. */
+static void test_a_sheet_without_area_has_a_hull(void **state) {
+  (void)state;
+  qmat_mesh *mesh = box_around(1, 1, 1);
+  const uint32_t ends[2] = {shape_vertex(mesh, 2, 0, 0), shape_vertex(mesh, 3, 0, 0)};
+  shape_triangle(mesh, ends[0], ends[1], shape_vertex(mesh, 2.5, 0, 0));
+  mesh->sheet_triangle_count = 1;
+  mesh->closed = mesh->oriented = true;
+  const double spheres[12] = {0, 0, 0, 2, 2, 0, 0, 0, 3, 0, 0, 0};
+  result r = make(mesh, sealed_medial_mesh(spheres, 3, (uint32_t[]){1, 2}, 1, NULL, 0), "fit=contain kind=hulls", 0);
+  assert_int_equal(r.colliders->shape_count, 2);
+  for (int k = 0; k < 2; k++) {
+    bool found = false;
+    for (size_t s = 0; s < 2; s++) found = found || is_in_hull(r.colliders, s, (double[]){2 + k, 0, 0}, 0);
+    assert_true(found);
+  }
+  result_free(&r);
+}
+
 /* Of an l-bracket, all points are in hulls, and these have less volume beyond it than the shapes. */
 static void test_hulls_of_the_solid_contain_it(void **state) {
   (void)state;
@@ -455,6 +515,8 @@ int main(void) {
       cmocka_unit_test(test_inside_leaves_no_point_of_a_shape_outside),
       cmocka_unit_test(test_the_hull_of_a_ball_around_a_box_is_the_box),
       cmocka_unit_test(test_hulls_are_joined_where_the_solid_is_convex),
+      cmocka_unit_test(test_a_sheet_beside_a_box_has_a_hull_of_its_own),
+      cmocka_unit_test(test_a_sheet_without_area_has_a_hull),
       cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
       cmocka_unit_test(test_one_two_and_eight_threads_make_the_same_bytes),

@@ -29,7 +29,7 @@ static void test_two_balls_halve_a_bar(void **state) {
   uint32_t shapes[6] = {0, 0, 0, 1, 1, 1};
   const qmat_shape_set set = {.spheres = spheres, .sphere_count = 2, .shapes = shapes, .shape_count = 2};
   qmat_solid_part *parts;
-  assert_int_equal(qmat_solid_parts_find(&context, surface, &set, &parts), QMAT_OK);
+  assert_int_equal(qmat_solid_parts_find(&context, surface, &set, 0.001, &parts), QMAT_OK);
   for (int p = 0; p < 2; p++) {
     const double sign = p == 0 ? -1 : 1;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -77,7 +77,7 @@ static void test_a_far_shape_has_no_part(void **state) {
   uint32_t shapes[6] = {0, 0, 0, 1, 1, 1};
   const qmat_shape_set set = {.spheres = spheres, .sphere_count = 2, .shapes = shapes, .shape_count = 2};
   qmat_solid_part *parts;
-  assert_int_equal(qmat_solid_parts_find(&context, surface, &set, &parts), QMAT_OK);
+  assert_int_equal(qmat_solid_parts_find(&context, surface, &set, 0.001, &parts), QMAT_OK);
   assert_true(parts[0].count >= 8);
   assert_int_equal(parts[1].count, 0);
   qmat_solid_parts_free(parts, 2);
