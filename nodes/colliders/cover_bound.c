@@ -9,7 +9,7 @@
 
 /* Each region keeps its first parts and stops splitting after a number of cubes; what is left then counts with its
  * bound. */
-enum { MOST_PARTS = 24, MOST_CUBES = 1000000 };
+enum { MOST_PARTS = 256, MOST_CUBES = 1000000 };
 
 /* Above this a shape does not contain a point: a margin for rounding, which is part of the bound. */
 static const double rounding = 1e-9;

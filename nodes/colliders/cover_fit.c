@@ -244,7 +244,8 @@ static qmat_status cover_solid(fit *t) {
       grow_parts(t, &bound);
       continue;
     }
-    for (size_t k = 0; k < bound.count && t->sample_count < room; k++)
+    const size_t stride = 1 + ROUNDS * bound.count / MOST_PARTS; /* each round has its share of the room */
+    for (size_t k = 0; k < bound.count && t->sample_count < room; k += stride)
       memcpy(&t->samples[3 * t->sample_count++], bound.parts[k].point, sizeof bound.parts[k].point);
     status = fit_samples(t, MORE_STEPS, most_penalty / 4);
   }
