@@ -257,6 +257,18 @@ static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Where the proof does not end within its rounds, all shapes grow by what is left. */
+static void test_contain_grows_shapes_only_where_the_solid_is_outside(void **state) {
+  (void)state;
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe("curved-sheet", &mesh, &medial);
+  result r = make(mesh, medial, "fit=contain", 0);
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_true(pipeline_number(r.report, "volume_ratio") < 1.8);
+  result_free(&r);
+}
+
 static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   (void)state;
   qmat_mesh *mesh;
@@ -512,6 +524,7 @@ int main(void) {
       cmocka_unit_test(test_inertia_turns_with_the_solid),
       cmocka_unit_test(test_nested_and_degenerate_shapes_are_left_out),
       cmocka_unit_test(test_contain_leaves_none_of_a_million_points_outside),
+      cmocka_unit_test(test_contain_grows_shapes_only_where_the_solid_is_outside),
       cmocka_unit_test(test_inside_leaves_no_point_of_a_shape_outside),
       cmocka_unit_test(test_the_hull_of_a_ball_around_a_box_is_the_box),
       cmocka_unit_test(test_hulls_are_joined_where_the_solid_is_convex),
