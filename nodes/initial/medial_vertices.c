@@ -58,20 +58,21 @@ static qmat_status find_surface_components(qmat_dual_complex *d) {
   return QMAT_OK;
 }
 
+double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b, double limit) {
+  double middle[3];
+  for (size_t k = 0; k < 3; k++) middle[k] = 0.5 * (d->points[3 * (size_t)a + k] + d->points[3 * (size_t)b + k]);
+  return qmat_surface_inside(d->surface, middle) ? 0 : qmat_surface_distance(d->surface, middle, limit, NULL, NULL);
+}
+
 /* Whether a tetrahedron connects two components of the surface through the outside. The incentre of such a needle can
  * still be inside, between the samples and a surface that bulges past them. */
 static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
   const double tolerance = d->params->thinning_tolerance;
   for (int a = 0; a < 3 && d->surface_components; a++)
-    for (int b = a + 1; b < 4; b++) {
-      if (qmat_dual_surface_component(d, corners[a]) == qmat_dual_surface_component(d, corners[b])) continue;
-      double middle[3];
-      for (size_t k = 0; k < 3; k++)
-        middle[k] = 0.5 * (d->points[3 * (size_t)corners[a] + k] + d->points[3 * (size_t)corners[b] + k]);
-      if (!qmat_surface_inside(d->surface, middle) &&
-          qmat_surface_distance(d->surface, middle, tolerance, NULL, NULL) > tolerance)
+    for (int b = a + 1; b < 4; b++)
+      if (qmat_dual_surface_component(d, corners[a]) != qmat_dual_surface_component(d, corners[b]) &&
+          qmat_dual_edge_outside(d, corners[a], corners[b], tolerance) > tolerance)
         return true;
-    }
   return false;
 }
 

@@ -15,4 +15,8 @@ void qmat_medial_vertex_incentre(const qmat_dual_complex *dual, size_t cell, dou
  * the order of their first tetrahedron: sets `sphere_of` and `sphere_count`. QMAT_ERROR_MEMORY. One thread. */
 qmat_status qmat_medial_vertices_number(qmat_dual_complex *dual);
 
+/* How far the middle of the edge between two samples is outside of the solid (unit frame): 0 inside, INFINITY beyond
+ * `limit`. Thread-safe. */
+double qmat_dual_edge_outside(const qmat_dual_complex *dual, uint32_t a, uint32_t b, double limit);
+
 #endif

@@ -238,23 +238,16 @@ static bool opens(mending *m, uint32_t cell, cell_link link) {
   return link.parts == 2 && link.loops == 0 && m->now.loops > m->wanted.loops && is_bridged(m, cell, link);
 }
 
-static double distance_from_surface(const mending *m, const double *point) {
-  return qmat_surface_distance(m->d->surface, point, most_gap, NULL, NULL);
-}
-
 /* The distance of a tetrahedron's incentre from the surface. A needle between distant parts of the surface leaves the
  * solid far while its incentre does not, so the middles of the edges count too, where the tetrahedron is outside. */
 static double gap_of(const mending *m, uint32_t cell) {
   const qmat_dual_complex *d = m->d;
-  double place[3];
-  qmat_medial_vertex_incentre(d, cell, place);
-  double gap = distance_from_surface(m, place);
-  for (int e = 0; e < 6 && gap <= most_gap && !m->before[cell]; e++) {
-    const uint32_t *corners = &d->cells.corners[4 * (size_t)cell];
-    const double *a = &d->points[3 * (size_t)corners[edges[e][0]]], *b = &d->points[3 * (size_t)corners[edges[e][1]]];
-    for (int k = 0; k < 3; k++) place[k] = 0.5 * (a[k] + b[k]);
-    if (!qmat_surface_inside(d->surface, place)) gap = fmax(gap, distance_from_surface(m, place));
-  }
+  const uint32_t *corners = &d->cells.corners[4 * (size_t)cell];
+  double centre[3];
+  qmat_medial_vertex_incentre(d, cell, centre);
+  double gap = qmat_surface_distance(d->surface, centre, most_gap, NULL, NULL);
+  for (int e = 0; e < 6 && gap <= most_gap && !m->before[cell]; e++)
+    gap = fmax(gap, qmat_dual_edge_outside(d, corners[edges[e][0]], corners[edges[e][1]], most_gap));
   return gap;
 }
 
