@@ -207,6 +207,13 @@ static void describe(const char *name, qmat_mesh **mesh, qmat_medial **medial) {
   qmat_value_release(initial);
 }
 
+static result make_of_model(const char *name, const char *params) {
+  qmat_mesh *mesh;
+  qmat_medial *medial;
+  describe(name, &mesh, &medial);
+  return make(mesh, medial, params, 0);
+}
+
 static qmat_envelope *envelope_of(const qmat_colliders *c) {
   qmat_context context = {0};
   const qmat_shape_set set = {c->sphere_count, c->shape_count, c->spheres, c->shapes};
@@ -218,18 +225,15 @@ static qmat_envelope *envelope_of(const qmat_colliders *c) {
 
 static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
   (void)state;
-  qmat_mesh *mesh;
-  qmat_medial *medial;
-  describe("l-bracket", &mesh, &medial);
-  result r = make(mesh, medial, "fit=contain", 0);
+  result r = make_of_model("l-bracket", "fit=contain");
   qmat_context context = {0};
   qmat_surface *surface;
-  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
   qmat_envelope *envelope = envelope_of(r.colliders);
   size_t inside = 0, outside = 0;
   const double *positions = qmat_surface_positions(surface);
   double low[3] = {1, 1, 1}, high[3] = {-1, -1, -1};
-  for (size_t i = 0; i < 3 * mesh->vertex_count; i++) {
+  for (size_t i = 0; i < 3 * r.mesh->vertex_count; i++) {
     low[i % 3] = fmin(low[i % 3], positions[i]);
     high[i % 3] = fmax(high[i % 3], positions[i]);
   }
@@ -260,10 +264,7 @@ static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
 /* Where the proof does not end within its rounds, all shapes grow by what is left. */
 static void test_contain_grows_shapes_only_where_the_solid_is_outside(void **state) {
   (void)state;
-  qmat_mesh *mesh;
-  qmat_medial *medial;
-  describe("curved-sheet", &mesh, &medial);
-  result r = make(mesh, medial, "fit=contain", 0);
+  result r = make_of_model("curved-sheet", "fit=contain");
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_true(pipeline_number(r.report, "volume_ratio") < 1.8);
   result_free(&r);
@@ -271,13 +272,10 @@ static void test_contain_grows_shapes_only_where_the_solid_is_outside(void **sta
 
 static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   (void)state;
-  qmat_mesh *mesh;
-  qmat_medial *medial;
-  describe("l-bracket", &mesh, &medial);
-  result r = make(mesh, medial, "fit=inside", 0);
+  result r = make_of_model("l-bracket", "fit=inside");
   qmat_context context = {0};
   qmat_surface *surface;
-  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
   size_t outside = 0;
   for (uint64_t i = 0; i < 200000; i++) { /* points of the boundaries of the shapes' spheres */
     const uint32_t *ids = &r.colliders->shapes[3 * (i % r.colliders->shape_count)];
