@@ -22,6 +22,10 @@ static const double floor_tolerances = 5;
 
 static const double least_tolerance = 1e-5;
 
+/* As a share of epsilon: once a place beyond epsilon is known, pieces of that reach are not split in a search for
+ * places. */
+static const double place_share = 0.1;
+
 /* Points deeper in the envelope than this are off its boundary where a certificate depends on it: far more than
  * rounding. */
 static const double certain_skin = 1e-6;
@@ -103,7 +107,9 @@ typedef struct search {
   double epsilon;
   double lo[BOUND_COUNT], target[BOUND_COUNT], smallest, skin;
   uint8_t wanted;
-  bool last; /* pieces are not split any more */
+  bool last;        /* pieces are not split any more */
+  bool only_places; /* the search is for places beyond epsilon, not for a bound */
+  bool has_place;   /* it has found one */
 } search;
 
 /* The evaluation of a piece. */
@@ -204,11 +210,13 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   if (inside && d > reach) *wanted &= WANT_EITHER_SIDE;
   if (d > qmat_smaller(s->lo[0], s->epsilon) || ((*wanted & WANT_OUTSIDE) && !inside && d > s->lo[1]))
     raise_lower_bound(s, is_cell, middle, *wanted, &result);
+  if (s->only_places && result.found[EITHER_SIDE] > s->epsilon) *wanted = 0;
+  if (!*wanted) return result;
   if (!s->last && reach > s->smallest) return result;
   for (int i = 0; i < BOUND_COUNT; i++)
     if (*wanted >> i & 1) result.bound[i] = d + reach;
   *wanted = 0;
-  result.maybe_exposed = !(result.found[0] > s->epsilon) && d > s->epsilon;
+  result.maybe_exposed = !(result.found[0] > s->epsilon) && d > s->epsilon && !s->has_place;
   if (result.maybe_exposed) memcpy(result.place, middle, sizeof result.place);
   return result;
 }
@@ -292,10 +300,13 @@ static void set_targets(search *s, double tolerance, const qmat_boundary_distanc
   for (int k = 0; k < BOUND_COUNT; k++)
     s->target[k] = qmat_larger(qmat_bound_target(s->lo[k], s->epsilon, tolerance), floor) - rounding;
   s->smallest = smallest_share * qmat_smaller(tolerated(s->lo[0], s->epsilon, tolerance), s->target[0] - s->lo[0]);
+  s->has_place = s->only_places && result->either_side.lo > s->epsilon;
+  if (!s->has_place) return;
+  s->target[EITHER_SIDE] = s->epsilon;
+  s->smallest = place_share * s->epsilon;
 }
 
-static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, bool ends_beyond,
-                                 qmat_boundary_distance *result) {
+static qmat_status search_pieces(qmat_context *context, search *s, double tolerance, qmat_boundary_distance *result) {
   const size_t count = qmat_boundary_features_count(s->features);
   const bool in_space = count > MANY_FEATURES;
   const size_t most_queries = in_space ? MOST_QUERIES_OF_MANY : MOST_QUERIES;
@@ -317,14 +328,11 @@ static qmat_status search_pieces(qmat_context *context, search *s, double tolera
     if (qmat_grow((void **)&findings, &capacity, from->count, sizeof *findings))
       status = qmat_fail_memory(context, "pieces of the envelope's boundary");
     if (status == QMAT_OK) status = search_level(context, s, from, &lists[1 - (level & 1)], findings, result);
-    if (ends_beyond && result->either_side.lo > s->epsilon) {
-      result->either_side.hi = INFINITY;
-      break;
-    }
   }
   qmat_free(lists[0].items);
   qmat_free(lists[1].items);
   qmat_free(findings);
+  if (s->only_places && result->either_side.lo > s->epsilon) result->either_side.hi = INFINITY;
   return status;
 }
 
@@ -334,7 +342,7 @@ static qmat_bounds raised(qmat_bounds b) {
 
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, bool outside, bool ends_beyond, size_t sample_count,
+                                           double tolerance, bool outside, bool only_places, size_t sample_count,
                                            qmat_boundary_distance *result) {
   *result = (qmat_boundary_distance){.sample_count = 0};
   qmat_boundary_features f;
@@ -346,9 +354,10 @@ qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_sur
               .surface = surface,
               .envelope = envelope,
               .epsilon = epsilon,
+              .only_places = only_places,
               .skin = outside ? certain_skin : QMAT_BOUNDARY_SKIN,
               .wanted = outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
-  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, ends_beyond, result);
+  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, result);
   result->either_side = raised(result->either_side);
   result->outside = raised(result->outside);
   return status;

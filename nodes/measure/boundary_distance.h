@@ -41,12 +41,13 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  *
  * The arrays of places have one point for each piece that was finished so, the farthest among them. Free them with
  * qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product is taken for
- * 1e-5 at least. `outside` false skips the inside tests. With `ends_beyond` the search ends after the first level of
- * pieces with a place farther than epsilon; hi is then INFINITY.
- * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+ * 1e-5 at least. `outside` false skips the inside tests. With `only_places` the search is for places farther than
+ * epsilon all over the boundary: a piece with one is not split, and once there is one, no piece is split below a tenth
+ * of epsilon. hi is then INFINITY. A search without such a place ends as usual. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
+ * threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
                                            const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, bool outside, bool ends_beyond, size_t sample_count,
+                                           double tolerance, bool outside, bool only_places, size_t sample_count,
                                            qmat_boundary_distance *result);
 
 /* The upper bound that a search for the largest of some distances has to prove, with `lo` attained: lo plus the

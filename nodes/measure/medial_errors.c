@@ -86,13 +86,13 @@ static size_t keep_inside(const qmat_surface *surface, double *points, size_t co
 static const double boundary_tolerance = 0.2;
 
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                         double epsilon, bool ends_beyond, qmat_medial_errors *errors) {
+                                         double epsilon, bool only_places, qmat_medial_errors *errors) {
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   qmat_boundary_distance boundary;
   status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false,
-                                          ends_beyond, 0, &boundary);
+                                          only_places, 0, &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->uncovered = boundary.far_points;

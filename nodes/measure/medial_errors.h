@@ -33,10 +33,10 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
                                                qmat_medial_errors *errors);
 
 /* Bounds the distance from the envelope's boundary to the surface on either side, closely enough to compare it with
- * `epsilon`. Where it may be more, some of the points deep in the solid are returned. With `ends_beyond` the first of
- * them end the search, and the bound is INFINITY. */
+ * `epsilon`. Where it may be more, some of the points deep in the solid are returned. With `only_places` these are
+ * wanted, not a bound, which is INFINITY then. */
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
-                                         double epsilon, bool ends_beyond, qmat_medial_errors *errors);
+                                         double epsilon, bool only_places, qmat_medial_errors *errors);
 
 /* Frees the points. */
 void qmat_medial_errors_uninit(qmat_medial_errors *errors);
