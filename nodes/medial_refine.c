@@ -200,15 +200,15 @@ static bool is_better(const refinement *a, const refinement *b) {
   return a->excess < b->excess;
 }
 
-/* Repeats with half the spacing until no place is farther than the limit, all that are have been given up, or a round
+/* Repeats with half the spacing until no place is farther than `enough`, all that are have been given up, or a round
  * does not improve. The first spacing is the limit. `*best` is the last round that improved. */
-static qmat_status refine_in_rounds(refiner *r, double limit, refinement *rounds, size_t *best) {
+static qmat_status refine_in_rounds(refiner *r, double limit, double enough, refinement *rounds, size_t *best) {
   qmat_surface *surface;
   qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
   if (status == QMAT_OK) status = give_up_without_solid(r, surface, &rounds[0], limit);
   size_t newest = 0;
   double spacing = limit;
-  for (int64_t i = 0; i < r->params->rounds && rounds[newest].excess > 0 && status == QMAT_OK; i++) {
+  for (int64_t i = 0; i < r->params->rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
     spacing *= 0.5;
@@ -237,12 +237,12 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   qmat_frame_to_unit(&r->frame, r->mesh->positions, r->mesh->vertex_count, r->positions);
   r->spacing = spacing_share * epsilon;
   r->known = rounds[0].samples->count;
-  qmat_status status = find_far_places(r, params->trigger * epsilon, &rounds[0]);
+  const double enough = params->trigger * epsilon, limit = fmin(params->target, params->trigger) * epsilon;
+  qmat_status status = find_far_places(r, enough, &rounds[0]);
   if (status != QMAT_OK || rounds[0].far_count == 0) return status;
-  const double limit = fmin(params->target, params->trigger) * epsilon;
   r->around = limit;
   status = find_far_places(r, limit, &rounds[0]);
-  return status == QMAT_OK ? refine_in_rounds(r, limit, rounds, best) : status;
+  return status == QMAT_OK ? refine_in_rounds(r, limit, enough, rounds, best) : status;
 }
 
 static qmat_status make_report(qmat_context *context, const refinement *rounds, size_t best, qmat_report *report) {
@@ -292,7 +292,7 @@ static const qmat_param params[] = {
         medial_refine_params, epsilon, 0.01, 0, 1,
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.75, 0.1, 1,
-               "Refinement starts only if some point of the surface is farther from the envelope than this"),
+               "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),
     QMAT_INT(medial_refine_params, rounds, "rounds", 4, 0, MOST_ROUNDS,
@@ -318,14 +318,16 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 8,
+    .version = 9,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
         "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly spaced "
         "samples are added around all points farther than the target, and the medial mesh is made again. Each further "
-        "round halves the spacing. Places that a round brings no nearer are given up, as are those of an open surface "
-        "without solid below. The result is the round that leaves the least excess over the target.\n\n"
+        "round halves the spacing, until no point is farther than the trigger. Places that a round brings no nearer "
+        "are "
+        "given up, as are those of an open surface without solid below. The result is the round that leaves the least "
+        "excess over the target.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "
         "before medial.simplify.\n\n"
         "The parameters after rounds are those of medial.delaunay. Set both nodes to the same values.",

@@ -58,7 +58,8 @@ qmat_status qmat_decimation_run_copies(const qmat_decimation *from, const qmat_m
                                        qmat_copy_depths *depths, qmat_constraint_points *constraints,
                                        qmat_decimation *to) {
   const start start = {.from = from, .left = left, .extra = extra};
-  const int threads = qmat_threads(to->context) < QMAT_MOST_COPIES ? qmat_threads(to->context) : QMAT_MOST_COPIES;
+  const int most = to->rules.repairs ? 1 : QMAT_MOST_COPIES; /* repairs share no attempts */
+  const int threads = qmat_threads(to->context) < most ? qmat_threads(to->context) : most;
   qmat_lookahead shared;
   qmat_status statuses[QMAT_MOST_COPIES] = {QMAT_OK};
   qmat_error errors[QMAT_MOST_COPIES];

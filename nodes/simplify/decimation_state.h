@@ -50,6 +50,12 @@ typedef struct qmat_decimation_rules {
   const uint8_t *thin; /* per sample: whether it lies on a thin feature; read only with protection */
 } qmat_decimation_rules;
 
+/* Places that no fit could repair; 3 doubles each, unit frame. */
+typedef struct qmat_failed_places {
+  double *points;
+  size_t count, capacity;
+} qmat_failed_places;
+
 /* A medial mesh while its edges collapse, the cheapest first, each to the best candidate that lies inside the model and
  * keeps both errors within the threshold (sections 3.1.2, 3.3 and 3.4).
  *
@@ -86,9 +92,10 @@ typedef struct qmat_decimation {
   uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
   const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
   bool protecting, fitting;
-  int refusal;            /* why the newest test of a sphere failed */
-  uint32_t tested_first;  /* the constraint point that it tested first, or QMAT_NONE */
-  struct qmat_copy *copy; /* NULL: the decimation is alone */
+  int refusal;                       /* why the newest test of a sphere failed */
+  uint32_t tested_first;             /* the constraint point that it tested first, or QMAT_NONE */
+  struct qmat_copy *copy;            /* NULL: the decimation is alone */
+  qmat_failed_places *failed_places; /* of earlier repairs of the same round; the caller's */
   size_t moves;
   qmat_collapse_counts counts;
 } qmat_decimation;

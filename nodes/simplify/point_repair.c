@@ -2,6 +2,7 @@
 #include "nodes/simplify/point_repair.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/geometry/vector.h"
 #include "nodes/simplify/collapse_commit.h"
@@ -29,26 +30,33 @@ static qmat_status exceeds(qmat_decimation *s, size_t point, bool *answer) {
   return QMAT_OK;
 }
 
-/* Places that no fit could repair. */
-typedef struct failed_places {
-  const double **points;
-  size_t count;
-} failed_places;
+void qmat_failed_places_uninit(qmat_failed_places *failed) {
+  qmat_free(failed->points);
+  *failed = (qmat_failed_places){0};
+}
+
+static qmat_status add_failed(qmat_context *context, qmat_failed_places *failed, const double *point) {
+  if (qmat_grow((void **)&failed->points, &failed->capacity, failed->count + 1, 3 * sizeof *failed->points))
+    return qmat_fail_memory(context, "repairs");
+  memcpy(&failed->points[3 * failed->count++], point, 3 * sizeof *point);
+  return QMAT_OK;
+}
 
 /* Whether several places within epsilon of a point have failed. */
-static bool is_near_failed(const qmat_decimation *s, const failed_places *failed, const double *point) {
+static bool is_near_failed(const qmat_decimation *s, const double *point) {
+  const qmat_failed_places *failed = s->failed_places;
   int near = 0;
   for (size_t i = 0; i < failed->count && near < QMAT_MOST_FAILED_REPAIRS; i++)
-    near += qmat_point_distance(failed->points[i], point) < s->threshold;
+    near += qmat_point_distance(&failed->points[3 * i], point) < s->threshold;
   return near == QMAT_MOST_FAILED_REPAIRS;
 }
 
 /* Tries the spheres of the witness alone, then each with its neighbours. */
-static qmat_status repair_point(qmat_decimation *s, size_t point, failed_places *failed) {
+static qmat_status repair_point(qmat_decimation *s, size_t point) {
   bool is_beyond;
   qmat_status status = exceeds(s, point, &is_beyond);
   const double *place = &s->surface_tracker.points[3 * point];
-  if (status != QMAT_OK || !is_beyond || is_near_failed(s, failed, place)) return status;
+  if (status != QMAT_OK || !is_beyond || is_near_failed(s, place)) return status;
   uint32_t vertices[3];
   for (size_t k = 0; k < 3; k++) vertices[k] = s->surface_tracker.witnesses[3 * point + k];
   for (int i = 0; i < 6; i++) {
@@ -64,19 +72,16 @@ static qmat_status repair_point(qmat_decimation *s, size_t point, failed_places 
       return qmat_decimation_accept(s, s->neighbourhood.spheres[0]);
     }
   }
-  failed->points[failed->count++] = place;
-  return QMAT_OK;
+  return add_failed(s->context, s->failed_places, place);
 }
 
 qmat_status qmat_decimation_repair(qmat_decimation *s) {
   const size_t count = s->newest_surface_count + s->newest_inner_count;
-  failed_places failed = {.points = qmat_arena_alloc(&s->context->arena, count, sizeof *failed.points)};
-  if (!failed.points) return qmat_fail_memory(s->context, "repairs");
   s->fitting = true;
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     status = qmat_progress(s->context, i, count, "repairs");
-    if (status == QMAT_OK) status = repair_point(s, newest_point(s, i), &failed);
+    if (status == QMAT_OK) status = repair_point(s, newest_point(s, i));
   }
   return status;
 }

@@ -118,15 +118,16 @@ static bool is_beyond(const qmat_simplification *s, const qmat_medial_errors *fo
 }
 
 /* Moves the spheres of the newest round, whose extract is `*medial`, where the errors exceed epsilon. The newest round
- * and `*medial` are then the repaired ones. */
-static qmat_status repair_round(qmat_simplification *s, const qmat_medial_errors *found, qmat_medial **medial,
-                                bool *has_moved) {
+ * and `*medial` are then the repaired ones. `failed` are the places that earlier repairs could not mend. */
+static qmat_status repair_round(qmat_simplification *s, const qmat_medial_errors *found, qmat_failed_places *failed,
+                                qmat_medial **medial, bool *has_moved) {
   qmat_extra_points extra = no_extra_points(s);
   extra.is_strict = true;
   qmat_status status = constrain_found_points(s, found, &extra);
   const qmat_decimation *from = &s->rounds[s->newest];
   qmat_decimation *round = take_round(s);
   round->rules.repairs = true;
+  round->failed_places = failed;
   if (status == QMAT_OK)
     status = qmat_decimation_run_copies(from, *medial, &extra, &s->dense.envelope_tracker.lattice, &s->depths,
                                         &s->round_constraints[s->newest], round);
@@ -143,12 +144,14 @@ static qmat_status repair_round(qmat_simplification *s, const qmat_medial_errors
 static qmat_status measure_and_repair(qmat_simplification *s, qmat_medial **medial, qmat_medial_errors *found) {
   const int repairs = s->params.epsilon > 0 && s->params.refits > 0 ? QMAT_MOST_REPAIRS : 0;
   qmat_status status = qmat_simplification_measure(s, *medial, repairs > 0, found);
+  qmat_failed_places failed = {0};
   bool has_moved = true;
   for (int i = 1; i <= repairs && status == QMAT_OK && is_beyond(s, found) && has_moved; i++) {
-    status = repair_round(s, found, medial, &has_moved);
+    status = repair_round(s, found, &failed, medial, &has_moved);
     qmat_medial_errors_uninit(found);
     if (status == QMAT_OK) status = qmat_simplification_measure(s, *medial, true, found);
   }
+  qmat_failed_places_uninit(&failed);
   if (status == QMAT_OK && repairs > 0 && found->surface_to_envelope > s->params.epsilon) {
     qmat_medial_errors_uninit(found);
     status = qmat_simplification_measure(s, *medial, false, found);

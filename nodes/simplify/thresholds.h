@@ -22,7 +22,7 @@ static const double qmat_required_depth_share = 0.05;
 enum {
   QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
   QMAT_MOST_REPAIRS = 4,       /* of a round, each with the points found after the one before */
-  QMAT_MOST_JOINT_REFITS = 3,  /* the same for joint refits */
+  QMAT_MOST_JOINT_REFITS = 6,  /* the same for joint refits */
   QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
   QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
   QMAT_MOST_WALLS = 12,        /* tried per void; of edges, per loop */

@@ -12,6 +12,7 @@
 
 #include "core/geometry/medial_build.h"
 #include "nodes/simplify/decimation.h"
+#include "nodes/simplify/thresholds.h"
 #include "tests/shapes.h"
 
 /* A bar of 2 x 0.1 x 0.1 along the x-axis and a chain of three spheres in it. The middle one lies a little too low and
@@ -27,6 +28,7 @@ typedef struct bar {
   qmat_surface *surface;
   qmat_medial *medial;
   qmat_constraint_points constraints;
+  qmat_failed_places failed;
   qmat_decimation run;
   double points[3 * POINTS], scale;
 } bar;
@@ -84,7 +86,8 @@ static void make_bar(bar *b, const double newest[3], const double middle[4]) {
                                        .finest = limit * b->scale,
                                        .k = 1e-5,
                                        .repairs = true,
-                                       .crease_share = 0.5}};
+                                       .crease_share = 0.5},
+                             .failed_places = &b->failed};
   assert_int_equal(qmat_complex_init(&b->context, &b->run.complex, b->medial, NULL), QMAT_OK);
   double depths[SPHERES];
   for (size_t i = 0; i < SPHERES; i++)
@@ -106,6 +109,7 @@ static void make_bar(bar *b, const double newest[3], const double middle[4]) {
 
 static void free_bar(bar *b) {
   qmat_decimation_uninit(&b->run);
+  qmat_failed_places_uninit(&b->failed);
   qmat_value_release(&b->medial->base);
   qmat_surface_free(b->surface);
   qmat_value_release(&b->mesh->base);
@@ -175,6 +179,28 @@ static void test_a_place_out_of_reach_moves_nothing_and_is_given_up(void **state
   assert_true(b.run.surface_tracker.limits[OLDER] == INFINITY);
   assert_true(b.constraints.distances[OLDER] == INFINITY);
   assert_true(b.run.surface_tracker.limits[0] < INFINITY);
+  assert_int_equal(b.failed.count, 1);
+  assert_memory_equal(b.failed.points, &b.points[3 * OLDER], 3 * sizeof(double));
+  free_bar(&b);
+}
+
+/* The place could be repaired, but several places within epsilon of it could not. */
+static void test_a_place_near_failed_ones_is_passed_over(void **state) {
+  (void)state;
+  bar b;
+  make_bar(&b, above, low);
+  b.failed = (qmat_failed_places){.points = qmat_alloc(3 * QMAT_MOST_FAILED_REPAIRS, sizeof *b.failed.points),
+                                  .count = QMAT_MOST_FAILED_REPAIRS,
+                                  .capacity = QMAT_MOST_FAILED_REPAIRS};
+  assert_non_null(b.failed.points);
+  for (size_t i = 0; i < QMAT_MOST_FAILED_REPAIRS; i++) {
+    memcpy(&b.failed.points[3 * i], &b.points[3 * OLDER], 3 * sizeof *b.failed.points);
+    b.failed.points[3 * i] += 0.5 * limit * b.scale;
+  }
+  check_nothing_moves(&b);
+  b.failed.count--;
+  assert_int_equal(qmat_decimation_repair(&b.run), QMAT_OK);
+  assert_true(b.run.moves > 0);
   free_bar(&b);
 }
 
@@ -197,6 +223,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_sphere_moves_until_the_place_is_within_epsilon),
       cmocka_unit_test(test_a_place_out_of_reach_moves_nothing_and_is_given_up),
+      cmocka_unit_test(test_a_place_near_failed_ones_is_passed_over),
       cmocka_unit_test(test_places_within_epsilon_move_nothing),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
