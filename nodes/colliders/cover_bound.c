@@ -27,9 +27,7 @@ typedef struct gathered {
 } gathered;
 
 /* How far the solid's part in the cube, and the sheets around their middle in it, may leave a shape, as far as that
- * exceeds `enough`; the worst point, and how far the sheet reaches around it. -INFINITY where facets only touch the
- * cube.
- */
+ * exceeds `enough`; the worst point, and how far the solid reaches around it. -INFINITY where facets only touch it. */
 static double leaves(const qmat_cube_search *s, qmat_solid_cube *c, uint32_t shape, double enough, double worst[3],
                      double *reach) {
   const qmat_prepared_shape *prepared = &s->shapes[shape];
