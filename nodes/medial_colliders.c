@@ -271,7 +271,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 15,
+    .version = 17,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -289,8 +289,9 @@ const qmat_node qmat_node_medial_colliders = {
         "otherwise hulls are inside their shapes. proved is false for open surfaces.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
         "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
-        "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. They are "
-        "those of the shapes, not of hulls, but for hull_protrusion.",
+        "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. Thick "
+        "sheets are parts of the solid, without mass. The measures are those of the shapes, not of hulls, but for "
+        "hull_protrusion.",
     .citation = "",
     .params_size = sizeof(medial_colliders_params),
     .params = params,

@@ -591,3 +591,7 @@ const double *qmat_surface_positions(const qmat_surface *surface) {
 const qmat_mesh *qmat_surface_mesh(const qmat_surface *surface) {
   return surface->mesh;
 }
+
+double qmat_surface_half_thickness(const qmat_surface *surface) {
+  return surface->sheet_blocks ? surface->half_thickness : 0;
+}

@@ -28,6 +28,8 @@ const qmat_frame *qmat_surface_frame(const qmat_surface *surface);
 /* The mesh's vertices in the unit frame: 3 * vertex_count doubles, owned by the surface. */
 const double *qmat_surface_positions(const qmat_surface *surface);
 const qmat_mesh *qmat_surface_mesh(const qmat_surface *surface);
+/* Half the thickness of the sheets; 0 without sheets. */
+double qmat_surface_half_thickness(const qmat_surface *surface);
 
 /* Whether a point lies inside the solid, sheets aside, by the winding number of the surface around it. A closed and
  * oriented surface is tested with fixed rays, two to seven until they agree; each ray adds up the orientations of the

@@ -26,9 +26,10 @@ typedef struct gathered {
   size_t count, capacity;
 } gathered;
 
-/* How far the solid's part in the cube may leave a shape, as far as it exceeds `enough`; the worst point. -INFINITY
- * where facets only touch the cube. */
-static double leaves(const qmat_cube_search *s, qmat_solid_cube *c, uint32_t shape, double enough, double worst[3]) {
+/* How far the solid's part in the cube, and the sheets around their middle in it, may leave a shape, as far as that
+ * exceeds `enough`; the worst point, and how far the solid reaches around it. -INFINITY where facets only touch it. */
+static double leaves(const qmat_cube_search *s, qmat_solid_cube *c, uint32_t shape, double enough, double worst[3],
+                     double *reach) {
   const qmat_prepared_shape *prepared = &s->shapes[shape];
   double largest = -INFINITY, corners[8][3], at[8], highest = -INFINITY;
   for (int i = 0; i < 8; i++) {
@@ -38,51 +39,49 @@ static double leaves(const qmat_cube_search *s, qmat_solid_cube *c, uint32_t sha
     highest = at[i];
     memcpy(worst, corners[i], sizeof corners[i]);
   }
-  if (c->facet_count == 0 || highest <= 0) return highest; /* all of the cube */
+  *reach = c->facet_count > 0 ? s->half_thickness : 0;
+  if (c->facet_count == 0 || highest + *reach <= 0) return highest + *reach; /* all of the cube */
   for (size_t f = 0; f < c->facet_count && largest < enough; f++) {
     double polygon[QMAT_CUBE_MOST_CORNERS][3];
     const int count = qmat_cube_clip(s, c, c->facets[f], polygon);
+    const double around = qmat_cube_facet_reach(s, c->facets[f]);
     for (int i = 0; i < count; i++) {
-      const double value = qmat_shape_distance(prepared, polygon[i], NULL);
+      const double value = qmat_shape_distance(prepared, polygon[i], NULL) + around;
       if (!(value > largest)) continue;
       largest = value;
+      *reach = around;
       memcpy(worst, polygon[i], sizeof polygon[i]);
     }
   }
   for (int i = 0; i < 8 && largest < enough; i++) {
     if (!(at[i] > largest) || !qmat_cube_corner_counts(s, c, i)) continue;
     largest = at[i];
+    *reach = 0;
     memcpy(worst, corners[i], sizeof corners[i]);
   }
   return largest;
 }
 
-static void finish(region *r, uint32_t shape, double value, const double worst[3]) {
-  r->bound = qmat_larger(r->bound, value);
-  if (r->count == MOST_PARTS) return;
-  qmat_uncovered *part = &r->parts[r->count++];
-  *part = (qmat_uncovered){.value = value, .shape = shape};
-  memcpy(part->point, worst, sizeof part->point);
+static void finish(region *r, const qmat_uncovered *part) {
+  r->bound = qmat_larger(r->bound, part->value);
+  if (r->count < MOST_PARTS) r->parts[r->count++] = *part;
 }
 
 /* Divides a cube whose part of the solid no shape contains. */
 static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
   const gathered *all = s->visitor->all;
-  double value = INFINITY, worst[3];
-  uint32_t shape = c->candidates[0];
-  memcpy(worst, c->centre, sizeof worst);
+  qmat_uncovered part = {.value = INFINITY, .shape = c->candidates[0]};
+  memcpy(part.point, c->centre, sizeof part.point);
   for (size_t i = 0; i < c->candidate_count; i++) {
-    double at[3];
-    const double of_shape = leaves(s, c, c->candidates[i], value, at) + rounding;
-    if (of_shape <= 0) return false;
-    if (!(of_shape < value)) continue;
-    value = of_shape;
-    shape = c->candidates[i];
-    memcpy(worst, at, sizeof worst);
+    qmat_uncovered other = {.shape = c->candidates[i]};
+    other.value = leaves(s, c, other.shape, part.value, other.point, &other.reach) + rounding;
+    if (other.value <= 0) return false;
+    if (other.value < part.value) part = other;
   }
-  if (c->reach > all->tolerance && c->depth < QMAT_CUBE_DEEPEST && s->cubes < MOST_CUBES && c->nearest <= 4 * c->reach)
+  if (c->reach > all->tolerance && c->depth < QMAT_CUBE_DEEPEST && s->cubes < MOST_CUBES &&
+      c->nearest + part.reach <= 4 * c->reach)
     return true;
-  finish(s->region, shape, value, worst);
+  finish(s->region, &part);
   return false;
 }
 

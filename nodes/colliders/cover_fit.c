@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/colliders/cover_bound.h"
@@ -31,7 +32,7 @@ typedef struct fit {
   qmat_shape_set *set;
   double least_radius;
   size_t sample_count, even_count; /* all samples; the first are spread evenly and count as slack */
-  double *samples;                 /* 3 per sample */
+  double *samples;                 /* 4 per sample: a point, and how far the solid reaches around it */
   row *rows;
   double *vectors; /* 6 vectors of 4 numbers per sphere, and those below */
   double *best, *step;
@@ -47,17 +48,21 @@ static qmat_status take_samples(fit *t) {
   size_t even = SAMPLES_PER_SPHERE * t->set->sphere_count;
   even = even < LEAST_SAMPLES ? LEAST_SAMPLES : even < MOST_SAMPLES ? even : MOST_SAMPLES;
   const size_t room = even + vertices + MOST_PARTS;
-  t->samples = qmat_arena_alloc(&context->arena, room, 3 * sizeof *t->samples);
+  t->samples = qmat_arena_alloc(&context->arena, room, 4 * sizeof *t->samples);
   t->rows = qmat_arena_alloc(&context->arena, room, sizeof *t->rows);
   double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
   if (!t->samples || !t->rows || !areas) return qmat_fail_memory(context, "samples of the surface");
   qmat_running_areas(positions, mesh->triangles, mesh->triangle_count, areas);
+  const size_t solid_count = qmat_solid_triangle_count(mesh);
+  const double half_thickness = qmat_surface_half_thickness(t->surface);
   for (size_t i = 0; i < even; i++) {
+    double *sample = &t->samples[4 * i];
     const double at = areas[mesh->triangle_count - 1] * ((double)i + 0.5) / (double)even;
     const size_t facet = qmat_area_element_at(areas, mesh->triangle_count, at);
     const uint32_t *ids = &mesh->triangles[3 * facet];
     qmat_triangle_point(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]], &positions[3 * (size_t)ids[2]],
-                        qmat_hash_unit(qmat_hash3(3, i, 0)), qmat_hash_unit(qmat_hash3(3, i, 1)), &t->samples[3 * i]);
+                        qmat_hash_unit(qmat_hash3(3, i, 0)), qmat_hash_unit(qmat_hash3(3, i, 1)), sample);
+    sample[3] = facet < solid_count ? 0 : half_thickness;
   }
   t->even_count = t->sample_count = even;
   uint8_t *taken = qmat_arena_calloc(&context->arena, mesh->vertex_count, 1);
@@ -66,7 +71,9 @@ static qmat_status take_samples(fit *t) {
     const size_t vertex = mesh->triangles[i];
     if (taken[vertex]) continue;
     taken[vertex] = 1;
-    memcpy(&t->samples[3 * t->sample_count++], &positions[3 * vertex], 3 * sizeof *t->samples);
+    double *sample = &t->samples[4 * t->sample_count++];
+    memcpy(sample, &positions[3 * vertex], 3 * sizeof *sample);
+    sample[3] = i < 3 * solid_count ? 0 : half_thickness;
   }
   return QMAT_OK;
 }
@@ -83,11 +90,11 @@ static qmat_status evaluate(fit *t, double *slack, double *outside) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
   for (size_t i = 0; i < t->sample_count; i++) {
     row *r = &t->rows[i];
-    const double *point = &t->samples[3 * i];
+    const double *point = &t->samples[4 * i];
     double medial[4];
     size_t primitive = 0;
     qmat_prepared_shape shape;
-    r->f = qmat_envelope_nearest(envelope, point, &primitive, medial);
+    r->f = qmat_envelope_nearest(envelope, point, &primitive, medial) + point[3];
     memcpy(r->ids, &set->shapes[3 * primitive], sizeof r->ids);
     qmat_shape_prepare(&shape, set->spheres, r->ids);
     qmat_shape_distance(&shape, point, r->shares);
@@ -221,7 +228,8 @@ static void grow_parts(fit *t, const qmat_cover_bound *bound) {
     const qmat_uncovered *part = &bound->parts[k];
     qmat_prepared_shape shape;
     qmat_shape_prepare(&shape, t->set->spheres, &t->set->shapes[3 * (size_t)part->shape]);
-    const double left = qmat_shape_distance(&shape, part->point, NULL) + 1e-6; /* earlier growth may have covered it */
+    /* Earlier growth may have covered it. */
+    const double left = qmat_shape_distance(&shape, part->point, NULL) + part->reach + 1e-6;
     if (left > 0) grow_at(t->set, part->shape, part->point, left);
   }
 }
@@ -245,8 +253,11 @@ static qmat_status cover_solid(fit *t) {
       continue;
     }
     const size_t stride = 1 + ROUNDS * bound.count / MOST_PARTS; /* each round has its share of the room */
-    for (size_t k = 0; k < bound.count && t->sample_count < room; k += stride)
-      memcpy(&t->samples[3 * t->sample_count++], bound.parts[k].point, sizeof bound.parts[k].point);
+    for (size_t k = 0; k < bound.count && t->sample_count < room; k += stride) {
+      double *sample = &t->samples[4 * t->sample_count++];
+      memcpy(sample, bound.parts[k].point, sizeof bound.parts[k].point);
+      sample[3] = bound.parts[k].reach;
+    }
     status = fit_samples(t, MORE_STEPS, most_penalty / 4);
   }
   if (status == QMAT_OK) status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, &bound);

@@ -8,8 +8,11 @@
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_vertices.h"
 
-/* So many points of a heap are reduced. */
-enum { MANY_POINTS = 4096 };
+/* So many points of a heap are reduced. Points inside of the hull of those along every fourth direction go first. */
+enum { MANY_POINTS = 4096, FEW_STRIDE = 4 };
+
+/* Those may be so far outside of that hull. */
+static const double least_tolerance = 1e-9;
 
 /* The points: those chosen, those left that may be outside of the hull of these, and those dropped. */
 typedef struct cloud {
@@ -31,9 +34,9 @@ static void swap_points(double *points, size_t i, size_t j) {
   memcpy(&points[3 * j], kept, sizeof kept);
 }
 
-size_t qmat_extreme_points_first(double *points, size_t count, size_t directions) {
-  size_t chosen = 0;
-  for (size_t d = 0; d < directions && count > 0; d++) {
+/* Moves the farthest points along every `stride`-th direction behind the first `chosen` ones; the number with these. */
+static size_t choose_farthest(double *points, size_t count, size_t chosen, size_t directions, size_t stride) {
+  for (size_t d = 0; d < directions && count > 0; d += stride) {
     double direction[3], most = -INFINITY;
     size_t best = 0;
     qmat_spread_direction(d, directions, direction);
@@ -46,6 +49,10 @@ size_t qmat_extreme_points_first(double *points, size_t count, size_t directions
     if (best >= chosen) swap_points(points, best, chosen++);
   }
   return chosen;
+}
+
+size_t qmat_extreme_points_first(double *points, size_t count, size_t directions) {
+  return choose_farthest(points, count, 0, directions, 1);
 }
 
 static bool make_room(cloud *c) {
@@ -116,8 +123,11 @@ static void choose_points(cloud *c) {
 qmat_status qmat_extreme_points_keep(double *points, size_t *count, double tolerance) {
   cloud c = {.points = points, .left = *count};
   if (*count <= QMAT_EXTREME_DIRECTIONS) return QMAT_OK;
-  c.chosen = qmat_extreme_points_first(points, *count, QMAT_EXTREME_DIRECTIONS);
-  qmat_status status = QMAT_OK;
+  c.chosen = choose_farthest(points, c.left, 0, QMAT_EXTREME_DIRECTIONS, FEW_STRIDE);
+  qmat_status status = c.chosen >= 4 ? find_planes(&c) : QMAT_ERROR_GEOMETRY;
+  if (status == QMAT_OK) drop_points(&c, qmat_smaller(tolerance, least_tolerance));
+  if (status != QMAT_ERROR_MEMORY) status = QMAT_OK; /* more directions may have a hull */
+  c.chosen = choose_farthest(points, c.left, c.chosen, QMAT_EXTREME_DIRECTIONS, 1);
   while (status == QMAT_OK && c.chosen >= 4) {
     status = find_planes(&c);
     if (status != QMAT_OK) break;

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/measure/area_samples.h"
@@ -49,9 +51,21 @@ static size_t sample_point(const measuring *m, size_t i, uint64_t stream, double
   return triangle;
 }
 
+/* Moves a point of a thick sheet's middle to one of its sides. */
+static void move_to_side(const measuring *m, size_t triangle, bool is_front, double point[3]) {
+  double normal[3];
+  const uint32_t *row = &m->area.rows[3 * triangle];
+  const double half = qmat_surface_half_thickness(m->surface);
+  if (half == 0 || triangle < qmat_solid_triangle_count(qmat_surface_mesh(m->surface))) return;
+  qmat_triangle_normal(&m->area.positions[3 * (size_t)row[0]], &m->area.positions[3 * (size_t)row[1]],
+                       &m->area.positions[3 * (size_t)row[2]], normal);
+  for (int k = 0; k < 3; k++) point[k] += (is_front ? half : -half) * normal[k];
+}
+
 static double gap_at(const measuring *m, size_t i) {
   double point[3];
-  sample_point(m, i, 1, point);
+  const size_t triangle = sample_point(m, i, 1, point);
+  move_to_side(m, triangle, i % 2 == 0, point);
   return qmat_larger(qmat_envelope_distance(m->envelope, point, NULL), 0);
 }
 
@@ -127,12 +141,13 @@ static void spread_point(size_t i, double point[3]) {
 static qmat_status measure_volumes(const measuring *m, double volume, qmat_shape_measures *measures) {
   const qmat_mesh *mesh = qmat_surface_mesh(m->surface);
   const double *positions = qmat_surface_positions(m->surface);
+  const double half = qmat_surface_half_thickness(m->surface);
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
     for (int k = 0; k < 3; k++) {
       const double x = positions[3 * (size_t)mesh->triangles[i] + (size_t)k];
-      low[k] = fmin(low[k], x);
-      high[k] = fmax(high[k], x);
+      low[k] = fmin(low[k], x - half);
+      high[k] = fmax(high[k], x + half);
     }
   for (size_t i = 0; i < m->set->sphere_count; i++)
     for (int k = 0; k < 3; k++) {
@@ -152,7 +167,8 @@ static qmat_status measure_volumes(const measuring *m, double volume, qmat_shape
       double point[3];
       spread_point(i, point);
       for (int k = 0; k < 3; k++) point[k] = low[k] + point[k] * (high[k] - low[k]);
-      const bool in_solid = qmat_surface_inside(m->surface, point),
+      const bool in_solid = half > 0 ? qmat_surface_signed_distance(m->surface, point) <= 0
+                                     : qmat_surface_inside(m->surface, point),
                  in_shape = qmat_envelope_holds(m->envelope, point, 0);
       solid += in_solid;
       shapes += in_shape;
@@ -161,7 +177,7 @@ static qmat_status measure_volumes(const measuring *m, double volume, qmat_shape
   }
   double box = 1;
   for (int k = 0; k < 3; k++) box *= high[k] - low[k];
-  const double share = box / (double)count, of_solid = volume > 0 ? volume : (double)solid * share;
+  const double share = box / (double)count, of_solid = volume > 0 && half == 0 ? volume : (double)solid * share;
   measures->coverage = solid > 0 ? (double)both / (double)solid : 0;
   measures->volume_ratio = of_solid > 0 ? (double)shapes * share / of_solid : 0;
   measures->iou = solid + shapes > both ? (double)both / (double)(solid + shapes - both) : 0;

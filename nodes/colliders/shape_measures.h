@@ -6,7 +6,7 @@
 #include "nodes/colliders/shape_set.h"
 
 /* How well colliders describe a solid, by the measures of cuRobo (SphereFitMetrics) and the intersection over union.
- * All are sampled; lengths are in the unit frame. */
+ * All are sampled; lengths are in the unit frame. Sheets with a thickness are parts of the solid. */
 typedef struct qmat_shape_measures {
   double coverage;                        /* share of the solid that is in a shape */
   double protrusion;                      /* share of the shapes' boundary that is outside of the solid */
@@ -18,9 +18,9 @@ typedef struct qmat_shape_measures {
 } qmat_shape_measures;
 
 /* Takes `samples` points of the surface, about as many of the boundary, and ten times as many of the volume.
- * `volume` is that of the solid, or 0 where it is not known: then it is sampled, too. `colliders` has the hulls of the
- * shapes; `envelope` is theirs in the unit frame. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not
- * depend on their number. */
+ * `volume` is that of the solid without sheets, or 0 where it is not known: then it is sampled, too, as it is with
+ * sheets that have a thickness. `colliders` has the hulls of the shapes; `envelope` is theirs in the unit frame.
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
 qmat_status qmat_shape_measures_take(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                      const qmat_envelope *envelope, const qmat_colliders *colliders, double volume,
                                      size_t samples, qmat_shape_measures *measures);

@@ -5,6 +5,7 @@
 #include <omp.h>
 #include <string.h>
 
+#include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 
 /* The unit frame's box is cut into GRID^3 regions, which are searched independently, SLICE at a time. */
@@ -105,7 +106,7 @@ static void search_cube(qmat_cube_search *s, const qmat_solid_cube *around, cons
   memset(c.known, -1, sizeof c.known);
   s->cubes++;
   filter_candidates(s, &c, around->candidates, around->candidate_count);
-  if (s->visitor->skips_covered && c.nearest + c.reach + rounding <= 0) return;
+  if (s->visitor->skips_covered && c.nearest + c.reach + s->half_thickness + rounding <= 0) return;
   find_facets(s, &c, around);
   const bool is_known_inside = depth > 0 && around->facet_count == 0;
   if (c.facet_count == 0 && !is_known_inside && !qmat_surface_inside(s->surface, c.centre)) return;
@@ -208,6 +209,8 @@ qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *s
       qmat_cube_search s = {.surface = surface,
                             .positions = qmat_surface_positions(surface),
                             .triangles = qmat_surface_mesh(surface)->triangles,
+                            .solid_count = qmat_solid_triangle_count(qmat_surface_mesh(surface)),
+                            .half_thickness = qmat_surface_half_thickness(surface),
                             .shapes = shapes,
                             .visitor = visitor,
                             .stack = stacks + thread * room,

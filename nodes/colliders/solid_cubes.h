@@ -26,6 +26,8 @@ typedef struct qmat_cube_search {
   const qmat_surface *surface;
   const double *positions;
   const uint32_t *triangles;
+  size_t solid_count;    /* the triangles from here on are sheets */
+  double half_thickness; /* of sheets */
   const qmat_prepared_shape *shapes;
   const struct qmat_cube_visitor *visitor;
   uint32_t *stack; /* of candidates and facets, level by level */
@@ -43,9 +45,14 @@ typedef struct qmat_cube_visitor {
   void (*finish)(void *region);                                         /* after its last cube; may be NULL */
   qmat_status (*gather)(void *all, void *region);                       /* QMAT_OK or QMAT_ERROR_MEMORY */
   void *all;
-  bool skips_covered; /* cubes within the first candidate are not visited */
+  bool skips_covered; /* cubes are not visited that the first candidate contains, and the sheets in them */
   const char *what;   /* for progress and errors: "regions searched" */
 } qmat_cube_visitor;
+
+/* How far the solid reaches around a facet: half the thickness of a sheet, or 0. */
+static inline double qmat_cube_facet_reach(const qmat_cube_search *search, uint32_t facet) {
+  return facet < search->solid_count ? 0 : search->half_thickness;
+}
 
 /* The convex polygon of a triangle in a cube; its number of corners. */
 int qmat_cube_clip(const qmat_cube_search *search, const qmat_solid_cube *cube, uint32_t facet,

@@ -14,6 +14,9 @@ static const double smallest = 1.0 / 512 * (1 + 1e-3), largest = 0.5 / QMAT_SOLI
 /* So many points of a cell are reduced: at once, and when it ends. */
 enum { MANY_IN_CELL = 512, FEW_IN_CELL = 128 };
 
+/* The corners of the cubes in a cell are on a grid, so many along an axis. */
+enum { GRID = 5, GRID_POINTS = GRID * GRID * GRID };
+
 /* The points that one shape has so far, and its cells with theirs. */
 typedef struct heap {
   uint32_t shape;
@@ -21,7 +24,9 @@ typedef struct heap {
   size_t cell_count, cell_capacity, point_count, point_capacity;
   qmat_solid_cell *cells;
   double *cell_points;
-  size_t limit; /* of points of the last cell, before they are reduced */
+  size_t limit;              /* of points of the last cell, before they are reduced */
+  bool has[GRID_POINTS];     /* the last cell's corners of cubes */
+  double at[GRID_POINTS][3]; /* their places */
 } heap;
 
 typedef struct region {
@@ -70,10 +75,33 @@ static bool reduce_cell(heap *h, size_t many) {
   return true;
 }
 
+/* Whether the cell has corners on both sides of this one along an axis. */
+static bool is_between(const heap *h, int i) {
+  for (int axis = 0, step = 1; axis < 3; axis++, step *= GRID) {
+    const int place = i / step % GRID;
+    bool before = false, after = false;
+    for (int k = 0; k < place; k++) before = before || h->has[i - (place - k) * step];
+    for (int k = place + 1; k < GRID; k++) after = after || h->has[i + (k - place) * step];
+    if (before && after) return true;
+  }
+  return false;
+}
+
+/* Adds those corners of cubes to the last cell that may be vertices of its hull. */
+static bool add_corners(heap *h) {
+  double corners[GRID_POINTS][3];
+  size_t count = 0;
+  for (int i = 0; i < GRID_POINTS; i++)
+    if (h->has[i] && !is_between(h, i)) memcpy(corners[count++], h->at[i], sizeof corners[0]);
+  memset(h->has, 0, sizeof h->has);
+  h->cells[h->cell_count - 1].count += (uint32_t)count;
+  return add_cells(h, NULL, 0, corners[0], count);
+}
+
 /* Gives the points of the last cell to the hull. */
 static bool end_cell(heap *h) {
   if (h->cell_count == 0) return true;
-  if (!reduce_cell(h, FEW_IN_CELL)) return false;
+  if (!add_corners(h) || !reduce_cell(h, FEW_IN_CELL)) return false;
   qmat_solid_cell *last = &h->cells[h->cell_count - 1];
   double *points = &h->cell_points[3 * (h->point_count - last->count)];
   last->first = (uint32_t)qmat_extreme_points_first(points, last->count, QMAT_EXTREME_DIRECTIONS);
@@ -91,6 +119,17 @@ static bool add_points(heap *h, const qmat_solid_cube *c, const double *points, 
   }
   last->count += cell.count;
   return add_cells(h, NULL, 0, points, count) && reduce_cell(h, h->limit);
+}
+
+/* Remembers a corner of a cube of the last cell. */
+static void add_corner(heap *h, const double corner[3]) {
+  int i = 0;
+  for (int k = 2; k >= 0; k--) {
+    const double place = (corner[k] + 0.5) * QMAT_SOLID_CELLS - h->cells[h->cell_count - 1].at[k];
+    i = GRID * i + (int)lround((GRID - 1) * place);
+  }
+  h->has[i] = true;
+  memcpy(h->at[i], corner, sizeof h->at[i]);
 }
 
 /* Adds octahedra around points of a sheet. */
@@ -116,11 +155,12 @@ static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
     done = c->facets[f] < all->solid_count ? add_points(h, c, polygon[0], count)
                                            : add_octahedra(h, c, polygon, count, all->reach);
   }
+  done = done && add_points(h, c, NULL, 0);
   for (int i = 0; i < 8 && done; i++) {
     double corner[3];
     if (c->facet_count > 0 && !qmat_cube_corner_counts(s, c, i)) continue;
     qmat_cube_corner(c, i, corner);
-    done = add_points(h, c, corner, 1);
+    add_corner(h, corner);
   }
   r->failed = !done;
   return false;

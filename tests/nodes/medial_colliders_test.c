@@ -11,6 +11,7 @@
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "nodes/colliders/shape_set.h"
+#include "nodes/measure/area_samples.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
@@ -399,6 +400,53 @@ static void test_a_sheet_beside_a_box_has_a_hull_of_its_own(void **state) {
   }
 }
 
+static void place_sail(double u, double v, double point[3]) {
+  point[0] = 3 + u * v, point[1] = 2 * u - 1, point[2] = 2 * v - 1;
+}
+
+/* Random points of a curved sheet with a thickness beside a box are in shapes, and in hulls, of each kind. The medial
+ * mesh has two slabs of it, which leave some of it out. */
+static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) {
+  (void)state;
+  static const char *const kinds[] = {"any", "capsules", "hulls"};
+  const double half = 0.1, spheres[20] = {0, 0, 0, 1, 3, -1, -1, half, 3, 1, -1, half, 3, -1, 1, half, 4, 1, 1, half};
+  const uint32_t triangles[6] = {1, 2, 4, 1, 3, 4}, edges[10] = {1, 2, 1, 3, 1, 4, 2, 4, 3, 4};
+  for (int kind = 0; kind < 3; kind++) {
+    char params[64];
+    qmat_mesh *mesh = box_around(1, 1, 1);
+    shape_add_sheet(mesh, 8, 8, place_sail);
+    mesh->closed = mesh->oriented = true;
+    mesh->sheet_thickness = 2 * half;
+    snprintf(params, sizeof params, "fit=contain kind=%s", kinds[kind]);
+    result r = make(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2), params, 0);
+    assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+    assert_near(pipeline_number(r.report, "coverage"), 1, 0);
+    assert_near(pipeline_number(r.report, "max_uncovered_gap"), 0, 0);
+    assert_in_bounds(pipeline_number(r.report, "volume_ratio"), 1, 4);
+    qmat_envelope *envelope = envelope_of(r.colliders);
+    size_t outside_shapes = 0, outside_hulls = 0;
+    for (uint64_t i = 0; i < 100000; i++) {
+      /* A point of a facet, and a point on the sphere of half the thickness around it. */
+      const size_t facet = 12 + i % mesh->sheet_triangle_count;
+      double point[3], direction[3];
+      const double *corners[3];
+      for (size_t k = 0; k < 3; k++) corners[k] = &r.mesh->positions[3 * (size_t)r.mesh->triangles[3 * facet + k]];
+      qmat_triangle_point(corners[0], corners[1], corners[2], qmat_hash_unit(qmat_hash3(6, i, 0)),
+                          qmat_hash_unit(qmat_hash3(6, i, 1)), point);
+      qmat_spread_direction((size_t)(qmat_hash3(6, i, 2) % 1000), 1000, direction);
+      for (int k = 0; k < 3; k++) point[k] += half * direction[k];
+      outside_shapes += !qmat_envelope_holds(envelope, point, 0);
+      bool found = false;
+      for (size_t s = 0; s < r.colliders->shape_count && !found; s++) found = is_in_hull(r.colliders, s, point, 1e-9);
+      outside_hulls += !found;
+    }
+    assert_int_equal(outside_shapes, 0);
+    assert_int_equal(outside_hulls, 0);
+    qmat_envelope_free(envelope);
+    result_free(&r);
+  }
+}
+
 /* A needle of a sheet, without area, has a hull, too. */
 static void test_a_sheet_without_area_has_a_hull(void **state) {
   (void)state;
@@ -527,6 +575,7 @@ int main(void) {
       cmocka_unit_test(test_the_hull_of_a_ball_around_a_box_is_the_box),
       cmocka_unit_test(test_hulls_are_joined_where_the_solid_is_convex),
       cmocka_unit_test(test_a_sheet_beside_a_box_has_a_hull_of_its_own),
+      cmocka_unit_test(test_contain_leaves_no_point_of_a_thick_sheet_outside),
       cmocka_unit_test(test_a_sheet_without_area_has_a_hull),
       cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The ES module of examples/readers, and the schemas of what is written: js_test.sh SOURCE_FOLDER BUILD_FOLDER QMAT
-# QMAT_MODELS. Without three.js, Babylon.js, glTF-Transform and ajv, which npm fetches once, only what needs none of them is
-# tested, and the test counts as skipped.
+# QMAT_MODELS. Without three.js, Babylon.js, glTF-Transform, ajv and the Khronos validator, which npm fetches once, only what
+# needs none of them is tested, and the test counts as skipped.
 set -eu
 if ! command -v node >/dev/null 2>&1; then
   echo "skipped: there is no node (Debian: apt install nodejs)"
@@ -27,7 +27,8 @@ for model in "$work/capsule.off" "$1/examples/game/models/pear.off" "$1/examples
   for kind in any hulls spheres; do
     name=$(basename "$model")
     "$3" mat "$model" --colliders --kind "$kind" --epsilon 5% --set asset.khr_physics=true --set asset.omi_physics=true \
-      -o "$work/physics_${name%.*}_$kind.gltf" --no-cache --quiet
+      -o "$work/physics_${name%.*}_$kind.gltf" -o "$work/physics_${name%.*}_$kind.glb" --no-cache --quiet
   done
 done
 node "$work/physics_test.mjs" "$1/tests/readers/physics.schema.json" "$work"/physics_*.gltf
+node "$work/validator_test.mjs" "$work"/physics_*.glb

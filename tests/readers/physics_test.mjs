@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The physics extensions of .gltf files against their schema: physics_test.mjs SCHEMA FILE.gltf... Run from a folder with the
-// packages of package.json. The Khronos validator does not know these extensions.
+// packages of package.json. The Khronos validator (validator_test.mjs) does not know these extensions.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import Ajv from 'ajv/dist/2020.js';
