@@ -9,6 +9,9 @@
 /* Below this, rounding of F exceeds the tolerance. */
 static const double least_tolerance = 1e-6;
 
+/* The bound is raised by it: more than the rounding of F. */
+static const double rounding = 1e-9;
+
 /* Pieces up to this share of the tolerance are not split. */
 static const double least_reach = 1.0 / 32;
 
@@ -76,7 +79,7 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
     for (size_t t = first; t < last; t++) {
       facet_search search = {.envelope = envelope,
                              .tolerance = fmax(tolerance, least_tolerance),
-                             .decisive = decisive,
+                             .decisive = decisive - rounding,
                              .found = known,
                              .bound = -INFINITY,
                              .worst = -INFINITY};
@@ -95,6 +98,6 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
     memmove(&result->points[3 * result->count], &result->points[3 * t], 3 * sizeof *result->points);
     result->facets[result->count++] = (uint32_t)t;
   }
-  result->bound = bound;
+  result->bound = bound + rounding;
   return QMAT_OK;
 }

@@ -8,7 +8,7 @@
 /* The distance from a surface to an envelope: the one-sided Hausdorff distance of the first to the second. */
 typedef struct qmat_hausdorff_bound {
   double found;     /* the largest F found at a point of the surface, or `known` */
-  double bound;     /* an upper bound of F over the surface; unit frame */
+  double bound;     /* an upper bound of F over the surface, raised by 1e-9 for rounding; unit frame */
   size_t count;     /* facets with a point where F exceeds the threshold */
   double *points;   /* 3 per such facet: its worst point; in the context's arena */
   uint32_t *facets; /* their numbers, in rising order */

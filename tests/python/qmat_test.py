@@ -114,7 +114,7 @@ class OfArrays(unittest.TestCase):
         # No vertex is farther from the envelope than the bound; the farthest point is near one, on a fine surface.
         errors = m.error_at(V)
         self.assertEqual(errors.shape, (len(V),))
-        self.assertLessEqual(errors.max(), m.errors.surface_to_envelope + 1e-12)  # of rounding
+        self.assertLessEqual(errors.max(), m.errors.surface_to_envelope)
         self.assertGreaterEqual(errors.max(), .5 * m.errors.surface_to_envelope)
         self.assertEqual(m.solid.vertices.shape, V.shape)
         self.assertEqual(m.report["summary"]["spheres"], len(m.spheres))
