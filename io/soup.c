@@ -250,7 +250,8 @@ static qmat_status refuse_or_drop(conversion *c, size_t facet) {
   return QMAT_OK;
 }
 
-/* Checks the corners of the facets, and finds defects: a vertex used twice, the same vertices as an earlier facet. */
+/* Checks the corners of the facets, and finds defects: fewer than three different vertices, or the same vertices as an
+ * earlier facet. A polygon may repeat a vertex: a bridge from its border to that of a hole does. */
 static qmat_status check_facets(conversion *c) {
   const qmat_soup *soup = c->soup;
   size_t size = table_size(soup->facet_count);
@@ -269,6 +270,7 @@ static qmat_status check_facets(conversion *c) {
       return at_facet(c, f);
     }
     uint64_t hash = count;
+    size_t different = 0;
     uint32_t twice = NONE;
     for (size_t k = 0; k < count; k++) {
       if (corners[k] >= soup->vertex_count) {
@@ -277,10 +279,11 @@ static qmat_status check_facets(conversion *c) {
         return at_facet(c, f);
       }
       if (last_use[corners[k]] == stamp && twice == NONE) twice = corners[k];
+      different += last_use[corners[k]] != stamp;
       last_use[corners[k]] = stamp;
       hash += qmat_hash_mix(corners[k] + UINT64_C(0x9e3779b97f4a7c15)); /* a sum does not depend on the order */
     }
-    if (twice != NONE) {
+    if (different < 3) {
       if (!c->drops_defects)
         qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet uses vertex %u twice (counted from 0)", twice);
       qmat_status status = refuse_or_drop(c, f);

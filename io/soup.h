@@ -30,7 +30,7 @@ typedef struct qmat_soup {
   double deviation; /* of the facets from the surface that they stand for, copied into the mesh; 0: exact */
 } qmat_soup;
 
-/* How to treat facets that use a vertex twice or have the same vertices as an earlier facet. */
+/* How to treat facets that have fewer than three different vertices, or the same vertices as an earlier facet. */
 typedef enum qmat_defects { QMAT_DEFECTS_REFUSE, QMAT_DEFECTS_DROP } qmat_defects;
 
 typedef struct qmat_read_options {

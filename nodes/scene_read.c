@@ -31,7 +31,8 @@ static const qmat_param params[] = {
      .default_text = "all",
      .offset = offsetof(scene_read_params, mesh)},
     QMAT_ENUM(scene_read_params, defects, defects_choices, QMAT_DEFECTS_DROP,
-              "Facets that name a vertex twice or repeat another facet's vertices: an error, or dropped and counted"),
+              "Facets of fewer than three different vertices, or with those of another facet: an error, or dropped and "
+              "counted"),
     QMAT_INT(scene_read_params, segments, "sides", 64, 8, 1024,
              "Sides of the polygons that stand for the circles of USD's spheres, capsules, cylinders and cones"),
     QMAT_ENUM(
@@ -76,7 +77,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 14,
+    .version = 15,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "

@@ -293,6 +293,42 @@ static void test_defects_are_refused_with_facet_and_line_or_dropped_and_counted(
                       "were dropped as defects");
 }
 
+static double flat_area(const qmat_mesh *mesh) {
+  double sum = 0;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const double *a = mesh->positions + 3 * mesh->triangles[3 * t],
+                 *b = mesh->positions + 3 * mesh->triangles[3 * t + 1],
+                 *c = mesh->positions + 3 * mesh->triangles[3 * t + 2];
+    sum += ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
+  }
+  return sum;
+}
+
+/* A square with a square hole as one polygon: a bridge leads from corner 0 to corner 4 and back. */
+static void test_a_polygon_may_repeat_vertices_at_a_bridge_to_its_hole(void **state) {
+  (void)state;
+  const double positions[] = {0, 0, 0, 3, 0, 0, 3, 3, 0, 0, 3, 0, 1, 1, 0, 1, 2, 0, 2, 2, 0, 2, 1, 0};
+  const int facets[] = {0, 1, 2, 3, 0, 4, 5, 6, 7, 4, -1};
+  json_t *report;
+  qmat_mesh *mesh = convert(make_soup(positions, 8, facets, 1), QMAT_DEFECTS_REFUSE, &report);
+  assert_int_equal(mesh->triangle_count, 8);
+  assert_true(fabs(flat_area(mesh) - 8) < 1e-15);
+  assert_count(report, "border_edges", 8);
+  assert_count(report, "facets_dropped_as_defects", 0);
+  done(mesh, report);
+}
+
+static void test_a_square_that_repeats_a_vertex_is_a_triangle(void **state) {
+  (void)state;
+  const int facets[] = {0, 1, 2, 2, -1, 0, 2, 2, 0, -1};
+  json_t *report;
+  qmat_mesh *mesh = convert(make_soup(cube, 8, facets, 2), QMAT_DEFECTS_DROP, &report);
+  assert_int_equal(mesh->triangle_count, 1);
+  assert_true(fabs(flat_area(mesh) - 0.5) < 1e-15);
+  assert_count(report, "facets_dropped_as_defects", 1);
+  done(mesh, report);
+}
+
 static void test_a_file_without_a_surface_is_refused(void **state) {
   (void)state;
   assert_soup_refused((qmat_soup){0}, QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY, "file: the file has no facets");
@@ -411,6 +447,8 @@ int main(void) {
       cmocka_unit_test(test_vertices_at_one_place_become_the_first_of_them),
       cmocka_unit_test(test_what_welding_collapses_repeats_or_turns_back_to_back_is_counted),
       cmocka_unit_test(test_defects_are_refused_with_facet_and_line_or_dropped_and_counted),
+      cmocka_unit_test(test_a_polygon_may_repeat_vertices_at_a_bridge_to_its_hole),
+      cmocka_unit_test(test_a_square_that_repeats_a_vertex_is_a_triangle),
       cmocka_unit_test(test_a_file_without_a_surface_is_refused),
       cmocka_unit_test(test_coordinates_near_the_largest_double_do_no_harm),
       cmocka_unit_test(test_counts_agree_with_a_slow_count_on_random_soups),
