@@ -57,8 +57,8 @@ static void move_to_side(const measuring *m, size_t triangle, bool is_front, dou
   const uint32_t *row = &m->area.rows[3 * triangle];
   const double half = qmat_surface_half_thickness(m->surface);
   if (half == 0 || triangle < qmat_solid_triangle_count(qmat_surface_mesh(m->surface))) return;
-  qmat_triangle_normal(&m->area.positions[3 * (size_t)row[0]], &m->area.positions[3 * (size_t)row[1]],
-                       &m->area.positions[3 * (size_t)row[2]], normal);
+  (void)qmat_triangle_area(&m->area.positions[3 * (size_t)row[0]], &m->area.positions[3 * (size_t)row[1]],
+                           &m->area.positions[3 * (size_t)row[2]], normal);
   for (int k = 0; k < 3; k++) point[k] += (is_front ? half : -half) * normal[k];
 }
 

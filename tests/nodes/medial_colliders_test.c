@@ -447,6 +447,26 @@ static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) 
   }
 }
 
+static void place_square(double u, double v, double point[3]) {
+  point[0] = 2 * u - 1, point[1] = 2 * v - 1, point[2] = 0;
+}
+
+/* Slabs of radius 0.04 in a square of thickness 0.2: both sides of it are 0.06 away. */
+static void test_the_gap_of_a_thick_sheet_is_that_of_its_sides(void **state) {
+  (void)state;
+  const double r = 0.04, spheres[16] = {-1, -1, 0, r, 1, -1, 0, r, 1, 1, 0, r, -1, 1, 0, r};
+  const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3}, edges[10] = {0, 1, 0, 2, 0, 3, 1, 2, 2, 3};
+  qmat_mesh *mesh = shape_new();
+  shape_add_sheet(mesh, 4, 4, place_square);
+  mesh->closed = mesh->oriented = true;
+  mesh->sheet_thickness = 0.2;
+  result made = make(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=both", 0);
+  const double gap = 0.06 / sqrt(8);
+  assert_near(pipeline_number(made.report, "gap_mean"), gap, 1e-9);
+  assert_near(pipeline_number(made.report, "max_uncovered_gap"), gap, 1e-9);
+  result_free(&made);
+}
+
 /* A needle of a sheet, without area, has a hull, too. */
 static void test_a_sheet_without_area_has_a_hull(void **state) {
   (void)state;
@@ -576,6 +596,7 @@ int main(void) {
       cmocka_unit_test(test_hulls_are_joined_where_the_solid_is_convex),
       cmocka_unit_test(test_a_sheet_beside_a_box_has_a_hull_of_its_own),
       cmocka_unit_test(test_contain_leaves_no_point_of_a_thick_sheet_outside),
+      cmocka_unit_test(test_the_gap_of_a_thick_sheet_is_that_of_its_sides),
       cmocka_unit_test(test_a_sheet_without_area_has_a_hull),
       cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
