@@ -210,8 +210,10 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   if (inside && d > reach) *wanted &= WANT_EITHER_SIDE;
   if (d > qmat_smaller(s->lo[0], s->epsilon) || ((*wanted & WANT_OUTSIDE) && !inside && d > s->lo[1]))
     raise_lower_bound(s, is_cell, middle, *wanted, &result);
-  if (s->only_places && result.found[EITHER_SIDE] > s->epsilon) *wanted = 0;
-  if (!*wanted) return result;
+  if (s->only_places && result.found[EITHER_SIDE] > s->epsilon) {
+    *wanted = 0;
+    return result;
+  }
   if (!s->last && reach > s->smallest) return result;
   for (int i = 0; i < BOUND_COUNT; i++)
     if (*wanted >> i & 1) result.bound[i] = d + reach;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/geometry/triangle.h"
 #include "tests/io/files.h"
 
 /* Facets are lists of vertex numbers, each ended by -1. */
@@ -293,13 +294,12 @@ static void test_defects_are_refused_with_facet_and_line_or_dropped_and_counted(
                       "were dropped as defects");
 }
 
-static double flat_area(const qmat_mesh *mesh) {
-  double sum = 0;
+static double area(const qmat_mesh *mesh) {
+  double sum = 0, normal[3];
   for (size_t t = 0; t < mesh->triangle_count; t++) {
-    const double *a = mesh->positions + 3 * mesh->triangles[3 * t],
-                 *b = mesh->positions + 3 * mesh->triangles[3 * t + 1],
-                 *c = mesh->positions + 3 * mesh->triangles[3 * t + 2];
-    sum += ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
+    const uint32_t *ids = &mesh->triangles[3 * t];
+    sum += qmat_triangle_area(&mesh->positions[3 * (size_t)ids[0]], &mesh->positions[3 * (size_t)ids[1]],
+                              &mesh->positions[3 * (size_t)ids[2]], normal);
   }
   return sum;
 }
@@ -312,7 +312,7 @@ static void test_a_polygon_may_repeat_vertices_at_a_bridge_to_its_hole(void **st
   json_t *report;
   qmat_mesh *mesh = convert(make_soup(positions, 8, facets, 1), QMAT_DEFECTS_REFUSE, &report);
   assert_int_equal(mesh->triangle_count, 8);
-  assert_true(fabs(flat_area(mesh) - 8) < 1e-15);
+  assert_true(fabs(area(mesh) - 8) < 1e-15);
   assert_count(report, "border_edges", 8);
   assert_count(report, "facets_dropped_as_defects", 0);
   done(mesh, report);
@@ -324,7 +324,7 @@ static void test_a_square_that_repeats_a_vertex_is_a_triangle(void **state) {
   json_t *report;
   qmat_mesh *mesh = convert(make_soup(cube, 8, facets, 2), QMAT_DEFECTS_DROP, &report);
   assert_int_equal(mesh->triangle_count, 1);
-  assert_true(fabs(flat_area(mesh) - 0.5) < 1e-15);
+  assert_true(fabs(area(mesh) - 0.5) < 1e-15);
   assert_count(report, "facets_dropped_as_defects", 1);
   done(mesh, report);
 }
