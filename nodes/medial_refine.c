@@ -11,6 +11,7 @@
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/sampled_solid.h"
+#include "nodes/initial/crease_spheres.h"
 #include "nodes/initial/local_resampling.h"
 #include "nodes/initial/voronoi_dual.h"
 #include "nodes/measure/constraint_points.h"
@@ -29,6 +30,13 @@ static const double spacing_share = 0.5;
 /* A round brings a far place nearer if its distance falls below this share. Other places are given up: around a sheet
  * of an open surface there is no solid that a sphere could fill. */
 static const double nearer_share = 0.9;
+
+/* The spacing of the samples that the first round adds, as a multiple of the limit. Finer ones beside coarse ones leave
+ * the places between both too far. */
+static const double first_spacing = 2;
+
+/* Samples are added up to this distance from a far place, as a multiple of their spacing. */
+static const double reach_of_samples = 3;
 
 enum { MOST_ROUNDS = 8 };
 
@@ -50,9 +58,9 @@ typedef struct {
   qmat_mesh solids; /* the mesh without its sheets, which need no samples */
   const qmat_field *thickness;
   qmat_frame frame;
-  double *positions; /* 3 per vertex, unit frame */
-  double spacing;    /* of the test points */
-  double around;     /* samples are added up to this distance from a far place */
+  qmat_crease_spheres creases; /* of the medial mesh; those of every round */
+  double *positions;           /* 3 per vertex, unit frame */
+  double spacing;              /* of the test points */
   /* The test points of all rounds: the samples of the input, then the grid. */
   size_t known, place_count;
   double *places;    /* 3 each, unit frame */
@@ -168,6 +176,22 @@ static void give_up(refiner *r, const refinement *from, const refinement *to, do
     r->given_up[i] |= from->distances[i] > limit && to->distances[i] > nearer_share * from->distances[i];
 }
 
+/* Makes the medial mesh of the samples of `to`, with the spheres of creases. */
+static qmat_status make_medial(const refiner *r, const qmat_surface *surface, refinement *to) {
+  qmat_context *context = r->context;
+  qmat_medial *bare;
+  qmat_crease_links links;
+  qmat_status status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples,
+                                              to->reaches, &bare, NULL);
+  if (status != QMAT_OK || r->creases.count == 0) {
+    to->medial = bare;
+    return status;
+  }
+  status = qmat_crease_spheres_link(context, &r->frame, bare, &r->creases, &to->medial, &links);
+  qmat_value_release(&bare->base);
+  return status;
+}
+
 /* One round: samples are added around the far places of `from`, and the medial mesh is made again. `to->medial` stays
  * NULL if there is none, or nothing changes. */
 static qmat_status refine(refiner *r, const qmat_surface *surface, const refinement *from, double spacing, double limit,
@@ -176,7 +200,7 @@ static qmat_status refine(refiner *r, const qmat_surface *surface, const refinem
   const qmat_arena kept = context->arena; /* a round's scratch memory is released before the next round */
   context->arena = (qmat_arena){NULL};
   qmat_point_grid far;
-  const qmat_resampling where = {&r->solids, &r->frame, r->positions, &far, r->around, spacing};
+  const qmat_resampling where = {&r->solids, &r->frame, r->positions, &far, reach_of_samples * spacing, spacing};
   double *targets;
   size_t count;
   qmat_status status = choose_targets(r, from, limit, &targets, &count);
@@ -184,9 +208,7 @@ static qmat_status refine(refiner *r, const qmat_surface *surface, const refinem
     status = qmat_point_grid_init(context, targets, count, &far);
     if (status == QMAT_OK)
       status = qmat_samples_densify(context, &where, from->samples, from->reaches, &to->samples, &to->reaches);
-    if (status == QMAT_OK && to->samples)
-      status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples,
-                                      to->reaches, &to->medial, NULL);
+    if (status == QMAT_OK && to->samples) status = make_medial(r, surface, to);
     if (status == QMAT_OK && to->samples) status = find_far_places(r, limit, to);
   }
   qmat_arena_uninit(&context->arena);
@@ -200,16 +222,18 @@ static bool is_better(const refinement *a, const refinement *b) {
   return a->excess < b->excess;
 }
 
-/* Repeats with half the spacing until no place is farther than `enough`, all that are have been given up, or a round
- * does not improve. The first spacing is the limit. `*best` is the last round that improved. */
+/* Repeats with half the spacing until no place is farther than `enough`, or all that are have been given up. Where the
+ * spacing is at most the limit, a round that does not improve is the last one, and places are given up: coarser samples
+ * may only be too coarse. `*best` is the round with the least excess. */
 static qmat_status refine_in_rounds(refiner *r, double limit, double enough, refinement *rounds, size_t *best) {
   qmat_surface *surface;
   qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
   if (status == QMAT_OK) status = give_up_without_solid(r, surface, &rounds[0], limit);
   size_t newest = 0;
-  double spacing = limit;
+  double spacing = first_spacing * limit;
   for (int64_t i = 0; i < r->params->rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
+    const bool is_fine = spacing <= limit;
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
     spacing *= 0.5;
     if (status != QMAT_OK) break;
@@ -218,9 +242,11 @@ static qmat_status refine_in_rounds(refiner *r, double limit, double enough, ref
       continue;
     }
     newest++;
-    if (!is_better(next, &rounds[newest - 1])) break;
-    give_up(r, &rounds[newest - 1], next, limit);
-    *best = newest;
+    if (is_better(next, &rounds[*best]))
+      *best = newest;
+    else if (is_fine)
+      break;
+    if (is_fine) give_up(r, &rounds[newest - 1], next, limit);
   }
   qmat_surface_free(surface);
   return status;
@@ -238,9 +264,9 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   r->spacing = spacing_share * epsilon;
   r->known = rounds[0].samples->count;
   const double enough = params->trigger * epsilon, limit = fmin(params->target, params->trigger) * epsilon;
-  qmat_status status = find_far_places(r, enough, &rounds[0]);
+  qmat_status status = qmat_crease_spheres_of_medial(r->context, rounds[0].medial, &r->creases);
+  if (status == QMAT_OK) status = find_far_places(r, enough, &rounds[0]);
   if (status != QMAT_OK || rounds[0].far_count == 0) return status;
-  r->around = limit;
   status = find_far_places(r, limit, &rounds[0]);
   return status == QMAT_OK ? refine_in_rounds(r, limit, enough, rounds, best) : status;
 }
@@ -284,6 +310,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
                             qmat_value_retain(&rounds[best].medial->base), report ? &report->base : NULL},
       3, outputs);
   for (size_t i = 0; i <= MOST_ROUNDS; i++) refinement_uninit(&rounds[i]);
+  qmat_crease_spheres_uninit(&r.creases);
   return status;
 }
 
@@ -303,7 +330,9 @@ static const qmat_param params[] = {
 
 static const qmat_port inputs[] = {
     QMAT_SAMPLED_SOLID_INPUTS,
-    {.name = "medial", .type = QMAT_MEDIAL, .doc = "The initial medial mesh of these samples, from medial.delaunay"},
+    {.name = "medial",
+     .type = QMAT_MEDIAL,
+     .doc = "The initial medial mesh of these samples, from medial.delaunay or medial.features"},
     {0},
 };
 
@@ -318,7 +347,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 9,
+    .version = 10,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
@@ -328,6 +357,8 @@ const qmat_node qmat_node_medial_refine = {
         "are "
         "given up, as are those of an open surface without solid below. The result is the round that leaves the least "
         "excess over the target.\n\n"
+        "The spheres that medial.features has added stay as they are and are linked again in each round. No samples "
+        "are needed next to them.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "
         "before medial.simplify.\n\n"
         "The parameters after rounds are those of medial.delaunay. Set both nodes to the same values.",

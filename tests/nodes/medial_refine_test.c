@@ -285,6 +285,59 @@ static void test_threads_do_not_change_a_byte(void **state) {
   pipeline_free(&p);
 }
 
+/* The last `count` spheres, those of creases, and the edges between them are the same. */
+static void check_same_creases(const qmat_medial *before, const qmat_medial *after, size_t count) {
+  assert_true(after->sphere_count > before->sphere_count);
+  assert_memory_equal(&after->spheres[4 * (after->sphere_count - count)],
+                      &before->spheres[4 * (before->sphere_count - count)], 4 * count * sizeof(double));
+  size_t edges[2] = {0, 0};
+  const qmat_medial *const both[2] = {before, after};
+  for (size_t i = 0; i < 2; i++)
+    for (size_t e = 0; e < both[i]->edge_count; e++)
+      edges[i] += both[i]->edges[2 * e] >= both[i]->sphere_count - count &&
+                  both[i]->edges[2 * e + 1] >= both[i]->sphere_count - count;
+  assert_int_equal(edges[0], edges[1]);
+  assert_int_equal(pipeline_euler(after), pipeline_euler(before));
+  for (size_t v = before->sphere_count - count; v < before->sphere_count; v++) {
+    const uint32_t *a = &before->region_offsets[v],
+                   *b = &after->region_offsets[v + after->sphere_count - before->sphere_count];
+    assert_int_equal(a[1] - a[0], b[1] - b[0]);
+    if (a[1] > a[0]) assert_int_equal(before->region_samples[a[0]], after->region_samples[b[0]]);
+  }
+}
+
+/* A coarse box needs further samples only at its corners. */
+static void test_spheres_on_creases_stay_and_are_linked_again(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_box(3, 2, 1), "spacing=5%", "");
+  qmat_value *features[PIPELINE_MOST_PORTS], *refined[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "medial.features", "", (const qmat_value *[]){&p.mesh->base, &p.medial->base}, features);
+  const qmat_value *inputs[] = {&p.mesh->base, &p.thickness->base, &p.samples->base, features[0]};
+  pipeline_must_run(0, "medial.refine", "epsilon=1%", inputs, refined);
+  const qmat_medial *creased = (const qmat_medial *)features[0], *medial = (const qmat_medial *)refined[REFINED_MEDIAL];
+  check_same_creases(creased, medial, creased->sphere_count - p.medial->sphere_count);
+  assert_true(largest_distance(p.mesh, medial, 20000) < 0.008);
+  release(refined);
+  for (size_t i = 0; i < 2; i++) qmat_value_release(features[i]);
+  pipeline_free(&p);
+}
+
+/* Samples of a fifth of a percent beside those of five percent would leave the places between both too far away. */
+static void test_the_first_samples_are_not_much_finer_than_those_around(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_box(3, 2, 1), "spacing=5%", "");
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  must_refine(&p, 0, "epsilon=2%", outputs);
+  const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
+  assert_true(pipeline_count(report, "far_places") > 100);
+  assert_true(pipeline_number(report, "farthest_place_left") <= 0.75 * 0.02);
+  assert_true(pipeline_count(report, "rounds") <= 2);
+  release(outputs);
+  pipeline_free(&p);
+}
+
 static void test_nothing_is_refined_where_the_mesh_itself_is_farther_than_epsilon(void **state) {
   (void)state;
   pipeline p;
@@ -335,6 +388,8 @@ int main(void) {
       cmocka_unit_test(test_places_without_solid_get_no_samples),
       cmocka_unit_test(test_a_cancelled_run_leaves_nothing),
       cmocka_unit_test(test_threads_do_not_change_a_byte),
+      cmocka_unit_test(test_spheres_on_creases_stay_and_are_linked_again),
+      cmocka_unit_test(test_the_first_samples_are_not_much_finer_than_those_around),
       cmocka_unit_test(test_nothing_is_refined_where_the_mesh_itself_is_farther_than_epsilon),
       cmocka_unit_test(test_what_does_not_belong_together_is_named),
   };
