@@ -118,6 +118,7 @@ typedef struct finding {
   double found[BOUND_COUNT]; /* distances attained on the boundary */
   double bound[BOUND_COUNT]; /* upper bounds over the piece, where it is finished */
   int children;
+  uint32_t near;      /* the triangle nearest to the piece's middle, where that is known */
   uint8_t wanted;     /* what the children count for */
   bool undecided;     /* `place` is tolerated, but the distance near it may exceed epsilon */
   bool maybe_exposed; /* `place` is farther than epsilon, and may or may not be on the boundary */
@@ -188,22 +189,31 @@ static void finish_with(const search *s, double bound, uint8_t *wanted, finding 
  * piece off the boundary counts for nothing. */
 static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, double middle[3], double reach,
                              uint8_t *wanted) {
-  finding result = {.children = 0};
+  finding result = {.near = QMAT_NONE};
   const bool is_cell = p->feature == QMAT_CELL;
+  const hull h = hull_of(s, p);
   /* With one bound to prove, a distance beyond the target need not be exact. */
   const bool is_short = !s->last && *wanted == WANT_EITHER_SIDE;
-  const double limit = is_short ? s->target[0] - reach : INFINITY;
-  uint32_t triangle = 0;
-  double d = limit > 0 ? qmat_surface_distance(s->surface, middle, limit, NULL, &triangle) : INFINITY;
+  double known = INFINITY; /* by the triangle that is nearest to what the piece is a part of */
+  if (p->near != QMAT_NONE) {
+    const double bound = is_short ? hull_bound(s, &h, p->near) : INFINITY;
+    if (bound <= qmat_smaller(s->epsilon, s->target[EITHER_SIDE])) {
+      result.bound[EITHER_SIDE] = bound;
+      *wanted = 0;
+      return result;
+    }
+    known = qmat_surface_distance_to_triangle(s->surface, middle, p->near) + rounding;
+  }
+  const double limit = is_short ? qmat_smaller(s->target[EITHER_SIDE] - reach, known) : known;
+  double d = limit > 0 ? qmat_surface_distance(s->surface, middle, limit, NULL, &result.near) : INFINITY;
   finish_with(s, d + reach, wanted, &result);
   if (!*wanted && !result.undecided) return result;
-  const hull h = hull_of(s, p);
   if (is_off_boundary(s, &h, middle, reach)) {
     *wanted = 0;
     return (finding){.children = 0};
   }
-  if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, INFINITY, NULL, &triangle);
-  if (*wanted) finish_with(s, hull_bound(s, &h, triangle), wanted, &result);
+  if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, known, NULL, &result.near);
+  if (*wanted) finish_with(s, hull_bound(s, &h, result.near), wanted, &result);
   if (result.undecided) memcpy(result.place, middle, sizeof result.place);
   if (!*wanted) return result;
   const bool inside = (*wanted & WANT_OUTSIDE) && qmat_surface_inside(s->surface, middle);
@@ -224,7 +234,7 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
 }
 
 static finding evaluate(const search *s, const qmat_boundary_piece *p) {
-  finding result = {.children = 0};
+  finding result = {.near = QMAT_NONE};
   double middle[3], reach;
   uint8_t wanted = p->wanted;
   if (!qmat_boundary_piece_ball(s->features, p, middle, &reach)) return result;
@@ -287,6 +297,7 @@ static qmat_status search_level(qmat_context *context, const search *s, const pi
   for (size_t i = 0; i < from->count; i++) {
     if (findings[i].children == 0) continue;
     qmat_boundary_piece piece = from->items[i];
+    piece.near = findings[i].near;
     piece.wanted = findings[i].wanted;
     qmat_boundary_piece_split(s->features, &piece, &to->items[filled]);
     filled += (size_t)findings[i].children;

@@ -13,7 +13,7 @@ static const double rounding = 1e-9;
 
 size_t qmat_boundary_pieces_of_feature(const qmat_boundary_features *f, size_t feature, uint8_t wanted,
                                        qmat_boundary_piece pieces[]) {
-  qmat_boundary_piece root = {.feature = (uint32_t)feature, .wanted = wanted};
+  qmat_boundary_piece root = {.feature = (uint32_t)feature, .near = QMAT_NONE, .wanted = wanted};
   size_t row;
   qmat_cone_side side;
   switch (qmat_boundary_feature_kind(f, feature, &row)) {
@@ -40,7 +40,7 @@ size_t qmat_boundary_pieces_of_feature(const qmat_boundary_features *f, size_t f
 }
 
 qmat_boundary_piece qmat_boundary_piece_of_space(const qmat_boundary_features *f, uint8_t wanted) {
-  qmat_boundary_piece cell = {.feature = QMAT_CELL, .wanted = wanted};
+  qmat_boundary_piece cell = {.feature = QMAT_CELL, .near = QMAT_NONE, .wanted = wanted};
   for (int k = 0; k < 3; k++) {
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < f->sphere_count; i++) {

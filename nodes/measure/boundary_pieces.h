@@ -2,6 +2,7 @@
 #ifndef QMAT_NODES_MEASURE_BOUNDARY_PIECES_H
 #define QMAT_NODES_MEASURE_BOUNDARY_PIECES_H
 
+#include "core/geometry/medial_complex.h"
 #include "nodes/measure/boundary_features.h"
 
 /* In place of a feature's number: the piece is a cube of space. */
@@ -17,6 +18,7 @@
 typedef struct qmat_boundary_piece {
   double at[9];
   uint32_t feature;
+  uint32_t near;  /* the caller's: a triangle of the surface near the piece, or QMAT_NONE */
   uint8_t wanted; /* the caller's: which bounds the piece still counts for */
 } qmat_boundary_piece;
 
@@ -38,7 +40,7 @@ bool qmat_boundary_piece_ball(const qmat_boundary_features *f, const qmat_bounda
 int qmat_boundary_piece_hull(const qmat_boundary_features *f, const qmat_boundary_piece *p, double points[4][3],
                              double *bulge);
 
-/* How many pieces (2, 4 or 8) a piece is split into, and these; they are wanted for the same. */
+/* How many pieces (2, 4 or 8) a piece is split into, and these; what is the caller's is the same. */
 int qmat_boundary_piece_child_count(const qmat_boundary_features *f, const qmat_boundary_piece *p);
 void qmat_boundary_piece_split(const qmat_boundary_features *f, const qmat_boundary_piece *p,
                                qmat_boundary_piece children[]);

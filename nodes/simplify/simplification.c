@@ -189,9 +189,8 @@ static qmat_status judge_round(qmat_simplification *s, qmat_simplified *a, qmat_
 
 /* ---- the passes ---- */
 
-/* Collapses the dense initial medial mesh as far as `qmat_dense_share` of the error allows: in pieces on all threads,
- * where it is large, then as a whole. */
-static qmat_status collapse_dense(qmat_simplification *s) {
+/* Makes the dense initial medial mesh, and the constraint points. */
+static qmat_status make_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   qmat_decimation_uninit(dense);
   *dense = (qmat_decimation){
@@ -200,16 +199,21 @@ static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
   const bool inside = s->params.error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
-  if (status == QMAT_OK)
-    status = qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
-                                         QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
+  return status == QMAT_OK
+             ? qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
+                                           QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints)
+             : status;
+}
 
+/* Collapses the dense initial medial mesh as far as `qmat_dense_share` of the error allows: in pieces on all threads,
+ * where it is large, then as a whole. */
+static qmat_status collapse_dense(qmat_simplification *s) {
+  qmat_decimation *dense = &s->dense;
   dense->rules.share = qmat_dense_share;
   dense->rules.refits = 0;
-  if (status == QMAT_OK)
-    status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex, dense->sheet_vertices)
-                 ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
-                 : qmat_decimation_init(dense, &s->constraints, s->state.depths);
+  const qmat_status status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex, dense->sheet_vertices)
+                                 ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
+                                 : qmat_decimation_init(dense, &s->constraints, s->state.depths);
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;
 }
 
@@ -240,11 +244,24 @@ static qmat_status collapse_and_fit(qmat_simplification *s, const qmat_extra_poi
   return status;
 }
 
+/* Mends the Betti numbers of a free result. Small loops and voids of the dense initial mesh are noise at the scale of
+ * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. */
+static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *best) {
+  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  bool right = false;
+  qmat_status status = qmat_simplification_open_voids(s, best);
+  if (status == QMAT_OK) status = qmat_simplification_close_loops(s, best);
+  if (status == QMAT_OK && best->within_epsilon) status = judge_topology(s, best->medial, &right);
+  if (right) best->has_right_topology = true;
+  return status;
+}
+
 /* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
  * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
- * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
+ * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse; if
+ * only its topology gets worse, `right` becomes the result before. */
 static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best,
-                              bool *fewer) {
+                              qmat_simplified *right, bool *fewer) {
   *fewer = false;
   if (s->params.refits == 0 || best->medial->sphere_count <= (size_t)s->params.vertices) return QMAT_OK;
   qmat_extra_points extra = no_extra_points(s);
@@ -260,37 +277,49 @@ static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *
     ended = a.within_epsilon;
     if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
-    if (status == QMAT_OK && !qmat_simplified_is_better(best, &a)) {
-      *fewer = a.medial->sphere_count < best->medial->sphere_count;
+    if (status == QMAT_OK) *fewer = a.medial->sphere_count < best->medial->sphere_count;
+    if (status == QMAT_OK && (!qmat_simplified_is_better(best, &a) || (*fewer && a.fault == best->fault))) {
+      if (best->has_right_topology && !a.has_right_topology) replace(best, right);
       replace(&a, best);
       return QMAT_OK;
     }
     qmat_simplified_uninit(&a);
   }
+  *fewer = false;
   s->newest = base;
   return status;
 }
 
-/* Repeats joint refits while they remove spheres: refitted spheres make room for others to disappear. */
+/* Repeats joint refits while they remove spheres: refitted spheres make room for others to disappear. A result that
+ * loses the right topology on the way counts only if that can be mended. */
 static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
   qmat_status status = QMAT_OK;
+  qmat_simplified right = {.fault = INFINITY};
   bool fewer = true;
   for (int i = 0; i < QMAT_MOST_REFIT_REPEATS && fewer && status == QMAT_OK; i++)
-    status = refit_once(s, found, best, &fewer);
+    status = refit_once(s, found, best, &right, &fewer);
+  if (right.medial) {
+    if (status == QMAT_OK) status = mend_topology(s, best);
+    if (status == QMAT_OK && qmat_simplified_is_better(&right, best)) replace(&right, best);
+  }
+  qmat_simplified_uninit(&right);
   return status;
 }
 
 /* Runs rounds of collapses until both errors are within epsilon between the constraint points too. Places where the
  * surface is too far from the envelope, or the interior is uncovered, become constraint points. The best round
- * counts. */
+ * counts. There may be no result where the initial medial mesh itself is not within epsilon. */
 static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
   const double epsilon = s->params.epsilon;
   qmat_extra_points extra = no_extra_points(s);
-  qmat_status status = collapse_dense(s);
+  qmat_status status = make_dense(s);
+  const bool is_within = status == QMAT_OK && starts_within(s);
+  if (status == QMAT_OK && s->may_end_without_result && epsilon > 0 && !is_within) return QMAT_OK;
+  if (status == QMAT_OK) status = collapse_dense(s);
   for (size_t round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
-    const bool is_within = starts_within(s), is_last = round == QMAT_MOST_ROUNDS || !is_within;
+    const bool is_last = round == QMAT_MOST_ROUNDS || !is_within;
     status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
@@ -302,18 +331,6 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
     qmat_medial_errors_uninit(&errors);
     if (status != QMAT_OK || is_done) return status;
   }
-  return status;
-}
-
-/* Mends the Betti numbers of a free result. Small loops and voids of the dense initial mesh are noise at the scale of
- * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. */
-static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *best) {
-  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
-  bool right = false;
-  qmat_status status = qmat_simplification_open_voids(s, best);
-  if (status == QMAT_OK) status = qmat_simplification_close_loops(s, best);
-  if (status == QMAT_OK && best->within_epsilon) status = judge_topology(s, best->medial, &right);
-  if (right) best->has_right_topology = true;
   return status;
 }
 

@@ -16,7 +16,8 @@ typedef struct qmat_simplification {
   const qmat_samples *samples;
   const qmat_medial *initial;
   qmat_initial_medial state;
-  uint64_t seed; /* of the start; 0: costs as they are */
+  uint64_t seed;               /* of the start; 0: costs as they are */
+  bool may_end_without_result; /* where the initial medial mesh is not within epsilon */
   qmat_surface *surface;
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
@@ -28,7 +29,8 @@ typedef struct qmat_simplification {
   qmat_copy_depths depths; /* of the copies of rounds */
 } qmat_simplification;
 
-/* A result so far, in the unit frame. `fault` is its largest error, at least epsilon. */
+/* A result so far, in the unit frame; `medial` is NULL where there is none. `fault` is its largest error, at least
+ * epsilon. */
 typedef struct qmat_simplified {
   qmat_medial *medial; /* unsealed; the caller releases it */
   qmat_simplify_figures figures;

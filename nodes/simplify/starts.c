@@ -5,6 +5,7 @@
 
 #include "core/geometry/medial_build.h"
 #include "core/side_by_side.h"
+#include "nodes/initial/crease_spheres.h"
 
 typedef struct all_starts {
   const qmat_simplification *prepared;
@@ -15,6 +16,7 @@ typedef struct all_starts {
   qmat_simplified *results;
   _Atomic size_t
       *free_counts; /* per seed: the spheres without kept creases, SIZE_MAX beyond epsilon; 0: not known yet */
+  size_t *left_out; /* the starts that run last */
   _Atomic size_t done;
 } all_starts;
 
@@ -39,13 +41,12 @@ static size_t keep_below(uint32_t *rows, size_t count, size_t width, size_t limi
   return kept;
 }
 
-/* Makes a copy of a medial mesh without the spheres of radius 0 at its end: those that medial.features has added. A
- * medial mesh of nothing else stays whole. */
+/* Makes a copy of a medial mesh without the spheres that medial.features has added. A medial mesh of nothing else stays
+ * whole. */
 static qmat_status leave_features(qmat_context *context, const qmat_medial *medial, qmat_medial **bare) {
   qmat_medial *copy = *bare = qmat_medial_copy(medial);
   if (!copy) return qmat_fail_memory(context, "the initial medial mesh");
-  size_t count = copy->sphere_count;
-  while (count > copy->sheet_sphere_count && copy->spheres[4 * count - 1] == 0) count--;
+  const size_t count = qmat_medial_count_without_creases(copy);
   if (count > 0) copy->sphere_count = count;
   if (copy->region_offset_count > 0) {
     copy->region_offset_count = copy->sphere_count + 1;
@@ -85,26 +86,53 @@ static bool is_beaten(const all_starts *all, size_t start) {
   return count > 0 && count <= all->fewest_kept;
 }
 
-/* Starts with the same seed follow each other, creases kept last. */
-static qmat_status run_start(void *user, qmat_context *own, size_t start) {
-  all_starts *all = user;
-  if (is_beaten(all, start)) {
-    atomic_fetch_add(&all->done, 1);
-    return QMAT_OK;
-  }
+/* Runs a start. `is_needed`: it has a result even where its initial medial mesh is not within epsilon. */
+static qmat_status run_start(all_starts *all, qmat_context *own, size_t start, bool is_needed) {
   qmat_simplification s = *all->prepared;
   qmat_simplified *result = &all->results[start];
   s.context = own;
   s.params = *all->params;
   s.seed = start / all->rule_count;
   if (all->rule_count == 2) s.params.features = keeps_creases(all, start) ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
-  if (all->rule_count == 2 && s.params.features == QMAT_FEATURES_NONE) s.initial = all->bare;
+  if (all->rule_count == 2 && !keeps_creases(all, start)) s.initial = all->bare;
+  s.may_end_without_result = !is_needed;
   const qmat_status status = qmat_simplification_run(&s, result);
-  if (status == QMAT_OK && all->rule_count == 2 && !keeps_creases(all, start))
-    atomic_store(&all->free_counts[start / 2],
-                 result->within_epsilon && result->has_right_topology ? result->medial->sphere_count : SIZE_MAX);
   s.surface = NULL; /* the caller's */
   qmat_simplification_uninit(&s);
+  return status;
+}
+
+/* Starts with the same seed follow each other, creases kept last. */
+static qmat_status run_first(void *user, qmat_context *own, size_t start) {
+  all_starts *all = user;
+  qmat_status status = QMAT_OK;
+  if (!is_beaten(all, start)) {
+    const bool is_free = all->rule_count == 2 && !keeps_creases(all, start);
+    const qmat_simplified *result = &all->results[start];
+    status = run_start(all, own, start, !is_free);
+    if (status == QMAT_OK && is_free)
+      atomic_store(&all->free_counts[start / 2],
+                   result->within_epsilon && result->has_right_topology ? result->medial->sphere_count : SIZE_MAX);
+  }
+  atomic_fetch_add(&all->done, 1);
+  return status;
+}
+
+/* The starts without kept creases that ended without a result, although those that keep creases have many spheres. */
+static size_t find_left_out(const all_starts *all, size_t count, size_t *left_out) {
+  size_t found = 0;
+  for (size_t i = 0; i + 1 < count && all->rule_count == 2; i += 2) {
+    const qmat_simplified *kept = &all->results[i + 1];
+    const bool is_good = kept->within_epsilon && kept->has_right_topology &&
+                         (double)kept->medial->sphere_count <= qmat_few_kept * (double)all->fewest_kept;
+    if (!all->results[i].medial && !is_good) left_out[found++] = i;
+  }
+  return found;
+}
+
+static qmat_status run_left_out(void *user, qmat_context *own, size_t i) {
+  all_starts *all = user;
+  const qmat_status status = run_start(all, own, all->left_out[i], true);
   atomic_fetch_add(&all->done, 1);
   return status;
 }
@@ -113,7 +141,7 @@ static qmat_status run_start(void *user, qmat_context *own, size_t start) {
 static qmat_status run_alone(qmat_context *context, all_starts *all) {
   const qmat_arena arena = context->arena;
   context->arena = (qmat_arena){0};
-  const qmat_status status = run_start(all, context, 0);
+  const qmat_status status = run_first(all, context, 0);
   qmat_arena_uninit(&context->arena);
   context->arena = arena;
   return status;
@@ -124,10 +152,12 @@ qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, 
   qmat_context *context = prepared->context;
   all_starts all = {.prepared = prepared, .params = params, .rule_count = chooses_features(prepared, params) ? 2 : 1};
   const size_t count = (size_t)params->effort * all.rule_count;
+  const size_t total = all.rule_count == 2 ? count + count / 2 : count; /* with those that may be left out at first */
   *best = (qmat_simplified){.fault = INFINITY};
   all.results = qmat_arena_alloc(&context->arena, count, sizeof *all.results);
   all.free_counts = qmat_arena_calloc(&context->arena, count, sizeof *all.free_counts);
-  if (!all.results || !all.free_counts) return qmat_fail_memory(context, "starts");
+  all.left_out = qmat_arena_alloc(&context->arena, count, sizeof *all.left_out);
+  if (!all.results || !all.free_counts || !all.left_out) return qmat_fail_memory(context, "starts");
   for (size_t i = 0; i < count; i++) all.results[i] = *best;
   qmat_status status = QMAT_OK;
   if (all.rule_count == 2) {
@@ -136,9 +166,12 @@ qmat_status qmat_simplification_run_starts(const qmat_simplification *prepared, 
   }
   if (status == QMAT_OK)
     status = count == 1 ? run_alone(context, &all)
-                        : qmat_run_side_by_side(context, count, run_start, &all, &all.done, count, "starts");
+                        : qmat_run_side_by_side(context, count, run_first, &all, &all.done, total, "starts");
+  const size_t left = status == QMAT_OK ? find_left_out(&all, count, all.left_out) : 0;
+  if (left > 0) status = qmat_run_side_by_side(context, left, run_left_out, &all, &all.done, total, "starts");
   for (size_t i = 0; i < count; i++) {
-    if (status == QMAT_OK && (i == 0 || (!is_beaten(&all, i) && qmat_simplified_is_better(&all.results[i], best)))) {
+    if (status == QMAT_OK && all.results[i].medial && !is_beaten(&all, i) &&
+        (!best->medial || qmat_simplified_is_better(&all.results[i], best))) {
       qmat_simplified_uninit(best);
       *best = all.results[i];
     } else {

@@ -58,6 +58,10 @@ static const double qmat_target_margin = 0.02;
 /* Starts after the first multiply each cost by a factor between 1 and this one. */
 static const double qmat_most_cost_factor = 1.65;
 
+/* Where the initial medial mesh without creases is not within epsilon, it is tried only if keeping the creases takes
+ * more than this multiple of the least number of spheres. */
+static const double qmat_few_kept = 1.75;
+
 /* A move of a sphere has to lower its error by at least this share of the error. */
 static const double qmat_least_gain = 0.02;
 

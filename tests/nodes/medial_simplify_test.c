@@ -546,6 +546,19 @@ static void test_joint_fits_find_what_single_fits_do_not(void **state) {
   release(&unfitted);
 }
 
+/* Joint refits find six spheres instead of nine, but lose the right topology, which is mended then. */
+static void test_joint_refits_may_lose_the_topology_for_a_while(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("box", 4), "spacing=12%", "");
+  result r = simplify(&p, "epsilon=5%");
+  assert_true(r.medial->sphere_count <= 6);
+  check_topology(&p, &r);
+  check_errors(&p, &r, 0.05, true);
+  release(&r);
+  pipeline_free(&p);
+}
+
 /* How far spheres reach from the octopus's head. */
 static double reach(const qmat_medial *medial) {
   double most = 0;
@@ -1058,6 +1071,7 @@ int main(void) {
       cmocka_unit_test(test_topology_is_free_guarded_or_preserved),
       cmocka_unit_test(test_a_planted_medial_mesh_is_found_again),
       cmocka_unit_test(test_joint_fits_find_what_single_fits_do_not),
+      cmocka_unit_test(test_joint_refits_may_lose_the_topology_for_a_while),
       cmocka_unit_test(test_protection_keeps_tubular_edges),
       cmocka_unit_test(test_protection_of_nothing_thin_changes_nothing),
       cmocka_unit_test(test_medial_mesh_without_regions_works),
