@@ -58,7 +58,7 @@ static qmat_status divide_edge(feature_builder *b, uint32_t from, uint32_t to) {
   uint32_t last, next = QMAT_NONE;
   qmat_status status = sphere_at_vertex(b, from, &last);
   for (double i = 1; i < pieces && status == QMAT_OK; i++) {
-    double place[3], centre[4] = {0, 0, 0, 0};
+    double place[3], centre[3];
     for (int k = 0; k < 3; k++) place[k] = a[k] + i / pieces * (c[k] - a[k]);
     qmat_frame_to_model(&b->frame, place, 1, centre);
     status = qmat_crease_spheres_add(b->context, centre, QMAT_NONE, &b->spheres, &next);

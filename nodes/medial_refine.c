@@ -264,10 +264,10 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   r->spacing = spacing_share * epsilon;
   r->known = rounds[0].samples->count;
   const double enough = params->trigger * epsilon, limit = fmin(params->target, params->trigger) * epsilon;
-  qmat_status status = qmat_crease_spheres_of_medial(r->context, rounds[0].medial, &r->creases);
-  if (status == QMAT_OK) status = find_far_places(r, enough, &rounds[0]);
+  qmat_status status = find_far_places(r, enough, &rounds[0]);
   if (status != QMAT_OK || rounds[0].far_count == 0) return status;
-  status = find_far_places(r, limit, &rounds[0]);
+  status = qmat_crease_spheres_of_medial(r->context, rounds[0].medial, &r->creases);
+  if (status == QMAT_OK) status = find_far_places(r, limit, &rounds[0]);
   return status == QMAT_OK ? refine_in_rounds(r, limit, enough, rounds, best) : status;
 }
 

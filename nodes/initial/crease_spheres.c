@@ -8,6 +8,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/vector.h"
+#include "nodes/initial/item_queue.h"
 
 void qmat_crease_spheres_uninit(qmat_crease_spheres *creases) {
   qmat_free(creases->spheres);
@@ -67,8 +68,7 @@ typedef struct sheet_graph {
   uint32_t *parents;
   uint32_t *reached, *finished, *wanted, *linked; /* per sphere: the last search that set this mark */
   uint32_t search;
-  uint32_t *heap, *places;
-  size_t heap_count;
+  qmat_item_queue queue; /* of spheres, by their distances then */
 } sheet_graph;
 
 typedef struct linker {
@@ -137,7 +137,7 @@ static qmat_status make_graph(linker *b) {
   g->starts = qmat_arena_calloc(arena, count + 2, sizeof *g->starts);
   g->neighbours = qmat_arena_alloc(arena, m->edge_count, 2 * sizeof *g->neighbours);
   g->distances = qmat_arena_alloc(arena, count, sizeof *g->distances);
-  uint32_t **const rows[] = {&g->parents, &g->reached, &g->finished, &g->wanted, &g->linked, &g->heap, &g->places};
+  uint32_t **const rows[] = {&g->parents, &g->reached, &g->finished, &g->wanted, &g->linked};
   bool bad = !spheres || !g->starts || !g->neighbours || !g->distances;
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
     bad |= !(*rows[i] = qmat_arena_calloc(arena, count, sizeof **rows[i]));
@@ -150,57 +150,34 @@ static qmat_status make_graph(linker *b) {
   return QMAT_OK;
 }
 
-static bool is_nearer(const sheet_graph *g, uint32_t a, uint32_t b) {
-  return g->distances[a] < g->distances[b] || (g->distances[a] == g->distances[b] && a < b);
-}
-
-static void put(sheet_graph *g, size_t place, uint32_t sphere) {
-  g->heap[place] = sphere;
-  g->places[sphere] = (uint32_t)place;
-}
-
-static void sift_up(sheet_graph *g, size_t place, uint32_t sphere) {
-  for (; place > 0 && is_nearer(g, sphere, g->heap[(place - 1) / 2]); place = (place - 1) / 2)
-    put(g, place, g->heap[(place - 1) / 2]);
-  put(g, place, sphere);
-}
-
-static uint32_t take_nearest(sheet_graph *g) {
-  const uint32_t first = g->heap[0], last = g->heap[--g->heap_count];
-  size_t place = 0;
-  for (size_t child; (child = 2 * place + 1) < g->heap_count; place = child) {
-    if (child + 1 < g->heap_count && is_nearer(g, g->heap[child + 1], g->heap[child])) child++;
-    if (!is_nearer(g, g->heap[child], last)) break;
-    put(g, place, g->heap[child]);
-  }
-  if (g->heap_count) put(g, place, last);
-  return first;
+static qmat_status reach(linker *b, uint32_t sphere, double distance, uint32_t parent) {
+  sheet_graph *g = &b->graph;
+  g->distances[sphere] = distance;
+  g->parents[sphere] = parent;
+  g->reached[sphere] = g->search;
+  return qmat_queue_push(&g->queue, distance, sphere) ? qmat_fail_memory(b->context, "the medial mesh") : QMAT_OK;
 }
 
 /* Grows the tree of shortest paths from `root` (Dijkstra 1959) until it contains all wanted spheres, `missing` of them.
  */
-static void find_paths(sheet_graph *g, uint32_t root, size_t missing) {
-  g->distances[root] = 0;
-  g->parents[root] = QMAT_NONE;
-  g->reached[root] = g->search;
-  g->heap_count = 1;
-  put(g, 0, root);
-  while (g->heap_count && missing) {
-    const uint32_t v = take_nearest(g);
+static qmat_status find_paths(linker *b, uint32_t root, size_t missing) {
+  sheet_graph *g = &b->graph;
+  g->queue.count = 0;
+  qmat_status status = reach(b, root, 0, QMAT_NONE);
+  while (g->queue.count && missing && status == QMAT_OK) {
+    const uint32_t v = (uint32_t)qmat_queue_pop(&g->queue).item;
+    if (g->finished[v] == g->search) continue; /* it came nearer after it was queued */
     g->finished[v] = g->search;
     missing -= g->wanted[v] == g->search;
-    for (size_t i = g->starts[v]; i < g->starts[v + 1]; i++) {
+    for (size_t i = g->starts[v]; i < g->starts[v + 1] && status == QMAT_OK; i++) {
       const uint32_t w = g->neighbours[i];
       const double distance =
           g->distances[v] + qmat_point_distance(&g->spheres[4 * (size_t)v], &g->spheres[4 * (size_t)w]);
-      const bool is_new = g->reached[w] != g->search;
-      if (g->finished[w] == g->search || !(is_new || distance < g->distances[w])) continue;
-      g->distances[w] = distance;
-      g->parents[w] = v;
-      g->reached[w] = g->search;
-      sift_up(g, is_new ? g->heap_count++ : g->places[w], w);
+      if (g->finished[w] == g->search || (g->reached[w] == g->search && !(distance < g->distances[w]))) continue;
+      status = reach(b, w, distance, v);
     }
   }
+  return status;
 }
 
 /* --- slabs between creases and medial mesh ----------------------------------------------------------------------- */
@@ -235,7 +212,7 @@ static qmat_status link_sphere(linker *b, uint32_t id, const uint32_t *next, siz
     missing += g->wanted[anchor] != g->search;
     g->wanted[anchor] = g->search;
   }
-  find_paths(g, root, missing);
+  if (status == QMAT_OK) status = find_paths(b, root, missing);
   g->linked[root] = g->search;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     const uint32_t anchor = b->anchors[next[i]];
@@ -330,6 +307,7 @@ qmat_status qmat_crease_spheres_link(qmat_context *context, const qmat_frame *fr
   if (status == QMAT_OK) status = find_anchors(&b);
   if (status == QMAT_OK) status = link_spheres(&b);
   if (status == QMAT_OK) status = make_medial(&b, *linked);
+  qmat_free(b.graph.queue.items);
   qmat_free(b.edges);
   qmat_free(b.triangles);
   if (status == QMAT_OK) return status;

@@ -79,6 +79,10 @@ static bool keeps_creases(const all_starts *all, size_t start) {
   return all->rule_count == 2 && start % 2 == 1;
 }
 
+static bool leaves_creases(const all_starts *all, size_t start) {
+  return all->rule_count == 2 && start % 2 == 0;
+}
+
 /* Whether a start that keeps creases has no fewer spheres than the one with the same seed that does not. */
 static bool is_beaten(const all_starts *all, size_t start) {
   if (!keeps_creases(all, start)) return false;
@@ -93,8 +97,11 @@ static qmat_status run_start(all_starts *all, qmat_context *own, size_t start, b
   s.context = own;
   s.params = *all->params;
   s.seed = start / all->rule_count;
-  if (all->rule_count == 2) s.params.features = keeps_creases(all, start) ? QMAT_FEATURES_SHARP : QMAT_FEATURES_NONE;
-  if (all->rule_count == 2 && !keeps_creases(all, start)) s.initial = all->bare;
+  if (keeps_creases(all, start)) s.params.features = QMAT_FEATURES_SHARP;
+  if (leaves_creases(all, start)) {
+    s.params.features = QMAT_FEATURES_NONE;
+    s.initial = all->bare;
+  }
   s.may_end_without_result = !is_needed;
   const qmat_status status = qmat_simplification_run(&s, result);
   s.surface = NULL; /* the caller's */
@@ -107,7 +114,7 @@ static qmat_status run_first(void *user, qmat_context *own, size_t start) {
   all_starts *all = user;
   qmat_status status = QMAT_OK;
   if (!is_beaten(all, start)) {
-    const bool is_free = all->rule_count == 2 && !keeps_creases(all, start);
+    const bool is_free = leaves_creases(all, start);
     const qmat_simplified *result = &all->results[start];
     status = run_start(all, own, start, !is_free);
     if (status == QMAT_OK && is_free)

@@ -620,7 +620,7 @@ static void test_loops_are_those_of_the_solid(void **state) {
   } models[] = {{"octopus", 0, true}, {"torus", 1, false}, {"l-bracket", 0, false}};
   for (size_t i = 0; i < sizeof models / sizeof *models; i++) {
     pipeline p;
-    pipeline_make(&p, pipeline_model(models[i].name, 0), "spacing=2%", "");
+    pipeline_make(&p, pipeline_model(models[i].name, 0), "", "");
     const int64_t changed =
         pipeline_count(p.report, "kept_for_topology") + pipeline_count(p.report, "dropped_for_topology");
     assert_int_equal(changed > 0, models[i].is_changed);
