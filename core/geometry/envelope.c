@@ -416,6 +416,27 @@ bool qmat_envelope_holds(const qmat_envelope *envelope, const double point[3], d
   return search(envelope, point, -depth, -depth, &nearest) < -depth;
 }
 
+/* The weights of the medial sphere of an item that attains its distance to the point. Returns the number of spheres. */
+static int foot_on_item(const qmat_envelope *envelope, envelope_item item, const double point[3], double weights[3]) {
+  int count;
+  (void)ids_at(envelope, item.primitive, &count);
+  weights[0] = 1;
+  weights[1] = weights[2] = 0;
+  if (count == 3) qmat_slab_foot(&envelope->slabs[item.slot], point, weights);
+  if (count == 2) qmat_cone_foot(&envelope->cones[item.slot], point, weights);
+  return count;
+}
+
+double qmat_envelope_foot_within(const qmat_envelope *envelope, const double point[3], double limit, uint32_t ids[3],
+                                 double weights[3]) {
+  envelope_item nearest;
+  const double distance = search(envelope, point, limit, -INFINITY, &nearest);
+  if (!(distance < INFINITY)) return distance;
+  for (int i = foot_on_item(envelope, nearest, point, weights); i < 3; i++) ids[i] = UINT32_MAX;
+  (void)qmat_envelope_primitive(envelope, nearest.primitive, ids);
+  return distance;
+}
+
 double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3], size_t *primitive,
                              double sphere[4]) {
   envelope_item nearest = {0, 0};
@@ -423,10 +444,9 @@ double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3
   if (primitive) *primitive = nearest.primitive;
   if (envelope->primitive_count == 0) return distance;
   int count;
+  double weights[3];
   const double *ends = envelope->ends + 4 * ids_at(envelope, nearest.primitive, &count);
-  double weights[3] = {1, 0, 0};
-  if (count == 3) qmat_slab_foot(&envelope->slabs[nearest.slot], point, weights);
-  if (count == 2) qmat_cone_foot(&envelope->cones[nearest.slot], point, weights);
+  (void)foot_on_item(envelope, nearest, point, weights);
   for (int k = 0; k < 4; k++) {
     sphere[k] = 0;
     for (int i = 0; i < count; i++) sphere[k] += weights[i] * ends[4 * i + k];

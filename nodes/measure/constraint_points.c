@@ -152,7 +152,7 @@ typedef struct {
   double weights[3];
 } witness;
 
-static void take_sphere(const regions *a, const double *point, uint32_t sample, witness *best) {
+static void take_spheres(const regions *a, const double *point, uint32_t sample, witness *best) {
   for (size_t i = a->sphere_starts[sample]; i < a->sphere_starts[sample + 1]; i++) {
     const uint32_t v = a->spheres[i];
     const double f = qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point);
@@ -202,40 +202,29 @@ static void take_star(const regions *a, const double *point, uint32_t vertex, wi
  * are farther than the second share, all of the medial mesh is. */
 static const double accepted_with_sphere = 0.5, accepted_with_star = 0.9;
 
-/* The work of about a tenth of a second. More far points than that are worth a search structure. */
-static const size_t most_sphere_queries = 100000000;
-
 static void store(qmat_constraint_points *constraints, size_t i, const witness *w) {
   memcpy(&constraints->witnesses[3 * i], w->vertices, sizeof w->vertices);
   memcpy(&constraints->weights[3 * i], w->weights, sizeof w->weights);
   constraints->distances[i] = w->distance;
 }
 
-/* The best witness among the regions of `count` samples. The primitives around are searched only where no sphere is as
- * near as `accepted`. */
-static void search_regions(const regions *a, const double *point, const uint32_t *samples, size_t count,
-                           double accepted, witness *best) {
-  *best = (witness){INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
-  for (size_t k = 0; k < count; k++) take_sphere(a, point, samples[k], best);
-  if (!(best->distance > accepted)) return;
-  for (size_t k = 0; k < count; k++)
-    for (size_t i = a->sphere_starts[samples[k]]; i < a->sphere_starts[samples[k] + 1]; i++) {
-      const uint32_t v = a->spheres[i];
-      if (qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point) - a->reaches[v] < best->distance)
-        take_star(a, point, v, best);
-    }
+/* The best witness in the region of a sample. The primitives around are searched only where no sphere is as near as
+ * `accepted`. */
+static witness search_region(const regions *a, const double *point, uint32_t sample, double accepted) {
+  witness best = {INFINITY, {QMAT_NONE, QMAT_NONE, QMAT_NONE}, {0, 0, 0}};
+  take_spheres(a, point, sample, &best);
+  if (!(best.distance > accepted)) return best;
+  for (size_t i = a->sphere_starts[sample]; i < a->sphere_starts[sample + 1]; i++) {
+    const uint32_t v = a->spheres[i];
+    if (qmat_sphere_distance(&a->complex->spheres[4 * (size_t)v], point) - a->reaches[v] < best.distance)
+      take_star(a, point, v, &best);
+  }
+  return best;
 }
 
-/* The same for a point on or below a facet, in the regions of its corners. These are far from most of a large facet:
- * beyond `enough` the region of the nearest sample is searched too. */
-static void search_near_facet(const regions *a, const double *point, size_t facet, double accepted, double enough,
-                              witness *best) {
-  search_regions(a, point, &a->mesh->triangles[3 * facet], 3, accepted, best);
-  if (best->distance <= enough) return;
-  const uint32_t nearest = qmat_point_grid_nearest(&a->samples, point);
-  witness other;
-  search_regions(a, point, &nearest, 1, accepted, &other);
-  if (other.distance < best->distance) *best = other;
+/* The same for the nearest sample. The corners of the point's facet would be far away on a large one. */
+static witness search_nearest_region(const regions *a, const double *point, double accepted) {
+  return search_region(a, point, qmat_point_grid_nearest(&a->samples, point), accepted);
 }
 
 /* Without a bound too, every point needs a witness. */
@@ -252,61 +241,10 @@ static qmat_status next_slice(qmat_context *context, size_t first, size_t count,
   return qmat_progress(context, first, count, "constraint points");
 }
 
-static size_t count_far(const qmat_constraint_points *constraints, double enough) {
-  size_t far = 0;
-  for (size_t i = 0; i < constraints->count; i++) far += is_far(constraints, i, enough);
-  return far;
-}
-
-/* Finds the nearest primitive of all for the points that are far from their regions, among the primitives at the
- * spheres that are near enough. For few points this is cheaper than a search structure over a dense medial mesh. */
-static qmat_status search_all_spheres(qmat_context *context, const regions *a, double enough,
-                                      qmat_constraint_points *constraints) {
-  const qmat_complex *complex = a->complex;
-  const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < constraints->count; first = last) {
-    const qmat_status status = next_slice(context, first, constraints->count, &last);
-    if (status != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-    for (size_t i = first; i < last; i++) {
-      if (!is_far(constraints, i, enough)) continue;
-      const double *p = &constraints->points[3 * i];
-      witness best = {.distance = constraints->distances[i]};
-      memcpy(best.vertices, &constraints->witnesses[3 * i], sizeof best.vertices);
-      memcpy(best.weights, &constraints->weights[3 * i], sizeof best.weights);
-      for (size_t v = 0; v < complex->vertex_count; v++) {
-        const double f = qmat_sphere_distance(&complex->spheres[4 * v], p);
-        if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
-      }
-      for (size_t v = 0; v < complex->vertex_count; v++)
-        if (qmat_sphere_distance(&complex->spheres[4 * v], p) - a->reaches[v] < best.distance)
-          take_star(a, p, (uint32_t)v, &best);
-      store(constraints, i, &best);
-    }
-  }
-  return QMAT_OK;
-}
-
-static witness nearest_primitive(const qmat_envelope *envelope, const qmat_complex *complex, const double *p) {
-  size_t primitive;
-  witness w = {.vertices = {QMAT_NONE, QMAT_NONE, QMAT_NONE}};
-  qmat_envelope_distance(envelope, p, &primitive);
-  const int count = qmat_envelope_primitive(envelope, primitive, w.vertices);
-  const double *s[3] = {NULL, NULL, NULL};
-  for (int k = 0; k < count; k++) s[k] = &complex->spheres[4 * (size_t)w.vertices[k]];
-  qmat_slab slab;
-  qmat_cone cone;
-  if (count == 3) {
-    qmat_slab_prepare(&slab, s[0], s[1], s[2]);
-    w.distance = qmat_slab_foot(&slab, p, w.weights);
-  } else if (count == 2) {
-    qmat_cone_prepare(&cone, s[0], s[1]);
-    w.distance = qmat_cone_foot(&cone, p, w.weights);
-  } else {
-    w.weights[0] = 1;
-    w.distance = qmat_sphere_distance(s[0], p);
-  }
-  for (int k = count; k < 3; k++) w.vertices[k] = QMAT_NONE;
+/* The distance is INFINITY where none is as near as `limit`. */
+static witness nearest_primitive(const qmat_envelope *envelope, const double *point, double limit) {
+  witness w;
+  w.distance = qmat_envelope_foot_within(envelope, point, limit, w.vertices, w.weights);
   return w;
 }
 
@@ -315,9 +253,12 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
                            complex->triangles, complex->triangle_count, envelope);
 }
 
-/* The same for many points. */
-static qmat_status search_envelope(qmat_context *context, const qmat_complex *complex, double enough,
-                                   qmat_constraint_points *constraints) {
+/* Finds the nearest primitive of all for the points that are farther than `enough` from their regions. */
+static qmat_status search_whole_envelope(qmat_context *context, const qmat_complex *complex, double enough,
+                                         qmat_constraint_points *constraints) {
+  bool found = false;
+  for (size_t i = 0; i < constraints->count && !found; i++) found = is_far(constraints, i, enough);
+  if (!found) return QMAT_OK;
   qmat_envelope *envelope;
   qmat_status status = envelope_of(context, complex, &envelope);
   if (status != QMAT_OK) return status;
@@ -328,8 +269,8 @@ static qmat_status search_envelope(qmat_context *context, const qmat_complex *co
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
       if (!is_far(constraints, i, enough)) continue;
-      const witness w = nearest_primitive(envelope, complex, &constraints->points[3 * i]);
-      store(constraints, i, &w);
+      const witness w = nearest_primitive(envelope, &constraints->points[3 * i], constraints->distances[i]);
+      if (w.distance < constraints->distances[i]) store(constraints, i, &w);
     }
   }
   qmat_envelope_free(envelope);
@@ -435,7 +376,7 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
       if (!qmat_surface_inside(surface, place->point) ||
           qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
         continue;
-      search_near_facet(a, place->point, place->facet, 0, 0, &place->witness);
+      place->witness = search_nearest_region(a, place->point, 0);
     }
   }
   for (size_t i = 0; i < kept; i++)
@@ -477,7 +418,7 @@ static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, con
 
 /* Makes the points on the surface, with witnesses from the regions around them. */
 static qmat_status make_surface_points(qmat_context *context, const regions *a, const double *positions,
-                                       const double *unit_samples, const size_t *starts, double accepted, double enough,
+                                       const double *unit_samples, const size_t *starts, double accepted,
                                        qmat_constraint_points *constraints) {
   const qmat_mesh *mesh = a->mesh;
   const size_t samples = constraints->sample_count;
@@ -488,10 +429,8 @@ static qmat_status make_surface_points(qmat_context *context, const regions *a, 
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t i = first; i < last; i++) {
-      const uint32_t sample = (uint32_t)i;
-      witness best;
-      search_regions(a, &constraints->points[3 * i], &sample, 1, accepted, &best);
-      store(constraints, i, &best);
+      const witness w = search_region(a, &constraints->points[3 * i], (uint32_t)i, accepted);
+      store(constraints, i, &w);
     }
   }
   for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
@@ -504,22 +443,12 @@ static qmat_status make_surface_points(qmat_context *context, const regions *a, 
       const size_t count = grid_points(&g, constraints->spacing);
       if (count) fill_grid(&g, constraints->spacing, &constraints->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
-        witness best;
-        search_near_facet(a, &constraints->points[3 * i], t, accepted, enough, &best);
-        store(constraints, i, &best);
+        const witness w = search_nearest_region(a, &constraints->points[3 * i], accepted);
+        store(constraints, i, &w);
       }
     }
   }
   return QMAT_OK;
-}
-
-static qmat_status improve_far_points(qmat_context *context, const regions *a, double enough,
-                                      qmat_constraint_points *constraints) {
-  const size_t far = count_far(constraints, enough);
-  if (far == 0) return QMAT_OK;
-  if (far * a->complex->vertex_count > most_sphere_queries)
-    return search_envelope(context, a->complex, enough, constraints);
-  return search_all_spheres(context, a, enough, constraints);
 }
 
 qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
@@ -535,8 +464,8 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
   constraints->count = constraints->surface_count;
   if (status == QMAT_OK) status = allocate(context, constraints);
   if (status == QMAT_OK)
-    status = make_surface_points(context, &a, positions, unit_samples, starts, enough, enough, constraints);
-  return status == QMAT_OK ? improve_far_points(context, &a, enough, constraints) : status;
+    status = make_surface_points(context, &a, positions, unit_samples, starts, enough, constraints);
+  return status == QMAT_OK ? search_whole_envelope(context, complex, enough, constraints) : status;
 }
 
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
@@ -561,8 +490,8 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   constraints->count = constraints->surface_count + inner.count + shell.count;
   if ((status = allocate(context, constraints)) != QMAT_OK) return status;
   const double enough = accepted_with_star * epsilon;
-  status = make_surface_points(context, &a, positions, unit_samples, starts, accepted_with_sphere * epsilon, enough,
-                               constraints);
+  status =
+      make_surface_points(context, &a, positions, unit_samples, starts, accepted_with_sphere * epsilon, constraints);
   if (status != QMAT_OK) return status;
   size_t next = constraints->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {
@@ -575,7 +504,7 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
     memcpy(&constraints->points[3 * next], shell.places[i].point, 3 * sizeof(double));
     store(constraints, next, &shell.places[i].witness);
   }
-  return improve_far_points(context, &a, enough, constraints);
+  return search_whole_envelope(context, complex, enough, constraints);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
@@ -597,7 +526,7 @@ qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *co
     if (status != QMAT_OK) break;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
-      const witness w = nearest_primitive(envelope, complex, &constraints->points[3 * i]);
+      const witness w = nearest_primitive(envelope, &constraints->points[3 * i], INFINITY);
       store(constraints, i, &w);
     }
   }
