@@ -188,6 +188,14 @@ static void select_median(const hierarchy_build *build, int axis, size_t first, 
   }
 }
 
+static void extend_box(envelope_node *node, const double low[3], const double high[3], double largest) {
+  for (int k = 0; k < 3; k++) {
+    node->low[k] = qmat_smaller(low[k], node->low[k]);
+    node->high[k] = qmat_larger(high[k], node->high[k]);
+  }
+  node->largest = qmat_larger(largest, node->largest);
+}
+
 static void build_leaf(hierarchy_build *build, envelope_node *node, size_t low, size_t high) {
   qmat_envelope *envelope = build->envelope;
   node->right = (uint32_t)low;
@@ -207,43 +215,42 @@ static void build_leaf(hierarchy_build *build, envelope_node *node, size_t low, 
       memcpy(envelope->spheres + 4 * (size_t)slot, ends, 4 * sizeof *ends);
     }
     envelope->items[i] = (envelope_item){.primitive = build->order[i], .slot = slot};
+    for (const double *end = ends; end < ends + 4 * (ptrdiff_t)count; end += 4) {
+      const double from[3] = {end[0] - end[3], end[1] - end[3], end[2] - end[3]};
+      const double to[3] = {end[0] + end[3], end[1] + end[3], end[2] + end[3]};
+      extend_box(node, from, to, end[3]);
+    }
   }
 }
 
 static void build_node(hierarchy_build *build, size_t low, size_t high) {
   qmat_envelope *envelope = build->envelope;
   envelope_node *node = &envelope->nodes[envelope->node_count++];
-  double from[3] = {INFINITY, INFINITY, INFINITY}, to[3] = {-INFINITY, -INFINITY, -INFINITY};
   *node = (envelope_node){.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
-  for (size_t i = low; i < high; i++) {
-    int count;
-    const double *end = envelope->ends + 4 * ids_at(envelope, build->order[i], &count);
-    for (; count-- > 0; end += 4) {
-      for (int k = 0; k < 3; k++) {
-        node->low[k] = fmin(node->low[k], end[k] - end[3]);
-        node->high[k] = fmax(node->high[k], end[k] + end[3]);
-      }
-      node->largest = fmax(node->largest, end[3]);
-    }
-    for (int k = 0; k < 3; k++) {
-      double x = build->centres[3 * (size_t)build->order[i] + (size_t)k];
-      from[k] = fmin(from[k], x);
-      to[k] = fmax(to[k], x);
-    }
-  }
   if (high - low <= LEAF_SIZE) {
     build_leaf(build, node, low, high);
     return;
   }
+  double from[3] = {INFINITY, INFINITY, INFINITY}, to[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = low; i < high; i++)
+    for (int k = 0; k < 3; k++) {
+      const double x = build->centres[3 * (size_t)build->order[i] + (size_t)k];
+      from[k] = qmat_smaller(x, from[k]);
+      to[k] = qmat_larger(x, to[k]);
+    }
   int axis = 0;
   for (int k = 1; k < 3; k++) {
     if (to[k] - from[k] > to[axis] - from[axis]) axis = k;
   }
   size_t middle = low + (high - low) / 2;
   select_median(build, axis, low, high, middle);
+  const envelope_node *left = &envelope->nodes[envelope->node_count];
   build_node(build, low, middle);
+  const envelope_node *right = &envelope->nodes[envelope->node_count];
   node->right = (uint32_t)envelope->node_count;
   build_node(build, middle, high);
+  extend_box(node, left->low, left->high, left->largest);
+  extend_box(node, right->low, right->high, right->largest);
 }
 
 static qmat_status build_hierarchy(qmat_context *context, qmat_envelope *envelope) {
@@ -269,8 +276,8 @@ static qmat_status build_hierarchy(qmat_context *context, qmat_envelope *envelop
       for (int k = 0; k < 3; k++) {
         double low = INFINITY, high = -INFINITY;
         for (int j = 0; j < ends; j++) {
-          low = fmin(low, end[4 * j + k] - end[4 * j + 3]);
-          high = fmax(high, end[4 * j + k] + end[4 * j + 3]);
+          low = qmat_smaller(low, end[4 * j + k] - end[4 * j + 3]);
+          high = qmat_larger(high, end[4 * j + k] + end[4 * j + 3]);
         }
         build.centres[3 * i + (size_t)k] = 0.5 * (low + high);
       }

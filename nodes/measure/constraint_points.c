@@ -253,14 +253,27 @@ static qmat_status envelope_of(qmat_context *context, const qmat_complex *comple
                            complex->triangles, complex->triangle_count, envelope);
 }
 
+/* So few points take less time than the hierarchy of the envelope. */
+enum { FEW_POINTS = 32 };
+
+/* The nearest primitive of all, if one is nearer than `best`: looks at every sphere. */
+static witness search_all_spheres(const regions *a, const double *point, witness best) {
+  for (size_t v = 0; v < a->complex->vertex_count; v++) {
+    const double f = qmat_sphere_distance(&a->complex->spheres[4 * v], point);
+    if (f < best.distance) best = (witness){f, {(uint32_t)v, QMAT_NONE, QMAT_NONE}, {1, 0, 0}};
+    if (f - a->reaches[v] < best.distance) take_star(a, point, (uint32_t)v, &best);
+  }
+  return best;
+}
+
 /* Finds the nearest primitive of all for the points that are farther than `enough` from their regions. */
-static qmat_status search_whole_envelope(qmat_context *context, const qmat_complex *complex, double enough,
-                                         qmat_constraint_points *constraints) {
-  bool found = false;
-  for (size_t i = 0; i < constraints->count && !found; i++) found = is_far(constraints, i, enough);
-  if (!found) return QMAT_OK;
-  qmat_envelope *envelope;
-  qmat_status status = envelope_of(context, complex, &envelope);
+static qmat_status search_everywhere(qmat_context *context, const regions *a, double enough,
+                                     qmat_constraint_points *constraints) {
+  size_t far_count = 0;
+  for (size_t i = 0; i < constraints->count; i++) far_count += is_far(constraints, i, enough);
+  if (far_count == 0) return QMAT_OK;
+  qmat_envelope *envelope = NULL;
+  qmat_status status = far_count > FEW_POINTS ? envelope_of(context, a->complex, &envelope) : QMAT_OK;
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
   for (size_t first = 0, last; first < constraints->count; first = last) {
@@ -269,8 +282,10 @@ static qmat_status search_whole_envelope(qmat_context *context, const qmat_compl
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
       if (!is_far(constraints, i, enough)) continue;
-      const witness w = nearest_primitive(envelope, &constraints->points[3 * i], constraints->distances[i]);
-      if (w.distance < constraints->distances[i]) store(constraints, i, &w);
+      const double *p = &constraints->points[3 * i], distance = constraints->distances[i];
+      const witness w = envelope ? nearest_primitive(envelope, p, distance)
+                                 : search_all_spheres(a, p, (witness){.distance = distance});
+      if (w.distance < distance) store(constraints, i, &w);
     }
   }
   qmat_envelope_free(envelope);
@@ -465,7 +480,7 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
   if (status == QMAT_OK) status = allocate(context, constraints);
   if (status == QMAT_OK)
     status = make_surface_points(context, &a, positions, unit_samples, starts, enough, constraints);
-  return status == QMAT_OK ? search_whole_envelope(context, complex, enough, constraints) : status;
+  return status == QMAT_OK ? search_everywhere(context, &a, enough, constraints) : status;
 }
 
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
@@ -504,7 +519,7 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
     memcpy(&constraints->points[3 * next], shell.places[i].point, 3 * sizeof(double));
     store(constraints, next, &shell.places[i].witness);
   }
-  return search_whole_envelope(context, complex, enough, constraints);
+  return search_everywhere(context, &a, enough, constraints);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,

@@ -71,6 +71,23 @@ static void assert_near(double got, double wanted) {
   if (!(fabs(got - wanted) <= EXACT)) fail_msg("%.17g is not %.17g", got, wanted);
 }
 
+/* The weighted sphere is at the distance. Nothing is written beyond the limit. */
+static void check_foot(const qmat_envelope *envelope, const random_medial *m, const double p[3], double wanted) {
+  uint32_t ids[3];
+  double weights[3], sphere[4] = {0}, sum = 0;
+  assert_near(qmat_envelope_foot_within(envelope, p, wanted + 1e-9, ids, weights), wanted);
+  for (size_t k = 0; k < 3; k++) {
+    sum += weights[k];
+    if (ids[k] == UINT32_MAX) assert_true(k > 0 && weights[k] == 0);
+    for (size_t j = 0; ids[k] != UINT32_MAX && j < 4; j++) sphere[j] += weights[k] * m->spheres[4 * ids[k] + j];
+  }
+  assert_near(sum, 1);
+  assert_near(qmat_sphere_distance(sphere, p), wanted);
+  uint32_t untouched[3] = {7, 8, 9};
+  assert_true(qmat_envelope_foot_within(envelope, p, wanted - 1e-9, untouched, weights) == INFINITY);
+  assert_true(untouched[0] == 7 && untouched[1] == 8 && untouched[2] == 9);
+}
+
 static void test_the_minimum_matches_brute_force(void **unused) {
   (void)unused;
   qmat_context context = {0};
@@ -103,6 +120,7 @@ static void test_the_minimum_matches_brute_force(void **unused) {
                   wanted);
       assert_near(qmat_envelope_distance_within(envelope, p, got + 1e-9), wanted);
       assert_true(qmat_envelope_distance_within(envelope, p, got - 1e-9) == INFINITY);
+      check_foot(envelope, &m, p, wanted);
     }
     qmat_envelope_free(envelope);
   }

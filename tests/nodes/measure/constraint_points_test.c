@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/measure/constraint_points.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/geometry/medial_distance.h"
+#include "tests/nodes/pipeline.h"
+
+#define ROUNDING 1e-12
+
+/* A model with its initial medial mesh, in the unit frame. */
+typedef struct {
+  pipeline p;
+  qmat_context context;
+  qmat_complex complex;
+  double *positions, *unit_samples;
+} model;
+
+static void make_model(model *m, qmat_mesh *mesh, const char *sample_params) {
+  *m = (model){.positions = NULL};
+  pipeline_make(&m->p, mesh, sample_params, "");
+  qmat_frame frame;
+  assert_int_equal(qmat_frame_of_mesh(&m->context, m->p.mesh, &frame), QMAT_OK);
+  double *spheres = qmat_alloc(m->p.medial->sphere_count, 4 * sizeof *spheres);
+  m->positions = qmat_alloc(m->p.mesh->vertex_count, 3 * sizeof(double));
+  m->unit_samples = qmat_alloc(m->p.samples->count, 3 * sizeof(double));
+  assert_true(spheres && m->positions && m->unit_samples);
+  qmat_frame_spheres_to_unit(&frame, m->p.medial->spheres, m->p.medial->sphere_count, spheres);
+  qmat_frame_to_unit(&frame, m->p.mesh->positions, m->p.mesh->vertex_count, m->positions);
+  qmat_frame_to_unit(&frame, m->p.samples->positions, m->p.samples->count, m->unit_samples);
+  assert_int_equal(qmat_complex_init(&m->context, &m->complex, m->p.medial, spheres), QMAT_OK);
+  qmat_free(spheres);
+}
+
+static void free_model(model *m) {
+  qmat_free(m->positions);
+  qmat_free(m->unit_samples);
+  qmat_complex_uninit(&m->complex);
+  qmat_context_uninit(&m->context);
+  pipeline_free(&m->p);
+}
+
+/* F, by a look at every primitive. */
+static double brute_force(const qmat_complex *c, const double point[3]) {
+  double best = INFINITY;
+  const double *s = c->spheres;
+  for (size_t v = 0; v < c->vertex_count; v++) best = fmin(best, qmat_sphere_distance(&s[4 * v], point));
+  for (size_t e = 0; e < c->edge_count; e++)
+    best = fmin(best, qmat_cone_distance(&s[4 * (size_t)c->edges[2 * e]], &s[4 * (size_t)c->edges[2 * e + 1]], point));
+  for (size_t t = 0; t < c->triangle_count; t++) {
+    const uint32_t *ids = &c->triangles[3 * t];
+    best =
+        fmin(best, qmat_slab_distance(&s[4 * (size_t)ids[0]], &s[4 * (size_t)ids[1]], &s[4 * (size_t)ids[2]], point));
+  }
+  return best;
+}
+
+/* The distance to the medial sphere that the witness of point i names. */
+static double at_witness(const qmat_complex *c, const qmat_constraint_points *places, size_t i) {
+  double sphere[4] = {0};
+  for (size_t k = 0; k < 3; k++) {
+    const uint32_t v = places->witnesses[3 * i + k];
+    for (size_t j = 0; v != QMAT_NONE && j < 4; j++)
+      sphere[j] += places->weights[3 * i + k] * c->spheres[4 * (size_t)v + j];
+  }
+  return qmat_sphere_distance(sphere, &places->points[3 * i]);
+}
+
+/* Checks the distances of all places. Returns how many are above `enough`. */
+static size_t check_places(model *m, double spacing, double enough) {
+  qmat_constraint_points places;
+  assert_int_equal(qmat_surface_places_make(&m->context, m->p.mesh, m->positions, m->p.samples, m->unit_samples,
+                                            m->p.medial, &m->complex, spacing, 20000, enough, &places),
+                   QMAT_OK);
+  size_t far_count = 0;
+  for (size_t i = 0; i < places.count; i++) {
+    const double f = brute_force(&m->complex, &places.points[3 * i]), found = places.distances[i];
+    far_count += found > enough;
+    if (found < f - ROUNDING) fail_msg("place %zu is %g from the envelope, not %g", i, f, found);
+    if (found > enough && found > f + ROUNDING) fail_msg("far place %zu is %g from the envelope, not %g", i, f, found);
+    assert_true(fabs(at_witness(&m->complex, &places, i) - found) < ROUNDING);
+  }
+  return far_count;
+}
+
+/* Samples are too coarse for the envelope to come near everywhere. */
+static void test_far_places_have_their_distance_and_others_an_upper_bound(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, pipeline_model("torus", 6), "spacing=0 n_f=0");
+  const size_t many = check_places(&m, 0.05, 1e-3);
+  assert_true(many > 100);
+  double enough = 1e-3;
+  size_t few = many;
+  for (; few > 32; enough *= 1.3) few = check_places(&m, 0.05, enough); /* looks at every sphere for the last few */
+  assert_true(few > 0);
+  assert_int_equal(check_places(&m, 0.05, 1), 0);
+  free_model(&m);
+}
+
+/* The corners of a box are far from most places on its sides. */
+static void test_places_on_large_facets_are_measured(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_box(1, 2, 3), "spacing=20% n_f=0");
+  assert_true(check_places(&m, 0.03, 1e-3) > 0);
+  free_model(&m);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_far_places_have_their_distance_and_others_an_upper_bound),
+      cmocka_unit_test(test_places_on_large_facets_are_measured),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
