@@ -31,10 +31,6 @@ static const double spacing_share = 0.5;
  * of an open surface there is no solid that a sphere could fill. */
 static const double nearer_share = 0.9;
 
-/* The spacing of the samples that the first round adds, as a multiple of the limit. Finer ones beside coarse ones leave
- * the places between both too far. */
-static const double first_spacing = 2;
-
 /* Samples are added up to this distance from a far place, as a multiple of their spacing. */
 static const double reach_of_samples = 3;
 
@@ -216,21 +212,41 @@ static qmat_status refine(refiner *r, const qmat_surface *surface, const refinem
   return status;
 }
 
+/* The largest distance from a far place to the samples. */
+static qmat_status find_widest_gap(const refiner *r, const refinement *from, double limit, double *gap) {
+  qmat_context *context = r->context;
+  double *samples = qmat_arena_alloc(&context->arena, from->samples->count, 3 * sizeof *samples);
+  if (!samples) return qmat_fail_memory(context, "the samples");
+  qmat_frame_to_unit(&r->frame, from->samples->positions, from->samples->count, samples);
+  qmat_point_grid grid;
+  const qmat_status status = qmat_point_grid_init(context, samples, from->samples->count, &grid);
+  *gap = 0;
+  for (size_t i = 0; i < r->place_count && status == QMAT_OK; i++) {
+    if (!(from->distances[i] > limit) || r->given_up[i]) continue;
+    const double *place = &r->places[3 * i];
+    *gap = qmat_larger(*gap, qmat_point_distance(place, &samples[3 * (size_t)qmat_point_grid_nearest(&grid, place)]));
+  }
+  return status;
+}
+
 /* --- the node ---------------------------------------------------------------------------------------------------- */
 
 static bool is_better(const refinement *a, const refinement *b) {
   return a->excess < b->excess;
 }
 
-/* Repeats with half the spacing until no place is farther than `enough`, or all that are have been given up. Where the
- * spacing is at most the limit, a round that does not improve is the last one, and places are given up: coarser samples
- * may only be too coarse. `*best` is the round with the least excess. */
+/* Repeats with half the spacing until no place is farther than `enough`, or all that are have been given up. The first
+ * samples are as far apart as the gaps between those around: much finer ones would leave the places between both too
+ * far. Where the spacing is at most the limit, a round that does not improve is the last one, and places are given up:
+ * coarser samples may only be too coarse. `*best` is the round with the least excess. */
 static qmat_status refine_in_rounds(refiner *r, double limit, double enough, refinement *rounds, size_t *best) {
   qmat_surface *surface;
   qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
   if (status == QMAT_OK) status = give_up_without_solid(r, surface, &rounds[0], limit);
   size_t newest = 0;
-  double spacing = first_spacing * limit;
+  double gap = 0;
+  if (status == QMAT_OK) status = find_widest_gap(r, &rounds[0], limit, &gap);
+  double spacing = qmat_larger(gap, limit);
   for (int64_t i = 0; i < r->params->rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
     const bool is_fine = spacing <= limit;
@@ -322,7 +338,7 @@ static const qmat_param params[] = {
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),
-    QMAT_INT(medial_refine_params, rounds, "rounds", 4, 0, MOST_ROUNDS,
+    QMAT_INT(medial_refine_params, rounds, "rounds", 6, 0, MOST_ROUNDS,
              "The most rounds; each halves the spacing of the added samples; 0: nothing is refined"),
     QMAT_VORONOI_DUAL_PARAMS,
     {0},
@@ -347,16 +363,15 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 10,
+    .version = 11,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
         "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly spaced "
-        "samples are added around all points farther than the target, and the medial mesh is made again. Each further "
-        "round halves the spacing, until no point is farther than the trigger. Places that a round brings no nearer "
-        "are "
-        "given up, as are those of an open surface without solid below. The result is the round that leaves the least "
-        "excess over the target.\n\n"
+        "samples are added around all points farther than the target, and the medial mesh is made again. The first "
+        "ones are as far apart as the gaps between the samples there. Each further round halves that, until no point "
+        "is farther than the trigger. Places that a round brings no nearer are given up, as are those of an open "
+        "surface without solid below. The result is the round that leaves the least excess over the target.\n\n"
         "The spheres that medial.features has added stay as they are and are linked again in each round. No samples "
         "are needed next to them.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "

@@ -36,7 +36,8 @@ typedef struct smallest_areas {
 
 /* The samples that the spacing adds to eq. 7. */
 typedef struct spaced_points {
-  uint32_t *on_sides; /* 3 per facet: points on the sides that it owns; NULL without a spacing */
+  double *spacings;   /* per facet; NULL without a spacing, as the others */
+  uint32_t *on_sides; /* 3 per facet: points on the sides that it owns */
   uint64_t *in_rows;  /* per facet: points in rows if they outnumber the samples of eq. 7, else 0 */
 } spaced_points;
 
@@ -46,6 +47,10 @@ typedef struct sample_counts {
   size_t added, dropped;
   double threshold;
 } sample_counts;
+
+static void find_corners(const double *positions, const uint32_t *ids, const double *corners[3]) {
+  for (int k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)ids[k];
+}
 
 /* --- how many: eq. 7 and 8 -------------------------------------------------------------------------------------- */
 
@@ -89,10 +94,17 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
   const double least_side = LEAST_NEIGHBOUR_SIDE * params->spacing;
   counts->threshold = qmat_thickness_threshold(mesh, thickness, params->theta);
   if (params->spacing > 0) {
+    spaced->spacings = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *spaced->spacings);
     spaced->on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *spaced->on_sides);
     spaced->in_rows = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *spaced->in_rows);
-    if (!spaced->on_sides || !spaced->in_rows) return qmat_fail_memory(context, "the samples");
-    const qmat_status status = qmat_side_points_count(context, mesh, unit_positions, params->spacing, spaced->on_sides);
+    if (!spaced->spacings || !spaced->on_sides || !spaced->in_rows) return qmat_fail_memory(context, "the samples");
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+      const double *corners[3];
+      find_corners(unit_positions, mesh->triangles + 3 * i, corners);
+      spaced->spacings[i] = qmat_facet_spacing(corners[0], corners[1], corners[2], params->spacing);
+    }
+    const qmat_status status =
+        qmat_side_points_count(context, mesh, unit_positions, spaced->spacings, spaced->on_sides);
     if (status != QMAT_OK) return status;
   }
 
@@ -116,10 +128,9 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     const int64_t wanted = by_area + by_thickness;
     const int64_t count = wanted < params->max_per_facet ? wanted : params->max_per_facet;
     if (spaced->in_rows) {
-      const uint32_t *ids = mesh->triangles + 3 * i;
-      const uint64_t rows =
-          qmat_row_points_count(unit_positions + 3 * (size_t)ids[0], unit_positions + 3 * (size_t)ids[1],
-                                unit_positions + 3 * (size_t)ids[2], params->spacing);
+      const double *corners[3];
+      find_corners(unit_positions, mesh->triangles + 3 * i, corners);
+      const uint64_t rows = qmat_row_points_count(corners[0], corners[1], corners[2], spaced->spacings[i]);
       if (rows > (uint64_t)count) {
         spaced->in_rows[i] = rows;
         counts->by_spacing += rows;
@@ -155,8 +166,8 @@ static void limit_samples(uint64_t *offsets, size_t facet_count, uint64_t room, 
 /* Places a facet's samples: first on its sides, then inside. */
 static void place_samples(const mesh_sample_params *params, const double *unit_positions, const uint32_t *ids,
                           uint32_t facet, const spaced_points *spaced, size_t count, double *barycentrics) {
-  const double *a = unit_positions + 3 * (size_t)ids[0], *b = unit_positions + 3 * (size_t)ids[1],
-               *c = unit_positions + 3 * (size_t)ids[2];
+  const double *corners[3];
+  find_corners(unit_positions, ids, corners);
   for (int side = 0; side < 3 && spaced->on_sides; side++) {
     const size_t wanted = spaced->on_sides[3 * (size_t)facet + (size_t)side];
     const size_t placed = wanted < count ? wanted : count;
@@ -166,10 +177,11 @@ static void place_samples(const mesh_sample_params *params, const double *unit_p
   }
   if (count == 0) return;
   if (spaced->in_rows && spaced->in_rows[facet] > 0) {
-    qmat_row_points_fill(a, b, c, params->spacing, qmat_hash3((uint64_t)params->seed, facet, 0), count, barycentrics);
+    qmat_row_points_fill(corners[0], corners[1], corners[2], spaced->spacings[facet],
+                         qmat_hash3((uint64_t)params->seed, facet, 0), count, barycentrics);
   } else {
     const qmat_facet_relaxation_seed seed = {(uint64_t)params->seed, facet};
-    qmat_facet_relaxation(a, b, c, seed, params->lloyd_rounds, count, barycentrics);
+    qmat_facet_relaxation(corners[0], corners[1], corners[2], seed, params->lloyd_rounds, count, barycentrics);
   }
 }
 
@@ -287,7 +299,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   double *unit_positions = qmat_arena_alloc(&context->arena, 3 * mesh->vertex_count, sizeof *unit_positions);
   double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
   uint64_t *offsets = qmat_arena_alloc(&context->arena, mesh->triangle_count + 1, sizeof *offsets);
-  spaced_points spaced = {NULL, NULL};
+  spaced_points spaced = {NULL};
   sample_counts counts = {0};
   qmat_status status = QMAT_OK;
   if (!samples || !report || !unit_positions || !areas || !offsets) {
@@ -319,8 +331,10 @@ done:
 }
 
 static const qmat_param params[] = {
-    QMAT_LENGTH(mesh_sample_params, spacing, 0.02, 0, 1,
-                "The largest distance between neighbouring samples on long sides and large facets; 0: eq. 7 alone"),
+    QMAT_LENGTH(
+        mesh_sample_params, spacing, 0.02, 0, 1,
+        "The largest distance between neighbouring samples on long sides and large facets, up to 2.5 times that on "
+        "facets higher than 4 times; 0: eq. 7 alone"),
     QMAT_FLOAT(mesh_sample_params, theta, "1", 0.5, 0, 10,
                "A facet is thin if its thickness is at most this ratio of the mean (eq. 8)"),
     QMAT_INT(mesh_sample_params, n_f, "samples", 1, 0, 16, "Extra samples for each thin facet (eq. 7)"),
@@ -348,7 +362,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_mesh_sample = {
     .name = "mesh.sample",
-    .version = 3,
+    .version = 4,
     .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
         "Every vertex is a sample. Sheets have no other samples. A facet of a solid gets further samples for its area "
@@ -358,7 +372,9 @@ const qmat_node qmat_node_mesh_sample = {
         "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "
         "facet's bounded Voronoi diagram, with fixed corners.\n\n"
         "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "
-        "and large facets are therefore filled evenly at the given spacing.",
+        "and large facets are therefore filled evenly at the given spacing. Where a facet is higher than four times "
+        "that, "
+        "a quarter of its height is the spacing, up to 2.5 times the given one.",
     .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,

@@ -72,8 +72,10 @@ static qmat_status find_samples(qmat_context *context, const qmat_resampling *w,
   uint32_t *on_sides = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *on_sides);
   uint64_t *in_rows = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *in_rows);
   uint8_t *is_near = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *is_near);
-  if (!on_sides || !in_rows || !is_near) return qmat_fail_memory(context, "further samples");
-  qmat_status status = qmat_side_points_count(context, mesh, w->positions, w->spacing, on_sides);
+  double *spacings = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *spacings);
+  if (!on_sides || !in_rows || !is_near || !spacings) return qmat_fail_memory(context, "further samples");
+  for (size_t t = 0; t < mesh->triangle_count; t++) spacings[t] = w->spacing;
+  qmat_status status = qmat_side_points_count(context, mesh, w->positions, spacings, on_sides);
   const int threads = qmat_threads(context);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
   for (size_t t = 0; t < mesh->triangle_count; t++) {

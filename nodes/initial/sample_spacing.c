@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 
@@ -12,6 +13,10 @@
 static const double row_height = 0.86602540378443864676;
 /* The range of a point's random displacement, in steps along its row and in rows. */
 static const double displacement = 0.2;
+/* A side that is longer than a number of spacings by rounding alone has no further point. */
+static const double rounding = 1e-9;
+/* The spacing on a facet as a share of its height, and the most spacings that it may be. */
+static const double height_share = 0.25, widest = 2.5;
 
 typedef struct side {
   uint32_t low, high;
@@ -25,14 +30,22 @@ static int compare_sides(const void *left, const void *right) {
   return a->corner < b->corner ? -1 : a->corner > b->corner;
 }
 
+double qmat_facet_spacing(const double *a, const double *b, const double *c, double spacing) {
+  double normal[3];
+  const double longest =
+      qmat_larger(qmat_point_distance(a, b), qmat_larger(qmat_point_distance(b, c), qmat_point_distance(c, a)));
+  const double height = longest > 0 ? 2 * qmat_triangle_area(a, b, c, normal) / longest : 0;
+  return qmat_smaller(qmat_larger(height_share * height, spacing), widest * spacing);
+}
+
 qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh, const double *positions,
-                                   double spacing, uint32_t *counts) {
+                                   const double *spacings, uint32_t *counts) {
   size_t long_sides = 0;
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
     const double length =
         qmat_point_distance(&positions[3 * (size_t)mesh->triangles[i]], &positions[3 * (size_t)mesh->triangles[next]]);
-    counts[i] = (uint32_t)fmax(ceil(length / spacing) - 1, 0);
+    counts[i] = (uint32_t)fmax(ceil(length / spacings[i / 3] - rounding) - 1, 0);
     long_sides += counts[i] > 0;
   }
   side *sides = qmat_arena_alloc(&context->arena, long_sides, sizeof *sides);
@@ -44,8 +57,15 @@ qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh,
     sides[long_sides++] = (side){a < b ? a : b, a < b ? b : a, i};
   }
   qsort(sides, long_sides, sizeof *sides, compare_sides);
-  for (size_t i = 1; i < long_sides; i++)
-    if (sides[i].low == sides[i - 1].low && sides[i].high == sides[i - 1].high) counts[sides[i].corner] = 0;
+  for (size_t i = 1, first = 0; i < long_sides; i++) {
+    if (sides[i].low != sides[first].low || sides[i].high != sides[first].high) {
+      first = i;
+      continue;
+    }
+    uint32_t *own = &counts[sides[first].corner], *other = &counts[sides[i].corner];
+    *own = *other > *own ? *other : *own;
+    *other = 0;
+  }
   return QMAT_OK;
 }
 

@@ -323,7 +323,7 @@ static void test_spheres_on_creases_stay_and_are_linked_again(void **state) {
   pipeline_free(&p);
 }
 
-/* Samples of a fifth of a percent beside those of five percent would leave the places between both too far away. */
+/* Samples much finer than those around would be many, and leave the places between both too far away. */
 static void test_the_first_samples_are_not_much_finer_than_those_around(void **state) {
   (void)state;
   pipeline p;
@@ -333,6 +333,7 @@ static void test_the_first_samples_are_not_much_finer_than_those_around(void **s
   const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
   assert_true(pipeline_count(report, "far_places") > 100);
   assert_true(pipeline_number(report, "farthest_place_left") <= 0.75 * 0.02);
+  assert_true(pipeline_count(report, "samples_added") < 2000);
   assert_true(pipeline_count(report, "rounds") <= 2);
   release(outputs);
   pipeline_free(&p);

@@ -521,14 +521,15 @@ static void test_spacing_fills_a_coarse_box_evenly(void **state) {
   result made = sample(mesh, thickness, "spacing=0.1 theta=0.5");
   const qmat_samples *samples = made.samples;
   assert_int_equal(reported(&made, "added_by_spacing"), reported(&made, "added"));
-  /* 12 sides of ceil(5.77) - 1 = 5 points and 6 diagonals of ceil(8.16) - 1 = 8, each once. */
+  /* The spacing is a quarter of a facet's height, side / sqrt(2): 12 sides of ceil(5.66) - 1 = 5 points and 6 diagonals
+   * of 8 - 1 = 7, each once. */
   size_t on_sides = 0;
   for (size_t i = 8; i < samples->count; i++) {
     bool zero = false;
     for (size_t k = 0; k < 3; k++) zero |= samples->barycentrics[3 * i + k] == 0;
     on_sides += zero;
   }
-  assert_int_equal(on_sides, 12 * 5 + 6 * 8);
+  assert_int_equal(on_sides, 12 * 5 + 6 * 7);
   /* No two samples in one place, and none farther than the spacing from any point of the surface. */
   for (size_t i = 0; i < samples->count; i++)
     for (size_t j = 0; j < i; j++) {

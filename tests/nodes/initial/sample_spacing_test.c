@@ -18,7 +18,11 @@ static const double row_height = 0.86602540378443864676;
 
 static void count_sides(const qmat_mesh *mesh, double spacing, uint32_t *counts) {
   qmat_context context = {0};
-  assert_int_equal(qmat_side_points_count(&context, mesh, mesh->positions, spacing, counts), QMAT_OK);
+  double *spacings = qmat_alloc(mesh->triangle_count, sizeof *spacings);
+  assert_non_null(spacings);
+  for (size_t t = 0; t < mesh->triangle_count; t++) spacings[t] = spacing;
+  assert_int_equal(qmat_side_points_count(&context, mesh, mesh->positions, spacings, counts), QMAT_OK);
+  qmat_free(spacings);
   qmat_context_uninit(&context);
 }
 
@@ -61,6 +65,40 @@ static void test_shared_side_belongs_to_its_first_facet(void **state) {
   static const uint32_t expected[9] = {3, 4, 2, 0, 2, 3, 0, 0, 0};
   assert_memory_equal(counts, expected, sizeof counts);
   qmat_value_release(&mesh->base);
+}
+
+static void test_shared_side_has_the_spacing_of_the_facet_that_needs_more(void **state) {
+  (void)state;
+  qmat_mesh *mesh = right_triangle();
+  shape_vertex(mesh, 4, 3, 0);
+  shape_triangle(mesh, 2, 1, 3);
+  qmat_context context = {0};
+  uint32_t counts[6];
+  for (int finer = 0; finer < 2; finer++) {
+    const double spacings[2] = {finer == 0 ? 1 : 2.5, finer == 1 ? 1 : 2.5};
+    assert_int_equal(qmat_side_points_count(&context, mesh, mesh->positions, spacings, counts), QMAT_OK);
+    assert_int_equal(counts[1], 4);
+    assert_int_equal(counts[3], 0);
+    assert_int_equal(counts[0], finer == 0 ? 3 : 1);
+    assert_int_equal(counts[5], finer == 1 ? 3 : 1); /* as long as side 0 */
+  }
+  qmat_context_uninit(&context);
+  qmat_value_release(&mesh->base);
+}
+
+/* The height over the side of 5 is 2.4. */
+static void test_spacing_of_a_facet_is_a_quarter_of_its_height(void **state) {
+  (void)state;
+  const double a[3] = {0, 0, 0}, b[3] = {4, 0, 0}, c[3] = {0, 3, 0};
+  const double *orders[3][3] = {{a, b, c}, {b, c, a}, {c, b, a}};
+  for (int i = 0; i < 3; i++) {
+    const double *const *p = orders[i];
+    assert_true(fabs(qmat_facet_spacing(p[0], p[1], p[2], 0.5) - 0.6) < 1e-15);
+    assert_true(qmat_facet_spacing(p[0], p[1], p[2], 0.7) == 0.7);
+    assert_true(qmat_facet_spacing(p[0], p[1], p[2], 0.1) == 0.25);
+  }
+  assert_true(qmat_facet_spacing(a, a, a, 0.5) == 0.5);
+  assert_true(qmat_facet_spacing(a, b, b, 0.5) == 0.5);
 }
 
 static void test_degenerate_facets_count_without_harm(void **state) {
@@ -274,6 +312,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_sides_of_three_four_five),
       cmocka_unit_test(test_shared_side_belongs_to_its_first_facet),
+      cmocka_unit_test(test_shared_side_has_the_spacing_of_the_facet_that_needs_more),
+      cmocka_unit_test(test_spacing_of_a_facet_is_a_quarter_of_its_height),
       cmocka_unit_test(test_degenerate_facets_count_without_harm),
       cmocka_unit_test(test_box_has_points_on_each_edge_once),
       cmocka_unit_test(test_points_of_a_side_divide_it_evenly),
