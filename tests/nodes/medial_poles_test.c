@@ -33,7 +33,7 @@ static void free_poles(poles *p) {
 
 /* Samples at 4 % of the diagonal. */
 static poles make_sampled(pipeline *p, qmat_mesh *mesh) {
-  pipeline_sample(p, mesh, "spacing=4%");
+  pipeline_sample(p, mesh, "spacing=2%");
   return make_poles(p, 0, "");
 }
 
