@@ -299,7 +299,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   double *unit_positions = qmat_arena_alloc(&context->arena, 3 * mesh->vertex_count, sizeof *unit_positions);
   double *areas = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *areas);
   uint64_t *offsets = qmat_arena_alloc(&context->arena, mesh->triangle_count + 1, sizeof *offsets);
-  spaced_points spaced = {NULL};
+  spaced_points spaced = {.spacings = NULL};
   sample_counts counts = {0};
   qmat_status status = QMAT_OK;
   if (!samples || !report || !unit_positions || !areas || !offsets) {
