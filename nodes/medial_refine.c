@@ -219,9 +219,10 @@ static qmat_status find_widest_gap(const refiner *r, const refinement *from, dou
   if (!samples) return qmat_fail_memory(context, "the samples");
   qmat_frame_to_unit(&r->frame, from->samples->positions, from->samples->count, samples);
   qmat_point_grid grid;
-  const qmat_status status = qmat_point_grid_init(context, samples, from->samples->count, &grid);
+  qmat_status status = qmat_point_grid_init(context, samples, from->samples->count, &grid);
   *gap = 0;
   for (size_t i = 0; i < r->place_count && status == QMAT_OK; i++) {
+    if (i % 4096 == 0) status = qmat_progress(context, i, r->place_count, "places");
     if (!(from->distances[i] > limit) || r->given_up[i]) continue;
     const double *place = &r->places[3 * i];
     *gap = qmat_larger(*gap, qmat_point_distance(place, &samples[3 * (size_t)qmat_point_grid_nearest(&grid, place)]));

@@ -333,8 +333,8 @@ done:
 static const qmat_param params[] = {
     QMAT_LENGTH(
         mesh_sample_params, spacing, 0.02, 0, 1,
-        "The largest distance between neighbouring samples on long sides and large facets, up to 2.5 times that on "
-        "facets higher than 4 times; 0: eq. 7 alone"),
+        "The largest distance between neighbouring samples on long sides and large facets; 0: eq. 7 alone. Very "
+        "large facets have up to 2.5 times this distance"),
     QMAT_FLOAT(mesh_sample_params, theta, "1", 0.5, 0, 10,
                "A facet is thin if its thickness is at most this ratio of the mean (eq. 8)"),
     QMAT_INT(mesh_sample_params, n_f, "samples", 1, 0, 16, "Extra samples for each thin facet (eq. 7)"),
@@ -372,9 +372,8 @@ const qmat_node qmat_node_mesh_sample = {
         "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "
         "facet's bounded Voronoi diagram, with fixed corners.\n\n"
         "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "
-        "and large facets are therefore filled evenly at the given spacing. Where a facet is higher than four times "
-        "that, "
-        "a quarter of its height is the spacing, up to 2.5 times the given one.",
+        "and large facets are therefore filled evenly at the given spacing. A facet more than four spacings high has a "
+        "quarter of its height as spacing, at most 2.5 times the given one.",
     .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/hash.h"
 
@@ -30,11 +29,32 @@ static int compare_sides(const void *left, const void *right) {
   return a->corner < b->corner ? -1 : a->corner > b->corner;
 }
 
+/* The longest side of a triangle, from corner `base` to the next, and the height over it. */
+typedef struct longest_side {
+  int base;
+  double length, height;
+} longest_side;
+
+static longest_side find_longest_side(const double *a, const double *b, const double *c) {
+  const double *corners[3] = {a, b, c};
+  longest_side side = {0, 0, 0};
+  for (int k = 0; k < 3; k++) {
+    const double length = qmat_point_distance(corners[k], corners[(k + 1) % 3]);
+    if (length > side.length) side = (longest_side){k, length, 0};
+  }
+  if (!(side.length > 0)) return side;
+  const double *p = corners[side.base], *q = corners[(side.base + 1) % 3], *top = corners[(side.base + 2) % 3];
+  double along = 0, square = 0;
+  for (int k = 0; k < 3; k++) {
+    along += (q[k] - p[k]) * (top[k] - p[k]) / side.length;
+    square += (top[k] - p[k]) * (top[k] - p[k]);
+  }
+  side.height = sqrt(fmax(square - along * along, 0));
+  return side;
+}
+
 double qmat_facet_spacing(const double *a, const double *b, const double *c, double spacing) {
-  double normal[3];
-  const double longest =
-      qmat_larger(qmat_point_distance(a, b), qmat_larger(qmat_point_distance(b, c), qmat_point_distance(c, a)));
-  const double height = longest > 0 ? 2 * qmat_triangle_area(a, b, c, normal) / longest : 0;
+  const double height = find_longest_side(a, b, c).height;
   return qmat_smaller(qmat_larger(height_share * height, spacing), widest * spacing);
 }
 
@@ -78,29 +98,15 @@ void qmat_side_points_fill(int side, uint32_t count, double *barycentrics) {
   }
 }
 
-/* The rows of a triangle, parallel to its longest side, which starts at corner `base`. */
+/* The rows of a triangle, parallel to its longest side. */
 typedef struct rows {
-  int base;
-  double length;
+  longest_side side;
   uint64_t count; /* of rows, without the longest side and the opposite corner */
 } rows;
 
 static rows find_rows(const double *a, const double *b, const double *c, double spacing) {
-  const double *corners[3] = {a, b, c};
-  rows r = {0, 0, 0};
-  for (int k = 0; k < 3; k++) {
-    const double length = qmat_point_distance(corners[k], corners[(k + 1) % 3]);
-    if (length > r.length) r = (rows){k, length, 0};
-  }
-  if (!(r.length > spacing)) return r;
-  const double *p = corners[r.base], *q = corners[(r.base + 1) % 3], *top = corners[(r.base + 2) % 3];
-  double along = 0, square = 0;
-  for (int k = 0; k < 3; k++) {
-    along += (q[k] - p[k]) * (top[k] - p[k]) / r.length;
-    square += (top[k] - p[k]) * (top[k] - p[k]);
-  }
-  const double height = sqrt(fmax(square - along * along, 0));
-  r.count = (uint64_t)fmax(ceil(height / (row_height * spacing)) - 1, 0);
+  rows r = {find_longest_side(a, b, c), 0};
+  if (r.side.length > spacing) r.count = (uint64_t)fmax(ceil(r.side.height / (row_height * spacing)) - 1, 0);
   return r;
 }
 
@@ -110,7 +116,7 @@ static double row_place(const rows *r, uint64_t row) {
 }
 
 static uint64_t row_points(const rows *r, uint64_t row, double spacing) {
-  return (uint64_t)fmax(floor(r->length * (1 - row_place(r, row)) / spacing + 0.5), 1);
+  return (uint64_t)fmax(floor(r->side.length * (1 - row_place(r, row)) / spacing + 0.5), 1);
 }
 
 uint64_t qmat_row_points_count(const double *a, const double *b, const double *c, double spacing) {
@@ -135,9 +141,9 @@ void qmat_row_points_fill(const double *a, const double *b, const double *c, dou
       const double up = row_place(&r, row) + y / (double)(r.count + 1);
       const double t = ((double)i + 0.5 + x) / (double)points;
       double *weights = &barycentrics[3 * picked++];
-      weights[r.base] = (1 - up) * (1 - t);
-      weights[(r.base + 1) % 3] = (1 - up) * t;
-      weights[(r.base + 2) % 3] = 1 - weights[r.base] - weights[(r.base + 1) % 3];
+      weights[r.side.base] = (1 - up) * (1 - t);
+      weights[(r.side.base + 1) % 3] = (1 - up) * t;
+      weights[(r.side.base + 2) % 3] = 1 - weights[r.side.base] - weights[(r.side.base + 1) % 3];
     }
   }
 }
