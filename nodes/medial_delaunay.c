@@ -24,6 +24,9 @@ static qmat_status run(qmat_context *context, const void *params, const qmat_val
 }
 
 static const qmat_param params[] = {
+    QMAT_LENGTH(qmat_voronoi_dual_params, epsilon, 0, 0, 1,
+                "The largest distance between surface and envelope that the final result may have: merge and "
+                "thinning_tolerance are shares of it; 0: not known, they are as for 0.5%"),
     QMAT_VORONOI_DUAL_PARAMS,
     {0},
 };
@@ -43,7 +46,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 9,
+    .version = 10,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "

@@ -18,7 +18,6 @@
 
 typedef struct {
   qmat_voronoi_dual_params dual;
-  double epsilon;
   double trigger;
   double target;
   int64_t rounds;
@@ -272,9 +271,9 @@ static qmat_status refine_in_rounds(refiner *r, double limit, double enough, ref
 /* rounds[0] is the input; `*best` becomes the round to return. */
 static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best) {
   const medial_refine_params *params = r->params;
-  const double epsilon = params->epsilon - r->mesh->deviation / r->frame.diagonal;
+  const double epsilon = params->dual.epsilon - r->mesh->deviation / r->frame.diagonal;
   *best = 0;
-  if (!(params->epsilon > 0) || !(epsilon > 0) || !qmat_has_solids(r->mesh)) return QMAT_OK;
+  if (!(params->dual.epsilon > 0) || !(epsilon > 0) || !qmat_has_solids(r->mesh)) return QMAT_OK;
   r->positions = qmat_arena_alloc(&r->context->arena, r->mesh->vertex_count, 3 * sizeof *r->positions);
   if (!r->positions) return qmat_fail_memory(r->context, "the vertices");
   qmat_frame_to_unit(&r->frame, r->mesh->positions, r->mesh->vertex_count, r->positions);
@@ -333,7 +332,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 
 static const qmat_param params[] = {
     QMAT_LENGTH(
-        medial_refine_params, epsilon, 0.01, 0, 1,
+        qmat_voronoi_dual_params, epsilon, 0.01, 0, 1,
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.75, 0.1, 1,
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
@@ -364,7 +363,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 11,
+    .version = 12,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "

@@ -82,7 +82,6 @@ static qmat_status select_inner(voxel_core *v) {
 }
 
 static qmat_status find_core(voxel_core *v) {
-  static const qmat_voronoi_dual_params exact = {.merge = 0};
   qmat_context *context = v->context;
   qmat_status status = qmat_voxel_shape_make(context, v->surface, (int)v->params->depth, &v->shape);
   if (status == QMAT_OK && v->shape.count == 0) {
@@ -92,7 +91,7 @@ static qmat_status find_core(voxel_core *v) {
                                                         : "check that the surface is closed and faces outwards");
   }
   if (status == QMAT_OK) status = qmat_voxel_boundary(context, &v->shape, &v->points, &v->point_count);
-  v->dual = (qmat_dual_complex){.context = context, .params = &exact, .keep_duals = true};
+  v->dual = (qmat_dual_complex){.context = context, .keep_duals = true};
   if (status == QMAT_OK) status = qmat_delaunay_lattice(context, v->points, v->point_count, &v->dual.cells);
   if (status == QMAT_OK) status = select_inner(v);
   if (status == QMAT_OK) status = qmat_medial_vertices_number(&v->dual);

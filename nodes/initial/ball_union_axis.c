@@ -289,8 +289,7 @@ static qmat_status join_parts(union_axis *u, qmat_medial *medial) {
 
 qmat_status qmat_ball_union_axis(qmat_context *context, const double *balls, size_t count, double merge,
                                  qmat_medial *medial, qmat_ball_union_counts *counts) {
-  const qmat_voronoi_dual_params params = {.merge = merge};
-  union_axis u = {.context = context, .balls = balls, .count = count, .dual = {.context = context, .params = &params}};
+  union_axis u = {.context = context, .balls = balls, .count = count, .dual = {.context = context, .merge = merge}};
   qmat_status status = qmat_ball_union_new(context, balls, count, &u.shape, &u.parts);
   if (status == QMAT_OK) status = find_voronoi_part(&u);
   if (status == QMAT_OK) status = join_parts(&u, medial);

@@ -15,7 +15,9 @@ typedef enum { QMAT_CELL_DROPPED = 0, QMAT_CELL_CIRCUMCENTRE, QMAT_CELL_INCENTRE
  * `edges` and `triangles`, which the owner frees. */
 typedef struct qmat_dual_complex {
   qmat_context *context;
-  const qmat_voronoi_dual_params *params;
+  const qmat_voronoi_dual_params *params; /* NULL where tetrahedra are not selected */
+  double merge;                           /* adjacent medial vertices so near become one */
+  double thinning_tolerance;
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   const qmat_surface *surface;

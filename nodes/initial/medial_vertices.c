@@ -67,7 +67,7 @@ double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b
 /* Whether a tetrahedron connects two components of the surface through the outside. The incentre of such a needle can
  * still be inside, between the samples and a surface that bulges past them. */
 static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
-  const double tolerance = d->params->thinning_tolerance;
+  const double tolerance = d->thinning_tolerance;
   for (int a = 0; a < 3 && d->surface_components; a++)
     for (int b = a + 1; b < 4; b++)
       if (qmat_dual_surface_component(d, corners[a]) != qmat_dual_surface_component(d, corners[b]) &&
@@ -134,7 +134,7 @@ qmat_status qmat_medial_vertices_number(qmat_dual_complex *d) {
       const uint32_t j = d->cells.neighbours[4 * i + k];
       if (j == QMAT_NO_TETRAHEDRON || j < i || !d->kinds[j]) continue;
       const uint32_t a = qmat_set_leader(parent, (uint32_t)i), b = qmat_set_leader(parent, j);
-      if (qmat_point_distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->params->merge)
+      if (qmat_point_distance(&d->spheres[4 * (size_t)a], &d->spheres[4 * (size_t)b]) <= d->merge)
         qmat_sets_join(parent, a, b);
     }
   }

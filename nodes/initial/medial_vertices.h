@@ -11,7 +11,7 @@ qmat_status qmat_medial_vertices_select(qmat_dual_complex *dual);
 /* The centre (3 doubles, unit frame) of the sphere inscribed in a tetrahedron. Thread-safe. */
 void qmat_medial_vertex_incentre(const qmat_dual_complex *dual, size_t cell, double centre[3]);
 
-/* Merges adjacent medial vertices whose centres are no farther apart than the parameter `merge`, and numbers them in
+/* Merges adjacent medial vertices whose centres are no farther apart than `merge`, and numbers them in
  * the order of their first tetrahedron: sets `sphere_of` and `sphere_count`. QMAT_ERROR_MEMORY. One thread. */
 qmat_status qmat_medial_vertices_number(qmat_dual_complex *dual);
 

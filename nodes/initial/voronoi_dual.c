@@ -16,6 +16,10 @@
 #include "nodes/initial/sample_thinning.h"
 #include "nodes/initial/tetrahedra_topology.h"
 
+/* Where the largest distance of the final result is not known, vertices merge and samples are left out as for this one
+ * (unit frame). */
+static const double FINE_EPSILON = 0.005;
+
 /* --- connectivity ------------------------------------------------------------------------------------------------ */
 
 /* The corner pairs of a tetrahedron's edges. */
@@ -292,8 +296,8 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
   d->points = points;
   d->thin = thin;
   d->representatives = representatives;
-  qmat_status status = qmat_representatives_find(context, d->surface, d->samples, points, values,
-                                                 d->params->thinning_tolerance, reaches, representatives);
+  qmat_status status = qmat_representatives_find(context, d->surface, d->samples, points, values, d->thinning_tolerance,
+                                                 reaches, representatives);
   if (status == QMAT_OK) status = triangulate(d);
   if (status == QMAT_OK) status = qmat_medial_vertices_select(d);
   if (status == QMAT_OK && d->params->incentres == QMAT_INCENTRES_ALL) status = qmat_tetrahedra_mend(d, &made->mended);
@@ -312,7 +316,13 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
 qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dual_params *params, const qmat_mesh *mesh,
                                    const qmat_surface *solids, const qmat_field *thickness, const qmat_samples *samples,
                                    const double *reaches, qmat_medial **medial, qmat_report *report) {
-  qmat_dual_complex d = {.context = context, .params = params, .samples = samples, .surface = solids};
+  const double epsilon = params->epsilon > 0 ? params->epsilon : FINE_EPSILON;
+  qmat_dual_complex d = {.context = context,
+                         .params = params,
+                         .merge = params->merge * epsilon,
+                         .thinning_tolerance = params->thinning_tolerance * epsilon,
+                         .samples = samples,
+                         .surface = solids};
   dual_counts made = {.refined = 0};
   *medial = qmat_medial_new();
   qmat_status status = *medial ? QMAT_OK : qmat_fail_memory(context, "the medial mesh");

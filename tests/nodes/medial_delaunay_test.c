@@ -117,7 +117,7 @@ static void test_coincident_centres_of_a_cube_become_one(void **state) {
     if (variant / 2) shape_rotate(mesh);
     pipeline p;
     sample_vertices(&p, mesh);
-    pipeline_delaunay(&p, 0, "merge=1e-9");
+    pipeline_delaunay(&p, 0, "merge=1e-6");
     assert_counts(p.medial, 1, 0, 0);
     assert_sphere(p.medial, 0, 0, 0, 0, 1);
     assert_region(p.medial, 0, (uint32_t[]){0, 1, 2, 3, 4, 5, 6, 7}, 8);
@@ -355,7 +355,7 @@ static void test_flat_regions_are_thinned_and_every_sample_has_a_sphere(void **s
   size_t triangulated[2];
   for (int resolution = 0; resolution < 2; resolution++) {
     pipeline p;
-    pipeline_make(&p, pipeline_model("l-bracket", 20 << resolution), "spacing=0", "merge=0 thinning_tolerance=0.2%");
+    pipeline_make(&p, pipeline_model("l-bracket", 20 << resolution), "spacing=0", "epsilon=2% merge=0");
     triangulated[resolution] = (size_t)pipeline_count(p.report, "samples_triangulated");
     assert_int_equal(pipeline_count(p.report, "samples"), p.samples->count);
     assert_int_equal(pipeline_components(p.medial), 1);
@@ -378,6 +378,23 @@ static void test_flat_regions_are_thinned_and_every_sample_has_a_sphere(void **s
   }
   /* Four times the vertices, but fewer than four times the triangulated samples. */
   assert_true(2 * triangulated[1] < 5 * triangulated[0]);
+}
+
+static void test_merging_and_thinning_follow_epsilon(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_model("octopus", 24), "spacing=1%", "");
+  const qmat_digest without = p.medial->base.digest;
+  const size_t triangulated = (size_t)pipeline_count(p.report, "samples_triangulated");
+  const size_t spheres = p.medial->sphere_count;
+  pipeline_delaunay(&p, 0, "epsilon=0.5%");
+  assert_memory_equal(&p.medial->base.digest, &without, sizeof without);
+  pipeline_delaunay(&p, 0, "epsilon=4%");
+  assert_true((size_t)pipeline_count(p.report, "samples_triangulated") < triangulated);
+  assert_true(2 * p.medial->sphere_count < spheres);
+  pipeline_delaunay(&p, 0, "epsilon=4% merge=0.0125 thinning_tolerance=0.0125");
+  assert_memory_equal(&p.medial->base.digest, &without, sizeof without);
+  pipeline_free(&p);
 }
 
 static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(void **state) {
@@ -697,6 +714,7 @@ int main(void) {
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
       cmocka_unit_test(test_flat_regions_are_thinned_and_every_sample_has_a_sphere),
+      cmocka_unit_test(test_merging_and_thinning_follow_epsilon),
       cmocka_unit_test(test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller),
       cmocka_unit_test(test_all_incentres_add_spheres_and_keep_the_others),
       cmocka_unit_test(test_samples_all_have_a_sphere),

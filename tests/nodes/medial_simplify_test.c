@@ -550,7 +550,7 @@ static void test_joint_fits_find_what_single_fits_do_not(void **state) {
 static void test_joint_refits_may_lose_the_topology_for_a_while(void **state) {
   (void)state;
   pipeline p;
-  pipeline_make(&p, pipeline_model("box", 8), "spacing=12%", "");
+  pipeline_make(&p, pipeline_model("box", 8), "spacing=12%", "merge=0.04");
   result r = simplify(&p, "epsilon=4%");
   assert_true(r.medial->sphere_count <= 11);
   check_topology(&p, &r);

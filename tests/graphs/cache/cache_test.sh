@@ -92,7 +92,7 @@ else
   echo "skipped: another user (root and setpriv are needed)"
 fi
 model=box.off
-run -o a.glb --set initial.merge=0.1%
+run -o a.glb --set initial.merge=0.15
 for node in model thickness samples; do is $node hit "another parameter"; done
 is initial run "another parameter"
 sed 's/^2 1 1$/2 1 1.5/' box.off >changed.off
@@ -112,17 +112,17 @@ run -o a.glb --force
 all same "all nodes forced"
 holds "forcing names unknown nodes" sh -c '"$0" run "$1" --set model=box.off --force=inital 2>&1 | grep -q "did you mean .initial."' \
   "$qmat" "$graph"
-run -o dry.glb --set initial.merge=0.2% --dry-run
+run -o dry.glb --set initial.merge=0.2 --dry-run
 is model hit "a dry run"
 is initial run "a dry run"
 is asset depends "a dry run"
 holds "a dry run writes nothing" test ! -e dry.glb
-"$qmat" why "$graph" initial --set model=box.off --set initial.merge=0.2% >out.txt 2>err.txt
-holds "why names the parameter" grep -q 'parameter merge is 0.002, was 0.00' out.txt
+"$qmat" why "$graph" initial --set model=box.off --set initial.merge=0.2 >out.txt 2>err.txt
+holds "why names the parameter" grep -q 'parameter merge is 0.2, was 0.1' out.txt
 holds "why tells of the node that was asked for" sh -c '! grep -q "^model" out.txt'
 "$qmat" why "$graph" --set model=changed.off --json >out.txt 2>err.txt
 holds "why as JSON" grep -q '"tag": "name"' out.txt
-"$qmat" dot "$graph" --status --set model=box.off --set initial.merge=0.2% >out.txt 2>err.txt
+"$qmat" dot "$graph" --status --set model=box.off --set initial.merge=0.2 >out.txt 2>err.txt
 holds "dot shows hits" grep -q 'mesh.sdf: from cache' out.txt
 holds "dot shows what would run" grep -q 'medial.delaunay: to run' out.txt
 "$qmat" run "$graph" --set model=box.off -o a.glb --report report.json >out.txt 2>err.txt
@@ -205,9 +205,9 @@ holds "a run on a damaged cache" test "$code" -eq 0
 holds "a damaged cache does not change a result" cmp a.glb cold.glb
 run -o a.glb --cache damaged
 all hit "a cache that was damaged"
-run -o b.glb --cache-read-only --set initial.merge=0.3%
+run -o b.glb --cache-read-only --set initial.merge=0.3
 is initial run "reading only"
-run -o b.glb --set initial.merge=0.3%
+run -o b.glb --set initial.merge=0.3
 is initial run "nothing was kept when reading only"
 # No less than the 1024 bytes that an OpenMP runtime may want for itself.
 for size in 2 8; do
