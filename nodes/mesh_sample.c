@@ -101,7 +101,8 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     for (size_t i = 0; i < mesh->triangle_count; i++) {
       const double *corners[3];
       find_corners(unit_positions, mesh->triangles + 3 * i, corners);
-      spaced->spacings[i] = qmat_facet_spacing(corners[0], corners[1], corners[2], params->spacing);
+      spaced->spacings[i] =
+          qmat_triangle_spacing(qmat_triangle_longest_side(corners[0], corners[1], corners[2]).height, params->spacing);
     }
     const qmat_status status =
         qmat_side_points_count(context, mesh, unit_positions, spaced->spacings, spaced->on_sides);

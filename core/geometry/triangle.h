@@ -36,6 +36,39 @@ static inline double qmat_triangle_area(const double a[3], const double b[3], co
   return degenerate ? 0 : 0.5 * length;
 }
 
+/* The longest side of a triangle, from corner `base` to the next, and the height over it. */
+typedef struct qmat_longest_side {
+  int base;
+  double length, height;
+} qmat_longest_side;
+
+/* The longest side of the triangle abc (3 doubles each); the first of equal ones. */
+static inline qmat_longest_side qmat_triangle_longest_side(const double a[3], const double b[3], const double c[3]) {
+  const double *corners[3] = {a, b, c};
+  qmat_longest_side side = {0, 0, 0};
+  for (int k = 0; k < 3; k++) {
+    const double length = qmat_point_distance(corners[k], corners[(k + 1) % 3]);
+    if (!(length > side.length)) continue;
+    side.base = k;
+    side.length = length;
+  }
+  if (!(side.length > 0)) return side;
+  const double *p = corners[side.base], *q = corners[(side.base + 1) % 3], *top = corners[(side.base + 2) % 3];
+  double along = 0, square = 0;
+  for (int k = 0; k < 3; k++) {
+    along += (q[k] - p[k]) * (top[k] - p[k]) / side.length;
+    square += (top[k] - p[k]) * (top[k] - p[k]);
+  }
+  side.height = sqrt(fmax(square - along * along, 0));
+  return side;
+}
+
+/* The spacing of points inside a triangle of this height: a quarter of the height, but at least `spacing` and at most
+ * 2.5 times that. Large plane facets need fewer points than others. */
+static inline double qmat_triangle_spacing(double height, double spacing) {
+  return qmat_smaller(qmat_larger(0.25 * height, spacing), 2.5 * spacing);
+}
+
 /* Divides a triangle at the middles of its sides. `corners`: 3 vertices; `middles`: the vertex between corners k and
  * k + 1, or UINT32_MAX where that side stays whole; `pieces` (12 numbers) gets 3 vertices a piece, oriented as the
  * triangle. Returns the number of pieces: one more than sides are halved. */

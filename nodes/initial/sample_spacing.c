@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
+#include "core/geometry/triangle.h"
 #include "core/hash.h"
 
 /* The distance between the rows of a regular triangular pattern, in spacings. */
@@ -14,8 +14,6 @@ static const double row_height = 0.86602540378443864676;
 static const double displacement = 0.2;
 /* A side that is longer than a number of spacings by rounding alone has no further point. */
 static const double rounding = 1e-9;
-/* The spacing on a facet as a share of its height, and the most spacings that it may be. */
-static const double height_share = 0.25, widest = 2.5;
 
 typedef struct side {
   uint32_t low, high;
@@ -27,35 +25,6 @@ static int compare_sides(const void *left, const void *right) {
   if (a->low != b->low) return a->low < b->low ? -1 : 1;
   if (a->high != b->high) return a->high < b->high ? -1 : 1;
   return a->corner < b->corner ? -1 : a->corner > b->corner;
-}
-
-/* The longest side of a triangle, from corner `base` to the next, and the height over it. */
-typedef struct longest_side {
-  int base;
-  double length, height;
-} longest_side;
-
-static longest_side find_longest_side(const double *a, const double *b, const double *c) {
-  const double *corners[3] = {a, b, c};
-  longest_side side = {0, 0, 0};
-  for (int k = 0; k < 3; k++) {
-    const double length = qmat_point_distance(corners[k], corners[(k + 1) % 3]);
-    if (length > side.length) side = (longest_side){k, length, 0};
-  }
-  if (!(side.length > 0)) return side;
-  const double *p = corners[side.base], *q = corners[(side.base + 1) % 3], *top = corners[(side.base + 2) % 3];
-  double along = 0, square = 0;
-  for (int k = 0; k < 3; k++) {
-    along += (q[k] - p[k]) * (top[k] - p[k]) / side.length;
-    square += (top[k] - p[k]) * (top[k] - p[k]);
-  }
-  side.height = sqrt(fmax(square - along * along, 0));
-  return side;
-}
-
-double qmat_facet_spacing(const double *a, const double *b, const double *c, double spacing) {
-  const double height = find_longest_side(a, b, c).height;
-  return qmat_smaller(qmat_larger(height_share * height, spacing), widest * spacing);
 }
 
 qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh, const double *positions,
@@ -100,12 +69,12 @@ void qmat_side_points_fill(int side, uint32_t count, double *barycentrics) {
 
 /* The rows of a triangle, parallel to its longest side. */
 typedef struct rows {
-  longest_side side;
+  qmat_longest_side side;
   uint64_t count; /* of rows, without the longest side and the opposite corner */
 } rows;
 
 static rows find_rows(const double *a, const double *b, const double *c, double spacing) {
-  rows r = {find_longest_side(a, b, c), 0};
+  rows r = {qmat_triangle_longest_side(a, b, c), 0};
   if (r.side.length > spacing) r.count = (uint64_t)fmax(ceil(r.side.height / (row_height * spacing)) - 1, 0);
   return r;
 }

@@ -7,10 +7,6 @@
 /* Evenly spaced points on facets and edges that are long compared to a spacing. Coarse meshes need them, since their
  * vertices alone describe the surface poorly. All lengths are in the unit frame. */
 
-/* The spacing of a triangle abc (3 doubles each): a quarter of its height over its longest side, but at least `spacing`
- * and at most 2.5 times that. Large plane facets need fewer samples than others. */
-double qmat_facet_spacing(const double *a, const double *b, const double *c, double spacing);
-
 /* Counts the points that each facet owns on its sides: counts[3 * t + k] between corner k and the next, so that
  * neighbouring points are at most as far apart as the spacing of each facet with that side. The first facet that asks
  * for points owns them. `positions` holds 3 doubles per vertex, `spacings` 1 and `counts` 3 numbers per facet.

@@ -27,48 +27,39 @@ static uint32_t divisions_of(double length, double spacing) {
 }
 
 /* A facet's grid: points on the sides that run from the smaller to the larger vertex, so that the neighbour has the
- * others, and points inside on rows along the longest side. */
+ * others, and points inside on rows along the longest side. Those of large facets are farther apart. */
 typedef struct {
   const double *corners[3]; /* the longest side first, from corner 0 to corner 1 */
   double longest;
+  double spacing;        /* of the rows, and of the points on them */
   bool own[3];           /* whether this facet divides side k, which starts at corner k */
   uint32_t divisions[3]; /* of the sides */
   uint32_t rows;
 } grid;
 
 static grid grid_of(const double *positions, const uint32_t *corners, double spacing) {
-  double lengths[3];
-  size_t first = 0;
+  const double *at[3];
+  for (size_t k = 0; k < 3; k++) at[k] = &positions[3 * (size_t)corners[k]];
+  const qmat_longest_side longest = qmat_triangle_longest_side(at[0], at[1], at[2]);
+  grid g = {.longest = longest.length, .spacing = qmat_triangle_spacing(longest.height, spacing)};
   for (size_t k = 0; k < 3; k++) {
-    lengths[k] = qmat_point_distance(&positions[3 * (size_t)corners[k]], &positions[3 * (size_t)corners[(k + 1) % 3]]);
-    if (lengths[k] > lengths[first]) first = k;
+    const size_t side = ((size_t)longest.base + k) % 3, next = (side + 1) % 3;
+    g.corners[k] = at[side];
+    g.own[k] = corners[side] < corners[next];
+    g.divisions[k] = divisions_of(qmat_point_distance(at[side], at[next]), spacing);
   }
-  grid g = {.longest = lengths[first]};
-  for (size_t k = 0; k < 3; k++) {
-    const size_t side = (first + k) % 3;
-    g.corners[k] = &positions[3 * (size_t)corners[side]];
-    g.own[k] = corners[side] < corners[(side + 1) % 3];
-    g.divisions[k] = divisions_of(lengths[side], spacing);
-  }
-  double along = 0, square = 0;
-  for (int k = 0; k < 3; k++) {
-    const double side = g.corners[1][k] - g.corners[0][k], across = g.corners[2][k] - g.corners[0][k];
-    along += side * across;
-    square += across * across;
-  }
-  const double foot = g.longest > 0 ? along / g.longest : 0;
-  g.rows = divisions_of(sqrt(fmax(square - foot * foot, 0)), spacing);
+  g.rows = divisions_of(longest.height, g.spacing);
   return g;
 }
 
-static uint32_t divisions_of_row(const grid *g, uint32_t row, double spacing) {
-  return divisions_of(g->longest * (1 - (double)row / g->rows), spacing);
+static uint32_t divisions_of_row(const grid *g, uint32_t row) {
+  return divisions_of(g->longest * (1 - (double)row / g->rows), g->spacing);
 }
 
-static size_t grid_points(const grid *g, double spacing) {
+static size_t grid_points(const grid *g) {
   size_t count = 0;
   for (int k = 0; k < 3; k++) count += g->own[k] ? g->divisions[k] - 1 : 0;
-  for (uint32_t row = 1; row < g->rows; row++) count += divisions_of_row(g, row, spacing) - 1;
+  for (uint32_t row = 1; row < g->rows; row++) count += divisions_of_row(g, row) - 1;
   return count;
 }
 
@@ -77,7 +68,7 @@ static double *put_point(const double *const corners[3], double a, double b, dou
   return points + 3;
 }
 
-static void fill_grid(const grid *g, double spacing, double *points) {
+static void fill_grid(const grid *g, double *points) {
   for (int k = 0; k < 3; k++)
     for (uint32_t i = 1; g->own[k] && i < g->divisions[k]; i++) {
       double weights[3] = {0, 0, 0};
@@ -87,7 +78,7 @@ static void fill_grid(const grid *g, double spacing, double *points) {
     }
   for (uint32_t row = 1; row < g->rows; row++) {
     const double height = (double)row / g->rows;
-    const uint32_t divisions = divisions_of_row(g, row, spacing);
+    const uint32_t divisions = divisions_of_row(g, row);
     for (uint32_t i = 1; i < divisions; i++) {
       const double along = (1 - height) * i / divisions;
       points = put_point(g->corners, 1 - height - along, along, height, points);
@@ -350,12 +341,12 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   const qmat_mesh *mesh = a->mesh;
   const double *positions = qmat_surface_positions(surface);
   if (isinf(epsilon)) return QMAT_OK;
-  const double spacing = epsilon, depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
+  const double depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
   size_t capacity = 0;
   const size_t facets = qmat_solid_triangle_count(mesh);
   for (size_t t = 0; t < facets; t++) {
-    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
-    capacity += grid_points(&g, spacing) + 1;
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], epsilon);
+    capacity += grid_points(&g) + 1;
   }
   shell->places = qmat_arena_alloc(arena, capacity, sizeof *shell->places);
   double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
@@ -366,11 +357,11 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
       const qmat_status status = qmat_progress(context, t, facets, "constraint points");
       if (status != QMAT_OK) return status;
     }
-    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], epsilon);
     double normal[3];
     if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
-    const size_t on_grid = grid_points(&g, spacing);
-    fill_grid(&g, spacing, points);
+    const size_t on_grid = grid_points(&g);
+    fill_grid(&g, points);
     for (int k = 0; k < 3; k++)
       points[3 * on_grid + (size_t)k] = (g.corners[0][k] + g.corners[1][k] + g.corners[2][k]) / 3;
     for (size_t i = 0; i <= on_grid; i++)
@@ -424,7 +415,7 @@ static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, con
     for (size_t t = 0; t < mesh->triangle_count; t++) {
       const grid g = grid_of(positions, &mesh->triangles[3 * t], constraints->spacing);
       starts[t] = constraints->sample_count + added;
-      added += grid_points(&g, constraints->spacing);
+      added += grid_points(&g);
     }
     constraints->surface_count = constraints->sample_count + added;
     if (added <= most) return QMAT_OK;
@@ -455,8 +446,8 @@ static qmat_status make_surface_points(qmat_context *context, const regions *a, 
     for (size_t t = first; t < last; t++) {
       const uint32_t *corners = &mesh->triangles[3 * t];
       const grid g = grid_of(positions, corners, constraints->spacing);
-      const size_t count = grid_points(&g, constraints->spacing);
-      if (count) fill_grid(&g, constraints->spacing, &constraints->points[3 * starts[t]]);
+      const size_t count = grid_points(&g);
+      if (count) fill_grid(&g, &constraints->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
         const witness w = search_nearest_region(a, &constraints->points[3 * i], accepted);
         store(constraints, i, &w);
@@ -568,8 +559,7 @@ qmat_status qmat_constraint_points_join(qmat_context *context, const qmat_constr
                                         const qmat_constraint_points *extra, qmat_constraint_points *joined) {
   *joined = (qmat_constraint_points){.count = base->count + extra->count,
                                      .sample_count = base->sample_count,
-                                     .surface_count = base->surface_count + extra->surface_count,
-                                     .spacing = base->spacing};
+                                     .surface_count = base->surface_count + extra->surface_count};
   const qmat_status status = allocate(context, joined);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < joined->count; i++) {

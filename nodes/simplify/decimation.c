@@ -188,7 +188,6 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
   if (s->rules.repairs) return qmat_decimation_repair(s);
   bool ended = s->threshold > s->rules.limit; /* even the lowest threshold exceeds the limit */
   qmat_status status = s->rules.neighbourhoods ? QMAT_OK : qmat_decimation_collapse_edges(s, &ended);
-
   if (status != QMAT_OK || ended || !(s->rules.limit < INFINITY)) return status;
   for (int i = 0; i < s->rules.refits && !ended; i++) {
     const size_t collapses = s->counts.collapses;
@@ -204,6 +203,5 @@ qmat_status qmat_decimation_run(qmat_decimation *s) {
   size_t moved = s->rules.final_refit;
   for (int i = 0; i < s->rules.refits && moved > 0 && status == QMAT_OK; i++)
     status = refit(s, QMAT_FINAL_REFIT_POINTS, &moved);
-
   return status;
 }

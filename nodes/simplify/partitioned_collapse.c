@@ -167,7 +167,7 @@ static qmat_status take_points(qmat_context *context, const partition *d, size_t
   const qmat_constraint_points *all = d->constraints;
   const size_t first = d->points.starts[piece];
   qmat_arena *arena = &context->arena;
-  *own = (qmat_constraint_points){.count = d->points.starts[piece + 1] - first, .spacing = all->spacing};
+  *own = (qmat_constraint_points){.count = d->points.starts[piece + 1] - first};
   const uint32_t *items = &d->points.items[first];
   own->points = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));
   own->weights = qmat_arena_alloc(arena, own->count, 3 * sizeof(double));

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/initial/sample_spacing.h"
+#include "core/geometry/triangle.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -92,13 +93,15 @@ static void test_spacing_of_a_facet_is_a_quarter_of_its_height(void **state) {
   const double a[3] = {0, 0, 0}, b[3] = {4, 0, 0}, c[3] = {0, 3, 0};
   const double *orders[3][3] = {{a, b, c}, {b, c, a}, {c, b, a}};
   for (int i = 0; i < 3; i++) {
-    const double *const *p = orders[i];
-    assert_true(fabs(qmat_facet_spacing(p[0], p[1], p[2], 0.5) - 0.6) < 1e-15);
-    assert_true(qmat_facet_spacing(p[0], p[1], p[2], 0.7) == 0.7);
-    assert_true(qmat_facet_spacing(p[0], p[1], p[2], 0.1) == 0.25);
+    const qmat_longest_side side = qmat_triangle_longest_side(orders[i][0], orders[i][1], orders[i][2]);
+    assert_ptr_equal(orders[i][(side.base + 2) % 3], a);
+    assert_true(side.length == 5 && fabs(side.height - 2.4) < 1e-15);
   }
-  assert_true(qmat_facet_spacing(a, a, a, 0.5) == 0.5);
-  assert_true(qmat_facet_spacing(a, b, b, 0.5) == 0.5);
+  assert_true(fabs(qmat_triangle_spacing(2.4, 0.5) - 0.6) < 1e-15);
+  assert_true(qmat_triangle_spacing(2.4, 0.7) == 0.7);
+  assert_true(qmat_triangle_spacing(2.4, 0.1) == 0.25);
+  assert_true(qmat_triangle_longest_side(a, a, a).height == 0);
+  assert_true(qmat_triangle_longest_side(a, b, b).height == 0);
 }
 
 static void test_degenerate_facets_count_without_harm(void **state) {

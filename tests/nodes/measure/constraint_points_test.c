@@ -113,10 +113,32 @@ static void test_places_on_large_facets_are_measured(void **state) {
   free_model(&m);
 }
 
+/* Each of the twelve facets has sides of 0.577 and 0.816 and a height of 0.408. With a spacing of 0.03 the rows are
+ * 0.075 apart, with 0.2 they are not. */
+static void test_places_inside_large_facets_are_farther_apart_than_on_sides(void **state) {
+  (void)state;
+  const struct {
+    double spacing;
+    size_t on_sides, on_diagonals, in_rows;
+  } cases[] = {{0.03, 19, 27, 9 + 7 + 5 + 3 + 1}, {0.2, 2, 4, 2 + 1}};
+  model m;
+  make_model(&m, shape_box(2, 2, 2), "spacing=20% n_f=0");
+  for (size_t i = 0; i < 2; i++) {
+    qmat_constraint_points places;
+    assert_int_equal(qmat_surface_places_make(&m.context, m.p.mesh, m.positions, m.p.samples, m.unit_samples,
+                                              m.p.medial, &m.complex, cases[i].spacing, 20000, 1, &places),
+                     QMAT_OK);
+    assert_int_equal(places.count - places.sample_count,
+                     12 * cases[i].on_sides + 6 * cases[i].on_diagonals + 12 * cases[i].in_rows);
+  }
+  free_model(&m);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_far_places_have_their_distance_and_others_an_upper_bound),
       cmocka_unit_test(test_places_on_large_facets_are_measured),
+      cmocka_unit_test(test_places_inside_large_facets_are_farther_apart_than_on_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
