@@ -10,8 +10,8 @@
 bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qmat_complex *complex,
                                    size_t sheet_vertices);
 
-/* Does the first collapses of a dense medial mesh in pieces, down to a quarter of its vertices. The pieces are boxes of
- * space; in each the edges collapse in the order of their costs. Vertices with an edge to another piece stay.
+/* Does the first collapses of a dense medial mesh in pieces, down to `qmat_piece_share` of its vertices. The pieces are
+ * boxes of space; in each the edges collapse in the order of their costs. Vertices with an edge to another piece stay.
  * Afterwards `decimation` is what qmat_decimation_init makes of the joined medial mesh, with the quadrics, bounds and
  * witnesses of the pieces; qmat_decimation_run does the remaining collapses.
  *

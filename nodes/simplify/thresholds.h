@@ -70,7 +70,7 @@ static const double qmat_least_gain = 0.02;
 /* The largest number of vertices of a piece of the dense medial mesh, and the share that remains. A
  * piece whose vertices coincide may be larger. */
 enum { QMAT_MOST_PIECE_VERTICES = 1 << 14 };
-static const double qmat_piece_share = 0.25;
+static const double qmat_piece_share = 0.06;
 
 /* Thresholds that rise double every so many levels: steps of 6 %. */
 enum { QMAT_LEVELS_TO_A_DOUBLING = 12 };
