@@ -16,10 +16,6 @@
 #include "nodes/initial/sample_thinning.h"
 #include "nodes/initial/tetrahedra_topology.h"
 
-/* Where the largest distance of the final result is not known, vertices merge and samples are left out as for this one
- * (unit frame). */
-static const double FINE_EPSILON = 0.005;
-
 /* --- connectivity ------------------------------------------------------------------------------------------------ */
 
 /* The corner pairs of a tetrahedron's edges. */
@@ -316,7 +312,7 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
 qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dual_params *params, const qmat_mesh *mesh,
                                    const qmat_surface *solids, const qmat_field *thickness, const qmat_samples *samples,
                                    const double *reaches, qmat_medial **medial, qmat_report *report) {
-  const double epsilon = params->epsilon > 0 ? params->epsilon : FINE_EPSILON;
+  const double epsilon = params->epsilon > 0 ? params->epsilon : QMAT_FINE_EPSILON;
   qmat_dual_complex d = {.context = context,
                          .params = params,
                          .merge = params->merge * epsilon,

@@ -7,6 +7,9 @@
 typedef enum { QMAT_INCENTRES_THIN, QMAT_INCENTRES_ALL } qmat_incentre_rule;
 typedef enum { QMAT_RADIUS_DISTANCE, QMAT_RADIUS_CIRCUMRADIUS } qmat_radius_rule;
 
+/* Where epsilon is 0, vertices merge and samples are left out as for this one. */
+#define QMAT_FINE_EPSILON 0.005
+
 /* The parameters of medial.delaunay. Those of medial.refine start with the same struct. */
 typedef struct qmat_voronoi_dual_params {
   double epsilon; /* each node has its own row for it */

@@ -404,16 +404,16 @@ static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, 
   return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
 }
 
-/* Finds where the points of each facet's grid start, after the samples. The spacing grows until at most `most` points
+/* Finds where the points of each facet's grid start, after the samples. `*spacing` grows until at most `most` points
  * are added. */
 static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
-                               size_t *starts, qmat_constraint_points *constraints) {
-  for (;; constraints->spacing *= 1.25) {
+                               double *spacing, size_t *starts, qmat_constraint_points *constraints) {
+  for (;; *spacing *= 1.25) {
     const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
     if (status != QMAT_OK) return status;
     size_t added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-      const grid g = grid_of(positions, &mesh->triangles[3 * t], constraints->spacing);
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], *spacing);
       starts[t] = constraints->sample_count + added;
       added += grid_points(&g);
     }
@@ -424,8 +424,8 @@ static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, con
 
 /* Makes the points on the surface, with witnesses from the regions around them. */
 static qmat_status make_surface_points(qmat_context *context, const regions *a, const double *positions,
-                                       const double *unit_samples, const size_t *starts, double accepted,
-                                       qmat_constraint_points *constraints) {
+                                       const double *unit_samples, double spacing, const size_t *starts,
+                                       double accepted, qmat_constraint_points *constraints) {
   const qmat_mesh *mesh = a->mesh;
   const size_t samples = constraints->sample_count;
   memcpy(constraints->points, unit_samples, 3 * samples * sizeof *unit_samples);
@@ -445,7 +445,7 @@ static qmat_status make_surface_points(qmat_context *context, const regions *a, 
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t t = first; t < last; t++) {
       const uint32_t *corners = &mesh->triangles[3 * t];
-      const grid g = grid_of(positions, corners, constraints->spacing);
+      const grid g = grid_of(positions, corners, spacing);
       const size_t count = grid_points(&g);
       if (count) fill_grid(&g, &constraints->points[3 * starts[t]]);
       for (size_t i = starts[t]; i < starts[t] + count; i++) {
@@ -461,16 +461,16 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
                                      const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
                                      qmat_constraint_points *constraints) {
-  *constraints = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing};
+  *constraints = (qmat_constraint_points){.sample_count = samples->count};
   size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
   if (!starts) return qmat_fail_memory(context, "constraint points");
   regions a;
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
-  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, starts, constraints);
+  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, &spacing, starts, constraints);
   constraints->count = constraints->surface_count;
   if (status == QMAT_OK) status = allocate(context, constraints);
   if (status == QMAT_OK)
-    status = make_surface_points(context, &a, positions, unit_samples, starts, enough, constraints);
+    status = make_surface_points(context, &a, positions, unit_samples, spacing, starts, enough, constraints);
   return status == QMAT_OK ? search_everywhere(context, &a, enough, constraints) : status;
 }
 
@@ -480,7 +480,8 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  *constraints = (qmat_constraint_points){.sample_count = samples->count, .spacing = spacing_share * epsilon};
+  *constraints = (qmat_constraint_points){.sample_count = samples->count};
+  double spacing = spacing_share * epsilon;
   size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
   regions a;
   qmat_interior_points inner = {.count = 0};
@@ -492,12 +493,12 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
   if (status != QMAT_OK) return status;
-  if ((status = place_grids(context, mesh, positions, most, starts, constraints)) != QMAT_OK) return status;
+  if ((status = place_grids(context, mesh, positions, most, &spacing, starts, constraints)) != QMAT_OK) return status;
   constraints->count = constraints->surface_count + inner.count + shell.count;
   if ((status = allocate(context, constraints)) != QMAT_OK) return status;
   const double enough = accepted_with_star * epsilon;
-  status =
-      make_surface_points(context, &a, positions, unit_samples, starts, accepted_with_sphere * epsilon, constraints);
+  status = make_surface_points(context, &a, positions, unit_samples, spacing, starts, accepted_with_sphere * epsilon,
+                               constraints);
   if (status != QMAT_OK) return status;
   size_t next = constraints->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {

@@ -18,7 +18,6 @@ typedef struct qmat_constraint_points {
   uint32_t *witnesses;  /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
   double *weights;      /* 3 per point */
   double *distances;    /* per point: F at the witness */
-  double spacing;       /* of the grids, unit frame */
 } qmat_constraint_points;
 
 /* The usual limit of the points that grids add. */

@@ -21,6 +21,7 @@
 #include "examples/models.h"
 #include "io/model.h"
 #include "nodes/initial/sample_thinning.h"
+#include "nodes/initial/voronoi_dual_params.h"
 #include "nodes/nodes.h"
 #include "tests/bench/plain_delaunay_cgal.h"
 
@@ -189,9 +190,8 @@ static qmat_status run_node(qmat_context *context, const char *name, const qmat_
   return qmat_node_run(context, node, params, inputs, outputs);
 }
 
-/* Without epsilon the share is of 0.5 % (nodes/initial/voronoi_dual.c). */
 static double detail_of_delaunay(void) {
-  return 0.005 * qmat_param_find(qmat_node_find("medial.delaunay"), "thinning_tolerance")->default_number;
+  return QMAT_FINE_EPSILON * qmat_param_find(qmat_node_find("medial.delaunay"), "thinning_tolerance")->default_number;
 }
 
 /* The seconds of CGAL's triangulation of the samples that medial.delaunay triangulates, and of all samples. */

@@ -536,14 +536,16 @@ static void test_a_planted_medial_mesh_is_found_again(void **state) {
  * alone to more. */
 static void test_joint_fits_find_what_single_fits_do_not(void **state) {
   (void)state;
-  const pipeline *p = model(BRACKET);
-  result jointly = simplify(p, "epsilon=3.5%"), unfitted = simplify(p, "epsilon=3.5% refits=0");
+  pipeline p;
+  pipeline_make(&p, pipeline_model("l-bracket", 8), sampling, "merge=0.04");
+  result jointly = simplify(&p, "epsilon=3%"), unfitted = simplify(&p, "epsilon=3% refits=0");
   assert_true(jointly.medial->sphere_count <= 8);
   assert_true(unfitted.medial->sphere_count > 11);
-  check_errors(p, &jointly, 0.035, true);
-  check_errors(p, &unfitted, 0.035, true);
+  check_errors(&p, &jointly, 0.03, true);
+  check_errors(&p, &unfitted, 0.03, true);
   release(&jointly);
   release(&unfitted);
+  pipeline_free(&p);
 }
 
 /* Joint refits find eleven spheres instead of fifteen, but lose the right topology, which is mended then. */

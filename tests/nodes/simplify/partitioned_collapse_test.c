@@ -85,8 +85,7 @@ static void make_sheet(sheet *s) {
 static void start(sheet *s) {
   qmat_constraint_points *c = &s->constraints;
   const double *points = c->points;
-  *c = (qmat_constraint_points){
-      .count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = c->points, .spacing = INFINITY};
+  *c = (qmat_constraint_points){.count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = c->points};
   qmat_arena *arena = &s->context.arena;
   c->witnesses = qmat_arena_alloc(arena, POINTS, 3 * sizeof(uint32_t));
   c->weights = qmat_arena_calloc(arena, POINTS, 3 * sizeof(double));

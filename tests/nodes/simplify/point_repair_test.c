@@ -41,8 +41,7 @@ static void make_points(bar *b, const double newest[3]) {
   }
   memcpy(&b->points[3 * OLDER], newest, 3 * sizeof *newest);
   qmat_constraint_points *c = &b->constraints;
-  *c = (qmat_constraint_points){
-      .count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = b->points, .spacing = INFINITY};
+  *c = (qmat_constraint_points){.count = POINTS, .sample_count = POINTS, .surface_count = POINTS, .points = b->points};
   qmat_arena *arena = &b->context.arena;
   c->witnesses = qmat_arena_alloc(arena, POINTS, 3 * sizeof(uint32_t));
   c->weights = qmat_arena_calloc(arena, POINTS, 3 * sizeof(double));
