@@ -58,10 +58,11 @@ static qmat_status find_surface_components(qmat_dual_complex *d) {
   return QMAT_OK;
 }
 
-double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b, double limit) {
+double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b, double least, double limit) {
   double middle[3];
   for (size_t k = 0; k < 3; k++) middle[k] = 0.5 * (d->points[3 * (size_t)a + k] + d->points[3 * (size_t)b + k]);
-  return qmat_surface_inside(d->surface, middle) ? 0 : qmat_surface_distance(d->surface, middle, limit, NULL, NULL);
+  const double distance = qmat_surface_distance(d->surface, middle, limit, NULL, NULL);
+  return distance <= least || qmat_surface_inside(d->surface, middle) ? 0 : distance;
 }
 
 /* Whether a tetrahedron connects two components of the surface through the outside. The incentre of such a needle can
@@ -71,7 +72,7 @@ static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
   for (int a = 0; a < 3 && d->surface_components; a++)
     for (int b = a + 1; b < 4; b++)
       if (qmat_dual_surface_component(d, corners[a]) != qmat_dual_surface_component(d, corners[b]) &&
-          qmat_dual_edge_outside(d, corners[a], corners[b], tolerance) > tolerance)
+          qmat_dual_edge_outside(d, corners[a], corners[b], tolerance, tolerance) > 0)
         return true;
   return false;
 }

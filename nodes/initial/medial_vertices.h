@@ -16,7 +16,7 @@ void qmat_medial_vertex_incentre(const qmat_dual_complex *dual, size_t cell, dou
 qmat_status qmat_medial_vertices_number(qmat_dual_complex *dual);
 
 /* How far the middle of the edge between two samples is outside of the solid (unit frame): 0 inside, INFINITY beyond
- * `limit`. Thread-safe. */
-double qmat_dual_edge_outside(const qmat_dual_complex *dual, uint32_t a, uint32_t b, double limit);
+ * `limit`. At or below `least` the answer is any number up to that, which takes less time. Thread-safe. */
+double qmat_dual_edge_outside(const qmat_dual_complex *dual, uint32_t a, uint32_t b, double least, double limit);
 
 #endif

@@ -247,7 +247,7 @@ static double gap_of(const mending *m, uint32_t cell) {
   qmat_medial_vertex_incentre(d, cell, centre);
   double gap = qmat_surface_distance(d->surface, centre, most_gap, NULL, NULL);
   for (int e = 0; e < 6 && gap <= most_gap && !m->before[cell]; e++)
-    gap = fmax(gap, qmat_dual_edge_outside(d, corners[edges[e][0]], corners[edges[e][1]], most_gap));
+    gap = fmax(gap, qmat_dual_edge_outside(d, corners[edges[e][0]], corners[edges[e][1]], gap, most_gap));
   return gap;
 }
 
