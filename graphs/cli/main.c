@@ -31,10 +31,12 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
   return status;
 }
 
-/* Threads that wait for others give their processor away. OpenMP reads this from the environment before `main`, so the
- * program starts itself once more. Where that fails it runs as it is. */
+/* Threads that wait for others give their processor away, GCC's after some ten microseconds: most waits are shorter.
+ * OpenMP reads this from the environment before `main`, so the program starts itself once more. Where that fails it
+ * runs as it is. */
 static void wait_passively(char **argv) {
-  if (getenv("OMP_WAIT_POLICY") || getenv("GOMP_SPINCOUNT") || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
+  if (getenv("OMP_WAIT_POLICY") || getenv("GOMP_SPINCOUNT")) return;
+  if (setenv("OMP_WAIT_POLICY", "passive", 1) != 0 || setenv("GOMP_SPINCOUNT", "3000", 1) != 0) return;
   execv("/proc/self/exe", argv);
 }
 
