@@ -56,6 +56,8 @@ qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
   for (size_t i = 0; i < point_count; i += POINT_STRIDE)
     farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
+  /* Where a point exceeds the threshold, the facets beyond it are still to show their worst points. */
+  farthest = fmin(farthest, fmax(threshold, enough));
   status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold - tolerance,
                                         threshold, &errors->bound);
   errors->surface_to_envelope = errors->bound.bound;

@@ -189,20 +189,22 @@ static qmat_status judge_round(qmat_simplification *s, qmat_simplified *a, qmat_
 
 /* ---- the passes ---- */
 
-/* Makes the dense initial medial mesh, and the constraint points. */
+/* Makes the dense initial medial mesh. */
 static qmat_status make_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   qmat_decimation_uninit(dense);
   *dense = (qmat_decimation){
       .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
   dense->sheet_vertices = s->initial->sheet_sphere_count;
-  qmat_status status = qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
+  return qmat_complex_init(s->context, &dense->complex, s->initial, s->state.spheres);
+}
+
+/* Makes the constraint points of the dense initial medial mesh. */
+static qmat_status make_constraints(qmat_simplification *s) {
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : INFINITY;
   const bool inside = s->params.error == QMAT_ERROR_TWO_SIDED && epsilon < INFINITY;
-  return status == QMAT_OK
-             ? qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &dense->complex, epsilon,
-                                           QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints)
-             : status;
+  return qmat_constraint_points_make(s->context, s->surface, s->samples, s->initial, &s->dense.complex, epsilon,
+                                     QMAT_MOST_CONSTRAINT_POINTS, inside, &s->constraints);
 }
 
 /* Collapses the dense initial medial mesh as far as `qmat_dense_share` of the error allows: in pieces on all threads,
@@ -215,6 +217,21 @@ static qmat_status collapse_dense(qmat_simplification *s) {
                                  ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
                                  : qmat_decimation_init(dense, &s->constraints, s->state.depths);
   return status == QMAT_OK ? qmat_decimation_run(dense) : status;
+}
+
+/* Starts over with the points that rounds have found: the dense collapse may itself exceed epsilon between its points,
+ * which no round after it can undo. That is so where sheets cross: the nearest one changes between two points. */
+static qmat_status collapse_dense_again(qmat_simplification *s, qmat_extra_points *extra) {
+  qmat_constraint_points further, joined;
+  qmat_status status = make_dense(s);
+  if (status == QMAT_OK) status = qmat_extra_points_make(s->context, &s->dense.complex, extra, &further);
+  if (status == QMAT_OK)
+    status = qmat_constraint_points_join(s->context, &s->constraints, s->constraints.witnesses, s->constraints.weights,
+                                         NULL, &further, &joined);
+  if (status != QMAT_OK) return status;
+  s->constraints = joined;
+  *extra = no_extra_points(s);
+  return collapse_dense(s);
 }
 
 /* Continues the collapses of `from`, whose extract is `left`, and judges the result. `neighbourhoods` and `final_refit`
@@ -313,6 +330,7 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
   const double epsilon = s->params.epsilon;
   qmat_extra_points extra = no_extra_points(s);
   qmat_status status = make_dense(s);
+  if (status == QMAT_OK) status = make_constraints(s);
   const bool is_within = status == QMAT_OK && starts_within(s);
   if (status == QMAT_OK && s->may_end_without_result && epsilon > 0 && !is_within) return QMAT_OK;
   if (status == QMAT_OK) status = collapse_dense(s);
@@ -320,7 +338,8 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
     const bool is_last = round == QMAT_MOST_ROUNDS || !is_within;
-    status = collapse_and_fit(s, &extra, is_last, &a, &errors);
+    if (round >= QMAT_DENSE_AGAIN_ROUND) status = collapse_dense_again(s, &extra);
+    if (status == QMAT_OK) status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);
     if (status == QMAT_OK && is_done && (a.within_epsilon || a.figures.filled > 0 || is_within))

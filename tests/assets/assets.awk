@@ -2,7 +2,7 @@
 # Writes a small asset of a kind that people really have, as OFF: awk -v name=NAME -f assets.awk
 # head: a sphere with a cut-off neck; holes: a sphere with ten holes; soup: its triangles apart, each facing anywhere;
 # overlap: two spheres that reach into each other; crossing: a tube that crosses itself; plane, banner, shell,
-# leaves: surfaces without volume; card: a plane of two sides.
+# leaves: surfaces without volume; arcs, deep_arcs: two that cross; card: a plane of two sides.
 function vertex(x, y, z) { v[vertices++] = sprintf("%.9g %.9g %.9g", x, y, z) }
 function face(a, b, c) { f[faces++] = "3 " a " " b " " c }
 # A sphere of `rows` rows; of the lowest `cut` there is none.
@@ -44,6 +44,10 @@ function place(u, w,   a, b, x, y) {
     x = 0.1 + u
     y = 0.3 * (w - 0.5) * sin(pi * (0.1 + 0.8 * u))
     vertex(x * cos(a) - y * sin(a), x * sin(a) + y * cos(a), 0.4 * sin(2 * u + leaf))
+  } else if (name ~ /arcs$/) {
+    x = sin(curvature * u) / curvature
+    y = 0.9 * (w - 0.5)
+    vertex(x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn), (1 - cos(curvature * u)) / curvature)
   } else vertex(u, 1.6 * w, 0)
 }
 # A tube along a figure of eight, which crosses itself in the middle.
@@ -67,7 +71,14 @@ BEGIN {
   else if (name == "overlap") { sphere(0, 16, 0); sphere(1, 16, 0) }
   else if (name == "crossing") tube(64, 16)
   else if (name == "leaves") for (leaf = 0; leaf < 7; leaf++) grid(8, 4)
-  else if (name == "holes" || name == "soup") sphere(0, 16, 0)
+  else if (name ~ /arcs$/) {
+    curvature = 1
+    turn = 0
+    grid(10, 4)
+    curvature = name == "arcs" ? 2.5 : 3.5
+    turn = 0.5
+    grid(10, 4)
+  } else if (name == "holes" || name == "soup") sphere(0, 16, 0)
   else if (name == "card") {
     grid(6, 10)
     other = faces

@@ -39,6 +39,9 @@ asset plane 4 solids=0 sheets=1 sheet_triangles=128
 asset banner 8 solids=0 sheets=1 sheet_triangles=576
 asset shell 30 solids=0 sheets=1 sheet_triangles=576
 asset leaves 34 solids=0 sheets=7 sheet_triangles=448
+# Where sheets cross, the nearest one changes between two constraint points, and the distance may be largest there.
+asset arcs 16 solids=0 sheets=2 sheet_triangles=160
+asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
 # The cap is the disc that cut the neck: of 32 sides, in a circle of the radius sin(3/16 pi).
