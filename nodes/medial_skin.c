@@ -549,9 +549,9 @@ static const char *const methods[] = {"envelope", "skin_surface", NULL};
 static const qmat_param params[] = {
     QMAT_ENUM(medial_skin_params, method, methods, METHOD_ENVELOPE,
               "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it"),
-    QMAT_INT(medial_skin_params, resolution, "cells", 128, 8, 2048,
+    QMAT_INT(medial_skin_params, resolution, "cells", 96, 8, 2048,
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
-    QMAT_INT(medial_skin_params, detail, "halvings", 3, 0, 6,
+    QMAT_INT(medial_skin_params, detail, "halvings", 4, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
              "often where that makes more than 400,000 triangles to decimate"),
     QMAT_LENGTH(
@@ -583,7 +583,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 10,
+    .version = 11,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "

@@ -229,7 +229,7 @@ static qmat_medial *soup(uint64_t seed) {
 
 static void test_a_sphere_has_its_area_and_volume(void **unused) {
   (void)unused;
-  skin_result result = skin(ball(), "");
+  skin_result result = skin(ball(), "resolution=128 detail=3");
   check_shape(result, 2, 1, 4 * PI * 4, 4.0 / 3 * PI * 8, 4e-4);
   const double diagonal = 4 * sqrt(3);
   assert_near(number_of(result, "diagonal"), diagonal, 1e-12);
@@ -268,7 +268,8 @@ static double farthest_from(const qmat_envelope *envelope, const qmat_mesh *mesh
 
 static void test_decimation_leaves_few_triangles_within_its_error(void **unused) {
   (void)unused;
-  static const char *const settings[] = {"error=0.1%", "error=0.2%", "error=1%"};
+  static const char *const settings[] = {"resolution=128 detail=3 error=0.1%", "resolution=128 detail=3 error=0.2%",
+                                         "resolution=128 detail=3 error=1%"};
   qmat_context context = {0};
   size_t last = SIZE_MAX / 2;
   for (int i = 0; i < 3; i++) {
@@ -361,7 +362,7 @@ static void test_a_gap_narrower_than_all_cells_is_filled_and_stated(void **unuse
   const uint32_t edges[] = {0, 1, 2, 3};
   qmat_context context = {0};
   qmat_medial *medial = medial_mesh(spheres, 4, edges, 2, NULL, 0);
-  skin_result result = skin(medial_mesh(spheres, 4, edges, 2, NULL, 0), "error=0.2%");
+  skin_result result = skin(medial_mesh(spheres, 4, edges, 2, NULL, 0), "resolution=128 detail=3 error=0.2%");
   assert_manifold(result.mesh);
   const double found = farthest_from_mesh(&context, medial, result.mesh) / number_of(result, "diagonal");
   assert_true(found > 2e-3 && number_of(result, "envelope_to_mesh") >= found);
@@ -446,7 +447,7 @@ static void test_finer_cells_come_closer(void **unused) {
 
 static void test_a_capsule_has_its_area_and_volume(void **unused) {
   (void)unused;
-  skin_result result = skin(capsule(0), "");
+  skin_result result = skin(capsule(0), "resolution=128 detail=3");
   check_shape(result, 2, 1, 4 * PI + 2 * PI * 5, 4.0 / 3 * PI + PI * 5, 1e-3);
   release(result);
 }
@@ -523,7 +524,7 @@ static void test_thin_parts_stay_connected(void **unused) {
   /* A ball with a hair of a tenth of a cell's width that ends in a point, and a sheet of paper on it. */
   const double spheres[] = {0, 0, 0, 1, 4, 0.7, 0.3, 1e-3, 7, -1, 2, 0, -3, 2, 1, 1e-3, -2, 3, 0, 0};
   const uint32_t edges[] = {0, 1, 1, 2}, triangles[] = {0, 3, 4};
-  static const char *const settings[] = {"resolution=16 detail=0", "resolution=50 detail=2", "resolution=128",
+  static const char *const settings[] = {"resolution=16 detail=0", "resolution=50 detail=2", "resolution=128 detail=3",
                                          "resolution=32 detail=6"};
   double last = INFINITY;
   for (int i = 0; i < 4; i++) {
@@ -691,7 +692,7 @@ static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unus
   assert_near(number_of(result, "triangles"), 0, 0);
   assert_true(result.mesh->oriented && !result.mesh->closed);
   /* Both sides of the slab cancel; the prism is six times its third and turned outwards. */
-  const double side = sqrt(3) * number_of(result, "diagonal") / 1024, prism = sqrt(3) / 4 * side * side * 5;
+  const double side = sqrt(3) * number_of(result, "diagonal") / (96 << 4), prism = sqrt(3) / 4 * side * side * 5;
   assert_near(volume_of(result.mesh), prism, 1e-9 * prism);
   release(result);
   assert_int_equal(try_skin(&context, sealed_medial_mesh(spheres, 5, cone, 1, slab, 1), "resolution=32", &result),
