@@ -20,8 +20,9 @@ typedef struct qmat_medial_errors {
 
 /* Bounds the distance from the surface to the envelope, to within `tolerance` (> 0) where it is above `enough`. Below,
  * `enough` is the answer: the maximum over a plateau of small errors takes too many queries. F at the `point_count`
- * points (3 doubles each, on the surface) is the first lower bound. The bound is exact enough to compare it with
- * `threshold`, and the points of `errors->bound` have an F above it less the tolerance. */
+ * points (3 doubles each, on the surface) is the first lower bound, as far as it is at most `threshold`. The bound is
+ * exact enough to compare it with `threshold`, and the points of `errors->bound`, one a facet, have an F above it less
+ * the tolerance. */
 qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_surface *surface,
                                               const qmat_medial *unit, const double *points, size_t point_count,
                                               double tolerance, double enough, double threshold,

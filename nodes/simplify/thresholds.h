@@ -17,11 +17,11 @@ static const double qmat_dense_share = 0.9;
 /* Found points inside the solid must be as deep in the envelope as this share. */
 static const double qmat_required_depth_share = 0.05;
 
-/* ---- repetitions: none was reached on a model that ended within epsilon ---- */
+/* ---- repetitions: no limit was reached on a model that ended within epsilon ---- */
 
 enum {
   QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
-  QMAT_DENSE_AGAIN_ROUND = 3,  /* from it on the dense collapse starts over, with the points found */
+  QMAT_DENSE_AGAIN_ROUND = 3,  /* the first round before which the dense collapse starts over */
   QMAT_MOST_REPAIRS = 4,       /* of a round, each with the points found after the one before */
   QMAT_MOST_JOINT_REFITS = 6,  /* the same for joint refits */
   QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
