@@ -66,9 +66,8 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
   const size_t count = mesh->triangle_count, slice = 1 << 12;
   *result = (qmat_hausdorff_bound){.found = known, .bound = known};
   result->points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *result->points);
-  result->facets = qmat_arena_alloc(&context->arena, count, sizeof *result->facets);
   double *worst = qmat_arena_alloc(&context->arena, count, sizeof *worst);
-  if (!result->points || !result->facets || !worst) return qmat_fail_memory(context, "the Hausdorff bound");
+  if (!result->points || !worst) return qmat_fail_memory(context, "the Hausdorff bound");
   const int threads = qmat_threads(context);
   double bound = known;
   for (size_t first = 0; first < count; first += slice) {
@@ -95,8 +94,7 @@ qmat_status qmat_hausdorff_bound_measure(qmat_context *context, const qmat_surfa
   for (size_t t = 0; t < count; t++) {
     result->found = fmax(result->found, worst[t]);
     if (!(worst[t] > threshold)) continue;
-    memmove(&result->points[3 * result->count], &result->points[3 * t], 3 * sizeof *result->points);
-    result->facets[result->count++] = (uint32_t)t;
+    memmove(&result->points[3 * result->count++], &result->points[3 * t], 3 * sizeof *result->points);
   }
   result->bound = bound + rounding;
   return QMAT_OK;

@@ -7,11 +7,10 @@
 
 /* The distance from a surface to an envelope: the one-sided Hausdorff distance of the first to the second. */
 typedef struct qmat_hausdorff_bound {
-  double found;     /* the largest F found at a point of the surface, or `known` */
-  double bound;     /* an upper bound of F over the surface, raised by 1e-9 for rounding; unit frame */
-  size_t count;     /* facets with a point where F exceeds the threshold */
-  double *points;   /* 3 per such facet: its worst point; in the context's arena */
-  uint32_t *facets; /* their numbers, in rising order */
+  double found;   /* the largest F found at a point of the surface, or `known` */
+  double bound;   /* an upper bound of F over the surface, raised by 1e-9 for rounding; unit frame */
+  size_t count;   /* facets with a point where F exceeds the threshold */
+  double *points; /* 3 per such facet, in the order of their numbers: its worst point; in the context's arena */
 } qmat_hausdorff_bound;
 
 /* Bounds F over the whole surface by branch and bound (eq. 9 over all of S, not only its samples). F is 1-Lipschitz,
