@@ -251,19 +251,13 @@ static qmat_status copy_triangles(skin *s, const qmat_skin_triangles *from, qmat
   return QMAT_OK;
 }
 
-/* Bounds both distances between a surface and the envelope; `*far` (may be NULL) gets the places beyond `threshold`. */
-static qmat_status bound_distance(skin *s, const qmat_skin_triangles *surface, double threshold,
-                                  qmat_skin_distance *far) {
+/* Bounds both distances between the surface and the envelope; `far` gets the places beyond the error. */
+static qmat_status bound_distance(skin *s, qmat_skin_distance *far) {
   qmat_medial unit = s->solid;
   unit.spheres = s->spheres;
-  qmat_skin_distance distance;
-  const qmat_status status = qmat_skin_distance_measure(s->context, &unit, surface, threshold, &distance);
-  s->to_envelope = distance.to_envelope;
-  s->from_envelope = distance.from_envelope;
-  if (far)
-    *far = distance;
-  else
-    qmat_skin_distance_uninit(&distance);
+  const qmat_status status = qmat_skin_distance_measure(s->context, &unit, &s->surface, s->params->error, far);
+  s->to_envelope = far->to_envelope;
+  s->from_envelope = far->from_envelope;
   return status;
 }
 
@@ -346,18 +340,18 @@ static qmat_status mark_far_triangles(skin *s, int level, size_t *far) {
 }
 
 /* Makes the contour again with the marks of now. It stays where no cell is halved, or where that is too much. */
-static qmat_status make_finer_contour(skin *s, int detail, bool *is_finer) {
+static qmat_status make_finer_contour(skin *s, int detail, qmat_skin_triangles *contour, bool *is_finer) {
   qmat_skin_triangles finer;
   qmat_envelope_grid grid;
   *is_finer = false;
-  if (2 * s->surface.triangle_count > MOST_CONTOUR_TRIANGLES) return QMAT_OK;
+  if (2 * contour->triangle_count > MOST_CONTOUR_TRIANGLES) return QMAT_OK;
   const qmat_status status = make_contour(s, detail, &finer, &grid);
   if (status != QMAT_OK || grid.cell_count == s->grid.cell_count || finer.triangle_count > MOST_CONTOUR_TRIANGLES) {
     drop_triangles(&finer);
     return status;
   }
-  drop_triangles(&s->surface);
-  s->surface = finer;
+  drop_triangles(contour);
+  *contour = finer;
   s->grid = grid;
   *is_finer = true;
   return QMAT_OK;
@@ -371,62 +365,65 @@ static qmat_status refine_contour(skin *s, int detail) {
     size_t far;
     status = mark_far_triangles(s, level, &far);
     if (status != QMAT_OK || far == 0) break;
-    status = make_finer_contour(s, detail, &is_finer);
+    status = make_finer_contour(s, detail, &s->surface, &is_finer);
   }
   return status;
 }
 
-/* Decimates a copy of the contour, and bounds the errors of what is left. The surface becomes that. `far` gets the
+/* Decimates a copy of the contour, and bounds the errors of what is left, which becomes the surface. `far` gets the
  * places beyond the error; free it with qmat_skin_distance_uninit, also after a failure. */
 static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, double error, qmat_skin_distance *far) {
   const medial_skin_params *p = s->params;
   *far = (qmat_skin_distance){0};
+  drop_triangles(&s->surface);
   qmat_status status = copy_triangles(s, contour, &s->surface);
   if (status == QMAT_OK)
     status = qmat_skin_decimate(s->context, s->envelope, error, (size_t)p->triangles, &s->surface, &s->errors);
-  return status == QMAT_OK ? bound_distance(s, &s->surface, p->error, far) : status;
+  return status == QMAT_OK ? bound_distance(s, far) : status;
 }
 
-/* Makes the finest cells at the places, as the surface. False where that changes nothing. */
-static qmat_status refine_places(skin *s, const qmat_skin_distance *far, int detail, bool *is_finer) {
+/* Makes the contour again with the finest cells at the places. */
+static qmat_status refine_places(skin *s, const qmat_skin_distance *far, int detail, qmat_skin_triangles *contour,
+                                 bool *is_finer) {
   *is_finer = false;
   const qmat_status status = mark_places(s, far->far_points, far->far_count, detail);
-  return status == QMAT_OK && far->far_count > 0 ? make_finer_contour(s, detail, is_finer) : status;
+  return status == QMAT_OK && far->far_count > 0 ? make_finer_contour(s, detail, contour, is_finer) : status;
+}
+
+/* Decimates the contour for a share of the error. The surface stays as it is where that does not help. */
+static qmat_status decimate_more_closely(skin *s, const qmat_skin_triangles *contour) {
+  skin before = *s;
+  qmat_skin_distance far;
+  s->surface = (qmat_skin_triangles){.vertex_count = 0};
+  const qmat_status status = decimate_copy(s, contour, SECOND_SHARE * s->params->error, &far);
+  qmat_skin_distance_uninit(&far);
+  if (status == QMAT_OK && distance_of(s) <= s->params->error) {
+    drop_triangles(&before.surface);
+    return status;
+  }
+  drop_triangles(&s->surface);
+  *s = before;
+  return status;
 }
 
 /* Decimates the contour. Where the result exceeds the error, the contour gets the finest cells. If that does not help,
- * a contour within the error is decimated for a share of it. */
+ * it is decimated for a share of the error. */
 static qmat_status decimate_contour(skin *s, int detail) {
-  const double error = s->params->error;
   qmat_skin_triangles contour = s->surface;
   qmat_status status = QMAT_OK;
-  double share = 1;
-  for (int attempt = 1; status == QMAT_OK; attempt++) {
+  s->surface = (qmat_skin_triangles){.vertex_count = 0};
+  bool exceeds = true, is_finer = true;
+  for (int attempt = 1; status == QMAT_OK && exceeds && is_finer; attempt++) {
     qmat_skin_distance far;
     s->contour_triangle_count = contour.triangle_count;
-    status = decimate_copy(s, &contour, share * error, &far);
-    const double to_envelope = s->to_envelope, from_envelope = s->from_envelope;
-    bool is_finer = false, goes_on = share == 1 && s->params->triangles == 0 && distance_of(s) > error;
-    if (status == QMAT_OK && goes_on) {
-      qmat_skin_triangles decimated = s->surface;
-      s->surface = contour;
-      if (attempt < MOST_CONTOURS) status = refine_places(s, &far, detail, &is_finer);
-      if (status == QMAT_OK && !is_finer) {
-        share = SECOND_SHARE;
-        status = bound_distance(s, &s->surface, error, NULL);
-        goes_on = distance_of(s) <= error;
-      }
-      contour = s->surface;
-      s->surface = decimated;
-    }
+    status = decimate_copy(s, &contour, s->params->error, &far);
+    exceeds = s->params->triangles == 0 && distance_of(s) > s->params->error;
+    is_finer = false;
+    if (status == QMAT_OK && exceeds && attempt < MOST_CONTOURS)
+      status = refine_places(s, &far, detail, &contour, &is_finer);
     qmat_skin_distance_uninit(&far);
-    if (!goes_on) {
-      s->to_envelope = to_envelope;
-      s->from_envelope = from_envelope;
-      break;
-    }
-    if (status == QMAT_OK) drop_triangles(&s->surface);
   }
+  if (status == QMAT_OK && exceeds) status = decimate_more_closely(s, &contour);
   drop_triangles(&contour);
   return status;
 }
@@ -583,7 +580,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 11,
+    .version = 12,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "

@@ -7,12 +7,11 @@
 
 #include "core/disjoint_sets.h"
 #include "core/node.h"
-#include "nodes/skin/skin_topology.h"
 
-/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Each round doubles them.
- * The first rounds leave them around their own faults only; the others, around all that was left before, too: on a
- * plane, faults come again along its border. */
-enum { MOST_ROUNDS = 6, NARROW_ROUNDS = 3, FIRST_RINGS = 2 };
+/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Every second round doubles
+ * them. The first rounds leave them around their own faults only; the others, around all that was left before, too: on
+ * a plane, faults come again along its border. */
+enum { MOST_ROUNDS = 12, NARROW_ROUNDS = 6, FIRST_RINGS = 2 };
 
 typedef struct thinning {
   qmat_context *context;
@@ -26,6 +25,7 @@ typedef struct thinning {
   size_t *firsts;       /* per vertex, and the end: its corners in `corners` */
   uint32_t *corners;    /* corners of the thinned surface by their vertices */
   uint32_t *leaders;    /* disjoint sets of vertices: the components of the surface */
+  int64_t *euler;       /* per leader: twice what thinning changes in the Euler characteristic of the component */
 } thinning;
 
 static qmat_status start(qmat_context *context, const qmat_skin_triangles *surface, thinning *t) {
@@ -40,8 +40,10 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
                   .open = qmat_arena_alloc(arena, corners, sizeof *t->open),
                   .firsts = qmat_arena_alloc(arena, vertices + 1, sizeof *t->firsts),
                   .corners = qmat_arena_alloc(arena, corners, sizeof *t->corners),
-                  .leaders = qmat_sets_new(context, vertices)};
-  if (!t->leaders || !t->positions || !t->locked || !t->rings || !t->thinned || !t->open || !t->firsts || !t->corners)
+                  .leaders = qmat_sets_new(context, vertices),
+                  .euler = qmat_arena_alloc(arena, vertices, sizeof *t->euler)};
+  if (!t->leaders || !t->euler || !t->positions || !t->locked || !t->rings || !t->thinned || !t->open || !t->firsts ||
+      !t->corners)
     return qmat_fail_memory(context, "the skin");
   for (size_t i = 0; i < 3 * vertices; i++) t->positions[i] = (float)surface->positions[i];
   for (size_t i = 0; i < corners; i++) qmat_sets_join(t->leaders, surface->triangles[i], surface->triangles[i - i % 3]);
@@ -103,20 +105,6 @@ static bool is_fan(const thinning *t, size_t vertex) {
   return false;
 }
 
-/* Locks the components of which nothing is left. False where there are none. */
-static bool lock_lost_components(thinning *t) {
-  const size_t count = t->surface->vertex_count;
-  bool any = false;
-  uint8_t *is_left = t->rings;
-  memset(is_left, 0, count * sizeof *is_left);
-  for (size_t i = 0; i < 3 * t->thinned_count; i++) is_left[qmat_set_leader(t->leaders, t->thinned[i])] = 1;
-  for (uint32_t v = 0; v < count; v++) {
-    if (is_left[qmat_set_leader(t->leaders, v)]) continue;
-    t->locked[v] = any = true;
-  }
-  return any;
-}
-
 /* Locks the vertices within some rings of those that are no fan, and of the locked ones if they grow. False where all
  * are fans. */
 static bool lock_faults(thinning *t, int rings, bool grow) {
@@ -141,18 +129,29 @@ static bool lock_faults(thinning *t, int rings, bool grow) {
   return any;
 }
 
-/* Whether the thinned surface has the topology of the given one. */
-static qmat_status compare_topology(const thinning *t, bool *is_same) {
+/* Locks the components that are gone, or whose Euler characteristic changed. False where there are none. */
+static bool lock_changed_components(thinning *t) {
   const qmat_skin_triangles *surface = t->surface;
-  size_t components[2];
-  int64_t euler[2];
-  qmat_status status = qmat_skin_topology(t->context, surface->triangles, surface->triangle_count,
-                                          surface->vertex_count, &components[0], &euler[0]);
-  if (status == QMAT_OK)
-    status =
-        qmat_skin_topology(t->context, t->thinned, t->thinned_count, surface->vertex_count, &components[1], &euler[1]);
-  *is_same = status == QMAT_OK && components[0] == components[1] && euler[0] == euler[1];
-  return status;
+  const size_t count = surface->vertex_count;
+  bool any = false;
+  memset(t->euler, 0, count * sizeof *t->euler);
+  for (size_t v = 0; v < count; v++)
+    if (t->firsts[v + 1] == t->firsts[v]) t->euler[qmat_set_leader(t->leaders, (uint32_t)v)] -= 2;
+  for (size_t i = 0; i < surface->triangle_count; i++)
+    t->euler[qmat_set_leader(t->leaders, surface->triangles[3 * i])]++;
+  uint8_t *is_left = t->rings;
+  memset(is_left, 0, count * sizeof *is_left);
+  for (size_t i = 0; i < t->thinned_count; i++) {
+    const uint32_t leader = qmat_set_leader(t->leaders, t->thinned[3 * i]);
+    t->euler[leader]--;
+    is_left[leader] = true;
+  }
+  for (uint32_t v = 0; v < count; v++) {
+    const uint32_t leader = qmat_set_leader(t->leaders, v);
+    if (is_left[leader] && t->euler[leader] == 0) continue;
+    t->locked[v] = any = true;
+  }
+  return any;
 }
 
 /* Makes the surface the thinned one, without vertices that are not used. */
@@ -176,12 +175,9 @@ qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triang
     thin(&t, error);
     sort_corners(&t);
     status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
-    const bool has_lost = lock_lost_components(&t);
-    const bool has_faults = lock_faults(&t, FIRST_RINGS << round, round >= NARROW_ROUNDS);
-    if (status != QMAT_OK || has_lost || has_faults) continue;
-    bool is_same;
-    status = compare_topology(&t, &is_same);
-    if (status == QMAT_OK && is_same) take(&t, surface);
+    const int rings = FIRST_RINGS << round / 2;
+    if (status != QMAT_OK || lock_faults(&t, rings, round >= NARROW_ROUNDS) || lock_changed_components(&t)) continue;
+    take(&t, surface);
     return status;
   }
   return status;

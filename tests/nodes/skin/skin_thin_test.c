@@ -152,6 +152,26 @@ static void test_faults_keep_few_triangles(void **state) {
   drop(&surface);
 }
 
+/* A ring thinner than the error closes its hole: it stays as it is. The box beside it is thinned out all the same. */
+static void test_a_component_that_would_change_its_topology_stays_alone(void **state) {
+  (void)state;
+  qmat_mesh *mesh = gridded_box(16), *ring = shape_torus(0.5, 0.05, 48, 12);
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  for (size_t v = 0; v < ring->vertex_count; v++) {
+    const double *p = ring->positions + 3 * v;
+    shape_vertex(mesh, p[0] + 5, p[1], p[2]);
+  }
+  for (size_t i = 0; i < ring->triangle_count; i++) {
+    const uint32_t *t = ring->triangles + 3 * i;
+    shape_triangle(mesh, first + t[0], first + t[1], first + t[2]);
+  }
+  const size_t of_ring = ring->triangle_count;
+  qmat_skin_triangles surface = thinned(shape_seal(mesh), 0.1);
+  assert_int_equal(surface.triangle_count, of_ring + 12);
+  drop(&surface);
+  qmat_value_release(&ring->base);
+}
+
 static bool cancel(void *user, const char *id, const char *type, uint64_t done, uint64_t total, const char *unit) {
   (void)user, (void)id, (void)type, (void)done, (void)total, (void)unit;
   return false;
@@ -175,6 +195,7 @@ int main(void) {
       cmocka_unit_test(test_any_error_leaves_a_manifold_of_the_same_topology),
       cmocka_unit_test(test_a_component_stays_where_it_is_smaller_than_the_error),
       cmocka_unit_test(test_faults_keep_few_triangles),
+      cmocka_unit_test(test_a_component_that_would_change_its_topology_stays_alone),
       cmocka_unit_test(test_a_cancel_is_obeyed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
