@@ -40,8 +40,8 @@ typedef struct piece_result {
 typedef struct partition {
   qmat_context *context;
   qmat_decimation *whole;
-  qmat_constraint_points *constraints;
-  double *depths; /* per vertex: of its centre */
+  qmat_constraint_points *constraints; /* with the witnesses of now */
+  double *depths;                      /* per vertex: of its centre */
   size_t piece_count;
   uint32_t *pieces;       /* per vertex */
   uint32_t *numbers;      /* per vertex: its number within its piece */
@@ -388,14 +388,31 @@ static void free_results(const partition *d) {
   }
 }
 
-qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constraint_points *constraints,
+/* A copy with witnesses and weights of its own; NULL when memory is short. */
+static qmat_constraint_points *copy_constraints(qmat_context *context, const qmat_constraint_points *from) {
+  qmat_constraint_points *copy = qmat_arena_alloc(&context->arena, 1, sizeof *copy);
+  uint32_t *witnesses = qmat_arena_alloc(&context->arena, from->count, 3 * sizeof *witnesses);
+  double *weights = qmat_arena_alloc(&context->arena, from->count, 3 * sizeof *weights);
+  if (!copy || !witnesses || !weights) return NULL;
+  if (from->count > 0) {
+    memcpy(witnesses, from->witnesses, 3 * from->count * sizeof *witnesses);
+    memcpy(weights, from->weights, 3 * from->count * sizeof *weights);
+  }
+  *copy = *from;
+  copy->witnesses = witnesses;
+  copy->weights = weights;
+  return copy;
+}
+
+qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                       const double *depths) {
   qmat_context *context = decimation->context;
   const qmat_complex *c = &decimation->complex;
-  partition d = {.context = context, .whole = decimation, .constraints = constraints};
+  partition d = {.context = context, .whole = decimation, .constraints = copy_constraints(context, constraints)};
   d.depths = qmat_arena_alloc(&context->arena, c->vertex_count, sizeof *d.depths);
   decimation->quadrics = qmat_arena_calloc(&context->arena, c->vertex_count, sizeof *decimation->quadrics);
-  if (!d.depths || !decimation->quadrics) return qmat_fail_memory(context, "pieces of the medial mesh");
+  if (!d.constraints || !d.depths || !decimation->quadrics)
+    return qmat_fail_memory(context, "pieces of the medial mesh");
   memcpy(d.depths, depths, c->vertex_count * sizeof *depths);
   qmat_medial_quadrics_add(c, decimation->quadrics);
   qmat_status status = divide(&d);

@@ -16,11 +16,11 @@ bool qmat_can_collapse_partitioned(const qmat_decimation_rules *rules, const qma
  * witnesses of the pieces; qmat_decimation_run does the remaining collapses.
  *
  * The caller has given `decimation` its context, surface and rules (qmat_can_collapse_partitioned), and `complex` (unit
- * frame, unchanged so far), which is replaced. `constraints` are its constraint points; they get the witnesses and
- * weights of the result, and stay the caller's. `depths`: per vertex of the complex. The partition depends on the
- * medial mesh only, never on threads. QMAT_ERROR_MEMORY, QMAT_CANCELLED; free with qmat_decimation_uninit in any case.
- * All threads. */
-qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, qmat_constraint_points *constraints,
+ * frame, unchanged so far), which is replaced. `constraints` are its constraint points. `decimation->constraints`
+ * becomes a copy with the witnesses and weights of the result, in the context's arena. `depths`: per vertex of the
+ * complex. The partition depends on the medial mesh only, never on threads. QMAT_ERROR_MEMORY, QMAT_CANCELLED; free
+ * with qmat_decimation_uninit in any case. All threads. */
+qmat_status qmat_collapse_partitioned(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                       const double *depths);
 
 #endif

@@ -156,11 +156,12 @@ static void test_a_share_is_left_with_what_was_held(void **state) {
   assert_int_equal((int64_t)c->vertex_count - (int64_t)c->edge_count + (int64_t)c->triangle_count, 1);
   for (size_t i = 0; i < POINTS; i++) {
     double sphere[4] = {0, 0, 0, 0}, sum = 0;
-    const uint32_t *w = &s->constraints.witnesses[3 * i];
+    const uint32_t *w = &s->run.constraints->witnesses[3 * i];
+    const double *weights = &s->run.constraints->weights[3 * i];
     for (size_t k = 0; k < 3 && w[k] != QMAT_NONE; k++) {
       assert_true(w[k] < c->vertex_count);
-      sum += s->constraints.weights[3 * i + k];
-      for (size_t j = 0; j < 4; j++) sphere[j] += s->constraints.weights[3 * i + k] * c->spheres[4 * (size_t)w[k] + j];
+      sum += weights[k];
+      for (size_t j = 0; j < 4; j++) sphere[j] += weights[k] * c->spheres[4 * (size_t)w[k] + j];
     }
     assert_near(sum, 1, 1e-9);
     assert_true(qmat_sphere_distance(sphere, &s->constraints.points[3 * i]) <= limit * (1 + 1e-9));
@@ -186,6 +187,17 @@ static void test_a_share_is_left_with_what_was_held(void **state) {
   /* It goes on from there. */
   assert_int_equal(qmat_decimation_run(&s->run), QMAT_OK);
   assert_true(s->run.complex.live_vertices < 40);
+  end(s);
+}
+
+/* A later round starts over with the same points. */
+static void test_the_points_keep_their_witnesses_in_the_dense_medial_mesh(void **state) {
+  sheet *s = *state;
+  collapse(s, 2);
+  for (uint32_t i = 0; i < POINTS; i++) {
+    assert_int_equal(s->constraints.witnesses[3 * (size_t)i], i / 2);
+    assert_true(s->constraints.weights[3 * (size_t)i] == 1);
+  }
   end(s);
 }
 
@@ -313,6 +325,7 @@ static void test_a_shortage_of_memory_anywhere_is_an_error(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_share_is_left_with_what_was_held),
+      cmocka_unit_test(test_the_points_keep_their_witnesses_in_the_dense_medial_mesh),
       cmocka_unit_test(test_threads_change_no_byte),
       cmocka_unit_test(test_spheres_in_one_place_are_one_part),
       cmocka_unit_test(test_what_depends_on_the_order_is_not_done_in_parts),
