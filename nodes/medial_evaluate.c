@@ -97,10 +97,15 @@ static qmat_status sample_surface(evaluation *e) {
   return status;
 }
 
+/* The bound that both errors must keep for a certificate. */
+static double decisive_bound(const evaluation *e) {
+  return e->params->epsilon - e->deviation;
+}
+
 /* Bounds max(0, F) over the surface, more closely where that decides whether it is within epsilon. */
 static qmat_status bound_surface_to_envelope(evaluation *e) {
   double known = e->largest_gap;
-  const double decisive = e->params->epsilon - e->deviation;
+  const double decisive = decisive_bound(e);
   bool is_open = false; /* epsilon is between the bounds */
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK; search++) {
@@ -178,6 +183,26 @@ static qmat_status count_degenerate(evaluation *e) {
   return QMAT_OK;
 }
 
+/* ---- envelope to surface ---- */
+
+/* Bounds the distance over the envelope's boundary, more closely where that decides whether it is within epsilon. */
+static qmat_status bound_envelope_to_surface(evaluation *e) {
+  const double decisive = decisive_bound(e), usual = e->params->tolerance;
+  double epsilon = e->epsilon, tolerance = usual;
+  bool is_open = true; /* epsilon is between the bounds */
+  qmat_status status = QMAT_OK;
+  for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK && is_open; search++) {
+    qmat_boundary_distance_uninit(&e->boundary);
+    status = qmat_boundary_distance_measure(e->context, e->surface, e->envelope, &e->unit, epsilon, tolerance, true,
+                                            false, (size_t)e->params->samples, &e->boundary);
+    const qmat_bounds found = e->boundary.either_side;
+    is_open = found.lo <= decisive && found.hi > decisive;
+    epsilon = decisive;
+    tolerance = fmax(fmin(usual, (decisive - found.lo) / decisive), LEAST_TOLERANCE * usual);
+  }
+  return status;
+}
+
 /* ---- the report ---- */
 
 static qmat_status make_report(const evaluation *e, qmat_report *report) {
@@ -247,9 +272,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = sample_surface(&e);
   if (status == QMAT_OK) status = bound_surface_to_envelope(&e);
   if (status == QMAT_OK) status = bound_spheres(&e);
-  if (status == QMAT_OK)
-    status = qmat_boundary_distance_measure(context, e.surface, e.envelope, &e.unit, e.epsilon, params->tolerance, true,
-                                            false, (size_t)params->samples, &e.boundary);
+  if (status == QMAT_OK) status = bound_envelope_to_surface(&e);
   if (status == QMAT_OK) status = count_spheres_outside(&e);
   if (status == QMAT_OK) status = count_degenerate(&e);
   if (status == QMAT_OK) status = make_report(&e, report);
@@ -285,7 +308,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 13,
+    .version = 14,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

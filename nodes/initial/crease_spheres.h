@@ -40,7 +40,8 @@ typedef struct qmat_crease_links {
 } qmat_crease_links;
 
 /* Makes a sealed medial mesh of `bare` followed by the spheres of the creases (at least one): each is linked by an edge
- * to its anchor, the nearest sphere, and by slabs to the shortest path between the anchors of a segment. The homotopy
+ * to its anchor, the nearest sphere of the component in which most of its joined creases have theirs, and by slabs to
+ * the shortest path between the anchors of a segment. The homotopy
  * type is that of `bare`. A sphere at a vertex is responsible for it: the first samples are the vertices. The caller
  * releases `*linked`, which is NULL on failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Anchors are found on all threads.
  * Cost: a search around each anchor (Dijkstra 1959). */

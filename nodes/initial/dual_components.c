@@ -156,9 +156,9 @@ static int by_site(const void *left, const void *right) {
   return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
 }
 
-/* Sorted contacts without duplicates. By sample: only the samples that several components are responsible for. By
- * surface component: all spheres. */
-static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, bool by_surface_component, size_t *count) {
+/* Sorted contacts without duplicates: of all spheres with the components of the surface in which they lie (`homes`, per
+ * component), or, where that is NULL, with the samples that several components are responsible for. */
+static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, size_t *count) {
   qmat_arena *arena = &d->context->arena;
   const size_t samples = d->samples->count;
   uint32_t *component_of = qmat_arena_alloc(arena, samples, sizeof *component_of);
@@ -172,16 +172,15 @@ static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, bool 
     component_of[sample] = component;
   }
   size_t room = 0;
-  for (size_t i = 0; i < 4 * d->cells.count; i++)
-    room += d->kinds[i / 4] && (by_surface_component || shared[d->cells.corners[i]]);
+  for (size_t i = 0; i < 4 * d->cells.count; i++) room += d->kinds[i / 4] && (homes || shared[d->cells.corners[i]]);
   contact *contacts = qmat_arena_alloc(arena, room, sizeof *contacts);
   if (!contacts) return NULL;
   *count = 0;
   for (size_t i = 0; i < 4 * d->cells.count; i++) {
     const uint32_t sample = d->cells.corners[i];
-    if (!d->kinds[i / 4] || !(by_surface_component || shared[sample])) continue;
-    contacts[(*count)++] =
-        (contact){by_surface_component ? qmat_dual_surface_component(d, sample) : sample, d->sphere_of[i / 4]};
+    if (!d->kinds[i / 4] || !(homes || shared[sample])) continue;
+    const uint32_t sphere = d->sphere_of[i / 4];
+    contacts[(*count)++] = (contact){homes ? homes[index[sphere]] : sample, sphere};
   }
   qsort(contacts, *count, sizeof *contacts, by_site);
   size_t kept = 0;
@@ -189,6 +188,29 @@ static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, bool 
     if (kept == 0 || by_site(&contacts[kept - 1], &contacts[i]) != 0) contacts[kept++] = contacts[i];
   *count = kept;
   return contacts;
+}
+
+/* Per component of the medial mesh, the component of the surface that has most corners of its tetrahedra. Where solids
+ * touch, tetrahedra of one have corners on others. NULL when memory is short. */
+static uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, size_t count) {
+  qmat_arena *arena = &d->context->arena;
+  contact *corners = qmat_arena_alloc(arena, 4 * d->cells.count, sizeof *corners);
+  uint32_t *homes = qmat_arena_alloc(arena, count, sizeof *homes);
+  size_t *most = qmat_arena_calloc(arena, count, sizeof *most), corner_count = 0;
+  if (!corners || !homes || !most) return NULL;
+  for (size_t i = 0; i < 4 * d->cells.count; i++)
+    if (d->kinds[i / 4])
+      corners[corner_count++] =
+          (contact){index[d->sphere_of[i / 4]], qmat_dual_surface_component(d, d->cells.corners[i])};
+  qsort(corners, corner_count, sizeof *corners, by_site);
+  for (size_t first = 0, last; first < corner_count; first = last) {
+    for (last = first; last < corner_count && by_site(&corners[first], &corners[last]) == 0;) last++;
+    const uint32_t component = corners[first].site;
+    if (last - first <= most[component]) continue;
+    most[component] = last - first;
+    homes[component] = corners[first].sphere;
+  }
+  return homes;
 }
 
 static qmat_status add_link(qmat_dual_complex *d, uint32_t a, uint32_t b) {
@@ -201,18 +223,18 @@ static qmat_status add_link(qmat_dual_complex *d, uint32_t a, uint32_t b) {
   return QMAT_OK;
 }
 
-/* Links components by edges between spheres that are responsible for a common sample, so that they touch the surface at
- * the same place. The edges that stay inside come first. */
-static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, uint32_t *joined, const double *spheres,
-                                   size_t *links) {
+/* Links components of one surface component by edges between spheres that are responsible for a common sample, so that
+ * they touch the surface at the same place. The edges that stay inside come first. */
+static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
+                                   const double *spheres, size_t *links) {
   size_t count = 0, candidate_count = 0, capacity = 0;
-  const contact *contacts = find_contacts(d, index, false, &count);
+  const contact *contacts = find_contacts(d, index, NULL, &count);
   medial_link *candidates = NULL;
   qmat_status status = contacts ? QMAT_OK : qmat_fail_memory(d->context, "components");
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
     for (size_t j = i + 1; j < count && contacts[j].site == contacts[i].site; j++) {
       const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
-      if (index[a] == index[b]) continue;
+      if (index[a] == index[b] || homes[index[a]] != homes[index[b]]) continue;
       if (qmat_grow((void **)&candidates, &capacity, candidate_count + 1, sizeof *candidates)) {
         status = qmat_fail_memory(d->context, "components");
         break;
@@ -231,10 +253,10 @@ static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, 
 
 /* Links the nearest two spheres of different components in the same component of the surface, until that has only one.
  * Quadratic, but rare: components that share a sample are already linked. */
-static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, uint32_t *joined, const double *spheres,
-                                size_t *links) {
+static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
+                                const double *spheres, size_t *links) {
   size_t count = 0;
-  contact *contacts = find_contacts(d, index, true, &count);
+  contact *contacts = find_contacts(d, index, homes, &count);
   if (!contacts) return qmat_fail_memory(d->context, "components");
   for (size_t first = 0, last; first < count; first = last) {
     for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
@@ -269,11 +291,12 @@ static qmat_status link_components(qmat_dual_complex *d, qmat_dual_component_cou
   size_t count = 0;
   const component *components = index && spheres ? find_components(d, index, &count) : NULL;
   uint32_t *joined = qmat_sets_new(d->context, count);
-  if (!components || !joined) return qmat_fail_memory(d->context, "components");
+  const uint32_t *homes = components ? find_homes(d, index, count) : NULL;
+  if (!joined || !homes) return qmat_fail_memory(d->context, "components");
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
-  qmat_status status = link_at_samples(d, index, joined, spheres, &counts->links);
-  if (status == QMAT_OK) status = link_nearest(d, index, joined, spheres, &counts->links);
+  qmat_status status = link_at_samples(d, index, homes, joined, spheres, &counts->links);
+  if (status == QMAT_OK) status = link_nearest(d, index, homes, joined, spheres, &counts->links);
   counts->components -= counts->links;
   return status;
 }

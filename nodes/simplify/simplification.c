@@ -109,6 +109,7 @@ static qmat_decimation *take_round(qmat_simplification *s) {
   qmat_decimation_uninit(round);
   *round = (qmat_decimation){
       .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
+  round->rules.share = s->share;
   return round;
 }
 
@@ -211,7 +212,7 @@ static qmat_status make_constraints(qmat_simplification *s) {
  * where it is large, then as a whole. */
 static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
-  dense->rules.share = qmat_dense_share;
+  dense->rules.share = qmat_dense_share * s->share;
   dense->rules.refits = 0;
   const qmat_status status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex, dense->sheet_vertices)
                                  ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)
@@ -333,12 +334,16 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
   if (status == QMAT_OK) status = make_constraints(s);
   const bool is_within = status == QMAT_OK && starts_within(s);
   if (status == QMAT_OK && s->may_end_without_result && epsilon > 0 && !is_within) return QMAT_OK;
+  s->share = 1;
   if (status == QMAT_OK) status = collapse_dense(s);
   for (size_t round = 1; status == QMAT_OK; round++) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
     const bool is_last = round == QMAT_MOST_ROUNDS || !is_within;
-    if (round >= QMAT_DENSE_AGAIN_ROUND) status = collapse_dense_again(s, &extra);
+    if (round >= QMAT_DENSE_AGAIN_ROUND) {
+      s->share *= qmat_late_round_share;
+      status = collapse_dense_again(s, &extra);
+    }
     if (status == QMAT_OK) status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);

@@ -13,14 +13,16 @@ number() {
   awk -v key="\"$1\":" '$1 == key { gsub(/,/, "", $2); print $2; exit }' report.json
 }
 
-# asset NAME SPHERES KEY=VALUE...: at 2 %, at most so many spheres, and these facts in the report.
+epsilon=2%
+
+# asset NAME SPHERES KEY=VALUE...: at $epsilon, at most so many spheres, and these facts in the report.
 asset() {
   name=$1
   most=$2
   shift 2
   rm -f report.json
   awk -v name="$name" -f "$tests/assets.awk" >"$name.off"
-  expect 0 '' "$qmat" mat --quiet --progress off "$name.off" -o "$name.ma" --epsilon 2% \
+  expect 0 '' "$qmat" mat --quiet --progress off "$name.off" -o "$name.ma" --epsilon "$epsilon" \
     --require certified --report report.json
   spheres=$(awk 'NR == 1 { print $1 }' "$name.ma")
   if [ -z "$spheres" ] || [ "$spheres" -gt "$most" ]; then fail "$name: $spheres spheres, more than $most"; fi
@@ -42,6 +44,10 @@ asset leaves 34 solids=0 sheets=7 sheet_triangles=448
 # Where sheets cross, the nearest one changes between two constraint points, and the distance may be largest there.
 asset arcs 16 solids=0 sheets=2 sheet_triangles=160
 asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
+# With more points alone the places beyond epsilon only move.
+epsilon=1.5%
+asset tubes 56 solids=0 sheets=2 sheet_triangles=192
+epsilon=2%
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
 # The cap is the disc that cut the neck: of 32 sides, in a circle of the radius sin(3/16 pi).

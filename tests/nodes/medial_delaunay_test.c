@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -311,6 +312,19 @@ static void test_spheres_beside_each_other_are_not_joined(void **state) {
   for (size_t i = 0; i < p.medial->sphere_count; i++)
     assert_true(p.medial->spheres[4 * i] < 1 || p.medial->spheres[4 * i] > 2.95);
   pipeline_free(&p);
+}
+
+/* Across a gap narrower than the distance of the samples, tetrahedra of one box have corners on the other. */
+static void test_boxes_beside_a_narrow_gap_are_not_linked(void **state) {
+  (void)state;
+  for (int seed = 0; seed < 3; seed++) {
+    char sampling[32];
+    snprintf(sampling, sizeof sampling, "seed=%d", seed);
+    pipeline p;
+    pipeline_make(&p, pipeline_narrow_gap(), sampling, "");
+    assert_int_equal(pipeline_components(p.medial), 2);
+    pipeline_free(&p);
+  }
 }
 
 static void test_cavity_is_left_out(void **state) {
@@ -711,6 +725,7 @@ int main(void) {
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_two_solids_give_two_pieces),
       cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),
+      cmocka_unit_test(test_boxes_beside_a_narrow_gap_are_not_linked),
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
       cmocka_unit_test(test_flat_regions_are_thinned_and_every_sample_has_a_sphere),

@@ -268,6 +268,30 @@ static void test_an_epsilon_just_above_the_error_is_certified(void **state) {
   subject_free(&s);
 }
 
+/* The same for the envelope's boundary. */
+static void test_epsilon_is_told_from_the_distance_of_the_boundary(void **state) {
+  (void)state;
+  random_numbers random = {.seed = 12};
+  for (int i = 0; i < 40; i++) {
+    double balls[4 * 12];
+    for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
+    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
+    qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001 samples=16", 1);
+    const double truth = pipeline_number(close, "envelope_to_surface");
+    qmat_value_release(&close->base);
+    for (int share = 1; share <= 4; share++) {
+      char params[64];
+      const double epsilon = truth * (1 + 0.001 * share);
+      snprintf(params, sizeof params, "epsilon=%.12f samples=16", epsilon);
+      qmat_report *report = evaluate(&s, params, 1);
+      if (!(pipeline_number(report, "envelope_to_surface") <= epsilon))
+        fail_msg("%.9f is not told from %.9f", pipeline_number(report, "envelope_to_surface"), epsilon);
+      qmat_value_release(&report->base);
+    }
+    subject_free(&s);
+  }
+}
+
 static void test_an_open_surface_is_never_certified(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
@@ -555,6 +579,7 @@ int main(void) {
       cmocka_unit_test(test_the_deviation_of_the_mesh_is_part_of_both_errors),
       cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
       cmocka_unit_test(test_an_epsilon_just_above_the_error_is_certified),
+      cmocka_unit_test(test_epsilon_is_told_from_the_distance_of_the_boundary),
       cmocka_unit_test(test_an_open_surface_is_never_certified),
       cmocka_unit_test(test_odd_spheres_cones_and_slabs_are_counted),
       cmocka_unit_test(test_random_medial_meshes_against_dense_samples),

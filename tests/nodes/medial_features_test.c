@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -74,6 +75,21 @@ static void check_mesh(qmat_mesh *mesh, const char *text, size_t creases, size_t
   assert_int_equal(count_crease_edges(r.medial), crease_edges);
   release(&r);
   pipeline_free(&p);
+}
+
+/* The nearest sphere to a crease may be one of the other box. */
+static void test_creases_beside_a_narrow_gap_are_linked_to_their_own_box(void **state) {
+  (void)state;
+  for (int seed = 0; seed < 3; seed++) {
+    char text[32];
+    snprintf(text, sizeof text, "seed=%d", seed);
+    pipeline p;
+    pipeline_make(&p, pipeline_narrow_gap(), text, "");
+    result r = find_features(&p, 0, "");
+    check_extension(p.medial, &r);
+    release(&r);
+    pipeline_free(&p);
+  }
 }
 
 /* A square frame: a ring with creases on the outside, and at the rims of the hole. */
@@ -283,6 +299,7 @@ int main(void) {
       cmocka_unit_test(test_a_cavity_has_no_crease),
       cmocka_unit_test(test_rims_of_a_hole_and_of_a_prism_of_many_sides_are_loops),
       cmocka_unit_test(test_creases_do_not_join_parts),
+      cmocka_unit_test(test_creases_beside_a_narrow_gap_are_linked_to_their_own_box),
       cmocka_unit_test(test_a_smooth_model_keeps_its_medial_mesh),
       cmocka_unit_test(test_auto_adds_features_to_flat_faces_alone),
       cmocka_unit_test(test_none_keeps_the_medial_mesh_whatever_the_surface),

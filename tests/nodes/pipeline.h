@@ -248,6 +248,14 @@ static inline void pipeline_free(pipeline *p) {
   *p = (pipeline){NULL, NULL, NULL, NULL, NULL};
 }
 
+/* Two boxes, one above the other, with a gap of 0.4 % of the diagonal between them. */
+static inline qmat_mesh *pipeline_narrow_gap(void) {
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 1, 0.1, 0.1, false);
+  shape_add_box(mesh, 0.2, 0.104, 0.02, 0.8, 0.2, 0.08, false);
+  return mesh;
+}
+
 /* The spheres of radius zero. */
 static inline size_t pipeline_features(const qmat_medial *medial) {
   size_t count = 0;
