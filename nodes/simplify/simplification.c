@@ -340,10 +340,8 @@ static qmat_status run_rounds(qmat_simplification *s, qmat_simplified *best) {
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     qmat_simplified a = {.figures = {.rounds = round, .initial_spheres = s->initial->sphere_count}, .fault = INFINITY};
     const bool is_last = round == QMAT_MOST_ROUNDS || !is_within;
-    if (round >= QMAT_DENSE_AGAIN_ROUND) {
-      s->share *= qmat_late_round_share;
-      status = collapse_dense_again(s, &extra);
-    }
+    if (round > QMAT_DENSE_AGAIN_ROUND) s->share *= qmat_late_round_share;
+    if (round >= QMAT_DENSE_AGAIN_ROUND) status = collapse_dense_again(s, &extra);
     if (status == QMAT_OK) status = collapse_and_fit(s, &extra, is_last, &a, &errors);
     const bool is_done =
         is_last || a.within_epsilon || (errors.surface_to_envelope <= epsilon && errors.uncovered_count == 0);

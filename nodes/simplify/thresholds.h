@@ -14,8 +14,8 @@ static const double qmat_error_tolerance = 0.01, qmat_least_reported = 0.5;
 /* The dense collapse uses this share of the error; the rest is for the constraint points that are found later. */
 static const double qmat_dense_share = 0.9;
 
-/* From QMAT_DENSE_AGAIN_ROUND on each round uses this share of the error that the one before used: more points alone
- * move the places beyond epsilon elsewhere. */
+/* After QMAT_DENSE_AGAIN_ROUND each round uses this share of the error that the one before used: more points alone move
+ * the places beyond epsilon elsewhere. */
 static const double qmat_late_round_share = 0.95;
 
 /* Found points inside the solid must be as deep in the envelope as this share. */

@@ -46,7 +46,7 @@ asset arcs 16 solids=0 sheets=2 sheet_triangles=160
 asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
 # With more points alone the places beyond epsilon only move.
 epsilon=1.5%
-asset tubes 56 solids=0 sheets=2 sheet_triangles=192
+asset tubes 56 solids=1 sheets=1
 epsilon=2%
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
