@@ -2,7 +2,7 @@
 # Writes a small asset of a kind that people really have, as OFF: awk -v name=NAME -f assets.awk
 # head: a sphere with a cut-off neck; holes: a sphere with ten holes; soup: its triangles apart, each facing anywhere;
 # overlap: two spheres that reach into each other; crossing: a tube that crosses itself; plane, banner, shell,
-# leaves: surfaces without volume; arcs, deep_arcs, tubes: two that cross; card: a plane of two sides.
+# leaves: surfaces without volume; arcs, deep_arcs: two that cross; card: a plane of two sides.
 function vertex(x, y, z) { v[vertices++] = sprintf("%.9g %.9g %.9g", x, y, z) }
 function face(a, b, c) { f[faces++] = "3 " a " " b " " c }
 # A sphere of `rows` rows; of the lowest `cut` there is none.
@@ -50,20 +50,6 @@ function place(u, w,   a, b, x, y) {
     vertex(x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn), (1 - cos(curvature * u)) / curvature)
   } else vertex(u, 1.6 * w, 0)
 }
-# An open tube of `rings` rings along x (turned = 0) or z, from -height / 2 to height / 2; `radii` has the radii.
-function open_tube(radii, rings, around, height, x, y, z, turned,   i, j, b, along, side, first) {
-  first = vertices
-  for (i = 0; i < rings; i++) for (j = 0; j < around; j++) {
-    b = 2 * pi * j / around
-    along = height * (i / (rings - 1) - 0.5)
-    side = radii[i + 1] * cos(b)
-    if (turned) vertex(x + along, y + side, z + radii[i + 1] * sin(b))
-    else vertex(x + radii[i + 1] * sin(b), y + along, z + side)
-  }
-  for (i = 0; i + 1 < rings; i++) for (j = 0; j < around; j++)
-    quad(first + i * around + j, first + i * around + (j + 1) % around, first + (i + 1) * around + (j + 1) % around,
-         first + (i + 1) * around + j)
-}
 # A tube along a figure of eight, which crosses itself in the middle.
 function tube(along, around,   i, j, a, b, x, y, length_) {
   for (i = 0; i < along; i++) for (j = 0; j < around; j++) {
@@ -92,11 +78,6 @@ BEGIN {
     curvature = name == "arcs" ? 2.5 : 3.5
     turn = 0.5
     grid(10, 4)
-  } else if (name == "tubes") {
-    split("0.7888 0.7616 0.918 0.5576", wide, " ")
-    open_tube(wide, 4, 24, 1.78, -0.24, 0.23, 0.16, 0)
-    split("0.6318 1.014", cone, " ")
-    open_tube(cone, 2, 24, 0.52, -0.18, 0.28, -0.14, 1)
   } else if (name == "holes" || name == "soup") sphere(0, 16, 0)
   else if (name == "card") {
     grid(6, 10)

@@ -21,7 +21,11 @@ asset() {
   most=$2
   shift 2
   rm -f report.json
-  awk -v name="$name" -f "$tests/assets.awk" >"$name.off"
+  if [ -e "$tests/$name.off" ]; then
+    cp "$tests/$name.off" "$name.off"
+  else
+    awk -v name="$name" -f "$tests/assets.awk" >"$name.off"
+  fi
   expect 0 '' "$qmat" mat --quiet --progress off "$name.off" -o "$name.ma" --epsilon "$epsilon" \
     --require certified --report report.json
   spheres=$(awk 'NR == 1 { print $1 }' "$name.ma")
@@ -44,9 +48,9 @@ asset leaves 34 solids=0 sheets=7 sheet_triangles=448
 # Where sheets cross, the nearest one changes between two constraint points, and the distance may be largest there.
 asset arcs 16 solids=0 sheets=2 sheet_triangles=160
 asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
-# With more points alone the places beyond epsilon only move.
-epsilon=1.5%
-asset tubes 56 solids=1 sheets=1
+# Two open tubes that reach into each other, one of them taken for a solid: with more points alone the places beyond epsilon only move.
+epsilon=1%
+asset tubes 74 solids=1 solids_with_holes=1 sheets=1
 epsilon=2%
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
