@@ -16,7 +16,7 @@ static const double qmat_dense_share = 0.9;
 
 /* After QMAT_DENSE_AGAIN_ROUND each round uses this share of the error that the one before used: more points alone move
  * the places beyond epsilon elsewhere. */
-static const double qmat_late_round_share = 0.95;
+static const double qmat_late_round_share = 0.9;
 
 /* Found points inside the solid must be as deep in the envelope as this share. */
 static const double qmat_required_depth_share = 0.05;

@@ -50,7 +50,7 @@ asset arcs 16 solids=0 sheets=2 sheet_triangles=160
 asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
 # Two open tubes that reach into each other, one of them taken for a solid: with more points alone the places beyond epsilon only move.
 epsilon=1%
-asset tubes 74 solids=1 solids_with_holes=1 sheets=1
+asset tubes 78 solids=1 solids_with_holes=1 sheets=1
 epsilon=2%
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
