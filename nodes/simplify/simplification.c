@@ -263,13 +263,17 @@ static qmat_status collapse_and_fit(qmat_simplification *s, const qmat_extra_poi
 }
 
 /* Mends the Betti numbers of a free result. Small loops and voids of the dense initial mesh are noise at the scale of
- * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. */
+ * epsilon: a guard that counts them while it collapses strands simple solids at hundreds of spheres. No edit joins or
+ * parts components, so that a result with other ones stays as it is. */
 static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *best) {
-  if (s->params.topology != QMAT_TOPOLOGY_GUARD) return QMAT_OK;
+  if (s->params.topology != QMAT_TOPOLOGY_GUARD || !best->within_epsilon || !s->solid.known) return QMAT_OK;
+  qmat_topology found;
   bool right = false;
-  qmat_status status = qmat_simplification_open_voids(s, best);
+  qmat_status status = qmat_topology_of_medial(s->context, best->medial, &found);
+  if (status != QMAT_OK || !found.known || found.components != s->solid.components) return status;
+  status = qmat_simplification_open_voids(s, best);
   if (status == QMAT_OK) status = qmat_simplification_close_loops(s, best);
-  if (status == QMAT_OK && best->within_epsilon) status = judge_topology(s, best->medial, &right);
+  if (status == QMAT_OK) status = judge_topology(s, best->medial, &right);
   if (right) best->has_right_topology = true;
   return status;
 }

@@ -138,7 +138,6 @@ static qmat_status open_void(const qmat_simplification *s, const qmat_topology *
 }
 
 qmat_status qmat_simplification_open_voids(const qmat_simplification *s, qmat_simplified *result) {
-  if (!result->within_epsilon || !s->solid.known) return QMAT_OK;
   for (;;) {
     qmat_topology topology;
     bool opened;
@@ -200,7 +199,6 @@ static qmat_status cut_loop(const qmat_simplification *s, const qmat_topology *b
 }
 
 qmat_status qmat_simplification_close_loops(const qmat_simplification *s, qmat_simplified *result) {
-  if (!result->within_epsilon || !s->solid.known) return QMAT_OK;
   for (;;) {
     qmat_topology topology;
     bool closed;
