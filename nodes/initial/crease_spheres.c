@@ -2,7 +2,6 @@
 #include "nodes/initial/crease_spheres.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/disjoint_sets.h"
@@ -11,6 +10,7 @@
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/vector.h"
 #include "nodes/initial/item_queue.h"
+#include "nodes/initial/majority.h"
 
 void qmat_crease_spheres_uninit(qmat_crease_spheres *creases) {
   qmat_free(creases->spheres);
@@ -128,33 +128,6 @@ static qmat_status find_anchors(linker *b) {
   return status;
 }
 
-/* A sphere of a crease with its set of joined creases, and the component of the medial mesh that its anchor lies in. */
-typedef struct vote {
-  uint32_t set, component;
-} vote;
-
-static int compare_votes(const void *left, const void *right) {
-  const vote *p = left, *q = right;
-  if (p->set != q->set) return p->set < q->set ? -1 : 1;
-  return p->component < q->component ? -1 : p->component > q->component;
-}
-
-/* Per set, the component with most votes, the first where several have; NULL when memory is short. Sorts the votes. */
-static const uint32_t *count_votes(const linker *b, vote *votes) {
-  const size_t count = b->creases->count;
-  uint32_t *elected = qmat_arena_alloc(&b->context->arena, count, sizeof *elected);
-  size_t *most = qmat_arena_calloc(&b->context->arena, count, sizeof *most);
-  if (!elected || !most) return NULL;
-  qsort(votes, count, sizeof *votes, compare_votes);
-  for (size_t first = 0, last; first < count; first = last) {
-    for (last = first; last < count && compare_votes(&votes[first], &votes[last]) == 0;) last++;
-    if (last - first <= most[votes[first].set]) continue;
-    most[votes[first].set] = last - first;
-    elected[votes[first].set] = votes[first].component;
-  }
-  return elected;
-}
-
 /* The sphere of a component that is nearest to a point. */
 static uint32_t nearest_of_component(const linker *b, const uint32_t *components, uint32_t component,
                                      const double *point) {
@@ -177,24 +150,24 @@ static qmat_status agree_on_components(linker *b) {
   const qmat_medial *m = b->bare;
   const qmat_crease_spheres *c = b->creases;
   uint32_t *components = qmat_sets_new(b->context, m->sphere_count), *sets = qmat_sets_new(b->context, c->count);
-  vote *votes = qmat_arena_alloc(&b->context->arena, c->count, sizeof *votes);
+  qmat_vote *votes = qmat_arena_alloc(&b->context->arena, c->count, sizeof *votes);
   if (!components || !sets || !votes) return qmat_fail_memory(b->context, "features");
   for (size_t e = 0; e < m->edge_count; e++) qmat_sets_join(components, m->edges[2 * e], m->edges[2 * e + 1]);
   for (uint32_t v = 0; v < m->sphere_count; v++) components[v] = qmat_set_leader(components, v);
   for (size_t s = 0; s < c->segment_count; s++) qmat_sets_join(sets, c->segments[2 * s], c->segments[2 * s + 1]);
   for (uint32_t i = 0; i < c->count; i++) {
     sets[i] = qmat_set_leader(sets, i);
-    votes[i] = (vote){sets[i], components[b->anchors[i]]};
+    votes[i] = (qmat_vote){sets[i], components[b->anchors[i]]};
   }
-  const uint32_t *elected = count_votes(b, votes);
-  if (!elected) return qmat_fail_memory(b->context, "features");
+  const uint32_t *own = qmat_majorities(b->context, votes, c->count, c->count); /* per set of joined creases */
+  if (!own) return qmat_fail_memory(b->context, "features");
   for (size_t i = 0; i < c->count; i++) {
-    if (components[b->anchors[i]] == elected[sets[i]]) continue;
+    if (components[b->anchors[i]] == own[sets[i]]) continue;
     double point[3];
     const qmat_status status = qmat_progress(b->context, i, c->count, "features");
     if (status != QMAT_OK) return status;
     qmat_frame_to_unit(b->frame, c->spheres[i].centre, 1, point);
-    b->anchors[i] = nearest_of_component(b, components, elected[sets[i]], point);
+    b->anchors[i] = nearest_of_component(b, components, own[sets[i]], point);
   }
   return QMAT_OK;
 }

@@ -39,12 +39,12 @@ typedef struct qmat_crease_links {
   double longest; /* of the paths, unit frame */
 } qmat_crease_links;
 
-/* Makes a sealed medial mesh of `bare` followed by the spheres of the creases (at least one): each is linked by an edge
- * to its anchor, the nearest sphere of the component in which most of its joined creases have theirs, and by slabs to
- * the shortest path between the anchors of a segment. The homotopy
- * type is that of `bare`. A sphere at a vertex is responsible for it: the first samples are the vertices. The caller
- * releases `*linked`, which is NULL on failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Anchors are found on all threads.
- * Cost: a search around each anchor (Dijkstra 1959). */
+/* Makes a sealed medial mesh of `bare` followed by the spheres of the creases (at least one). Each is linked by an edge
+ * to its anchor, and by slabs to the shortest path between the anchors of a segment. The anchor is the nearest sphere
+ * of the component that is nearest to most spheres of the joined creases. The homotopy type is that of `bare`. A sphere
+ * at a vertex is responsible for it: the first samples are the vertices. The caller releases `*linked`, which is NULL
+ * on failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Anchors are found on all threads, but for the few in another
+ * component. Cost: a search around each anchor (Dijkstra 1959). */
 qmat_status qmat_crease_spheres_link(qmat_context *context, const qmat_frame *frame, const qmat_medial *bare,
                                      const qmat_crease_spheres *creases, qmat_medial **linked,
                                      qmat_crease_links *links);

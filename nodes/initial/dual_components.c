@@ -8,6 +8,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/vector.h"
+#include "nodes/initial/majority.h"
 
 #define NONE QMAT_NO_ID
 
@@ -192,25 +193,15 @@ static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const
 
 /* Per component of the medial mesh, the component of the surface that has most corners of its tetrahedra. Where solids
  * touch, tetrahedra of one have corners on others. NULL when memory is short. */
-static uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, size_t count) {
-  qmat_arena *arena = &d->context->arena;
-  contact *corners = qmat_arena_alloc(arena, 4 * d->cells.count, sizeof *corners);
-  uint32_t *homes = qmat_arena_alloc(arena, count, sizeof *homes);
-  size_t *most = qmat_arena_calloc(arena, count, sizeof *most), corner_count = 0;
-  if (!corners || !homes || !most) return NULL;
+static const uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, size_t count) {
+  qmat_vote *corners = qmat_arena_alloc(&d->context->arena, 4 * d->cells.count, sizeof *corners);
+  size_t corner_count = 0;
+  if (!corners) return NULL;
   for (size_t i = 0; i < 4 * d->cells.count; i++)
     if (d->kinds[i / 4])
       corners[corner_count++] =
-          (contact){index[d->sphere_of[i / 4]], qmat_dual_surface_component(d, d->cells.corners[i])};
-  qsort(corners, corner_count, sizeof *corners, by_site);
-  for (size_t first = 0, last; first < corner_count; first = last) {
-    for (last = first; last < corner_count && by_site(&corners[first], &corners[last]) == 0;) last++;
-    const uint32_t component = corners[first].site;
-    if (last - first <= most[component]) continue;
-    most[component] = last - first;
-    homes[component] = corners[first].sphere;
-  }
-  return homes;
+          (qmat_vote){index[d->sphere_of[i / 4]], qmat_dual_surface_component(d, d->cells.corners[i])};
+  return qmat_majorities(d->context, corners, corner_count, count);
 }
 
 static qmat_status add_link(qmat_dual_complex *d, uint32_t a, uint32_t b) {
