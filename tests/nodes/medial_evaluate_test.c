@@ -221,29 +221,41 @@ static void test_the_deviation_of_the_mesh_is_part_of_both_errors(void **state) 
   subject_free(&s);
 }
 
-/* Looks at middles of pieces only come closer and closer to the farthest place, where several primitives are as near:
- * an epsilon that is a thousandth above it is told from it. */
-static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
-  (void)state;
-  random_numbers random = {.seed = 11};
+/* The figure `key` is told from every epsilon that is 1, 1 + `step`, ... up to `most` thousandths above it, for balls
+ * at random. */
+static void check_epsilon_is_told_from(const char *key, uint64_t seed, int step, int most) {
+  random_numbers random = {.seed = seed};
   for (int i = 0; i < 40; i++) {
     double balls[4 * 12];
     for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
     subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
     qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001", 1);
-    const double truth = pipeline_number(close, "surface_to_envelope");
+    const double truth = pipeline_number(close, key);
     qmat_value_release(&close->base);
-    for (int share = 1; share <= 41; share += 4) {
+    for (int share = 1; share <= most; share += step) {
       char params[64];
       const double epsilon = truth * (1 + 0.001 * share);
       snprintf(params, sizeof params, "epsilon=%.12f samples=16", epsilon);
       qmat_report *report = evaluate(&s, params, 1);
-      if (!(pipeline_number(report, "surface_to_envelope") <= epsilon))
-        fail_msg("%.9f is not told from %.9f", pipeline_number(report, "surface_to_envelope"), epsilon);
+      if (!(pipeline_number(report, key) <= epsilon))
+        fail_msg("%.9f is not told from %.9f", pipeline_number(report, key), epsilon);
       qmat_value_release(&report->base);
     }
     subject_free(&s);
   }
+}
+
+/* Looks at middles of pieces only come closer and closer to the farthest place, where several primitives are as near:
+ * an epsilon that is a thousandth above it is told from it. */
+static void test_epsilon_is_told_from_what_looks_creep_up_to(void **state) {
+  (void)state;
+  check_epsilon_is_told_from("surface_to_envelope", 11, 4, 41);
+}
+
+/* The same for the envelope's boundary. */
+static void test_epsilon_is_told_from_the_distance_of_the_boundary(void **state) {
+  (void)state;
+  check_epsilon_is_told_from("envelope_to_surface", 12, 1, 4);
 }
 
 /* The farthest place, as far from both balls, is on a long edge. Pieces as small as the tolerance allows do not tell an
@@ -266,30 +278,6 @@ static void test_an_epsilon_just_above_the_error_is_certified(void **state) {
   check_bounds(&s, report, "surface_to_envelope", truth * s.diagonal, 0.05);
   qmat_value_release(&report->base);
   subject_free(&s);
-}
-
-/* The same for the envelope's boundary. */
-static void test_epsilon_is_told_from_the_distance_of_the_boundary(void **state) {
-  (void)state;
-  random_numbers random = {.seed = 12};
-  for (int i = 0; i < 40; i++) {
-    double balls[4 * 12];
-    for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
-    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
-    qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001 samples=16", 1);
-    const double truth = pipeline_number(close, "envelope_to_surface");
-    qmat_value_release(&close->base);
-    for (int share = 1; share <= 4; share++) {
-      char params[64];
-      const double epsilon = truth * (1 + 0.001 * share);
-      snprintf(params, sizeof params, "epsilon=%.12f samples=16", epsilon);
-      qmat_report *report = evaluate(&s, params, 1);
-      if (!(pipeline_number(report, "envelope_to_surface") <= epsilon))
-        fail_msg("%.9f is not told from %.9f", pipeline_number(report, "envelope_to_surface"), epsilon);
-      qmat_value_release(&report->base);
-    }
-    subject_free(&s);
-  }
 }
 
 static void test_an_open_surface_is_never_certified(void **state) {
@@ -578,8 +566,8 @@ int main(void) {
       cmocka_unit_test(test_certified_exactly_where_epsilon_holds),
       cmocka_unit_test(test_the_deviation_of_the_mesh_is_part_of_both_errors),
       cmocka_unit_test(test_epsilon_is_told_from_what_looks_creep_up_to),
-      cmocka_unit_test(test_an_epsilon_just_above_the_error_is_certified),
       cmocka_unit_test(test_epsilon_is_told_from_the_distance_of_the_boundary),
+      cmocka_unit_test(test_an_epsilon_just_above_the_error_is_certified),
       cmocka_unit_test(test_an_open_surface_is_never_certified),
       cmocka_unit_test(test_odd_spheres_cones_and_slabs_are_counted),
       cmocka_unit_test(test_random_medial_meshes_against_dense_samples),
