@@ -25,7 +25,7 @@ typedef struct medial_evaluate_params {
 /* Centres this close to the surface count as inside. */
 static const double beside_surface = 1e-5;
 
-/* The surface is searched up to so many times, each time from the F found before. */
+/* The surface and the envelope's boundary are searched up to so many times, the surface from the F found before. */
 enum { MOST_SEARCHES = 4 };
 /* Where epsilon is between the bounds, the tolerance is its distance from the lower one, at least this share of the
  * usual tolerance. */
@@ -196,7 +196,7 @@ static qmat_status bound_envelope_to_surface(evaluation *e) {
     status = qmat_boundary_distance_measure(e->context, e->surface, e->envelope, &e->unit, epsilon, tolerance, true,
                                             false, (size_t)e->params->samples, &e->boundary);
     const qmat_bounds found = e->boundary.either_side;
-    is_open = found.lo <= decisive && found.hi > decisive;
+    is_open = found.lo < decisive && found.hi > decisive;
     epsilon = decisive;
     tolerance = fmax(fmin(usual, (decisive - found.lo) / decisive), LEAST_TOLERANCE * usual);
   }

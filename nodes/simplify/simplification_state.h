@@ -26,7 +26,7 @@ typedef struct qmat_simplification {
   qmat_constraint_points round_constraints[3];
   qmat_decimation rounds[3];
   int newest, base;        /* numbers of the first two */
-  double share;            /* of the error, which rounds may use */
+  double share;            /* of the error: what rounds use */
   qmat_copy_depths depths; /* of the copies of rounds */
 } qmat_simplification;
 

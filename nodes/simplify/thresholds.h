@@ -21,7 +21,7 @@ static const double qmat_late_round_share = 0.9;
 /* Found points inside the solid must be as deep in the envelope as this share. */
 static const double qmat_required_depth_share = 0.05;
 
-/* ---- repetitions: no limit was reached on a model that ended within epsilon ---- */
+/* ---- repetitions: but for damaged models no limit was reached on a model that ended within epsilon ---- */
 
 enum {
   QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
