@@ -224,9 +224,9 @@ static qmat_status make_skin_surface(skin *s) {
   return status;
 }
 
-/* A contour above this number of triangles is made again with cells twice as large: the decimation would take long for
- * shells that are thin everywhere. */
-enum { MOST_CONTOUR_TRIANGLES = 400000 };
+/* A contour of more cells is made with cells twice as large instead: the decimation would take long for shells that are
+ * thin everywhere. */
+enum { MOST_CONTOUR_CELLS = 300000 };
 /* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
  */
 static const double CONTOUR_SHARE = 0.3;
@@ -272,9 +272,11 @@ static double distance_of(const skin *s) {
   return fmax(s->to_envelope, s->from_envelope);
 }
 
-static qmat_status make_contour(skin *s, int detail, qmat_skin_triangles *surface, qmat_envelope_grid *grid) {
+static qmat_status make_contour(skin *s, int detail, size_t most_cells, qmat_skin_triangles *surface,
+                                qmat_envelope_grid *grid) {
   return qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
-                               1 / (double)s->params->resolution, detail, s->marks, s->mark_count, surface, grid);
+                               1 / (double)s->params->resolution, detail, s->marks, s->mark_count, most_cells, surface,
+                               grid);
 }
 
 /* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
@@ -344,9 +346,9 @@ static qmat_status make_finer_contour(skin *s, int detail, qmat_skin_triangles *
   qmat_skin_triangles finer;
   qmat_envelope_grid grid;
   *is_finer = false;
-  if (2 * contour->triangle_count > MOST_CONTOUR_TRIANGLES) return QMAT_OK;
-  const qmat_status status = make_contour(s, detail, &finer, &grid);
-  if (status != QMAT_OK || grid.cell_count == s->grid.cell_count || finer.triangle_count > MOST_CONTOUR_TRIANGLES) {
+  if (2 * s->grid.cell_count > MOST_CONTOUR_CELLS) return QMAT_OK;
+  const qmat_status status = make_contour(s, detail, MOST_CONTOUR_CELLS, &finer, &grid);
+  if (status != QMAT_OK || grid.cell_count == s->grid.cell_count || grid.is_too_fine) {
     drop_triangles(&finer);
     return status;
   }
@@ -433,9 +435,9 @@ static qmat_status make_envelope_surface(skin *s) {
   qmat_status status = QMAT_OK;
   int detail = (int)p->detail;
   for (;; detail--) {
-    status = make_contour(s, detail, &s->surface, &s->grid);
-    if (status != QMAT_OK || detail == 0 || p->error == 0 || s->surface.triangle_count <= MOST_CONTOUR_TRIANGLES) break;
-    drop_triangles(&s->surface);
+    const bool may_be_coarser = detail > 0 && p->error > 0;
+    status = make_contour(s, detail, may_be_coarser ? MOST_CONTOUR_CELLS : SIZE_MAX, &s->surface, &s->grid);
+    if (status != QMAT_OK || !s->grid.is_too_fine) break;
   }
   s->contour_triangle_count = s->surface.triangle_count;
   if (status == QMAT_OK && p->error > 0) status = refine_contour(s, detail);
@@ -550,7 +552,7 @@ static const qmat_param params[] = {
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
     QMAT_INT(medial_skin_params, detail, "halvings", 4, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
-             "often where that makes more than 400,000 triangles to decimate"),
+             "often where that makes more than 300,000 cells"),
     QMAT_LENGTH(
         medial_skin_params, error, 2e-3, 0, 0.1,
         "envelope: the distance from the envelope that the mesh may have; 0: no decimation, and nothing is measured"),
@@ -580,7 +582,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 12,
+    .version = 13,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "

@@ -47,6 +47,7 @@ typedef struct qmat_cells {
   uint32_t *lists;
   size_t list_count;
   size_t refined_count;  /* cells smaller than the base size */
+  bool is_incomplete;    /* there are more than the limit, so the search stopped */
   qmat_key_table marked; /* cells to be halved, by their keys */
 } qmat_cells;
 
@@ -57,12 +58,12 @@ typedef struct qmat_cell_mark {
 } qmat_cell_mark;
 
 /* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of. `base` is the largest
- * size of a cell, halved up to `detail` times where radii are small and at the marks; `floor` is the least radius. Free
- * with qmat_cells_uninit, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are
- * too many cells. The same cells in the same order for any number of threads. Cost: linear in the cells, times the
- * primitives that meet in one. */
+ * size of a cell, halved up to `detail` times where radii are small and at the marks; `floor` is the least radius. The
+ * search stops where there will be more than `most` cells. Free with qmat_cells_uninit, also after a failure.
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are too many cells for the memory. The same cells
+ * in the same order for any number of threads. Cost: linear in the cells, times the primitives that meet in one. */
 qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
-                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count,
+                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count, size_t most,
                             qmat_cells *cells);
 void qmat_cells_uninit(qmat_cells *cells);
 

@@ -30,15 +30,17 @@ static void contour_uninit(qmat_contour *c) {
 
 qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
                                   size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
-                                  size_t mark_count, qmat_skin_triangles *surface, qmat_envelope_grid *grid) {
+                                  size_t mark_count, size_t most_cells, qmat_skin_triangles *surface,
+                                  qmat_envelope_grid *grid) {
   *surface = (qmat_skin_triangles){0};
   qmat_contour c = {.context = context, .threads = qmat_threads(context)};
   *grid = (qmat_envelope_grid){.base = base, .finest = ldexp(base, -detail)};
   grid->smallest_radius = RADIUS_FLOOR * grid->finest;
   for (size_t i = 0; i < sphere_count; i++) grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
-  qmat_status status =
-      qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, marks, mark_count, &c.cells);
-  if (status == QMAT_OK && c.cells.count == 0)
+  qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, marks,
+                                       mark_count, most_cells, &c.cells);
+  grid->is_too_fine = c.cells.is_incomplete;
+  if (status == QMAT_OK && c.cells.count == 0 && !grid->is_too_fine)
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
   grid->cell_count = c.cells.count;
   grid->refined_cell_count = c.cells.refined_count;
@@ -47,11 +49,11 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
                                                   qmat_contour_find_partners,    qmat_contour_find_sheets,
                                                   qmat_contour_place_sheets,     qmat_contour_part_doubled_edges};
   size_t count = sizeof steps / sizeof *steps;
-  for (size_t i = 0; status == QMAT_OK && i < count; i++) {
+  for (size_t i = 0; status == QMAT_OK && i < count && !grid->is_too_fine; i++) {
     status = steps[i](&c);
     if (status == QMAT_OK) status = qmat_progress(context, i + 1, count + 1, "contouring steps");
   }
-  if (status == QMAT_OK) status = qmat_contour_make_triangles(&c, surface);
+  if (status == QMAT_OK && !grid->is_too_fine) status = qmat_contour_make_triangles(&c, surface);
   contour_uninit(&c);
   return status;
 }

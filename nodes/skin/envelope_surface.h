@@ -13,6 +13,7 @@ typedef struct qmat_envelope_grid {
   size_t cell_count;          /* cells that the surface crosses */
   size_t refined_cell_count;  /* those smaller than the base size */
   size_t raised_sphere_count; /* spheres whose radius was raised */
+  bool is_too_fine;           /* the surface crosses more cells than the limit, and there is none */
 } qmat_envelope_grid;
 
 /* Makes the surface of an envelope by dual contouring (Ju et al. 2002) of F on the cells of an octree. Each surface
@@ -24,11 +25,14 @@ typedef struct qmat_envelope_grid {
  * to `detail` times where radii are small and at the marks. Radii below 0.9 of the finest cell are raised to that, so
  * that every primitive gives a connected surface; single spheres of radius 0 are left out.
  *
+ * There is no surface where it crosses more than `most_cells` cells; a cell has about 1.3 triangles.
+ *
  * `surface` gets new arrays that the caller frees, also after a failure, when they may be NULL. QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there is no primitive or there are too many cells. Uses all threads; the
  * same bytes for any number of them. */
 qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
                                   size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
-                                  size_t mark_count, qmat_skin_triangles *surface, qmat_envelope_grid *grid);
+                                  size_t mark_count, size_t most_cells, qmat_skin_triangles *surface,
+                                  qmat_envelope_grid *grid);
 
 #endif

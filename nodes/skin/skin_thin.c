@@ -8,17 +8,15 @@
 #include "core/disjoint_sets.h"
 #include "core/node.h"
 
-/* Rounds, and the rings of triangles around a fault that the first one leaves as they are. Every second round doubles
- * them. The first rounds leave them around their own faults only; the others, around all that was left before, too: on
- * a plane, faults come again along its border. */
-enum { MOST_ROUNDS = 12, NARROW_ROUNDS = 6, FIRST_RINGS = 2 };
+/* The first round thins out everything; each later one leaves the triangles around all faults so far as they are. */
+enum { MOST_ROUNDS = 24 };
 
 typedef struct thinning {
   qmat_context *context;
   const qmat_skin_triangles *surface;
   float *positions;     /* 3 per vertex */
   bool *locked;         /* per vertex: its triangles stay */
-  uint8_t *rings;       /* per vertex: one more than its rings from a fault; 0: far from any */
+  bool *is_fault;       /* per vertex: what is around it is no closed fan of triangles */
   uint32_t *thinned;    /* 3 per triangle */
   size_t thinned_count; /* triangles */
   uint32_t *open;       /* 3 per triangle: those that may go */
@@ -35,15 +33,15 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
                   .surface = surface,
                   .positions = qmat_arena_alloc(arena, 3 * vertices, sizeof *t->positions),
                   .locked = qmat_arena_calloc(arena, vertices, sizeof *t->locked),
-                  .rings = qmat_arena_alloc(arena, vertices, sizeof *t->rings),
+                  .is_fault = qmat_arena_alloc(arena, vertices, sizeof *t->is_fault),
                   .thinned = qmat_arena_alloc(arena, corners, sizeof *t->thinned),
                   .open = qmat_arena_alloc(arena, corners, sizeof *t->open),
                   .firsts = qmat_arena_alloc(arena, vertices + 1, sizeof *t->firsts),
                   .corners = qmat_arena_alloc(arena, corners, sizeof *t->corners),
                   .leaders = qmat_sets_new(context, vertices),
                   .euler = qmat_arena_alloc(arena, vertices, sizeof *t->euler)};
-  if (!t->leaders || !t->euler || !t->positions || !t->locked || !t->rings || !t->thinned || !t->open || !t->firsts ||
-      !t->corners)
+  if (!t->leaders || !t->euler || !t->positions || !t->locked || !t->is_fault || !t->thinned || !t->open ||
+      !t->firsts || !t->corners)
     return qmat_fail_memory(context, "the skin");
   for (size_t i = 0; i < 3 * vertices; i++) t->positions[i] = (float)surface->positions[i];
   for (size_t i = 0; i < corners; i++) qmat_sets_join(t->leaders, surface->triangles[i], surface->triangles[i - i % 3]);
@@ -105,27 +103,20 @@ static bool is_fan(const thinning *t, size_t vertex) {
   return false;
 }
 
-/* Locks the vertices within some rings of those that are no fan, and of the locked ones if they grow. False where all
- * are fans. */
-static bool lock_faults(thinning *t, int rings, bool grow) {
+/* Locks the vertices that are no fan, and those that the original joins to them. A wider ring would lock more than it
+ * helps: on a plane faults come again along its border. False where all are fans. */
+static bool lock_faults(thinning *t) {
   const qmat_skin_triangles *surface = t->surface;
   bool any = false;
   for (size_t v = 0; v < surface->vertex_count; v++) {
-    t->rings[v] = grow && t->locked[v];
-    if (is_fan(t, v)) continue;
-    t->rings[v] = any = true;
+    t->is_fault[v] = !is_fan(t, v);
+    any = any || t->is_fault[v];
   }
-  for (int ring = 1; ring <= rings && any; ring++) {
-    for (size_t i = 0; i < 3 * surface->triangle_count; i++) {
-      const int here = t->rings[surface->triangles[i]];
-      if (here == 0 || here > ring) continue;
-      for (size_t k = 0; k < 3; k++) {
-        uint8_t *other = &t->rings[surface->triangles[i - i % 3 + k]];
-        if (*other == 0) *other = (uint8_t)(ring + 1);
-      }
-    }
+  for (size_t i = 0; i < surface->triangle_count && any; i++) {
+    const uint32_t *corners = surface->triangles + 3 * i;
+    if (!t->is_fault[corners[0]] && !t->is_fault[corners[1]] && !t->is_fault[corners[2]]) continue;
+    for (int c = 0; c < 3; c++) t->locked[corners[c]] = true;
   }
-  for (size_t v = 0; v < surface->vertex_count && any; v++) t->locked[v] |= t->rings[v] > 0;
   return any;
 }
 
@@ -139,7 +130,7 @@ static bool lock_changed_components(thinning *t) {
     if (t->firsts[v + 1] == t->firsts[v]) t->euler[qmat_set_leader(t->leaders, (uint32_t)v)] -= 2;
   for (size_t i = 0; i < surface->triangle_count; i++)
     t->euler[qmat_set_leader(t->leaders, surface->triangles[3 * i])]++;
-  uint8_t *is_left = t->rings;
+  bool *is_left = t->is_fault;
   memset(is_left, 0, count * sizeof *is_left);
   for (size_t i = 0; i < t->thinned_count; i++) {
     const uint32_t leader = qmat_set_leader(t->leaders, t->thinned[3 * i]);
@@ -175,8 +166,7 @@ qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triang
     thin(&t, error);
     sort_corners(&t);
     status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
-    const int rings = FIRST_RINGS << round / 2;
-    if (status != QMAT_OK || lock_faults(&t, rings, round >= NARROW_ROUNDS) || lock_changed_components(&t)) continue;
+    if (status != QMAT_OK || lock_faults(&t) || lock_changed_components(&t)) continue;
     take(&t, surface);
     return status;
   }
