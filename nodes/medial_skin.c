@@ -582,7 +582,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 13,
+    .version = 14,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
@@ -590,8 +590,8 @@ const qmat_node qmat_node_medial_skin = {
         "small, so that thin parts neither vanish nor break. Radii below 0.9 of the finest cell are raised to that; "
         "the report counts them. The mesh is a closed 2-manifold. Crevices narrower than a cell fill: cells are halved "
         "where that makes more than a third of `error`, up to `detail` times. The mesh is then thinned out "
-        "(meshoptimizer), and edges are collapsed (CGAL) as far as `error` and the topology allow. Both distances "
-        "between the mesh and the envelope are bounded at the end "
+        "(meshoptimizer), slivers are flipped, and edges are collapsed (CGAL) as far as `error` and the topology "
+        "allow. Both distances between the mesh and the envelope are bounded at the end "
         "(mesh_to_envelope, envelope_to_mesh), files state the larger, and a warning says when it exceeds `error`.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
         "as prisms of three sides. The counts and distances of the report are without them.\n\n"

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/arena.h"
+#include "core/geometry/triangle.h"
 
 namespace {
 
@@ -23,6 +24,9 @@ using Kernel = CGAL::Simple_cartesian<double>;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Vertex = Mesh::Vertex_index;
 using Placement = boost::optional<Kernel::Point_3>;
+
+/* Over the surface, of flips: a flip may make the sliver beside it one that can be flipped. */
+constexpr int MOST_PASSES = 16;
 
 struct Cancelled : std::exception {};
 
@@ -109,6 +113,48 @@ struct Visitor : SMS::Edge_collapse_visitor_base<Mesh> {
   }
 };
 
+/* The height of a face over its longest side, as a share of that, and the halfedge there. */
+struct Flatness {
+  double share;
+  Mesh::Halfedge_index side;
+};
+
+double height_share(const Mesh &mesh, Vertex a, Vertex b, Vertex c, int *base) {
+  double corners[3][3];
+  const Vertex ids[3] = {a, b, c};
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) corners[i][k] = mesh.point(ids[i])[k];
+  const qmat_longest_side side = qmat_triangle_longest_side(corners[0], corners[1], corners[2]);
+  *base = side.base;
+  return side.length > 0 ? side.height / side.length : 0;
+}
+
+Flatness flatness_of(const Mesh &mesh, Mesh::Face_index face) {
+  Mesh::Halfedge_index h = mesh.halfedge(face);
+  int base;
+  const double share = height_share(mesh, mesh.source(h), mesh.target(h), mesh.target(mesh.next(h)), &base);
+  for (; base > 0; base--) h = mesh.next(h);
+  return {share, h};
+}
+
+/* Flips the longest side of a sliver, unless the two new faces are flatter still or turn over. */
+bool flip_sliver(Mesh &mesh, Mesh::Face_index face) {
+  const Flatness flatness = flatness_of(mesh, face);
+  if (flatness.share > QMAT_SKIN_SLIVER) return false;
+  const Mesh::Halfedge_index h = flatness.side, other = mesh.opposite(h);
+  const Vertex a = mesh.source(h), b = mesh.target(h), c = mesh.target(mesh.next(h)), d = mesh.target(mesh.next(other));
+  int base;
+  if (c == d || mesh.halfedge(c, d).is_valid() || height_share(mesh, c, a, d, &base) <= flatness.share ||
+      height_share(mesh, d, b, c, &base) <= flatness.share)
+    return false;
+  const Kernel::Vector_3 normal = CGAL::normal(mesh.point(b), mesh.point(a), mesh.point(d));
+  if (!(normal * CGAL::normal(mesh.point(c), mesh.point(a), mesh.point(d)) > 0) ||
+      !(normal * CGAL::normal(mesh.point(d), mesh.point(b), mesh.point(c)) > 0))
+    return false;
+  CGAL::Euler::flip_edge(h, mesh);
+  return true;
+}
+
 bool read_mesh(const qmat_skin_triangles &surface, Mesh &mesh) {
   for (size_t v = 0; v < surface.vertex_count; v++) {
     const double *p = surface.positions + 3 * v;
@@ -145,6 +191,23 @@ qmat_status write_mesh(Mesh &mesh, qmat_skin_triangles *surface) {
 }
 
 }  // namespace
+
+qmat_status qmat_skin_flip_slivers(qmat_skin_triangles *surface) {
+  try {
+    Mesh mesh;
+    if (!read_mesh(*surface, mesh)) return QMAT_ERROR_GEOMETRY;
+    bool any = true;
+    for (int pass = 0; pass < MOST_PASSES && any; pass++) {
+      any = false;
+      for (const auto face : mesh.faces()) any = flip_sliver(mesh, face) || any;
+    }
+    return write_mesh(mesh, surface);
+  } catch (const std::bad_alloc &) {
+    return QMAT_ERROR_MEMORY;
+  } catch (const std::exception &) {
+    return QMAT_ERROR_GEOMETRY;
+  }
+}
 
 qmat_status qmat_skin_collapse(qmat_skin_triangles *surface, size_t most, const qmat_skin_judge *judge) {
   try {

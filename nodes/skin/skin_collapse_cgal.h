@@ -30,6 +30,12 @@ typedef struct qmat_skin_judge {
   bool (*goes_on)(void *user);
 } qmat_skin_judge;
 
+/* Flips the longest sides of slivers (QMAT_SKIN_SLIVER) of a closed, oriented 2-manifold, which stays one, of the same
+ * topology. A sliver stays where the flip would make no less flat or turned faces. The surface is replaced by the
+ * result. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY for a surface that is no such manifold; the surface is then unchanged.
+ * Deterministic, one thread. */
+qmat_status qmat_skin_flip_slivers(qmat_skin_triangles *surface);
+
 /* Collapses edges of a closed, oriented 2-manifold, cheapest first by the cost of Lindstrom and Turk, while more than
  * `most` triangles are left and the judge accepts; it stays one of the same topology. Face ids of the judge are rows of
  * `surface` at first. The surface is replaced by the result. QMAT_ERROR_MEMORY, QMAT_CANCELLED, QMAT_ERROR_GEOMETRY for

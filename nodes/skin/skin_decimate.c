@@ -12,9 +12,8 @@
 
 /* Samples of a triangle are the corners of its division into this many parts a side. */
 enum { PARTS = 4 };
-/* A triangle is degenerate if its doubled area is below this share of its longest side squared, and turns over if the
- * cosine of the angle to its old normal is below the other. */
-static const double LEAST_AREA = 1e-3, LEAST_COSINE = 0.3;
+/* A triangle turns over if the cosine of the angle to its old normal is below this. */
+static const double LEAST_COSINE = 0.3;
 /* The share of the error that samples may have: the rest is for what lies between them. */
 static const double SAMPLE_SHARE = 0.75;
 /* The share of the error for which the surface is thinned out before edges collapse, which takes most of the time: a
@@ -86,18 +85,14 @@ static void sample_of(const double corners[9], int i, int j, double point[3]) {
     point[k] = weights[0] * corners[k] + weights[1] * corners[3 + k] + weights[2] * corners[6 + k];
 }
 
-/* Whether a triangle would turn over or degenerate. */
+/* Whether a triangle would turn over or become a sliver. */
 static bool is_bad(const double before[9], const double after[9]) {
-  double old[3], new[3], longest = 0;
+  double old[3], new[3];
+  const qmat_longest_side side = qmat_triangle_longest_side(after, after + 3, after + 6);
+  if (!(side.height > QMAT_SKIN_SLIVER * side.length)) return true;
   qmat_triangle_normal(before, before + 3, before + 6, old);
   qmat_triangle_normal(after, after + 3, after + 6, new);
-  for (int e = 0; e < 3; e++) {
-    double side[3];
-    qmat_subtract(after + (ptrdiff_t)3 * e, after + (ptrdiff_t)3 * ((e + 1) % 3), side);
-    longest = fmax(longest, qmat_dot(side, side));
-  }
-  const double doubled = sqrt(qmat_dot(new, new));
-  return !(doubled > LEAST_AREA * longest) || qmat_dot(old, new) < LEAST_COSINE * doubled * sqrt(qmat_dot(old, old));
+  return qmat_dot(old, new) < LEAST_COSINE * sqrt(qmat_dot(new, new) * qmat_dot(old, old));
 }
 
 /* ---- what a collapse would do ---- */
@@ -257,12 +252,15 @@ static qmat_status start(decimation *d, const qmat_skin_triangles *surface) {
   return QMAT_OK;
 }
 
+static qmat_status fail(qmat_context *context, qmat_status status) {
+  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(context, "the skin");
+  return status == QMAT_OK ? QMAT_OK : qmat_fail(context, QMAT_ERROR_INTERNAL, "the skin is no 2-manifold");
+}
+
 static qmat_status collapse(decimation *d, size_t most, qmat_skin_triangles *surface) {
   const qmat_skin_judge judge = {.user = d, .accepts = accepts, .collapsed = collapsed, .goes_on = goes_on};
   const qmat_status status = qmat_skin_collapse(surface, most, &judge);
-  if (status == QMAT_CANCELLED) return d->status;
-  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(d->context, "the skin");
-  return status == QMAT_OK ? QMAT_OK : qmat_fail(d->context, QMAT_ERROR_INTERNAL, "the skin is no 2-manifold");
+  return status == QMAT_CANCELLED ? d->status : fail(d->context, status);
 }
 
 /* Decimates to `most` triangles, or as far as `error` allows. */
@@ -280,6 +278,8 @@ qmat_status qmat_skin_decimate(qmat_context *context, const qmat_envelope *envel
   decimation d = {.context = context, .envelope = envelope, .error = SAMPLE_SHARE * error};
   *errors = (qmat_skin_errors){0};
   qmat_status status = qmat_skin_thin(context, THIN_SHARE * error, surface);
+  /* Thinning leaves slivers along straight edges, which no collapse may touch. */
+  if (status == QMAT_OK) status = fail(context, qmat_skin_flip_slivers(surface));
   if (status == QMAT_OK) status = decimate(&d, 4, surface, errors);
   if (status == QMAT_OK && most > 0 && surface->triangle_count > most) {
     d = (decimation){.context = context, .envelope = envelope, .error = INFINITY};

@@ -103,8 +103,8 @@ static bool is_fan(const thinning *t, size_t vertex) {
   return false;
 }
 
-/* Locks the vertices that are no fan, and those that the original joins to them. A wider ring would lock more than it
- * helps: on a plane faults come again along its border. False where all are fans. */
+/* Locks the faults, and the vertices that the original joins to them. A wider ring would lock more than it helps: on a
+ * plane faults come again along its border. False where there are none. */
 static bool lock_faults(thinning *t) {
   const qmat_skin_triangles *surface = t->surface;
   bool any = false;

@@ -13,4 +13,7 @@ typedef struct qmat_skin_triangles {
   uint32_t *triangles;
 } qmat_skin_triangles;
 
+/* A triangle is a sliver where its height is at most this share of its longest side. */
+#define QMAT_SKIN_SLIVER 1e-3
+
 #endif

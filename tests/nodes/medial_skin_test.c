@@ -417,6 +417,54 @@ static void test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_
   assert_true(fewer >= 10);
 }
 
+/* The medial mesh of a box of 1 x 2 x 3: its corners, and the sheet in the middle. */
+static qmat_medial *box(void) {
+  double spheres[4 * 12];
+  for (size_t i = 0; i < 8; i++) {
+    const double corner[4] = {(double)(i & 1), (double)(2 * (i >> 1 & 1)), (double)(3 * (i >> 2)), 0};
+    memcpy(spheres + 4 * i, corner, sizeof corner);
+  }
+  for (size_t i = 0; i < 4; i++) {
+    const double inner[4] = {0.5, i & 1 ? 1.5 : 0.5, i & 2 ? 2.5 : 0.5, 0.5};
+    memcpy(spheres + 4 * (8 + i), inner, sizeof inner);
+  }
+  uint32_t triangles[3 * 22] = {8, 9, 10, 9, 11, 10};
+  size_t count = 2;
+  for (uint32_t axis = 0; axis < 3; axis++)
+    for (uint32_t a = 0; a < 8; a++) {
+      const uint32_t b = a | 1u << axis;
+      if (b == a) continue;
+      const uint32_t rows[2][3] = {{a, b, 8 + a / 2}, {b, 8 + b / 2, 8 + a / 2}};
+      const size_t made = axis == 0 ? 1 : 2;
+      memcpy(triangles + 3 * count, rows, made * sizeof rows[0]);
+      count += made;
+    }
+  assert_int_equal(count, 22);
+  return sealed_medial_mesh(spheres, 12, NULL, 0, triangles, count);
+}
+
+/* Its edges take the finest cells: nearly all of the contour is there, and has to be thinned out. Thinning makes
+ * slivers along them, which keep edges from collapsing. */
+static void test_decimation_leaves_few_triangles_of_a_box(void **unused) {
+  (void)unused;
+  skin_result result = skin(box(), "error=0.2%");
+  assert_true(number_of(result, "contour_triangles") > 100000);
+  assert_true(result.mesh->triangle_count < 40);
+  check_shape(result, 2, 1, 22, 6, 0.01);
+  release(result);
+}
+
+/* A plate that is thin everywhere would take twenty million of the finest cells. */
+static void test_a_thin_plate_takes_larger_cells(void **unused) {
+  (void)unused;
+  const double spheres[] = {0, 0, 0, 1e-3, 1, 0, 0, 1e-3, 0, 1, 0, 1e-3};
+  const uint32_t slab[] = {0, 1, 2};
+  skin_result result = skin(sealed_medial_mesh(spheres, 3, NULL, 0, slab, 1), "resolution=256 error=0.1%");
+  assert_true(number_of(result, "cells") < 300000 && number_of(result, "cells") > 75000);
+  assert_near(number_of(result, "components"), 1, 0);
+  release(result);
+}
+
 static void test_decimation_does_not_shorten_a_hair(void **unused) {
   (void)unused;
   /* A hair that is thinner than the error: all of it is near the envelope, its tip is not near the rest. */
@@ -727,6 +775,8 @@ int main(void) {
       cmocka_unit_test(test_a_gap_narrower_than_all_cells_is_filled_and_stated),
       cmocka_unit_test(test_a_number_of_triangles_comes_before_the_error),
       cmocka_unit_test(test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology),
+      cmocka_unit_test(test_decimation_leaves_few_triangles_of_a_box),
+      cmocka_unit_test(test_a_thin_plate_takes_larger_cells),
       cmocka_unit_test(test_decimation_does_not_shorten_a_hair),
       cmocka_unit_test(test_finer_cells_come_closer),
       cmocka_unit_test(test_a_capsule_has_its_area_and_volume),
