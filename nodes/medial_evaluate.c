@@ -288,7 +288,7 @@ static const qmat_param params[] = {
     QMAT_FLOAT(medial_evaluate_params, tolerance, "epsilon", 0.05, 0.001, 1,
                "The largest gap between the bounds of an error, relative to epsilon (0.1 % without one) or to the "
                "error, the larger"),
-    QMAT_INT(medial_evaluate_params, samples, "points", 20000, 1, 1e9,
+    QMAT_INT(medial_evaluate_params, samples, "points", 5000, 1, 1e9,
              "Points on the surface, and as many on the primitives, for sampled figures and means"),
     {0},
 };
@@ -308,7 +308,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 14,
+    .version = 15,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

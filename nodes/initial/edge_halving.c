@@ -34,8 +34,9 @@ static uint32_t middle_of(const qmat_medial *medial, const uint32_t *middles, ui
   return middles[qmat_simplex_find(medial->edges, medial->edge_count, 2, ends)];
 }
 
-/* One round; adds the number of halved edges to `*added`. */
-static qmat_status halve_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial,
+/* One round. Edges of two of the first `known` spheres stay: an earlier round has tried them. Adds the number of halved
+ * edges to `*added`. */
+static qmat_status halve_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, size_t known,
                                double tolerance, size_t *added) {
   qmat_arena *arena = &context->arena;
   const size_t spheres = medial->sphere_count, edges = medial->edge_count, triangles = medial->triangle_count;
@@ -49,12 +50,13 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
     if (status != QMAT_OK) return status;
     const size_t last = first + slice < edges ? first + slice : edges;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
-    for (size_t e = first; e < last; e++)
-      middles[e] =
-          find_middle(surface, &medial->spheres[4 * (size_t)medial->edges[2 * e]],
-                      &medial->spheres[4 * (size_t)medial->edges[2 * e + 1]], tolerance, &middle_spheres[4 * e])
-              ? 0
-              : NONE;
+    for (size_t e = first; e < last; e++) {
+      const uint32_t a = medial->edges[2 * e], b = medial->edges[2 * e + 1];
+      const bool is_halved =
+          (a >= known || b >= known) && find_middle(surface, &medial->spheres[4 * (size_t)a],
+                                                    &medial->spheres[4 * (size_t)b], tolerance, &middle_spheres[4 * e]);
+      middles[e] = is_halved ? 0 : NONE;
+    }
   }
   size_t count = 0;
   for (size_t e = 0; e < edges; e++)
@@ -94,10 +96,12 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
 
 qmat_status qmat_edges_halve(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, double tolerance,
                              size_t *added) {
+  size_t known = 0;
   *added = 0;
   for (int round = 0; round < MOST_ROUNDS; round++) {
-    const size_t before = *added;
-    qmat_status status = halve_edges(context, surface, medial, tolerance, added);
+    const size_t before = *added, count = medial->sphere_count;
+    qmat_status status = halve_edges(context, surface, medial, known, tolerance, added);
+    known = count;
     if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "refinement");
     if (status != QMAT_OK || *added == before) return status;
   }

@@ -80,7 +80,7 @@ static void test_a_ball_in_a_cube_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
   subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
-  qmat_report *report = evaluate(&s, "", 0);
+  qmat_report *report = evaluate(&s, "samples=20000", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1, 0.05);
   /* Under a corner of the cube the ball is the farthest from all sides. */
   check_bounds(&s, report, "envelope_to_surface", 1 - 1 / sqrt(3), 0.05);
