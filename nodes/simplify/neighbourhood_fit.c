@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/simplify/fit_steps.h"
 
 enum { VARIABLES = 4 * QMAT_NEIGHBOURHOOD_SPHERES };
 
@@ -238,10 +239,8 @@ static bool solve(equations *e) {
   return true;
 }
 
-/* The order of the norm in each step: the weight of a square is the error to this power. A full step overshoots
- * because the weights decrease with the error, so the step is divided by 1 + power / 2. */
-static const int powers[] = {0, 2, 2, 4, 4, 6, 6, 6};
-enum { STEPS = sizeof powers / sizeof *powers, FIRST_STEP_AGAIN = 4 };
+/* The first step of a fit that goes on with further targets. */
+enum { FIRST_STEP_AGAIN = 1 };
 
 /* A fit ends early when its error exceeds this multiple of the threshold after this many steps. */
 enum { EARLY_EXIT_STEP = 3 };
@@ -264,12 +263,11 @@ void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex 
     double worst = 0;
     for (size_t i = 0; i < fit->target_count; i++) {
       fit_target *target = &fit->targets[i];
-      double weights[3], weight = 1;
+      double weights[3];
       const double wrong = error_at(target, find_foot(fit, target, weights));
       worst = qmat_larger(worst, fabs(wrong));
-      if (step == STEPS || wrong == 0) continue;
-      const double relative = last_worst > 0 ? wrong / last_worst : 1;
-      for (int p = 0; p < powers[step]; p += 2) weight *= relative * relative;
+      if (step == QMAT_FIT_STEPS || wrong == 0) continue;
+      const double weight = qmat_fit_weight(last_worst > 0 ? wrong / last_worst : 1, step);
       add_target(fit, complex, current, target, weights, wrong, weight, &e);
     }
     fit->worst = worst;
@@ -277,9 +275,10 @@ void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex 
       *error = worst;
       memcpy(fit->spheres, current, bytes);
     }
-    if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * fit->threshold) || !solve(&e)) return;
+    if (step == QMAT_FIT_STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * fit->threshold) || !solve(&e))
+      return;
     for (int i = 0; i < fit->count; i++) {
-      for (int k = 0; k < 4; k++) current[i][k] += e.b[4 * i + k] / (1 + 0.5 * powers[step]);
+      for (int k = 0; k < 4; k++) current[i][k] += qmat_fit_step_share(step) * e.b[4 * i + k];
       if (!fit->keeps_radii && !(current[i][3] > 0)) return;
     }
   }

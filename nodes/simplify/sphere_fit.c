@@ -6,6 +6,7 @@
 
 #include "core/geometry/quadric.h"
 #include "core/geometry/vector.h"
+#include "nodes/simplify/fit_steps.h"
 
 void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   qmat_free(fit->points);
@@ -61,13 +62,10 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, qmat_sphere_fit *fit, q
   return QMAT_OK;
 }
 
-/* The order of the norm in each step: the weight of a square is |F| to this power. */
-static const int powers[] = {0, 0, 2, 2, 4, 4, 6, 6};
-enum { STEPS = sizeof powers / sizeof *powers };
-
-/* A fit ends early when its error exceeds this multiple of `give_up_error` after this many steps. */
-enum { EARLY_EXIT_STEP = 3 };
-static const double early_exit_ratio = 3;
+/* A fit ends early when its error exceeds this multiple of `give_up_error` after this many steps: 1 of 5,000 such fits
+ * would come below it. */
+enum { EARLY_EXIT_STEP = 2 };
+static const double early_exit_ratio = 2;
 
 /* Adds weight times the square of the linearised F of a point whose foot moves with `share` of the sphere: a tangent
  * plane in the coordinates of the sphere. */
@@ -108,28 +106,27 @@ qmat_status qmat_sphere_fit_run(qmat_context *context, qmat_sphere_fit *fit, qma
     qmat_quadric sum = {.c = 0};
     last_worst = worst;
     worst = 0;
-    for (size_t i = 0; i < fit->count && (step < STEPS || worst < *error); i++) {
+    for (size_t i = 0; i < fit->count && (step < QMAT_FIT_STEPS || worst < *error); i++) {
       const double *point = &tracker->points[3 * (size_t)fit->points[i]];
       double foot[4], share;
       const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, current, point, &fit->nearest[i],
                                                           foot, &share);
       worst = qmat_larger(worst, fabs(f));
-      if (step == STEPS || !(share > 1e-3)) continue;
-      double weight = 1;
-      const double relative = last_worst > 0 ? fabs(f) / last_worst : 1;
-      for (int p = 0; p < powers[step]; p += 2) weight *= relative * relative;
+      if (step == QMAT_FIT_STEPS || !(share > 1e-3)) continue;
+      const double weight = qmat_fit_weight(last_worst > 0 ? f / last_worst : 1, step);
       add_residual(&sum, point, foot, share, f, current, weight);
     }
     if (worst < *error) {
       *error = worst;
       memcpy(sphere, current, sizeof current);
     }
-    if (step == STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * give_up_error)) return QMAT_OK;
+    if (step == QMAT_FIT_STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * give_up_error))
+      return QMAT_OK;
     add_damping(&sum, current);
     double next[4] = {0, 0, 0, current[3]};
     if (fit->keeps_radius ? !qmat_quadric_minimise_centre(&sum, next)
                           : !qmat_quadric_minimise(&sum, next) || !(next[3] > 0))
       return QMAT_OK;
-    memcpy(current, next, sizeof current);
+    for (int k = 0; k < 4; k++) current[k] += qmat_fit_step_share(step) * (next[k] - current[k]);
   }
 }

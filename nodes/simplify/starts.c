@@ -83,11 +83,11 @@ static bool leaves_creases(const all_starts *all, size_t start) {
   return all->rule_count == 2 && start % 2 == 0;
 }
 
-/* Whether a start that keeps creases has no fewer spheres than the one with the same seed that does not. */
+/* Whether a start that keeps creases can hardly have fewer spheres than the one with the same seed that does not. */
 static bool is_beaten(const all_starts *all, size_t start) {
   if (!keeps_creases(all, start)) return false;
   const size_t count = atomic_load(&all->free_counts[start / 2]);
-  return count > 0 && count <= all->fewest_kept;
+  return count > 0 && (double)count <= qmat_least_kept * (double)all->fewest_kept;
 }
 
 /* Runs a start. `is_needed`: it has a result even where its initial medial mesh is not within epsilon. */
