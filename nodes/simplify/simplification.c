@@ -280,10 +280,9 @@ static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *
 
 /* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
  * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
- * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse; if
- * only its topology gets worse, `right` becomes the result before. */
+ * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
 static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best,
-                              qmat_simplified *right, bool *fewer) {
+                              bool *fewer) {
   *fewer = false;
   if (s->params.refits == 0 || best->medial->sphere_count <= (size_t)s->params.vertices) return QMAT_OK;
   qmat_extra_points extra = no_extra_points(s);
@@ -300,8 +299,7 @@ static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *
     if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
     qmat_medial_errors_uninit(&errors);
     if (status == QMAT_OK) *fewer = a.medial->sphere_count < best->medial->sphere_count;
-    if (status == QMAT_OK && (!qmat_simplified_is_better(best, &a) || (*fewer && a.fault == best->fault))) {
-      if (best->has_right_topology && !a.has_right_topology) replace(best, right);
+    if (status == QMAT_OK && !qmat_simplified_is_better(best, &a)) {
       replace(&a, best);
       return QMAT_OK;
     }
@@ -312,19 +310,12 @@ static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *
   return status;
 }
 
-/* Repeats joint refits while they remove spheres: refitted spheres make room for others to disappear. A result that
- * loses the right topology on the way counts only if that can be mended. */
+/* Repeats joint refits while they remove spheres: refitted spheres make room for others to disappear. */
 static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
   qmat_status status = QMAT_OK;
-  qmat_simplified right = {.fault = INFINITY};
   bool fewer = true;
   for (int i = 0; i < QMAT_MOST_REFIT_REPEATS && fewer && status == QMAT_OK; i++)
-    status = refit_once(s, found, best, &right, &fewer);
-  if (right.medial) {
-    if (status == QMAT_OK) status = mend_topology(s, best);
-    if (status == QMAT_OK && qmat_simplified_is_better(&right, best)) replace(&right, best);
-  }
-  qmat_simplified_uninit(&right);
+    status = refit_once(s, found, best, &fewer);
   return status;
 }
 

@@ -548,19 +548,6 @@ static void test_joint_fits_find_what_single_fits_do_not(void **state) {
   pipeline_free(&p);
 }
 
-/* Joint refits find eleven spheres instead of fifteen, but lose the right topology, which is mended then. */
-static void test_joint_refits_may_lose_the_topology_for_a_while(void **state) {
-  (void)state;
-  pipeline p;
-  pipeline_make(&p, pipeline_model("box", 8), "spacing=12%", "merge=0.04");
-  result r = simplify(&p, "epsilon=4%");
-  assert_true(r.medial->sphere_count <= 11);
-  check_topology(&p, &r);
-  check_errors(&p, &r, 0.04, true);
-  release(&r);
-  pipeline_free(&p);
-}
-
 /* How far spheres reach from the octopus's head. */
 static double reach(const qmat_medial *medial) {
   double most = 0;
@@ -1073,7 +1060,6 @@ int main(void) {
       cmocka_unit_test(test_topology_is_free_guarded_or_preserved),
       cmocka_unit_test(test_a_planted_medial_mesh_is_found_again),
       cmocka_unit_test(test_joint_fits_find_what_single_fits_do_not),
-      cmocka_unit_test(test_joint_refits_may_lose_the_topology_for_a_while),
       cmocka_unit_test(test_protection_keeps_tubular_edges),
       cmocka_unit_test(test_protection_of_nothing_thin_changes_nothing),
       cmocka_unit_test(test_medial_mesh_without_regions_works),
