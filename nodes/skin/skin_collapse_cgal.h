@@ -31,7 +31,7 @@ typedef struct qmat_skin_judge {
 } qmat_skin_judge;
 
 /* Flips the longest sides of slivers (QMAT_SKIN_SLIVER) of a closed, oriented 2-manifold, which stays one, of the same
- * topology. A sliver stays where the flip would make no less flat or turned faces. The surface is replaced by the
+ * topology. A sliver stays where a face would turn over or be as flat as before. The surface is replaced by the
  * result. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY for a surface that is no such manifold; the surface is then unchanged.
  * Deterministic, one thread. */
 qmat_status qmat_skin_flip_slivers(qmat_skin_triangles *surface);
