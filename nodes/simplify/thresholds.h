@@ -67,8 +67,8 @@ static const double qmat_most_cost_factor = 1.65;
  * more than this multiple of the least number of spheres. */
 static const double qmat_few_kept = 1.75;
 
-/* Keeping the creases is tried only if the result without them has more than this multiple of the least number. Nothing
- * but a cube came nearer to that. */
+/* Keeping the creases is tried only if the result without them has more than this multiple of the least number. Only
+ * cubes and boxes near one came below it. */
 static const double qmat_least_kept = 1.125;
 
 /* A move of a sphere has to lower its error by at least this share of the error. */

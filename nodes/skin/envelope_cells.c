@@ -310,11 +310,11 @@ static qmat_status too_many(qmat_context *context) {
 }
 
 /* Moves the finished cells of `from` to the result and the others to `next`. */
-static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t most, size_t *cell_capacity,
-                            size_t *list_capacity, const cell_batch *from, cell_batch *next) {
+static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t *cell_capacity, size_t *list_capacity,
+                            const cell_batch *from, cell_batch *next) {
   /* Each cell that will be halved becomes at least two. */
   const size_t least = cells->count + 2 * (next->count + from->count);
-  cells->is_incomplete = cells->is_incomplete || least > most;
+  cells->is_incomplete = cells->is_incomplete || least > cells->most;
   if (cells->is_incomplete) return QMAT_OK;
   if (least > MOST_CELLS || cells->list_count + next->list_count + from->list_count > MOST_ENTRIES) {
     return too_many(context);
@@ -344,8 +344,8 @@ static qmat_status sort_out(qmat_context *context, qmat_cells *cells, size_t mos
 }
 
 /* Halves every cell of `parents`: finished children go to the result, the others to `next`. */
-static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t most, size_t *cell_capacity,
-                         size_t *list_capacity, const cell_batch *parents, cell_batch *chunks, cell_batch *next) {
+static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_capacity, size_t *list_capacity,
+                         const cell_batch *parents, cell_batch *chunks, cell_batch *next) {
   int threads = qmat_threads(context);
   for (size_t first = 0; first < parents->count && !cells->is_incomplete;) {
     size_t end = first, entries = 0;
@@ -365,7 +365,7 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t most, 
     }
     if (failed) return qmat_fail_memory(context, "surface cells");
     for (size_t c = 0; c < chunk_count; c++) {
-      qmat_status status = sort_out(context, cells, most, cell_capacity, list_capacity, &chunks[c], next);
+      qmat_status status = sort_out(context, cells, cell_capacity, list_capacity, &chunks[c], next);
       if (status != QMAT_OK) return status;
     }
     first = end;
@@ -378,7 +378,7 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t most, 
 qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
                             int detail, double floor, const qmat_cell_mark *marks, size_t mark_count, size_t most,
                             qmat_cells *cells) {
-  *cells = (qmat_cells){.finest = ldexp(base, -detail), .base = (uint32_t)1 << detail};
+  *cells = (qmat_cells){.finest = ldexp(base, -detail), .base = (uint32_t)1 << detail, .most = most};
   qmat_status status = prepare_primitives(context, envelope, spheres, floor, &cells->primitives);
   if (status != QMAT_OK) return status;
   const qmat_cell_primitives *p = &cells->primitives;
@@ -425,10 +425,10 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
     status = qmat_fail_memory(context, "surface cells");
     goto done;
   }
-  status = sort_out(context, cells, most, &cell_capacity, &list_capacity, &chunks[0], &level);
+  status = sort_out(context, cells, &cell_capacity, &list_capacity, &chunks[0], &level);
   while (status == QMAT_OK && level.count > 0 && !cells->is_incomplete) {
     next.count = next.list_count = 0;
-    status = halve(context, cells, most, &cell_capacity, &list_capacity, &level, chunks, &next);
+    status = halve(context, cells, &cell_capacity, &list_capacity, &level, chunks, &next);
     cell_batch swap = level;
     level = next;
     next = swap;

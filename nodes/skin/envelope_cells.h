@@ -47,7 +47,8 @@ typedef struct qmat_cells {
   uint32_t *lists;
   size_t list_count;
   size_t refined_count;  /* cells smaller than the base size */
-  bool is_incomplete;    /* there are more than the limit, so the search stopped */
+  size_t most;           /* the search stops where there will be more cells */
+  bool is_incomplete;    /* it has stopped */
   qmat_key_table marked; /* cells to be halved, by their keys */
 } qmat_cells;
 

@@ -40,7 +40,11 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
   qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, marks,
                                        mark_count, most_cells, &c.cells);
   grid->is_too_fine = c.cells.is_incomplete;
-  if (status == QMAT_OK && c.cells.count == 0 && !grid->is_too_fine)
+  if (grid->is_too_fine) {
+    contour_uninit(&c);
+    return status;
+  }
+  if (status == QMAT_OK && c.cells.count == 0)
     status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh encloses no volume");
   grid->cell_count = c.cells.count;
   grid->refined_cell_count = c.cells.refined_count;
@@ -48,12 +52,12 @@ qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *en
                                                   qmat_contour_evaluate_corners, qmat_contour_find_crossings,
                                                   qmat_contour_find_partners,    qmat_contour_find_sheets,
                                                   qmat_contour_place_sheets,     qmat_contour_part_doubled_edges};
-  size_t count = sizeof steps / sizeof *steps;
-  for (size_t i = 0; status == QMAT_OK && i < count && !grid->is_too_fine; i++) {
+  const size_t count = sizeof steps / sizeof *steps;
+  for (size_t i = 0; status == QMAT_OK && i < count; i++) {
     status = steps[i](&c);
     if (status == QMAT_OK) status = qmat_progress(context, i + 1, count + 1, "contouring steps");
   }
-  if (status == QMAT_OK && !grid->is_too_fine) status = qmat_contour_make_triangles(&c, surface);
+  if (status == QMAT_OK) status = qmat_contour_make_triangles(&c, surface);
   contour_uninit(&c);
   return status;
 }

@@ -113,39 +113,30 @@ struct Visitor : SMS::Edge_collapse_visitor_base<Mesh> {
   }
 };
 
-/* The height of a face over its longest side, as a share of that, and the halfedge there. */
-struct Flatness {
-  double share;
-  Mesh::Halfedge_index side;
-};
-
-double height_share(const Mesh &mesh, Vertex a, Vertex b, Vertex c, int *base) {
+qmat_longest_side longest_side(const Mesh &mesh, Vertex a, Vertex b, Vertex c) {
   double corners[3][3];
   const Vertex ids[3] = {a, b, c};
   for (int i = 0; i < 3; i++)
     for (int k = 0; k < 3; k++) corners[i][k] = mesh.point(ids[i])[k];
-  const qmat_longest_side side = qmat_triangle_longest_side(corners[0], corners[1], corners[2]);
-  *base = side.base;
+  return qmat_triangle_longest_side(corners[0], corners[1], corners[2]);
+}
+
+/* The height over the longest side, as a share of that. */
+double height_share(const qmat_longest_side &side) {
   return side.length > 0 ? side.height / side.length : 0;
 }
 
-Flatness flatness_of(const Mesh &mesh, Mesh::Face_index face) {
-  Mesh::Halfedge_index h = mesh.halfedge(face);
-  int base;
-  const double share = height_share(mesh, mesh.source(h), mesh.target(h), mesh.target(mesh.next(h)), &base);
-  for (; base > 0; base--) h = mesh.next(h);
-  return {share, h};
-}
-
-/* Flips the longest side of a sliver, unless the two new faces are flatter still or turn over. */
+/* Flips the longest side of a sliver, unless a new face would be as flat or turn over. */
 bool flip_sliver(Mesh &mesh, Mesh::Face_index face) {
-  const Flatness flatness = flatness_of(mesh, face);
-  if (flatness.share > QMAT_SKIN_SLIVER) return false;
-  const Mesh::Halfedge_index h = flatness.side, other = mesh.opposite(h);
-  const Vertex a = mesh.source(h), b = mesh.target(h), c = mesh.target(mesh.next(h)), d = mesh.target(mesh.next(other));
-  int base;
-  if (c == d || mesh.halfedge(c, d).is_valid() || height_share(mesh, c, a, d, &base) <= flatness.share ||
-      height_share(mesh, d, b, c, &base) <= flatness.share)
+  Mesh::Halfedge_index h = mesh.halfedge(face);
+  const qmat_longest_side side = longest_side(mesh, mesh.source(h), mesh.target(h), mesh.target(mesh.next(h)));
+  const double least = height_share(side);
+  if (least > QMAT_SKIN_SLIVER) return false;
+  for (int i = 0; i < side.base; i++) h = mesh.next(h);
+  const Vertex a = mesh.source(h), b = mesh.target(h), c = mesh.target(mesh.next(h));
+  const Vertex d = mesh.target(mesh.next(mesh.opposite(h)));
+  if (c == d || mesh.halfedge(c, d).is_valid() || height_share(longest_side(mesh, c, a, d)) <= least ||
+      height_share(longest_side(mesh, d, b, c)) <= least)
     return false;
   const Kernel::Vector_3 normal = CGAL::normal(mesh.point(b), mesh.point(a), mesh.point(d));
   if (!(normal * CGAL::normal(mesh.point(c), mesh.point(a), mesh.point(d)) > 0) ||
