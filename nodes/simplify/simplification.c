@@ -280,33 +280,39 @@ static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *
 
 /* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
  * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
- * result beyond epsilon is tried again with the points found. The result changes only where that makes it no worse. */
+ * result beyond epsilon is tried again with the points found, and with less of the error where there are none. The
+ * result changes only where that makes it no worse. */
 static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best,
                               bool *fewer) {
   *fewer = false;
   if (s->params.refits == 0 || best->medial->sphere_count <= (size_t)s->params.vertices) return QMAT_OK;
   qmat_extra_points extra = no_extra_points(s);
   const int base = s->newest;
+  const double share = s->share;
   qmat_status status = QMAT_OK;
   if (best->figures.filled > 0) status = append_inner(s->context, found->uncovered, found->uncovered_count, &extra);
-  bool ended = false;
-  for (int i = 0; i < QMAT_MOST_JOINT_REFITS && status == QMAT_OK && !ended; i++) {
+  bool ended = false, is_taken = false;
+  for (int i = 0; i < QMAT_MOST_JOINT_REFITS && status == QMAT_OK && !ended && !is_taken; i++) {
     qmat_simplified a = {.figures = best->figures, .fault = INFINITY};
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     s->newest = base;
     status = run_round(s, &s->rounds[base], best->medial, &extra, true, true, &a, &errors);
     ended = a.within_epsilon;
-    if (status == QMAT_OK && !ended) status = constrain_found_points(s, &errors, &extra);
+    const size_t points = extra.surface_count + extra.inner_count;
+    if (status == QMAT_OK && !ended) {
+      status = constrain_found_points(s, &errors, &extra);
+      if (extra.surface_count + extra.inner_count == points) s->share *= qmat_hovering_share;
+    }
     qmat_medial_errors_uninit(&errors);
-    if (status == QMAT_OK) *fewer = a.medial->sphere_count < best->medial->sphere_count;
-    if (status == QMAT_OK && !qmat_simplified_is_better(best, &a)) {
+    is_taken = status == QMAT_OK && !qmat_simplified_is_better(best, &a);
+    if (is_taken) {
+      *fewer = a.medial->sphere_count < best->medial->sphere_count;
       replace(&a, best);
-      return QMAT_OK;
     }
     qmat_simplified_uninit(&a);
   }
-  *fewer = false;
-  s->newest = base;
+  s->share = share;
+  if (!is_taken) s->newest = base;
   return status;
 }
 

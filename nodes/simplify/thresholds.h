@@ -18,6 +18,10 @@ static const double qmat_dense_share = 0.9;
  * the places beyond epsilon elsewhere. */
 static const double qmat_late_round_share = 0.9;
 
+/* A joint refit whose boundary hovers just beyond epsilon finds no points: the next one, which would end the same, uses
+ * this share of the error. */
+static const double qmat_hovering_share = 0.99;
+
 /* Found points inside the solid must be as deep in the envelope as this share. */
 static const double qmat_required_depth_share = 0.05;
 
