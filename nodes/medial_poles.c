@@ -123,11 +123,14 @@ static qmat_status make_medial(power_crust *p, qmat_medial *medial) {
     if (p->sphere_of[i] != NO_SPHERE)
       memcpy(&medial->spheres[4 * (size_t)p->sphere_of[i]], &p->poles.spheres[4 * i], 4 * sizeof *medial->spheres);
   qmat_frame_spheres_to_model(&p->frame, medial->spheres, medial->sphere_count, medial->spheres);
+  qmat_status status = qmat_progress(p->context, 0, 0, "simplices");
+  if (status != QMAT_OK) return status;
   const size_t edges = keep_inner(p, p->power.edges, p->power.edge_count, 2);
   const size_t triangles = keep_inner(p, p->power.triangles, p->power.triangle_count, 3);
-  const qmat_status status =
-      qmat_medial_set_simplices(p->context, medial, p->power.edges, edges, p->power.triangles, triangles);
-  return status == QMAT_OK ? set_regions(p, medial) : status;
+  status = qmat_medial_set_simplices(p->context, medial, p->power.edges, edges, p->power.triangles, triangles);
+  if (status == QMAT_OK) status = qmat_progress(p->context, 0, 0, "regions");
+  if (status == QMAT_OK) status = set_regions(p, medial);
+  return status == QMAT_OK ? qmat_progress(p->context, 0, 0, "regions") : status;
 }
 
 /* --- the report -------------------------------------------------------------------------------------------------- */

@@ -36,7 +36,7 @@ using CellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel, Reg
 using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 using Cell = Triangulation::Cell_handle;
 
-constexpr size_t kSimplicesPerReport = 16384;
+constexpr size_t kSimplicesPerReport = 2048;
 
 /* The corners of a box around all balls, without weight: the triangulation is three-dimensional, and no simplex of
  * balls is on its hull. */

@@ -148,17 +148,12 @@ static qmat_status test_neighbourhood(qmat_decimation *s, uint32_t edge, uint32_
   return status;
 }
 
-/* Whether the sphere of the newest preview and its neighbours are few enough to be fitted jointly. */
-static bool is_small_neighbourhood(const qmat_decimation *s) {
-  return s->collapse.neighbour_count < QMAT_NEIGHBOURHOOD_SPHERES;
-}
-
 /* Starts the fit of the newest preview from `sphere`, jointly with its neighbours unless `alone`. */
 static qmat_status start_fit(qmat_decimation *s, const double sphere[4], bool alone) {
   const qmat_collapse *c = &s->collapse;
   uint32_t others[QMAT_NEIGHBOURHOOD_SPHERES];
   size_t count = 0;
-  for (size_t n = 0; !alone && n < c->neighbour_count; n++)
+  for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_NEIGHBOURHOOD_SPHERES; n++)
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
         !(s->protecting && qmat_decimation_is_protected(s, c->neighbours[n])))
       others[count++] = c->neighbours[n];
@@ -202,7 +197,7 @@ qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *s, uint32_t edge
   qmat_status status = QMAT_OK;
   if (s->refusal == QMAT_REFUSED_BY_MIDPOINT) return status;
   if (s->fitted_errors[edge] <= qmat_test_ratio * s->threshold) status = try_neighbourhood(s, edge, true, result);
-  if (status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED && is_small_neighbourhood(s) &&
+  if (status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED && s->collapse.neighbour_count < QMAT_COLLAPSE_SPHERES &&
       s->fitted_errors[edge] <= qmat_neighbourhood_ratio * s->threshold)
     status = try_neighbourhood(s, edge, false, result);
   return status;
@@ -212,8 +207,7 @@ qmat_status qmat_decimation_try_move(qmat_decimation *s, uint32_t vertex, size_t
                                      qmat_collapse_outcome *result) {
   *result = QMAT_COLLAPSE_REFUSED;
   qmat_status status = qmat_complex_preview_move(s->context, &s->complex, vertex, &s->collapse);
-  if (status != QMAT_OK || !(alone || is_small_neighbourhood(s))) return status;
-  status = start_fit(s, &s->complex.spheres[4 * (size_t)vertex], alone);
+  if (status == QMAT_OK) status = start_fit(s, &s->complex.spheres[4 * (size_t)vertex], alone);
   if (status == QMAT_OK) status = add_point_target(s, point);
   s->neighbourhood.worst = s->threshold; /* all errors are near it: the fit starts with high weights */
   return status == QMAT_OK ? fit_and_test(s, QMAT_NONE, result) : status;

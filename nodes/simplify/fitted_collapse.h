@@ -16,9 +16,9 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *decimation, uint32_t edg
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *decimation, uint32_t edge,
                                                qmat_collapse_outcome *result);
 
-/* Tries to bring a constraint point within its limit by fits of `vertex` and, unless `alone`, its neighbours, where
- * they are few. Where `*result` allows it, all of these are in place, and the move of `vertex` is the newest preview
- * and test; else nothing has changed. QMAT_ERROR_MEMORY. */
+/* Tries to bring a constraint point within its limit by fits of `vertex` and, unless `alone`, its neighbours. Where
+ * `*result` allows it, all of these are in place, and the move of `vertex` is the newest preview and test; else nothing
+ * has changed. QMAT_ERROR_MEMORY. */
 qmat_status qmat_decimation_try_move(qmat_decimation *decimation, uint32_t vertex, size_t point, bool alone,
                                      qmat_collapse_outcome *result);
 

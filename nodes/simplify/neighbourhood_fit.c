@@ -107,7 +107,7 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
   fit->count = 1;
   fit->vertices[0] = collapse->kept;
   memcpy(fit->spheres[0], sphere, sizeof fit->spheres[0]);
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < count && fit->count < QMAT_NEIGHBOURHOOD_SPHERES; i++) {
     fit->vertices[fit->count] = vertices[i];
     memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)vertices[i]], 4 * sizeof(double));
   }

@@ -25,9 +25,9 @@ typedef struct qmat_neighbourhood_fit {
 
 void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit);
 
-/* Starts a fit for `collapse` to `sphere`, and for `count` other `vertices`, fewer than QMAT_NEIGHBOURHOOD_SPHERES. A
- * few hundred of their constraint points, among the first `surface_count`, become targets, evenly spread over the
- * lists. QMAT_ERROR_MEMORY. */
+/* Starts a fit for `collapse` to `sphere`, and for as many of the `count` other `vertices` as fit in. A few hundred of
+ * their constraint points, among the first `surface_count`, become targets, evenly spread over the lists.
+ * QMAT_ERROR_MEMORY. */
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
                                          qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                          const qmat_collapse *collapse, const double sphere[4],

@@ -43,11 +43,12 @@ enum {
 /* ---- points of a fit: the tests use all of them, so that a fit may use fewer ---- */
 
 enum {
-  QMAT_FITTED_POINTS = 256,       /* of one sphere */
-  QMAT_FINAL_REFIT_POINTS = 1024, /* of one sphere, where the error itself counts */
-  QMAT_FITTED_TARGETS = 512,      /* of a neighbourhood */
-  /* Fitted jointly: 54 of 1,729 fits of so many lost a sphere, 6 of 2,257 fits of more, which took twice the time. */
-  QMAT_NEIGHBOURHOOD_SPHERES = 5
+  QMAT_FITTED_POINTS = 256,        /* of one sphere */
+  QMAT_FINAL_REFIT_POINTS = 1024,  /* of one sphere, where the error itself counts */
+  QMAT_FITTED_TARGETS = 512,       /* of a neighbourhood */
+  QMAT_NEIGHBOURHOOD_SPHERES = 12, /* 48 unknowns: a solve costs about as much as a pass over the targets */
+  /* Fitted jointly for a collapse: 54 of 1,729 such fits removed a sphere, 6 of 2,257 of more, which took twice as long. */
+  QMAT_COLLAPSE_SPHERES = 5
 };
 
 /* ---- multiples of the threshold at which a fit goes on ---- */
