@@ -47,7 +47,7 @@ enum {
   QMAT_FINAL_REFIT_POINTS = 1024,  /* of one sphere, where the error itself counts */
   QMAT_FITTED_TARGETS = 512,       /* of a neighbourhood */
   QMAT_NEIGHBOURHOOD_SPHERES = 12, /* 48 unknowns: a solve costs about as much as a pass over the targets */
-  /* Fitted jointly for a collapse: 54 of 1,729 such fits removed a sphere, 6 of 2,257 of more, which took twice as long. */
+  /* Fitted jointly by a collapse: 54 of 1,729 such fits removed a sphere, 6 of 2,257 of more, for twice the time. */
   QMAT_COLLAPSE_SPHERES = 5
 };
 
