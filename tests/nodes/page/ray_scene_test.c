@@ -27,10 +27,11 @@ static void test_a_sphere_a_cone_and_a_slab_by_hand(void **state) {
   static const struct {
     double x, y, depth;
     qmat_look_kind kind;
-  } rays[] = {{3, 0, 0.2, QMAT_LOOK_SPHERE},      /* the middle of the lone sphere */
-              {-0.06, 0, 0.08, QMAT_LOOK_SPHERE}, /* beyond the end of both cones: sqrt(0.1^2 - 0.06^2) */
-              {0.5, -0.06, 0.08, QMAT_LOOK_CONE}, /* beside the slab: the side of the cone along x */
-              {0.25, 0.25, 0.1, QMAT_LOOK_SLAB}}; /* the flat face */
+  } rays[] = {
+      {3, 0, 0.2, QMAT_LOOK_SPHERE},               /* the middle of the lone sphere */
+      {-0.06, -0.03, 0.0741620, QMAT_LOOK_SPHERE}, /* beyond the ends of both cones: sqrt(0.1^2 - 0.06^2 - 0.03^2) */
+      {0.5, -0.06, 0.08, QMAT_LOOK_CONE},          /* beside the slab: the side of the cone along x */
+      {0.25, 0.25, 0.1, QMAT_LOOK_SLAB}};          /* the flat face */
   for (size_t i = 0; i < sizeof rays / sizeof *rays; i++) {
     const qmat_ray_hit hit =
         qmat_ray_scene_medial(scene, (const double[]){rays[i].x, rays[i].y, 2}, (const double[]){0, 0, -1});
