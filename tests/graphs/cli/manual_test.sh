@@ -18,7 +18,7 @@ if command -v mandoc >/dev/null; then
   mandoc -T ascii qmat.1 | sed 's/.\x08//g' >page.txt
 else
   echo "skipped: mandoc (Debian: apt install mandoc)"
-  sed 's/\\f[BR]//g; s/\\-/-/g' qmat.1 >page.txt
+  sed 's/^\.S[HS] "\(.*\)"$/\1/; s/\\f[BR]//g; s/\\-/-/g' qmat.1 >page.txt
 fi
 if command -v groff >/dev/null; then
   man --warnings -E UTF-8 -l qmat.1 2>out.txt >/dev/null
