@@ -264,11 +264,6 @@ static qmat_status check_facets(conversion *c) {
     size_t start = facet_start(soup, f), count = soup->facet_ends[f] - start;
     const uint32_t *corners = soup->corners + start;
     uint32_t stamp = (uint32_t)f + 1;
-    if (count < 3) {
-      qmat_fail(c->context, QMAT_ERROR_FORMAT, "the facet has %zu corner%s; at least 3 are needed", count,
-                count == 1 ? "" : "s");
-      return at_facet(c, f);
-    }
     uint64_t hash = count;
     size_t different = 0;
     uint32_t twice = NONE;
@@ -284,7 +279,10 @@ static qmat_status check_facets(conversion *c) {
       hash += qmat_hash_mix(corners[k] + UINT64_C(0x9e3779b97f4a7c15)); /* a sum does not depend on the order */
     }
     if (different < 3) {
-      if (!c->drops_defects)
+      if (!c->drops_defects && count < 3)
+        qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet has %zu corner%s; at least 3 are needed", count,
+                  count == 1 ? "" : "s");
+      else if (!c->drops_defects)
         qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet uses vertex %u twice (counted from 0)", twice);
       qmat_status status = refuse_or_drop(c, f);
       if (status != QMAT_OK) return status;
@@ -355,7 +353,7 @@ static qmat_status triangulate(conversion *c) {
   for (size_t f = 0; f < soup->facet_count; f++) {
     size_t count = soup->facet_ends[f] - facet_start(soup, f);
     if (count > most) most = count;
-    total += count - 2;
+    if (!c->dropped[f]) total += count - 2;
   }
   uint32_t *ids = qmat_arena_alloc(&c->arena, most, sizeof *ids);
   uint32_t *links = qmat_arena_alloc(&c->arena, most, 8 * sizeof *links);

@@ -329,14 +329,27 @@ static void test_a_square_that_repeats_a_vertex_is_a_triangle(void **state) {
   done(mesh, report);
 }
 
+static void test_facets_of_fewer_than_three_corners_are_defects(void **state) {
+  (void)state;
+  const int facets[] = {0, 1, -1, 0, 1, 2, -1, -1, 3, -1};
+  assert_soup_refused(make_soup(cube, 8, facets, 4), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
+                      "file:10: facet 0: the facet has 2 corners; at least 3 are needed (set 'defects: drop' to drop "
+                      "such facets; qmat mat: --set model.defects=drop)");
+  json_t *report;
+  qmat_mesh *mesh = convert(make_soup(cube, 8, facets, 4), QMAT_DEFECTS_DROP, &report);
+  assert_int_equal(mesh->triangle_count, 1);
+  assert_count(report, "facets_dropped_as_defects", 3);
+  done(mesh, report);
+  assert_soup_refused(make_soup(cube, 8, facets, 1), QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY,
+                      "file: no facet remains: 0 collapsed when vertices of equal position were welded, 1 were dropped "
+                      "as defects");
+}
+
 static void test_a_file_without_a_surface_is_refused(void **state) {
   (void)state;
   assert_soup_refused((qmat_soup){0}, QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY, "file: the file has no facets");
   assert_soup_refused(make_soup(cube, 8, NULL, 0), QMAT_DEFECTS_DROP, QMAT_ERROR_GEOMETRY,
                       "file: the file has vertices but no facets");
-  const int two[] = {0, 1, 2, -1, 0, 1, -1};
-  assert_soup_refused(make_soup(cube, 8, two, 2), QMAT_DEFECTS_DROP, QMAT_ERROR_FORMAT,
-                      "file:11: facet 1: the facet has 2 corners; at least 3 are needed");
   const int far[] = {0, 1, 8, -1};
   assert_soup_refused(make_soup(cube, 8, far, 1), QMAT_DEFECTS_DROP, QMAT_ERROR_FORMAT,
                       "file:10: facet 0: the facet uses vertex 8, but there are only 8 (counted from 0)");
@@ -449,6 +462,7 @@ int main(void) {
       cmocka_unit_test(test_defects_are_refused_with_facet_and_line_or_dropped_and_counted),
       cmocka_unit_test(test_a_polygon_may_repeat_vertices_at_a_bridge_to_its_hole),
       cmocka_unit_test(test_a_square_that_repeats_a_vertex_is_a_triangle),
+      cmocka_unit_test(test_facets_of_fewer_than_three_corners_are_defects),
       cmocka_unit_test(test_a_file_without_a_surface_is_refused),
       cmocka_unit_test(test_coordinates_near_the_largest_double_do_no_harm),
       cmocka_unit_test(test_counts_agree_with_a_slow_count_on_random_soups),
