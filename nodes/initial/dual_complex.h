@@ -18,6 +18,7 @@ typedef struct qmat_dual_complex {
   const qmat_voronoi_dual_params *params; /* NULL where tetrahedra are not selected */
   double merge;                           /* adjacent medial vertices so near become one */
   double thinning_tolerance;
+  double link_limit; /* components are not linked by edges that leave the solid by more */
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   const qmat_surface *surface;

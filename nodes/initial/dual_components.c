@@ -9,6 +9,7 @@
 #include "core/disjoint_sets.h"
 #include "core/geometry/vector.h"
 #include "nodes/initial/majority.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 #define NONE QMAT_NO_ID
 
@@ -204,13 +205,28 @@ static const uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, s
   return qmat_majorities(d->context, corners, corner_count, count);
 }
 
-static qmat_status add_link(qmat_dual_complex *d, uint32_t a, uint32_t b) {
+/* Whether the link leaves the solid by at most the limit. */
+static bool is_near_solid(const qmat_dual_complex *d, const double *spheres, const medial_link *link) {
+  static const double tolerance_share = 0.01;
+  const double *const ends[] = {&spheres[4 * (size_t)link->a], &spheres[4 * (size_t)link->b]};
+  if (d->link_limit == INFINITY || link->outside > d->link_limit) return d->link_limit == INFINITY;
+  return qmat_envelope_to_surface_bound(d->surface, ends, 2, d->link_limit, tolerance_share * d->link_limit) <=
+         d->link_limit;
+}
+
+/* Links two components that are not linked yet, where the link stays near the solid. `joined` are the linked ones. */
+static qmat_status add_link(qmat_dual_complex *d, const double *spheres, const uint32_t *index, const medial_link *link,
+                            uint32_t *joined, size_t *links) {
+  const uint32_t a = index[link->a], b = index[link->b];
+  if (qmat_set_leader(joined, a) == qmat_set_leader(joined, b) || !is_near_solid(d, spheres, link)) return QMAT_OK;
   size_t capacity = 2 * d->edge_count;
   if (qmat_grow((void **)&d->edges, &capacity, 2 * (d->edge_count + 1), sizeof *d->edges))
     return qmat_fail_memory(d->context, "medial edges");
-  d->edges[2 * d->edge_count] = a;
-  d->edges[2 * d->edge_count + 1] = b;
+  d->edges[2 * d->edge_count] = link->a;
+  d->edges[2 * d->edge_count + 1] = link->b;
   d->edge_count++;
+  ++*links;
+  qmat_sets_join(joined, a, b);
   return QMAT_OK;
 }
 
@@ -233,42 +249,41 @@ static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, 
       candidates[candidate_count++] = measured_link(d, spheres, a, b);
     }
   if (candidate_count) qsort(candidates, candidate_count, sizeof *candidates, better_link);
-  for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++) {
-    if (!qmat_sets_join(joined, index[candidates[i].a], index[candidates[i].b])) continue;
-    ++*links;
-    status = add_link(d, candidates[i].a, candidates[i].b);
-  }
+  for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++)
+    status = add_link(d, spheres, index, &candidates[i], joined, links);
   qmat_free(candidates);
   return status;
 }
 
-/* Links the nearest two spheres of different components in the same component of the surface, until that has only one.
- * Quadratic, but rare: components that share a sample are already linked. */
-static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
-                                const double *spheres, size_t *links) {
+/* Links the nearest two spheres of different components in the same component of the surface, until that has only one,
+ * but for those whose link would leave the solid too far. Quadratic, but rare: components that share a sample are
+ * already linked. */
+static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, size_t components,
+                                uint32_t *joined, const double *spheres, size_t *links) {
   size_t count = 0;
   contact *contacts = find_contacts(d, index, homes, &count);
-  if (!contacts) return qmat_fail_memory(d->context, "components");
+  uint32_t *tried = qmat_arena_alloc(&d->context->arena, components, sizeof *tried);
+  if (!contacts || !tried) return qmat_fail_memory(d->context, "components");
+  memcpy(tried, joined, components * sizeof *tried);
   for (size_t first = 0, last; first < count; first = last) {
     for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
     for (;;) {
-      const uint32_t home = qmat_set_leader(joined, index[contacts[first].sphere]);
+      const uint32_t home = qmat_set_leader(tried, index[contacts[first].sphere]);
       medial_link best = {0, INFINITY, NONE, NONE};
       for (size_t i = first; i < last; i++) {
-        if (qmat_set_leader(joined, index[contacts[i].sphere]) == home) continue;
+        if (qmat_set_leader(tried, index[contacts[i].sphere]) == home) continue;
         const qmat_status status = qmat_progress(d->context, 0, 0, "components");
         if (status != QMAT_OK) return status;
         for (size_t j = first; j < last; j++) {
-          if (qmat_set_leader(joined, index[contacts[j].sphere]) != home) continue;
+          if (qmat_set_leader(tried, index[contacts[j].sphere]) != home) continue;
           const medial_link link = link_of(spheres, contacts[i].sphere, contacts[j].sphere);
           if (better_link(&link, &best) < 0) best = link;
         }
       }
       if (best.a == NONE) break;
-      const qmat_status status = add_link(d, best.a, best.b);
+      const qmat_status status = add_link(d, spheres, index, &best, joined, links);
       if (status != QMAT_OK) return status;
-      qmat_sets_join(joined, index[best.a], index[best.b]);
-      ++*links;
+      qmat_sets_join(tried, index[best.a], index[best.b]);
     }
   }
   return QMAT_OK;
@@ -287,7 +302,7 @@ static qmat_status link_components(qmat_dual_complex *d, qmat_dual_component_cou
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
   qmat_status status = link_at_samples(d, index, homes, joined, spheres, &counts->links);
-  if (status == QMAT_OK) status = link_nearest(d, index, homes, joined, spheres, &counts->links);
+  if (status == QMAT_OK) status = link_nearest(d, index, homes, count, joined, spheres, &counts->links);
   counts->components -= counts->links;
   return status;
 }

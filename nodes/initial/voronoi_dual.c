@@ -2,6 +2,7 @@
 /* The initial medial mesh: triangulate, select (Algorithm 1), connect, join components, assign responsible regions. */
 #include "nodes/initial/voronoi_dual.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -317,6 +318,7 @@ qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dua
                          .params = params,
                          .merge = params->merge * epsilon,
                          .thinning_tolerance = params->thinning_tolerance * epsilon,
+                         .link_limit = params->epsilon > 0 ? params->epsilon : INFINITY,
                          .samples = samples,
                          .surface = solids};
   dual_counts made = {.refined = 0};

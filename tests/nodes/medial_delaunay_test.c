@@ -327,6 +327,46 @@ static void test_boxes_beside_a_narrow_gap_are_not_linked(void **state) {
   }
 }
 
+/* Half a ring of square cross-section, thick at both ends and as thin as a hair between. */
+static qmat_mesh *half_ring_with_hair(void) {
+  enum { RINGS = 13 };
+  const double pi = acos(-1);
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < RINGS; i++) {
+    const double angle = pi * i / (RINGS - 1), half = i < 4 || i >= RINGS - 4 ? 0.2 : 1e-12;
+    for (int k = 0; k < 4; k++) {
+      const double radius = 1 + (k == 0 || k == 3 ? half : -half);
+      shape_vertex(mesh, radius * cos(angle), radius * sin(angle), k < 2 ? half : -half);
+    }
+  }
+  for (uint32_t i = 0; i + 1 < RINGS; i++)
+    for (uint32_t k = 0; k < 4; k++) {
+      const uint32_t a = 4 * i + k, b = 4 * i + (k + 1) % 4;
+      shape_triangle(mesh, a, b + 4, b);
+      shape_triangle(mesh, a, a + 4, b + 4);
+    }
+  shape_triangle(mesh, 0, 1, 2);
+  shape_triangle(mesh, 0, 2, 3);
+  const uint32_t last = 4 * (RINGS - 1);
+  shape_triangle(mesh, last, last + 2, last + 1);
+  shape_triangle(mesh, last, last + 3, last + 2);
+  return mesh;
+}
+
+/* The medial mesh tears at the hair. The chord between its parts is far outside of the solid. */
+static void test_links_stay_near_the_solid(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, half_ring_with_hair(), "spacing=5%", "epsilon=0");
+  assert_int_equal(pipeline_components(p.medial), 1);
+  assert_true(pipeline_count(p.report, "links") > 0);
+  pipeline_delaunay(&p, 0, "epsilon=1%");
+  assert_int_equal(pipeline_count(p.report, "links"), 0);
+  assert_int_equal(pipeline_components(p.medial), 2);
+  assert_int_equal(pipeline_count(p.report, "components"), 2);
+  pipeline_free(&p);
+}
+
 static void test_cavity_is_left_out(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_new();
@@ -726,6 +766,7 @@ int main(void) {
       cmocka_unit_test(test_two_solids_give_two_pieces),
       cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),
       cmocka_unit_test(test_boxes_beside_a_narrow_gap_are_not_linked),
+      cmocka_unit_test(test_links_stay_near_the_solid),
       cmocka_unit_test(test_cavity_is_left_out),
       cmocka_unit_test(test_circumradius_touches_its_samples_and_holds_none),
       cmocka_unit_test(test_flat_regions_are_thinned_and_every_sample_has_a_sphere),
