@@ -188,7 +188,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_features = {
     .name = "medial.features",
-    .version = 6,
+    .version = 7,
     .summary = "Extends an initial medial mesh to the sharp convex edges and corners of the surface",
     .doc =
         "The medial axis of a solid touches its convex creases with radius zero, but spheres through samples never do. "

@@ -204,15 +204,16 @@ static qmat_status reach(linker *b, uint32_t sphere, double distance, uint32_t p
   return qmat_queue_push(&g->queue, distance, sphere) ? qmat_fail_memory(b->context, "the medial mesh") : QMAT_OK;
 }
 
-/* Grows the tree of shortest paths from `root` (Dijkstra 1959) until it contains all wanted spheres, `missing` of them.
- */
-static qmat_status find_paths(linker *b, uint32_t root, size_t missing) {
+/* Grows the tree of shortest paths from `root` (Dijkstra 1959) until it contains all wanted spheres, `missing` of them,
+ * or all within `longest`. */
+static qmat_status find_paths(linker *b, uint32_t root, size_t missing, double longest) {
   sheet_graph *g = &b->graph;
   g->queue.count = 0;
   qmat_status status = reach(b, root, 0, QMAT_NONE);
   while (g->queue.count && missing && status == QMAT_OK) {
     const uint32_t v = (uint32_t)qmat_queue_pop(&g->queue).item;
     if (g->finished[v] == g->search) continue; /* it came nearer after it was queued */
+    if (g->distances[v] > longest) break;
     g->finished[v] = g->search;
     missing -= g->wanted[v] == g->search;
     for (size_t i = g->starts[v]; i < g->starts[v + 1] && status == QMAT_OK; i++) {
@@ -244,6 +245,20 @@ static qmat_status add_triangle(linker *b, uint32_t u, uint32_t v, uint32_t w) {
   return QMAT_OK;
 }
 
+/* A path between two anchors that is longer than the way over the crease by this factor is a detour. Its slabs would
+ * leave the solid. On clean models the factor is below 4; where the medial mesh is torn it is 20 to 100. */
+static const double longest_detour = 8;
+
+/* The longest path that links the segment from crease sphere `from` to `to`. */
+static double longest_path(const linker *b, uint32_t from, uint32_t to) {
+  double p[3], q[3];
+  qmat_frame_to_unit(b->frame, b->creases->spheres[from].centre, 1, p);
+  qmat_frame_to_unit(b->frame, b->creases->spheres[to].centre, 1, q);
+  return longest_detour *
+         (qmat_point_distance(&b->graph.spheres[4 * (size_t)b->anchors[from]], p) + qmat_point_distance(p, q) +
+          qmat_point_distance(q, &b->graph.spheres[4 * (size_t)b->anchors[to]]));
+}
+
 /* Links one sphere of a crease and the segments that start at it: a fan of slabs over the tree of paths from its anchor
  * to the anchors of the next spheres, and a slab on each segment. A cone over a tree keeps the homotopy type, and so
  * does a slab that adds one free edge. `next` holds the other ends of the segments. */
@@ -252,17 +267,19 @@ static qmat_status link_sphere(linker *b, uint32_t id, const uint32_t *next, siz
   const uint32_t first = (uint32_t)b->bare->sphere_count, sphere = first + id, root = b->anchors[id];
   qmat_status status = add_edge(b, sphere, root);
   size_t missing = 0;
+  double longest = 0;
   g->search++;
   for (size_t i = 0; i < count; i++) {
     const uint32_t anchor = b->anchors[next[i]];
+    longest = qmat_larger(longest, longest_path(b, id, next[i]));
     missing += g->wanted[anchor] != g->search;
     g->wanted[anchor] = g->search;
   }
-  if (status == QMAT_OK) status = find_paths(b, root, missing);
+  if (status == QMAT_OK) status = find_paths(b, root, missing, longest);
   g->linked[root] = g->search;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     const uint32_t anchor = b->anchors[next[i]];
-    if (g->finished[anchor] != g->search) {
+    if (g->finished[anchor] != g->search || g->distances[anchor] > longest_path(b, id, next[i])) {
       b->links->gaps++;
       continue;
     }

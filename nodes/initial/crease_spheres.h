@@ -35,7 +35,7 @@ qmat_status qmat_crease_spheres_of_medial(qmat_context *context, const qmat_medi
                                           qmat_crease_spheres *creases);
 
 typedef struct qmat_crease_links {
-  size_t gaps;    /* segments whose ends cannot be linked: there is no path in the medial mesh */
+  size_t gaps;    /* segments whose ends are not linked: no path in the medial mesh, or only a long detour */
   double longest; /* of the paths, unit frame */
 } qmat_crease_links;
 

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/medial_build.h"
 #include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
 
@@ -107,6 +108,55 @@ static qmat_mesh *frame(void) {
     shape_quad(mesh, k, i, i + 8, k + 8);           /* below */
   }
   return mesh;
+}
+
+/* Whether a simplex of the medial mesh of the frame crosses the plane between the halves of one side. */
+static bool crosses_cut(const qmat_medial *medial, const uint32_t *corners, size_t count) {
+  bool is_left = false, is_right = false, is_beyond = false;
+  for (size_t k = 0; k < count; k++) {
+    const double *centre = &medial->spheres[4 * (size_t)corners[k]];
+    is_left |= centre[0] < 0;
+    is_right |= centre[0] >= 0;
+    is_beyond |= centre[1] > 0;
+  }
+  return is_left && is_right && is_beyond;
+}
+
+static size_t cut(const qmat_medial *medial, uint32_t *simplices, size_t count, size_t corners) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (crosses_cut(medial, &simplices[corners * i], corners)) continue;
+    memmove(&simplices[corners * kept++], &simplices[corners * i], corners * sizeof *simplices);
+  }
+  return kept;
+}
+
+/* Where the medial mesh is torn, the path between anchors on both sides leads around the frame. */
+static void test_a_crease_is_not_linked_by_a_detour(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, frame(), "spacing=5%", "");
+  result r = find_features(&p, 0, "");
+  check_extension(p.medial, &r);
+  release(&r);
+  qmat_medial *torn = qmat_medial_copy(p.medial);
+  torn->edge_count = cut(torn, torn->edges, torn->edge_count, 2);
+  torn->triangle_count = cut(torn, torn->triangles, torn->triangle_count, 3);
+  qmat_context context = {0};
+  assert_int_equal(qmat_value_seal(&context, &torn->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  qmat_value_release(&p.medial->base);
+  p.medial = torn;
+  assert_int_equal(pipeline_components(torn), 1);
+  r = find_features(&p, 0, "");
+  assert_int_equal(pipeline_count(r.report, "gaps"), 4); /* of the creases outside and around the hole */
+  assert_true(json_real_value(json_object_get(r.report->root, "longest_link")) < 0.2);
+  const qmat_topology old = topology_of(torn), new = topology_of(r.medial);
+  assert_int_equal(new.components, old.components);
+  assert_int_equal(new.loops, old.loops);
+  assert_int_equal(new.voids, old.voids);
+  release(&r);
+  pipeline_free(&p);
 }
 
 static void test_a_box_has_twelve_creases_and_eight_corners(void **state) {
@@ -293,6 +343,7 @@ static void test_a_surface_without_sides_is_an_error(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_a_crease_is_not_linked_by_a_detour),
       cmocka_unit_test(test_a_box_has_twelve_creases_and_eight_corners),
       cmocka_unit_test(test_spheres_lie_on_the_creases_at_even_distances),
       cmocka_unit_test(test_the_concave_crease_of_a_bracket_is_none),
