@@ -332,32 +332,49 @@ static qmat_status change_side(mending *m, bool keep, bool neutral) {
 
 /* ---- the result ---- */
 
-/* Gives tetrahedra that are kept now the sphere of the nearest neighbour that has one. */
+/* Copies to `sphere` that of the nearest neighbour that has one; false where none has. */
+static bool take_from_neighbour(const mending *m, uint32_t cell, double sphere[4]) {
+  const qmat_dual_complex *d = m->d;
+  double centre[3], nearest = INFINITY;
+  qmat_medial_vertex_incentre(d, cell, centre);
+  for (size_t k = 0; k < 4; k++) {
+    const uint32_t j = d->cells.neighbours[4 * (size_t)cell + k];
+    if (!is_kept(d, j) || !m->before[j]) continue;
+    const double distance = qmat_point_distance(&d->spheres[4 * (size_t)j], centre);
+    if (!(distance < nearest)) continue;
+    nearest = distance;
+    memcpy(sphere, &d->spheres[4 * (size_t)j], 4 * sizeof *sphere);
+  }
+  return nearest < INFINITY;
+}
+
+/* The largest sphere around the incentre inside the solid; of radius zero where the incentre is outside. */
+static void take_incentre(const qmat_dual_complex *d, uint32_t cell, double sphere[4]) {
+  qmat_medial_vertex_incentre(d, cell, sphere);
+  sphere[3] = fmax(-qmat_surface_signed_distance(d->surface, sphere), 0);
+}
+
+/* One pass over the tetrahedra that are kept now and have no sphere; returns how many got one. */
+static size_t give_spheres(mending *m, bool from_neighbours) {
+  const qmat_dual_complex *d = m->d;
+  size_t given = 0;
+  for (size_t i = 0; i < m->changed_count; i++) {
+    const uint32_t cell = m->changed[i];
+    if (m->before[cell] || !d->kinds[cell]) continue;
+    double *sphere = &d->spheres[4 * (size_t)cell];
+    if (from_neighbours && !take_from_neighbour(m, cell, sphere)) continue;
+    if (!from_neighbours) take_incentre(d, cell, sphere);
+    m->before[cell] = QMAT_CELL_INCENTRE; /* it has a sphere now */
+    given++;
+  }
+  return given;
+}
+
+/* Gives tetrahedra that are kept now the sphere of a neighbour, or their own where no neighbour has one. */
 static void set_spheres(mending *m, qmat_mended_tetrahedra *mended) {
-  qmat_dual_complex *d = m->d;
-  size_t given;
-  do {
-    given = 0;
-    for (size_t i = 0; i < m->changed_count; i++) {
-      const uint32_t cell = m->changed[i];
-      if (m->before[cell] || !d->kinds[cell]) continue;
-      double centre[3], nearest = INFINITY;
-      qmat_medial_vertex_incentre(d, cell, centre);
-      for (size_t k = 0; k < 4; k++) {
-        const uint32_t j = d->cells.neighbours[4 * (size_t)cell + k];
-        if (!is_kept(d, j) || !m->before[j]) continue;
-        const double distance = qmat_point_distance(&d->spheres[4 * (size_t)j], centre);
-        if (!(distance < nearest)) continue;
-        nearest = distance;
-        memcpy(&d->spheres[4 * (size_t)cell], &d->spheres[4 * (size_t)j], 4 * sizeof *d->spheres);
-      }
-      if (!(nearest < INFINITY)) continue;
-      m->before[cell] = QMAT_CELL_INCENTRE; /* it has a sphere now */
-      mended->kept++;
-      given++;
-    }
-  } while (given > 0);
-  for (size_t i = 0; i < d->cells.count; i++) mended->dropped += m->before[i] && !d->kinds[i];
+  for (size_t given = 1; given > 0; mended->kept += given) given = give_spheres(m, true);
+  mended->kept += give_spheres(m, false);
+  for (size_t i = 0; i < m->d->cells.count; i++) mended->dropped += m->before[i] && !m->d->kinds[i];
 }
 
 static qmat_status start(mending *m) {
