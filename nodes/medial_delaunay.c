@@ -57,7 +57,7 @@ const qmat_node qmat_node_medial_delaunay = {
         "the tetrahedra nearest to the surface change sides until the loops and voids are those of the solid.\n\n"
         "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
         "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
-        "where one surface component contains several.\n\n"
+        "where one surface component contains several, unless the link leaves the solid by more than epsilon.\n\n"
         "Sheets are medial meshes already: each of their triangles becomes a slab, with spheres of half the sheet "
         "thickness at its corners.",
     .citation = "Section 3.2, Algorithm 1",

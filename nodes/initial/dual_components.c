@@ -209,7 +209,8 @@ static const uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, s
 static bool is_near_solid(const qmat_dual_complex *d, const double *spheres, const medial_link *link) {
   static const double tolerance_share = 0.01;
   const double *const ends[] = {&spheres[4 * (size_t)link->a], &spheres[4 * (size_t)link->b]};
-  if (d->link_limit == INFINITY || link->outside > d->link_limit) return d->link_limit == INFINITY;
+  if (d->link_limit == INFINITY) return true;
+  if (link->outside > d->link_limit) return false;
   return qmat_envelope_to_surface_bound(d->surface, ends, 2, d->link_limit, tolerance_share * d->link_limit) <=
          d->link_limit;
 }
@@ -255,38 +256,62 @@ static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, 
   return status;
 }
 
-/* Links the nearest two spheres of different components in the same component of the surface, until that has only one,
- * but for those whose link would leave the solid too far. Quadratic, but rare: components that share a sample are
- * already linked. */
-static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, size_t components,
-                                uint32_t *joined, const double *spheres, size_t *links) {
-  size_t count = 0;
-  contact *contacts = find_contacts(d, index, homes, &count);
-  uint32_t *tried = qmat_arena_alloc(&d->context->arena, components, sizeof *tried);
-  if (!contacts || !tried) return qmat_fail_memory(d->context, "components");
-  memcpy(tried, joined, components * sizeof *tried);
-  for (size_t first = 0, last; first < count; first = last) {
-    for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
-    for (;;) {
-      const uint32_t home = qmat_set_leader(tried, index[contacts[first].sphere]);
-      medial_link best = {0, INFINITY, NONE, NONE};
-      for (size_t i = first; i < last; i++) {
-        if (qmat_set_leader(tried, index[contacts[i].sphere]) == home) continue;
-        const qmat_status status = qmat_progress(d->context, 0, 0, "components");
-        if (status != QMAT_OK) return status;
-        for (size_t j = first; j < last; j++) {
-          if (qmat_set_leader(tried, index[contacts[j].sphere]) != home) continue;
-          const medial_link link = link_of(spheres, contacts[i].sphere, contacts[j].sphere);
-          if (better_link(&link, &best) < 0) best = link;
-        }
-      }
-      if (best.a == NONE) break;
-      const qmat_status status = add_link(d, spheres, index, &best, joined, links);
-      if (status != QMAT_OK) return status;
-      qmat_sets_join(tried, index[best.a], index[best.b]);
+/* The spheres in one component of the surface, while their sets are linked (Prim 1957). */
+typedef struct {
+  size_t count;
+  const contact *contacts;
+  const uint32_t *sets; /* per sphere: the components that were linked before */
+  medial_link *best;    /* per sphere: the shortest link to the reached spheres */
+  bool *reached;        /* per sphere */
+} sphere_sets;
+
+/* Reaches the spheres of a set. They may be nearer to the others than those reached before. */
+static qmat_status reach_set(qmat_dual_complex *d, const double *spheres, uint32_t set, sphere_sets *s) {
+  for (size_t i = 0; i < s->count; i++) s->reached[i] |= s->sets[i] == set;
+  for (size_t i = 0; i < s->count; i++) {
+    if (s->sets[i] != set) continue;
+    const qmat_status status = qmat_progress(d->context, 0, 0, "components");
+    if (status != QMAT_OK) return status;
+    for (size_t j = 0; j < s->count; j++) {
+      if (s->reached[j]) continue;
+      const medial_link link = link_of(spheres, s->contacts[i].sphere, s->contacts[j].sphere);
+      if (better_link(&link, &s->best[j]) < 0) s->best[j] = link;
     }
   }
   return QMAT_OK;
+}
+
+/* Links the nearest two spheres of different components in the same component of the surface, until that has only one,
+ * but for those whose link would leave the solid too far. Quadratic, but rare: components that share a sample are
+ * already linked. */
+static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
+                                const double *spheres, size_t *links) {
+  qmat_arena *arena = &d->context->arena;
+  size_t count = 0;
+  const contact *contacts = find_contacts(d, index, homes, &count);
+  uint32_t *sets = qmat_arena_alloc(arena, count, sizeof *sets);
+  medial_link *best = qmat_arena_alloc(arena, count, sizeof *best);
+  bool *reached = qmat_arena_calloc(arena, count, sizeof *reached);
+  if (!contacts || !sets || !best || !reached) return qmat_fail_memory(d->context, "components");
+  for (size_t i = 0; i < count; i++) {
+    sets[i] = qmat_set_leader(joined, index[contacts[i].sphere]);
+    best[i] = (medial_link){0, INFINITY, NONE, NONE};
+  }
+  qmat_status status = QMAT_OK;
+  for (size_t first = 0, last; first < count && status == QMAT_OK; first = last) {
+    for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
+    sphere_sets s = {last - first, &contacts[first], &sets[first], &best[first], &reached[first]};
+    uint32_t newest = s.sets[0];
+    while (status == QMAT_OK && (status = reach_set(d, spheres, newest, &s)) == QMAT_OK) {
+      size_t next = s.count;
+      for (size_t i = 0; i < s.count; i++)
+        if (!s.reached[i] && (next == s.count || better_link(&s.best[i], &s.best[next]) < 0)) next = i;
+      if (next == s.count) break;
+      newest = s.sets[next];
+      status = add_link(d, spheres, index, &s.best[next], joined, links);
+    }
+  }
+  return status;
 }
 
 static qmat_status link_components(qmat_dual_complex *d, qmat_dual_component_counts *counts) {
@@ -302,7 +327,7 @@ static qmat_status link_components(qmat_dual_complex *d, qmat_dual_component_cou
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) memcpy(&spheres[4 * (size_t)d->sphere_of[cell]], &d->spheres[4 * cell], 4 * sizeof *spheres);
   qmat_status status = link_at_samples(d, index, homes, joined, spheres, &counts->links);
-  if (status == QMAT_OK) status = link_nearest(d, index, homes, count, joined, spheres, &counts->links);
+  if (status == QMAT_OK) status = link_nearest(d, index, homes, joined, spheres, &counts->links);
   counts->components -= counts->links;
   return status;
 }

@@ -372,7 +372,11 @@ static size_t give_spheres(mending *m, bool from_neighbours) {
 
 /* Gives tetrahedra that are kept now the sphere of a neighbour, or their own where no neighbour has one. */
 static void set_spheres(mending *m, qmat_mended_tetrahedra *mended) {
-  for (size_t given = 1; given > 0; mended->kept += given) given = give_spheres(m, true);
+  size_t given;
+  do {
+    given = give_spheres(m, true);
+    mended->kept += given;
+  } while (given > 0);
   mended->kept += give_spheres(m, false);
   for (size_t i = 0; i < m->d->cells.count; i++) mended->dropped += m->before[i] && !m->d->kinds[i];
 }
