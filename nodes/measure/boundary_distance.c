@@ -31,7 +31,7 @@ static const double place_share = 0.1;
 static const double certain_skin = 1e-6;
 
 /* Cells of space are searched instead of features where there are more features than this: most of these are buried. */
-enum { MANY_FEATURES = 20000 };
+enum { MANY_FEATURES = 1 << 16 };
 
 /* After so many queries pieces are not split any more. F is slow where hundreds of primitives contain a point. */
 enum { MOST_QUERIES = 1 << 21, MOST_QUERIES_OF_MANY = 1 << 17 };

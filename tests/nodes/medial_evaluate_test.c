@@ -434,7 +434,7 @@ static void test_a_simplified_torus_against_dense_samples(void **state) {
 static void test_a_crowd_of_balls_against_dense_samples(void **state) {
   (void)state;
   /* Of so many primitives space is searched, not their surfaces. */
-  enum { BALLS = 12000 };
+  enum { BALLS = 70000 };
   random_numbers random = {.seed = 11};
   double *spheres = malloc(4 * BALLS * sizeof *spheres);
   assert_non_null(spheres);
