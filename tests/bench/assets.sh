@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Prints a Markdown table of what `qmat mat` makes of the model files in a folder, and a summary line:
 #   assets.sh [FOLDER] [--epsilon E] [--timeout SECONDS]      default: ../shared/data/assets at 2 %, a minute each
-# Where the folder's README.md has a table whose first column names files, these are taken, else all model files. Class: closed, holes (borders were closed), sheets, or what is mixed. A result is "wrong" when it is written
-# although an error is above 1.25 epsilon.
+# Where the folder's README.md has a table whose first column names files, these are taken, else all model files.
+# Class: closed, holes (borders were closed), sheets, or what is mixed. A result is "wrong" when it is written although
+# an error is above 1.25 epsilon.
 set -eu
 epsilon=2%
 seconds=60
