@@ -75,9 +75,9 @@ void qmat_soup_uninit(qmat_soup *soup);
  *   ones that enclose a negative volume: cavities), euler_characteristic: whole numbers;
  *   flipped: number of flipped triangles; closed, oriented: booleans.
  * Orientation: see qmat_orient_triangles.
- * QMAT_ERROR_FORMAT: an index out of range. QMAT_ERROR_GEOMETRY: no facet, a
- * coordinate that is not finite, a defect with QMAT_DEFECTS_REFUSE, a concave polygon with more than
- * QMAT_LARGEST_CONCAVE_POLYGON corners, or no triangle remains. Errors name the vertex or facet at fault.
+ * QMAT_ERROR_FORMAT: an index out of range. QMAT_ERROR_GEOMETRY: no facet, a coordinate that is not finite, a defect
+ * with QMAT_DEFECTS_REFUSE, a concave polygon with more than QMAT_LARGEST_CONCAVE_POLYGON corners, or no triangle
+ * remains. Errors name the vertex or facet at fault.
  * QMAT_CANCELLED.
  * `*mesh` is NULL on failure; the caller releases it. Deterministic, one thread. Cost: linear in the soup, quadratic in
  * the corners of a concave polygon. */

@@ -13,12 +13,11 @@ typedef struct qmat_mended_tetrahedra {
   size_t kept, dropped; /* tetrahedra outside that are kept now, and inside that are dropped */
 } qmat_mended_tetrahedra;
 
-/* Changes `kinds`; a tetrahedron that is kept now has the sphere of a neighbour, or one around its incentre where
- * no neighbour has one. Nothing changes where the Betti
- * numbers of the solid are not known, where they are right, or where they would come out no nearer. Components stay
- * (nodes/initial/dual_components.h joins them). Reads `cells` and `points`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
- * threads for distances; the result does not depend on their number. Cost: linear where nothing is wrong, else a
- * distance for each tetrahedron beside the surface. */
+/* Changes `kinds`; a tetrahedron that is kept now has the sphere of a neighbour, or one around its incentre where no
+ * neighbour has one. Nothing changes where the Betti numbers of the solid are not known, where they are right, or where
+ * they would come out no nearer. Components stay (nodes/initial/dual_components.h joins them). Reads `cells` and
+ * `points`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads for distances; the result does not depend on their number.
+ * Cost: linear where nothing is wrong, else a distance for each tetrahedron beside the surface. */
 qmat_status qmat_tetrahedra_mend(qmat_dual_complex *dual, qmat_mended_tetrahedra *mended);
 
 #endif

@@ -41,6 +41,13 @@ static qmat_topology topology_of(const qmat_medial *medial) {
   return t;
 }
 
+static void check_same_topology(const qmat_medial *before, const qmat_medial *after) {
+  const qmat_topology old = topology_of(before), new = topology_of(after);
+  assert_int_equal(new.components, old.components);
+  assert_int_equal(new.loops, old.loops);
+  assert_int_equal(new.voids, old.voids);
+}
+
 /* The input is unchanged; new spheres have radius 0 and keep the topology. */
 static void check_extension(const qmat_medial *before, const result *r) {
   const qmat_medial *after = r->medial;
@@ -48,10 +55,7 @@ static void check_extension(const qmat_medial *before, const result *r) {
   assert_memory_equal(after->spheres, before->spheres, 4 * before->sphere_count * sizeof(double));
   for (size_t i = before->sphere_count; i < after->sphere_count; i++) assert_near(after->spheres[4 * i + 3], 0, 0);
   assert_int_equal(pipeline_count(r->report, "gaps"), 0);
-  const qmat_topology old = topology_of(before), new = topology_of(after);
-  assert_int_equal(new.components, old.components);
-  assert_int_equal(new.loops, old.loops);
-  assert_int_equal(new.voids, old.voids);
+  check_same_topology(before, after);
 }
 
 static size_t count_crease_edges(const qmat_medial *medial) {
@@ -151,10 +155,7 @@ static void test_a_crease_is_not_linked_by_a_detour(void **state) {
   r = find_features(&p, 0, "");
   assert_int_equal(pipeline_count(r.report, "gaps"), 4); /* of the creases outside and around the hole */
   assert_true(json_real_value(json_object_get(r.report->root, "longest_link")) < 0.2);
-  const qmat_topology old = topology_of(torn), new = topology_of(r.medial);
-  assert_int_equal(new.components, old.components);
-  assert_int_equal(new.loops, old.loops);
-  assert_int_equal(new.voids, old.voids);
+  check_same_topology(torn, r.medial);
   release(&r);
   pipeline_free(&p);
 }
