@@ -132,7 +132,7 @@ static medial_link link_of(const double *spheres, uint32_t a, uint32_t b) {
   return (medial_link){0, length, a < b ? a : b, a < b ? b : a};
 }
 
-enum { LINK_TEST_POINTS = 7 };
+enum { LINK_TEST_POINTS = 7, SPHERES_A_REPORT = 64 };
 
 /* `spheres` holds 4 doubles per medial vertex. */
 static medial_link measured_link(const qmat_dual_complex *d, const double *spheres, uint32_t a, uint32_t b) {
@@ -256,59 +256,103 @@ static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, 
   return status;
 }
 
-/* The spheres in one component of the surface, while their sets are linked (Prim 1957). */
+/* A sphere in one component of the surface, and the shortest link from it to the spheres that are reached. */
 typedef struct {
-  size_t count;
-  const contact *contacts;
-  const uint32_t *sets; /* per sphere: the components that were linked before */
-  medial_link *best;    /* per sphere: the shortest link to the reached spheres */
-  bool *reached;        /* per sphere */
-} sphere_sets;
+  double along; /* its centre, along one axis */
+  medial_link best;
+  uint32_t sphere, set; /* components that are linked already are one set */
+  bool reached;
+} reachable_sphere;
 
-/* Reaches the spheres of a set. They may be nearer to the others than those reached before. */
-static qmat_status reach_set(qmat_dual_complex *d, const double *spheres, uint32_t set, sphere_sets *s) {
-  for (size_t i = 0; i < s->count; i++) s->reached[i] |= s->sets[i] == set;
-  for (size_t i = 0; i < s->count; i++) {
-    if (s->sets[i] != set) continue;
-    const qmat_status status = qmat_progress(d->context, 0, 0, "components");
-    if (status != QMAT_OK) return status;
-    for (size_t j = 0; j < s->count; j++) {
-      if (s->reached[j]) continue;
-      const medial_link link = link_of(spheres, s->contacts[i].sphere, s->contacts[j].sphere);
-      if (better_link(&link, &s->best[j]) < 0) s->best[j] = link;
+static int by_place(const void *left, const void *right) {
+  const reachable_sphere *p = left, *q = right;
+  if (p->along != q->along) return p->along < q->along ? -1 : 1;
+  return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
+}
+
+/* Sorts spheres along the axis on which they extend farthest. */
+static void sort_along(reachable_sphere *reachable, size_t count, const double *spheres) {
+  double widest = -1;
+  size_t axis = 0;
+  for (size_t k = 0; k < 3; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      low = fmin(low, spheres[4 * (size_t)reachable[i].sphere + k]);
+      high = fmax(high, spheres[4 * (size_t)reachable[i].sphere + k]);
     }
+    if (!(high - low > widest)) continue;
+    widest = high - low;
+    axis = k;
+  }
+  for (size_t i = 0; i < count; i++) reachable[i].along = spheres[4 * (size_t)reachable[i].sphere + axis];
+  qsort(reachable, count, sizeof *reachable, by_place);
+}
+
+/* Improves the link of a sphere by those to `members`, which are sorted: `next` is the first that lies not before it.
+ * Nearer members come first, and none beyond the best link can be better. */
+static void improve_link(const double *spheres, const reachable_sphere *reachable, const uint32_t *members,
+                         size_t member_count, size_t next, reachable_sphere *sphere) {
+  size_t previous = next; /* one more than the next member before it */
+  while (previous > 0 || next < member_count) {
+    const double before = previous > 0 ? sphere->along - reachable[members[previous - 1]].along : INFINITY;
+    const double behind = next < member_count ? reachable[members[next]].along - sphere->along : INFINITY;
+    if (fmin(before, behind) > sphere->best.length) return;
+    const uint32_t member = before < behind ? members[--previous] : members[next++];
+    const medial_link link = link_of(spheres, reachable[member].sphere, sphere->sphere);
+    if (better_link(&link, &sphere->best) < 0) sphere->best = link;
+  }
+}
+
+/* Reaches the spheres of a set. They may be nearer to the others than those reached before. `members` has room for the
+ * numbers of all spheres. */
+static qmat_status reach_set(qmat_dual_complex *d, const double *spheres, uint32_t set, reachable_sphere *reachable,
+                             size_t count, uint32_t *members) {
+  size_t member_count = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (reachable[i].set != set) continue;
+    reachable[i].reached = true;
+    members[member_count++] = (uint32_t)i;
+  }
+  for (size_t i = 0, next = 0; i < count; i++) {
+    if (i % SPHERES_A_REPORT == 0) {
+      const qmat_status status = qmat_progress(d->context, 0, 0, "components");
+      if (status != QMAT_OK) return status;
+    }
+    if (reachable[i].reached) continue;
+    while (next < member_count && members[next] < i) next++;
+    improve_link(spheres, reachable, members, member_count, next, &reachable[i]);
   }
   return QMAT_OK;
 }
 
 /* Links the nearest two spheres of different components in the same component of the surface, until that has only one,
- * but for those whose link would leave the solid too far. Quadratic, but rare: components that share a sample are
- * already linked. */
+ * but for those whose link would leave the solid too far (Prim 1957). */
 static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                 const double *spheres, size_t *links) {
   qmat_arena *arena = &d->context->arena;
   size_t count = 0;
   const contact *contacts = find_contacts(d, index, homes, &count);
-  uint32_t *sets = qmat_arena_alloc(arena, count, sizeof *sets);
-  medial_link *best = qmat_arena_alloc(arena, count, sizeof *best);
-  bool *reached = qmat_arena_calloc(arena, count, sizeof *reached);
-  if (!contacts || !sets || !best || !reached) return qmat_fail_memory(d->context, "components");
-  for (size_t i = 0; i < count; i++) {
-    sets[i] = qmat_set_leader(joined, index[contacts[i].sphere]);
-    best[i] = (medial_link){0, INFINITY, NONE, NONE};
-  }
+  reachable_sphere *reachable = qmat_arena_alloc(arena, count, sizeof *reachable);
+  uint32_t *members = qmat_arena_alloc(arena, count, sizeof *members);
+  if (!contacts || !reachable || !members) return qmat_fail_memory(d->context, "components");
   qmat_status status = QMAT_OK;
   for (size_t first = 0, last; first < count && status == QMAT_OK; first = last) {
-    for (last = first; last < count && contacts[last].site == contacts[first].site;) last++;
-    sphere_sets s = {last - first, &contacts[first], &sets[first], &best[first], &reached[first]};
-    uint32_t newest = s.sets[0];
-    while (status == QMAT_OK && (status = reach_set(d, spheres, newest, &s)) == QMAT_OK) {
-      size_t next = s.count;
-      for (size_t i = 0; i < s.count; i++)
-        if (!s.reached[i] && (next == s.count || better_link(&s.best[i], &s.best[next]) < 0)) next = i;
-      if (next == s.count) break;
-      newest = s.sets[next];
-      status = add_link(d, spheres, index, &s.best[next], joined, links);
+    size_t here = 0;
+    for (last = first; last < count && contacts[last].site == contacts[first].site; last++) {
+      const uint32_t sphere = contacts[last].sphere;
+      reachable[here++] = (reachable_sphere){
+          .best = {0, INFINITY, NONE, NONE}, .sphere = sphere, .set = qmat_set_leader(joined, index[sphere])};
+    }
+    sort_along(reachable, here, spheres);
+    uint32_t newest = reachable[0].set;
+    while (status == QMAT_OK && (status = reach_set(d, spheres, newest, reachable, here, members)) == QMAT_OK) {
+      size_t next = here;
+      for (size_t i = 0; i < here; i++)
+        if (!reachable[i].reached && (next == here || better_link(&reachable[i].best, &reachable[next].best) < 0))
+          next = i;
+      if (next == here) break;
+      newest = reachable[next].set;
+      status = add_link(d, spheres, index, &reachable[next].best, joined, links);
     }
   }
   return status;

@@ -163,15 +163,15 @@ static bool reaches_outside(mending *m, uint32_t sample, uint32_t base, const bo
   if (m->marks[sample] > base) return answers[m->marks[sample] - base - 1];
   found[count++] = sample;
   m->marks[sample] = ++m->stamp;
+  if (m->on_hull[sample]) return true;
   for (size_t i = 0; i < count; i++) {
-    if (m->on_hull[found[i]]) return true;
     for (size_t c = m->starts[found[i]]; c < m->starts[found[i] + 1]; c++) {
       const uint32_t cell = m->around[c];
       for (size_t k = 0; k < 4 && !m->d->kinds[cell]; k++) {
         const uint32_t corner = m->d->cells.corners[4 * (size_t)cell + k];
         if (m->marks[corner] == m->stamp) continue;
         if (m->marks[corner] > base) return answers[m->marks[corner] - base - 1];
-        if (count == MOST_POCKET) return true;
+        if (count == MOST_POCKET || m->on_hull[corner]) return true;
         m->marks[corner] = m->stamp;
         found[count++] = corner;
       }
