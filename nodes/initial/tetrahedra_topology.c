@@ -15,7 +15,8 @@
  * only adds work. */
 static const double most_gap = 0.005;
 
-/* Searches for the outside end after this number of samples, as if they had found it. Pockets have a handful. */
+/* The most samples of a pocket: samples that dropped tetrahedra connect with each other and not with the outside. A
+ * larger set counts as connected with the outside, since those of slivers have a handful. */
 enum { MOST_POCKET = 64 };
 
 enum { CELLS_A_REPORT = 1024 };
@@ -34,6 +35,8 @@ typedef struct mending {
   size_t *starts;         /* per sample: where its tetrahedra start in `around` */
   uint32_t *around;       /* 4 per tetrahedron */
   uint8_t *on_hull;       /* per sample */
+  uint32_t *pockets;      /* per sample: sets that dropped tetrahedra connect, while tetrahedra are dropped */
+  uint8_t *pocket_sizes;  /* of those that lead a set; MOST_POCKET + 1: connected with the outside */
   uint32_t *marks, stamp; /* per sample or tetrahedron: those of the newest search */
   uint32_t *found;        /* 2 per tetrahedron: those of a search from two sides */
   uint32_t *changed;      /* tetrahedra that changed sides, in order */
@@ -155,46 +158,63 @@ static int64_t distance_between(betti a, betti b) {
 
 /* ---- searches ---- */
 
-/* Whether dropped tetrahedra connect a sample to the outside. `answers` are those of the searches before, which have
- * the stamps after `base`: a search that meets one has its answer. */
-static bool reaches_outside(mending *m, uint32_t sample, uint32_t base, const bool *answers) {
+/* Whether dropped tetrahedra connect a sample with the outside. */
+static bool reaches_outside(mending *m, uint32_t sample) {
   uint32_t found[MOST_POCKET];
   size_t count = 0;
-  if (m->marks[sample] > base) return answers[m->marks[sample] - base - 1];
   found[count++] = sample;
   m->marks[sample] = ++m->stamp;
   if (m->on_hull[sample]) return true;
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < count; i++)
     for (size_t c = m->starts[found[i]]; c < m->starts[found[i] + 1]; c++) {
       const uint32_t cell = m->around[c];
       for (size_t k = 0; k < 4 && !m->d->kinds[cell]; k++) {
         const uint32_t corner = m->d->cells.corners[4 * (size_t)cell + k];
         if (m->marks[corner] == m->stamp) continue;
-        if (m->marks[corner] > base) return answers[m->marks[corner] - base - 1];
         if (count == MOST_POCKET || m->on_hull[corner]) return true;
         m->marks[corner] = m->stamp;
         found[count++] = corner;
       }
     }
-  }
   return false;
 }
 
-/* The corners of a tetrahedron that are connected to the outside without it. */
-static int corners_outside(mending *m, uint32_t cell) {
-  const uint32_t base = m->stamp;
+/* Whether other dropped tetrahedra connect all corners of a dropped one with the outside. */
+static bool all_reach_outside(mending *m, uint32_t cell) {
   const uint8_t kind = m->d->kinds[cell];
-  bool answers[4];
-  int count = 0;
+  bool reach = true;
   m->d->kinds[cell] = QMAT_CELL_INCENTRE;
-  for (size_t k = 0; k < 4; k++) {
-    const uint32_t before = m->stamp;
-    const bool is_outside = reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k], base, answers);
-    if (m->stamp > before) answers[before - base] = is_outside;
-    count += is_outside;
-  }
+  for (size_t k = 0; k < 4 && reach; k++) reach = reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k]);
   m->d->kinds[cell] = kind;
-  return count;
+  return reach;
+}
+
+/* Joins the pockets of a dropped tetrahedron's corners. */
+static void join_pockets(mending *m, uint32_t cell) {
+  const uint32_t *corners = &m->d->cells.corners[4 * (size_t)cell];
+  for (size_t k = 1; k < 4; k++) {
+    const uint32_t a = qmat_set_leader(m->pockets, corners[0]), b = qmat_set_leader(m->pockets, corners[k]);
+    const int size = m->pocket_sizes[a] + m->pocket_sizes[b];
+    if (qmat_sets_join(m->pockets, a, b))
+      m->pocket_sizes[a < b ? a : b] = (uint8_t)(size > MOST_POCKET ? MOST_POCKET + 1 : size);
+  }
+}
+
+static void find_pockets(mending *m) {
+  for (uint32_t i = 0; i < m->d->samples->count; i++) {
+    m->pockets[i] = i;
+    m->pocket_sizes[i] = m->on_hull[i] ? MOST_POCKET + 1 : 1;
+  }
+  for (size_t i = 0; i < m->d->cells.count; i++)
+    if (!m->d->kinds[i]) join_pockets(m, (uint32_t)i);
+}
+
+/* Whether a kept tetrahedron lies between pockets and the outside. */
+static bool is_beside_pocket_and_outside(mending *m, uint32_t cell) {
+  int outside = 0;
+  for (size_t k = 0; k < 4; k++)
+    outside += m->pocket_sizes[qmat_set_leader(m->pockets, m->d->cells.corners[4 * (size_t)cell + k])] > MOST_POCKET;
+  return outside > 0 && outside < 4;
 }
 
 /* Whether the two parts of the link of a kept tetrahedron are connected without it. Searches from both at the same
@@ -226,15 +246,13 @@ static bool is_bridged(mending *m, uint32_t cell, cell_link link) {
 /* Whether keeping a tetrahedron closes loops and no void. */
 static bool closes_loops(mending *m, uint32_t cell, cell_link link) {
   return link.parts == 1 && link.loops > 0 && m->now.loops - link.loops >= m->wanted.loops &&
-         corners_outside(m, cell) == 4;
+         all_reach_outside(m, cell);
 }
 
 /* Whether dropping a tetrahedron opens a void or a loop, and does nothing else. */
 static bool opens(mending *m, uint32_t cell, cell_link link) {
-  if (link.parts == 1 && link.loops == 1 && m->now.voids > m->wanted.voids) {
-    const int outside = corners_outside(m, cell);
-    return outside > 0 && outside < 4;
-  }
+  if (link.parts == 1 && link.loops == 1 && m->now.voids > m->wanted.voids)
+    return is_beside_pocket_and_outside(m, cell);
   return link.parts == 2 && link.loops == 0 && m->now.loops > m->wanted.loops && is_bridged(m, cell, link);
 }
 
@@ -283,6 +301,7 @@ static bool change(mending *m, uint32_t cell, bool keep, bool neutral) {
   else
     m->now.voids -= link.loops;
   m->d->kinds[cell] = keep ? QMAT_CELL_INCENTRE : QMAT_CELL_DROPPED;
+  if (!keep) join_pockets(m, cell);
   m->changed[m->changed_count++] = cell;
   return true;
 }
@@ -309,6 +328,7 @@ static qmat_status change_side(mending *m, bool keep, bool neutral) {
   const qmat_dual_complex *d = m->d;
   size_t before, tried = 0;
   qmat_status status = QMAT_OK;
+  if (!keep) find_pockets(m);
   do { /* a ring can be completed from afar */
     before = m->changed_count;
     status = queue_side(m, !keep);
@@ -390,10 +410,13 @@ static qmat_status start(mending *m) {
   m->starts = qmat_arena_calloc(arena, samples + 2, sizeof *m->starts);
   m->around = qmat_arena_alloc(arena, 4 * count, sizeof *m->around);
   m->on_hull = qmat_arena_calloc(arena, samples, sizeof *m->on_hull);
+  m->pockets = qmat_arena_alloc(arena, samples, sizeof *m->pockets);
+  m->pocket_sizes = qmat_arena_alloc(arena, samples, sizeof *m->pocket_sizes);
   m->marks = qmat_arena_calloc(arena, count > samples ? count : samples, sizeof *m->marks);
   m->found = qmat_arena_alloc(arena, 2 * count, sizeof *m->found);
   m->changed = qmat_arena_alloc(arena, 2 * count, sizeof *m->changed);
-  if (!m->before || !m->gaps || !m->starts || !m->around || !m->on_hull || !m->marks || !m->found || !m->changed)
+  if (!m->before || !m->gaps || !m->starts || !m->around || !m->on_hull || !m->pockets || !m->pocket_sizes ||
+      !m->marks || !m->found || !m->changed)
     return qmat_fail_memory(d->context, "the tetrahedra");
   memcpy(m->before, d->kinds, count);
   for (size_t i = 0; i < count; i++) m->gaps[i] = -1;
