@@ -321,7 +321,7 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
 }
 
 bool qmat_surface_is_watertight(const qmat_surface *surface) {
-  return surface->blocks && surface->leaf_count == 0 && !surface->sheet_blocks;
+  return surface->blocks && surface->leaf_count == 0 && qmat_surface_half_thickness(surface) == 0;
 }
 
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,

@@ -64,8 +64,8 @@ double qmat_surface_signed_distance_near(const qmat_surface *surface, const doub
 /* The depth of a point whose signed distance is known to be negative; INFINITY where it exceeds `limit`. */
 double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[3], double limit);
 
-/* Whether the surface is closed and oriented and has no sheets. The depth inside is then the distance to a set of
- * points, and a path at a positive distance does not change its side. */
+/* Whether the surface is closed and oriented, apart from sheets without a thickness, which have no inside. The depth
+ * inside is then the distance to a set of points, and a path at a positive distance does not change its side. */
 bool qmat_surface_is_watertight(const qmat_surface *surface);
 
 /* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), one point of
