@@ -152,11 +152,12 @@ typedef struct {
   qmat_collapse collapse;
 } model;
 
-static void make_model(model *m, qmat_mesh *mesh, double limit) {
+/* Takes the medial mesh of `mesh` with the surface of `measured`; NULL: that of `mesh`. */
+static void make_model(model *m, qmat_mesh *mesh, const qmat_mesh *measured, double limit) {
   *m = (model){.surface = NULL};
   pipeline_make(&m->p, mesh, "spacing=8% n_f=0", "");
   const qmat_medial *medial = m->p.medial;
-  assert_int_equal(qmat_surface_new(&m->context, m->p.mesh, &m->surface), QMAT_OK);
+  assert_int_equal(qmat_surface_new(&m->context, measured ? measured : m->p.mesh, &m->surface), QMAT_OK);
   double *spheres = qmat_alloc(medial->sphere_count, 4 * sizeof *spheres);
   double *depths = qmat_alloc(medial->sphere_count, sizeof *depths);
   qmat_frame_spheres_to_unit(qmat_surface_frame(m->surface), medial->spheres, medial->sphere_count, spheres);
@@ -289,7 +290,7 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least) {
 static void test_bounds_hold_after_random_collapses_of_a_torus(void **state) {
   (void)state;
   model m;
-  make_model(&m, pipeline_model("torus", 8), 0.02);
+  make_model(&m, pipeline_model("torus", 8), NULL, 0.02);
   collapse_at_random(&m, 1, 500);
   free_model(&m);
 }
@@ -297,15 +298,36 @@ static void test_bounds_hold_after_random_collapses_of_a_torus(void **state) {
 static void test_bounds_hold_after_random_collapses_of_an_l(void **state) {
   (void)state;
   model m;
-  make_model(&m, shape_l(), 0.05);
+  make_model(&m, shape_l(), NULL, 0.05);
   collapse_at_random(&m, 2, 300);
   free_model(&m);
+}
+
+/* Inside the bounding box of the L, partly within the solid. */
+static void through_l(double u, double v, double p[3]) {
+  p[0] = 2 * u, p[1] = 2 * v, p[2] = 0.4;
+}
+
+static void test_bounds_hold_after_random_collapses_of_an_l_with_a_sheet(void **state) {
+  (void)state;
+  for (int thick = 0; thick < 2; thick++) {
+    model m;
+    qmat_mesh *both = shape_l();
+    shape_add_sheet(both, 1, 1, through_l);
+    both->sheet_thickness = 0.3 * thick;
+    both = shape_seal(both);
+    make_model(&m, shape_l(), both, 0.05);
+    assert_int_equal(qmat_surface_is_watertight(m.surface), !thick);
+    collapse_at_random(&m, 2, 300);
+    free_model(&m);
+    qmat_value_release(&both->base);
+  }
 }
 
 static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void **state) {
   (void)state;
   model m;
-  make_model(&m, shape_box(1, 1, 1), INFINITY);
+  make_model(&m, shape_box(1, 1, 1), NULL, INFINITY);
   assert_int_equal(qmat_complex_preview(&m.context, &m.complex, 0, &m.collapse), QMAT_OK);
   assert_true(qmat_envelope_to_surface_test_sphere(&m.envelope_tracker, &m.complex, &m.collapse,
                                                    (const double[4]){0, 0, 0, 9}));
@@ -316,10 +338,13 @@ static void test_spheres_out_of_the_solid_are_refused_without_a_limit_too(void *
   free_model(&m);
 }
 
-static void test_a_slab_between_flat_faces_takes_few_queries(void **unused) {
-  (void)unused;
+static void beside_slab(double u, double v, double p[3]) {
+  p[0] = 2 * u, p[1] = 2 * v, p[2] = 0.3;
+}
+
+static void check_queries_of_slab(qmat_mesh *box) {
   solid s;
-  make_solid(&s, shape_box(4, 4, 1));
+  make_solid(&s, box);
   const double half = 0.5 / sqrt(33), limit = 0.005;
   const double spheres[12] = {-0.2, -0.2, 0, half, 0.2, -0.2, 0, half, 0, 0.2, 0, half}, depths[3] = {half, half, half};
   const uint32_t corners[3] = {0, 1, 2};
@@ -348,6 +373,18 @@ static void test_a_slab_between_flat_faces_takes_few_queries(void **unused) {
   free_solid(&s);
 }
 
+static void test_a_slab_between_flat_faces_takes_few_queries(void **unused) {
+  (void)unused;
+  check_queries_of_slab(shape_box(4, 4, 1));
+}
+
+static void test_a_sheet_without_thickness_adds_no_queries(void **unused) {
+  (void)unused;
+  qmat_mesh *box = shape_box(4, 4, 1);
+  shape_add_sheet(box, 1, 1, beside_slab);
+  check_queries_of_slab(box);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_spheres_in_a_cube_by_hand),
@@ -356,7 +393,9 @@ int main(void) {
       cmocka_unit_test(test_bound_against_dense_samples_in_an_l),
       cmocka_unit_test(test_bounds_hold_after_random_collapses_of_a_torus),
       cmocka_unit_test(test_bounds_hold_after_random_collapses_of_an_l),
+      cmocka_unit_test(test_bounds_hold_after_random_collapses_of_an_l_with_a_sheet),
       cmocka_unit_test(test_a_slab_between_flat_faces_takes_few_queries),
+      cmocka_unit_test(test_a_sheet_without_thickness_adds_no_queries),
       cmocka_unit_test(test_spheres_out_of_the_solid_are_refused_without_a_limit_too),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
