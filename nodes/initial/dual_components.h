@@ -13,8 +13,8 @@ typedef struct qmat_dual_component_counts {
  * surface. Then links the components that lie in the same component of the surface by medial edges; the solid tears
  * apart where it is thinner than the samples are dense. An edge that would leave the solid by more than `link_limit` is
  * not made: the components then stay apart. Changes the simplices and the numbers of the medial vertices.
- * QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear, and a sort of the pairs of spheres that share a sample.
- */
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear, and a sort of the pairs of spheres that share a sample;
+ * at worst quadratic where components share none. */
 qmat_status qmat_dual_components_join(qmat_dual_complex *dual, qmat_dual_component_counts *counts);
 
 #endif
