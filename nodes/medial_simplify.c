@@ -133,13 +133,14 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_simplify = {
     .name = "medial.simplify",
-    .version = 42,
+    .version = 43,
     .summary = "Collapses medial edges, cheapest first, while surface and envelope stay within epsilon of each other",
     .doc =
         "The cost of a collapse is the slab quadratic error of the merged sphere times the squared stability ratio of "
-        "the edge. A collapse is done when its sphere and the midpoints of its edges lie inside the model and both "
-        "errors stay within epsilon: surface to envelope at constraint points, and the envelope of spheres, cones and "
-        "slabs to the surface. Interior points must stay covered.\n\n"
+        "the edge. A collapse is done when its sphere lies inside the model and both errors stay within epsilon: "
+        "surface to envelope at constraint points, and the envelope of spheres, cones and slabs to the surface. "
+        "Interior points must stay covered. At first, and with error=one_sided always, the midpoints of its edges have "
+        "to lie inside the model too, unless they are much thinner than epsilon.\n\n"
         "When no edge is left, spheres are fitted to the surface and edges tried again. Branch and bound then finds "
         "places beyond epsilon between the constraint points, and the collapses are repeated with these. Uncovered "
         "interior is filled with extra spheres. Spheres of radius zero are sharp features and stay on their creases. "

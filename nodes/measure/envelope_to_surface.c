@@ -327,11 +327,12 @@ bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, con
 }
 
 bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
-                                             const qmat_collapse *collapse, const double sphere[4]) {
+                                             const qmat_collapse *collapse, const double sphere[4],
+                                             double exempt_radius) {
   if (collapse->kept < tracker->sheet_vertices) return true;
   for (size_t n = 0; n < collapse->neighbour_count; n++) {
     const double *other = &complex->spheres[4 * (size_t)collapse->neighbours[n]];
-    if (sphere[3] == 0 && other[3] == 0) continue; /* a crease lies on the surface */
+    if (sphere[3] <= exempt_radius && other[3] <= exempt_radius) continue;
     const double half = 0.5 * qmat_point_distance(sphere, other);
     if (half < tracker->sphere_depth || half < tracker->depths[collapse->neighbours[n]]) continue;
     double middle[3], gap;

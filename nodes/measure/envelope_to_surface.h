@@ -42,10 +42,12 @@ void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *tracker);
 bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4]);
 
-/* Whether the midpoint of every edge of the merged vertex lies inside the model (section 3.4). Edges of two spheres of
- * radius zero are exempt: they are creases of its surface. Call it after qmat_envelope_to_surface_test_sphere. */
+/* Whether the midpoint of every edge of the merged vertex lies inside the model (section 3.4). Edges of two spheres
+ * with radii up to `exempt_radius` (at least 0) are exempt: those of radius zero are creases of the model's surface.
+ * Call it after qmat_envelope_to_surface_test_sphere. */
 bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
-                                             const qmat_collapse *collapse, const double sphere[4]);
+                                             const qmat_collapse *collapse, const double sphere[4],
+                                             double exempt_radius);
 
 /* Whether every primitive of the merged vertex's star is within the limit: `*kept`. Call it after
  * qmat_envelope_to_surface_test_sphere. QMAT_ERROR_MEMORY. */

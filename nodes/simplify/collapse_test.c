@@ -58,7 +58,7 @@ static bool merges_feature(const qmat_decimation *s) {
 }
 
 /* Whether the merged sphere and its edges lie inside the model, and whether the sphere is within the threshold. A sharp
- * feature lies on the surface. */
+ * feature lies on the surface, and edges between thin spheres only have to be within the threshold. */
 static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *sphere) {
   const bool on_surface = merges_feature(s);
   const bool kept =
@@ -69,7 +69,8 @@ static qmat_collapse_outcome test_inside(qmat_decimation *s, const double *spher
   if (!inside || (!kept && s->rules.on_exceed == QMAT_EXCEED_SKIP)) return QMAT_COLLAPSE_REFUSED;
   s->refusal = QMAT_REFUSED_BY_MIDPOINT;
   if (!s->rules.published &&
-      !qmat_envelope_to_surface_test_midpoints(&s->envelope_tracker, &s->complex, &s->collapse, sphere))
+      !qmat_envelope_to_surface_test_midpoints(&s->envelope_tracker, &s->complex, &s->collapse, sphere,
+                                               bounds_envelope(s) ? s->rules.thin_radius : 0))
     return QMAT_COLLAPSE_REFUSED;
   return kept || !(sphere[3] - s->envelope_tracker.sphere_depth > s->envelope_tracker.limit) ? QMAT_COLLAPSE_ALLOWED
                                                                                              : QMAT_COLLAPSE_EXCEEDS;

@@ -28,12 +28,13 @@ typedef struct qmat_collapse_counts {
 
 /* The collapses that are allowed, and when they end. */
 typedef struct qmat_decimation_rules {
-  double limit;     /* limit of both errors at the constraint points, unit frame; INFINITY: none */
-  double share;     /* share of the limit that collapses may use: above 0, at most 1 */
-  double finest;    /* the first threshold where it rises, unit frame */
-  size_t vertices;  /* collapses end at this number of spheres; 0: never */
-  double most_cost; /* or when the cheapest collapse costs more; 0: never */
-  double k;         /* of eq. 6 */
+  double limit;       /* limit of both errors at the constraint points, unit frame; INFINITY: none */
+  double share;       /* share of the limit that collapses may use: above 0, at most 1 */
+  double thin_radius; /* where the envelope is bounded, edges of spheres up to this radius may leave the model */
+  double finest;      /* the first threshold where it rises, unit frame */
+  size_t vertices;    /* collapses end at this number of spheres; 0: never */
+  double most_cost;   /* or when the cheapest collapse costs more; 0: never */
+  double k;           /* of eq. 6 */
   qmat_cost_kind cost;
   bool published; /* quadrics and candidates of the public Q-MAT code, inside the model or not */
   qmat_error_kind error;

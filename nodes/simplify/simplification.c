@@ -209,10 +209,11 @@ static qmat_status make_constraints(qmat_simplification *s) {
 }
 
 /* Collapses the dense initial medial mesh as far as `qmat_dense_share` of the error allows: in pieces on all threads,
- * where it is large, then as a whole. */
+ * where it is large, then as a whole. Edges stay inside the model as in section 3.4, unless they are thin. */
 static qmat_status collapse_dense(qmat_simplification *s) {
   qmat_decimation *dense = &s->dense;
   dense->rules.share = qmat_dense_share * s->share;
+  dense->rules.thin_radius = qmat_thin_share * dense->rules.share * dense->rules.limit;
   dense->rules.refits = 0;
   const qmat_status status = qmat_can_collapse_partitioned(&dense->rules, &dense->complex, dense->sheet_vertices)
                                  ? qmat_collapse_partitioned(dense, &s->constraints, s->state.depths)

@@ -92,6 +92,7 @@ qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const q
   return (qmat_decimation_rules){
       .limit = p->epsilon > 0 ? qmat_constraint_share * p->epsilon : INFINITY,
       .share = 1,
+      .thin_radius = INFINITY,
       .finest = p->finest,
       .vertices = (size_t)p->vertices,
       .most_cost = p->most_cost,

@@ -14,6 +14,11 @@ static const double qmat_error_tolerance = 0.01, qmat_least_reported = 0.5;
 /* The dense collapse uses this share of the error; the rest is for the constraint points that are found later. */
 static const double qmat_dense_share = 0.9;
 
+/* In the dense collapse edges between spheres with radii up to this share of its error may leave the model, as far as
+ * the error allows: in a curved shell as thin as that only short ones lie inside. Edges of larger spheres may not,
+ * which leads to better collapses. After the dense collapse all may. */
+static const double qmat_thin_share = 0.5;
+
 /* After QMAT_DENSE_AGAIN_ROUND each round uses this share of the error that the one before used: more points alone move
  * the places beyond epsilon elsewhere. */
 static const double qmat_late_round_share = 0.9;

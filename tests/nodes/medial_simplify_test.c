@@ -312,6 +312,23 @@ static void test_thin_sheet_stays_on_its_mid_plane(void **state) {
   release(&r);
 }
 
+/* The shell's spheres have a tenth of epsilon as radius: between two of them only a short edge runs inside. */
+static void test_a_wavy_shell_much_thinner_than_epsilon_takes_few_spheres(void **state) {
+  (void)state;
+  qmat_mesh *mesh = pipeline_model("sheet", 24);
+  for (size_t v = 0; v < mesh->vertex_count; v++) {
+    double *p = &mesh->positions[3 * v];
+    p[2] = 0.3 * p[2] + 0.1 * sin(6 * p[0]) * cos(5 * p[1]);
+  }
+  pipeline p;
+  pipeline_make(&p, mesh, "n_f=0", "");
+  result r = simplify(&p, "epsilon=2%");
+  assert_true(r.medial->sphere_count <= 40);
+  check_errors(&p, &r, 0.02, true);
+  release(&r);
+  pipeline_free(&p);
+}
+
 /* --- parameters --------------------------------------------------------------------------------------------------- */
 
 /* Greedy collapses are not monotone in epsilon, but twice the epsilon leaves no more. */
@@ -1047,6 +1064,7 @@ int main(void) {
       cmocka_unit_test(test_tapered_capsule_keeps_both_radii),
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_thin_sheet_stays_on_its_mid_plane),
+      cmocka_unit_test(test_a_wavy_shell_much_thinner_than_epsilon_takes_few_spheres),
       cmocka_unit_test(test_twice_the_epsilon_leaves_no_more_spheres),
       cmocka_unit_test(test_number_of_vertices_within_epsilon_is_met_exactly),
       cmocka_unit_test(test_number_of_vertices_alone_finds_the_least_error),
