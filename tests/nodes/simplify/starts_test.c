@@ -96,7 +96,7 @@ static void test_more_starts_are_never_worse_and_the_same_on_any_thread(void **s
   for (int i = 0; i < 3; i++) {
     static const char *const texts[][2] = {{"epsilon=8%", "epsilon=8% effort=6"},
                                            {"epsilon=6%", "epsilon=6% effort=6"},
-                                           {"epsilon=5%", "epsilon=5% effort=6"}};
+                                           {"epsilon=2%", "epsilon=2% effort=6"}};
     const size_t alone = simplified_count(&c, 0, texts[i][0], &first);
     const size_t best = simplified_count(&c, 1, texts[i][1], &one);
     assert_true(best <= alone);
