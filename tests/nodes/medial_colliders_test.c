@@ -194,7 +194,7 @@ static qmat_value *first_output(const char *name, const char *text, const qmat_v
   return outputs[0];
 }
 
-/* A model at 3 % and its medial mesh. */
+/* A model and its medial mesh; `epsilon` is the parameter of medial.simplify, "epsilon=3%". */
 static void describe(const char *name, const char *epsilon, qmat_mesh **mesh, qmat_medial **medial) {
   *mesh = shape_seal(pipeline_model(name, 12));
   const qmat_value *solid = &(*mesh)->base;
