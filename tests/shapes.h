@@ -75,6 +75,28 @@ static inline qmat_mesh *shape_box(double x, double y, double z) {
   return mesh;
 }
 
+/* An open box of 1 x 1 x `height` with walls of one thickness. */
+static inline qmat_mesh *shape_tray(double height, double thickness) {
+  qmat_mesh *mesh = shape_new();
+  uint32_t v[16];
+  for (int i = 0; i < 16; i++) {
+    const double inset = i < 8 ? 0 : thickness, bottom = inset;
+    v[i] = shape_vertex(mesh, i & 1 ? 1 - inset : inset, i & 2 ? 1 - inset : inset, i & 4 ? height : bottom);
+  }
+  static const int sides[5][4] = {{0, 2, 3, 1}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  for (int s = 0; s < 5; s++) {
+    const int *q = sides[s];
+    shape_quad(mesh, v[q[0]], v[q[1]], v[q[2]], v[q[3]]);
+    shape_quad(mesh, v[8 + q[3]], v[8 + q[2]], v[8 + q[1]], v[8 + q[0]]);
+  }
+  static const int rim[4] = {4, 5, 7, 6};
+  for (int i = 0; i < 4; i++) {
+    const int a = rim[i], b = rim[(i + 1) % 4];
+    shape_quad(mesh, v[a], v[b], v[8 + b], v[8 + a]);
+  }
+  return mesh;
+}
+
 /* A sphere of `rings` x 2 `rings` facets around the origin. */
 static inline qmat_mesh *shape_sphere(double radius, uint32_t rings) {
   qmat_mesh *mesh = shape_new();

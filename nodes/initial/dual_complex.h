@@ -22,12 +22,14 @@ typedef struct qmat_dual_complex {
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   const qmat_surface *surface;
-  const double *points;               /* 3 per sample */
-  const uint8_t *thin;                /* per sample */
+  size_t point_count;                 /* the samples, then the points across thin walls from them */
+  const double *points;               /* 3 per point */
+  const uint8_t *thin;                /* per point */
+  const uint32_t *facets;             /* per point */
   const uint32_t *surface_components; /* per mesh vertex: smallest vertex of its component; NULL: one component */
   const uint32_t *representatives;    /* per sample: the triangulated sample that represents it, possibly itself */
-  size_t site_count;                  /* triangulated samples */
-  qmat_tetrahedra cells;              /* corners are samples */
+  size_t site_count;                  /* triangulated points */
+  qmat_tetrahedra cells;              /* corners are points */
   uint8_t *kinds;                     /* per cell: a qmat_cell_kind */
   double *spheres;                    /* 4 per cell */
   uint32_t *sphere_of;                /* per cell: its medial vertex, or QMAT_NO_ID */
@@ -40,11 +42,10 @@ typedef struct qmat_dual_complex {
   uint32_t *edge_duals, *triangle_duals;
 } qmat_dual_complex;
 
-/* The surface component of a sample. */
-static inline uint32_t qmat_dual_surface_component(const qmat_dual_complex *dual, uint32_t sample) {
-  const qmat_mesh *mesh = dual->mesh;
-  return dual->surface_components ? dual->surface_components[mesh->triangles[3 * (size_t)dual->samples->facets[sample]]]
-                                  : 0;
+/* The surface component of a point. */
+static inline uint32_t qmat_dual_surface_component(const qmat_dual_complex *dual, uint32_t point) {
+  const uint32_t *components = dual->surface_components;
+  return components ? components[dual->mesh->triangles[3 * (size_t)dual->facets[point]]] : 0;
 }
 
 /* A step around the Delaunay edge (a, b) of a tetrahedron: the neighbour across the facet opposite the corner

@@ -53,7 +53,7 @@ static qmat_status mark_needed(qmat_dual_complex *d, const uint32_t *index, size
   qmat_arena *arena = &d->context->arena;
   size_t *starts = qmat_arena_calloc(arena, count + 2, sizeof *starts);
   uint32_t *members = qmat_arena_alloc(arena, d->cells.count, sizeof *members);
-  uint8_t *covered = qmat_arena_calloc(arena, d->samples->count, sizeof *covered);
+  uint8_t *covered = qmat_arena_calloc(arena, d->point_count, sizeof *covered);
   if (!starts || !members || !covered) return qmat_fail_memory(d->context, "components");
   for (size_t cell = 0; cell < d->cells.count; cell++)
     if (d->kinds[cell]) starts[index[d->sphere_of[cell]] + 2]++;
@@ -162,11 +162,11 @@ static int by_site(const void *left, const void *right) {
  * component), or, where that is NULL, with the samples that several components are responsible for. */
 static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, size_t *count) {
   qmat_arena *arena = &d->context->arena;
-  const size_t samples = d->samples->count;
-  uint32_t *component_of = qmat_arena_alloc(arena, samples, sizeof *component_of);
-  uint8_t *shared = qmat_arena_calloc(arena, samples, sizeof *shared);
+  const size_t points = d->point_count;
+  uint32_t *component_of = qmat_arena_alloc(arena, points, sizeof *component_of);
+  uint8_t *shared = qmat_arena_calloc(arena, points, sizeof *shared);
   if (!component_of || !shared) return NULL;
-  for (size_t i = 0; i < samples; i++) component_of[i] = NONE;
+  for (size_t i = 0; i < points; i++) component_of[i] = NONE;
   for (size_t i = 0; i < 4 * d->cells.count; i++) {
     if (!d->kinds[i / 4]) continue;
     const uint32_t sample = d->cells.corners[i], component = index[d->sphere_of[i / 4]];

@@ -127,7 +127,7 @@ static int64_t euler_of_dual(const qmat_dual_complex *d) {
 
 static qmat_status count_betti(const qmat_dual_complex *d, betti *b) {
   qmat_context *context = d->context;
-  const size_t count = d->cells.count, outside = d->samples->count;
+  const size_t count = d->cells.count, outside = d->point_count;
   uint32_t *cells = qmat_sets_new(context, count), *samples = qmat_sets_new(context, outside + 1);
   uint8_t *used = qmat_arena_calloc(&context->arena, outside, sizeof *used);
   if (!cells || !samples || !used) return qmat_fail_memory(context, "the tetrahedra");
@@ -201,7 +201,7 @@ static void join_pockets(mending *m, uint32_t cell) {
 }
 
 static void find_pockets(mending *m) {
-  for (uint32_t i = 0; i < m->d->samples->count; i++) {
+  for (uint32_t i = 0; i < m->d->point_count; i++) {
     m->pockets[i] = i;
     m->pocket_sizes[i] = m->on_hull[i] ? MOST_POCKET + 1 : 1;
   }
@@ -404,7 +404,7 @@ static void set_spheres(mending *m, qmat_mended_tetrahedra *mended) {
 static qmat_status start(mending *m) {
   const qmat_dual_complex *d = m->d;
   qmat_arena *arena = &d->context->arena;
-  const size_t count = d->cells.count, samples = d->samples->count;
+  const size_t count = d->cells.count, samples = d->point_count;
   m->before = qmat_arena_alloc(arena, count, sizeof *m->before);
   m->gaps = qmat_arena_alloc(arena, count, sizeof *m->gaps);
   m->starts = qmat_arena_calloc(arena, samples + 2, sizeof *m->starts);

@@ -14,6 +14,7 @@
 #include "nodes/initial/dual_components.h"
 #include "nodes/initial/edge_halving.h"
 #include "nodes/initial/medial_vertices.h"
+#include "nodes/initial/mirrored_points.h"
 #include "nodes/initial/sample_thinning.h"
 #include "nodes/initial/tetrahedra_topology.h"
 
@@ -141,20 +142,20 @@ static void sort_numbers(uint32_t *row, size_t length) {
   }
 }
 
-/* The samples that a triangulated sample represents, itself included, in rising order: those of sample i are
- * items[starts[i] .. starts[i + 1]). */
+/* The samples that a triangulated point represents, in rising order: itself and others, or none if it lies across a
+ * thin wall from one. Those of point i are items[starts[i] .. starts[i + 1]). */
 typedef struct {
   size_t *starts;
   uint32_t *items;
 } represented_samples;
 
 static qmat_status find_represented(const qmat_dual_complex *d, represented_samples *s) {
-  const size_t count = d->samples->count;
-  s->starts = qmat_arena_calloc(&d->context->arena, count + 2, sizeof *s->starts);
+  const size_t count = d->samples->count, points = d->point_count;
+  s->starts = qmat_arena_calloc(&d->context->arena, points + 2, sizeof *s->starts);
   s->items = qmat_arena_alloc(&d->context->arena, count, sizeof *s->items);
   if (!s->starts || !s->items) return qmat_fail_memory(d->context, "regions");
   for (size_t i = 0; i < count; i++) s->starts[d->representatives[i] + 2]++;
-  for (size_t i = 0; i < count; i++) s->starts[i + 2] += s->starts[i + 1];
+  for (size_t i = 0; i < points; i++) s->starts[i + 2] += s->starts[i + 1];
   for (size_t i = 0; i < count; i++) s->items[s->starts[d->representatives[i] + 1]++] = (uint32_t)i;
   return QMAT_OK;
 }
@@ -228,15 +229,14 @@ static qmat_status make_medial(qmat_dual_complex *d, qmat_medial *medial, size_t
   return QMAT_OK;
 }
 
-/* Triangulates the samples of solids that represent themselves. */
+/* Triangulates the points that represent themselves, but not those of sheets. */
 static qmat_status triangulate(qmat_dual_complex *d) {
   qmat_arena *arena = &d->context->arena;
-  const size_t count = d->samples->count;
-  uint32_t *sites = qmat_arena_alloc(arena, count, sizeof *sites);
-  double *points = qmat_arena_alloc(arena, count, 3 * sizeof *points);
+  uint32_t *sites = qmat_arena_alloc(arena, d->point_count, sizeof *sites);
+  double *points = qmat_arena_alloc(arena, d->point_count, 3 * sizeof *points);
   if (!sites || !points) return qmat_fail_memory(d->context, "samples");
-  for (size_t i = 0; i < count; i++) {
-    if (d->representatives[i] != i || d->samples->facets[i] >= d->mesh->triangle_count) continue;
+  for (size_t i = 0; i < d->point_count; i++) {
+    if (d->representatives[i] != i || d->facets[i] >= d->mesh->triangle_count) continue;
     memcpy(&points[3 * d->site_count], &d->points[3 * i], 3 * sizeof *points);
     sites[d->site_count++] = (uint32_t)i;
   }
@@ -257,7 +257,8 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
   const qmat_json_count counts[] = {
       {"samples", d->samples->count},
       {"sheet_spheres", medial->sheet_sphere_count},
-      {"samples_triangulated", d->site_count},
+      {"samples_triangulated", d->site_count - (d->point_count - d->samples->count)},
+      {"points_across_thin_walls", d->point_count - d->samples->count},
       {"tetrahedra", d->cells.count},
       {"circumcentres", made->by_kind[QMAT_CELL_CIRCUMCENTRE]},
       {"incentres", made->by_kind[QMAT_CELL_INCENTRE]},
@@ -276,25 +277,50 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
   return bad ? qmat_fail_memory(d->context, "the report") : QMAT_OK;
 }
 
+/* Finds the points to triangulate: the samples with their representatives, then those across thin walls. */
+static qmat_status find_points(qmat_dual_complex *d, const qmat_field *thickness, const double *reaches) {
+  qmat_context *context = d->context;
+  qmat_arena *arena = &context->arena;
+  const size_t count = d->samples->count;
+  double *samples = qmat_arena_alloc(arena, count, 3 * sizeof *samples);
+  double *values = qmat_arena_alloc(arena, count, sizeof *values);
+  uint32_t *represented_by = qmat_arena_alloc(arena, count, sizeof *represented_by);
+  if (!samples || !values || !represented_by) return qmat_fail_memory(context, "samples");
+  qmat_frame_to_unit(qmat_surface_frame(d->surface), d->samples->positions, count, samples);
+  qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
+  qmat_mirrored_points mirrored;
+  qmat_status status = qmat_representatives_find(context, d->surface, d->samples, samples, values,
+                                                 d->thinning_tolerance, reaches, represented_by);
+  if (status == QMAT_OK)
+    status = qmat_mirrored_points_find(context, d->surface, d->samples, samples, represented_by, d->thinning_tolerance,
+                                       &mirrored);
+  if (status != QMAT_OK) return status;
+  const double theta = qmat_thickness_threshold(d->mesh, thickness, d->params->theta);
+  d->point_count = count + mirrored.count;
+  double *points = qmat_arena_alloc(arena, d->point_count, 3 * sizeof *points);
+  uint8_t *thin = qmat_arena_alloc(arena, d->point_count, sizeof *thin);
+  uint32_t *facets = qmat_arena_alloc(arena, d->point_count, sizeof *facets);
+  uint32_t *representatives = qmat_arena_alloc(arena, d->point_count, sizeof *representatives);
+  if (!points || !thin || !facets || !representatives) return qmat_fail_memory(context, "samples");
+  for (size_t i = 0; i < d->point_count; i++) {
+    const bool is_sample = i < count;
+    memcpy(&points[3 * i], is_sample ? &samples[3 * i] : &mirrored.points[3 * (i - count)], 3 * sizeof *points);
+    thin[i] = !is_sample || values[i] <= theta;
+    facets[i] = is_sample ? d->samples->facets[i] : mirrored.facets[i - count];
+    representatives[i] = is_sample ? represented_by[i] : (uint32_t)i;
+  }
+  d->points = points;
+  d->thin = thin;
+  d->facets = facets;
+  d->representatives = representatives;
+  return QMAT_OK;
+}
+
 /* Everything before the value. */
 static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, const double *reaches,
                              dual_counts *made) {
   qmat_context *context = d->context;
-  const size_t count = d->samples->count;
-  double *points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *points);
-  double *values = qmat_arena_alloc(&context->arena, count, sizeof *values);
-  uint8_t *thin = qmat_arena_alloc(&context->arena, count, sizeof *thin);
-  uint32_t *representatives = qmat_arena_alloc(&context->arena, count, sizeof *representatives);
-  if (!points || !values || !thin || !representatives) return qmat_fail_memory(context, "samples");
-  qmat_frame_to_unit(qmat_surface_frame(d->surface), d->samples->positions, count, points);
-  qmat_thickness_of_samples(d->mesh, thickness, d->samples, values);
-  const double theta = qmat_thickness_threshold(d->mesh, thickness, d->params->theta);
-  for (size_t i = 0; i < count; i++) thin[i] = values[i] <= theta;
-  d->points = points;
-  d->thin = thin;
-  d->representatives = representatives;
-  qmat_status status = qmat_representatives_find(context, d->surface, d->samples, points, values, d->thinning_tolerance,
-                                                 reaches, representatives);
+  qmat_status status = find_points(d, thickness, reaches);
   if (status == QMAT_OK) status = triangulate(d);
   if (status == QMAT_OK) status = qmat_medial_vertices_select(d);
   if (status == QMAT_OK && d->params->incentres == QMAT_INCENTRES_ALL) status = qmat_tetrahedra_mend(d, &made->mended);

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/surface.h"
+#include "core/geometry/triangle.h"
 #include "nodes/measure/topology.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
@@ -257,6 +258,31 @@ static void test_thin_sheet_gives_one_piece_near_its_middle(void **state) {
   assert_true(p.medial->sphere_count < all);
   assert_int_equal(pipeline_count(p.report, "incentres"), 0);
   pipeline_free(&p);
+}
+
+/* The slabs have the area of the walls' middles, whatever the thickness: there are no holes, and nothing is there
+ * twice. */
+static void test_walls_much_thinner_than_the_spacing_are_filled(void **state) {
+  (void)state;
+  static const double thicknesses[] = {0.01, 0.001, 0.0001};
+  for (size_t i = 0; i < sizeof thicknesses / sizeof *thicknesses; i++) {
+    const double t = thicknesses[i], side = 1 - t, height = 0.6 - 0.5 * t;
+    pipeline p;
+    pipeline_make(&p, shape_seal(shape_tray(0.6, t)), "", "");
+    double area = 0;
+    for (size_t k = 0; k < p.medial->triangle_count; k++) {
+      const double *corners[3];
+      double normal[3];
+      for (size_t c = 0; c < 3; c++) corners[c] = &p.medial->spheres[4 * (size_t)p.medial->triangles[3 * k + c]];
+      area += qmat_triangle_area(corners[0], corners[1], corners[2], normal);
+    }
+    const double expected = side * side + 4 * side * height;
+    assert_near(area, expected, 0.05 * expected);
+    assert_int_equal(pipeline_components(p.medial), 1);
+    assert_int_equal(pipeline_count(p.report, "links"), 0);
+    assert_true(pipeline_count(p.report, "points_across_thin_walls") > 1000);
+    pipeline_free(&p);
+  }
 }
 
 static void test_torus_keeps_its_loop(void **state) {
@@ -762,6 +788,7 @@ int main(void) {
       cmocka_unit_test(test_sphere_gives_its_centre),
       cmocka_unit_test(test_capsule_gives_its_axis),
       cmocka_unit_test(test_thin_sheet_gives_one_piece_near_its_middle),
+      cmocka_unit_test(test_walls_much_thinner_than_the_spacing_are_filled),
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_two_solids_give_two_pieces),
       cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),

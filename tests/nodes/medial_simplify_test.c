@@ -329,6 +329,21 @@ static void test_a_wavy_shell_much_thinner_than_epsilon_takes_few_spheres(void *
   pipeline_free(&p);
 }
 
+/* A box without a lid takes the same few spheres however thin its walls are. */
+static void test_thinner_walls_take_no_more_spheres(void **state) {
+  (void)state;
+  static const double thicknesses[] = {0.01, 0.001, 0.0001};
+  for (size_t i = 0; i < COUNT(thicknesses); i++) {
+    pipeline p;
+    pipeline_make(&p, shape_seal(shape_tray(0.6, thicknesses[i])), "", "");
+    result r = simplify(&p, "epsilon=3%");
+    assert_true(r.medial->sphere_count <= 24);
+    check_errors(&p, &r, 0.03, true);
+    release(&r);
+    pipeline_free(&p);
+  }
+}
+
 /* --- parameters --------------------------------------------------------------------------------------------------- */
 
 /* Greedy collapses are not monotone in epsilon, but twice the epsilon leaves no more. */
@@ -1065,6 +1080,7 @@ int main(void) {
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_thin_sheet_stays_on_its_mid_plane),
       cmocka_unit_test(test_a_wavy_shell_much_thinner_than_epsilon_takes_few_spheres),
+      cmocka_unit_test(test_thinner_walls_take_no_more_spheres),
       cmocka_unit_test(test_twice_the_epsilon_leaves_no_more_spheres),
       cmocka_unit_test(test_number_of_vertices_within_epsilon_is_met_exactly),
       cmocka_unit_test(test_number_of_vertices_alone_finds_the_least_error),
