@@ -32,6 +32,8 @@ static const double least_wrap_epsilon = 0.004;
 /* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
  */
 static const double weld_tolerance = 1e-5;
+/* A triangle that the union leaves out is within it if it leaves it by at most this share of epsilon. */
+static const double least_gap = 0.01;
 /* Components and caps that the report lists. */
 enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
 
@@ -55,7 +57,8 @@ typedef struct solidifier {
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
-  size_t caps, cap_sides, folded, turned_parts, inner_triangles;
+  size_t given_count; /* of the solids' triangles; behind these are the caps */
+  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -238,6 +241,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   s->solids.count = 0;
   for (size_t t = 0; status == QMAT_OK && t < count; t++) {
     const uint32_t *c = s->solids.corners + 3 * t;
+    if (t == given) s->given_count = s->solids.count;
     if (!classes[t]) {
       memmove(s->solids.corners + 3 * s->solids.count++, c, 3 * sizeof *c);
     } else if (t < given) {
@@ -260,7 +264,7 @@ static qmat_status sort_triangles(solidifier *s) {
     triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
   }
-  const size_t given = s->solids.count;
+  const size_t given = s->given_count = s->solids.count;
   for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
     if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
     status = add_cap(s, i);
@@ -355,11 +359,11 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
   return status;
 }
 
-/* ---- sheets inside solids ---- */
+/* ---- sheets inside solids, and solids' triangles that bound nothing ---- */
 
 /* Whether the corners, the middles of the sides and the centroid of a triangle, all drawn a little towards the
- * centroid, are inside. */
-static bool is_inside(const qmat_surface *solid, const double *positions, const uint32_t *corners) {
+ * centroid, are inside or as near as `reach`. */
+static bool is_inside(const qmat_surface *solid, const double *positions, const uint32_t *corners, double reach) {
   enum { POINTS = 7 };
   static const double weights[POINTS][3] = {{1, 0, 0},     {0, 1, 0},     {0, 0, 1}, {0.5, 0.5, 0},
                                             {0, 0.5, 0.5}, {0.5, 0, 0.5}, {0, 0, 0}};
@@ -372,31 +376,66 @@ static bool is_inside(const qmat_surface *solid, const double *positions, const 
       point[k] =
           is_centroid ? centroid : 0.99 * (weights[i][0] * a + weights[i][1] * b + weights[i][2] * c) + 0.01 * centroid;
     }
-    if (!qmat_surface_inside(solid, point)) return false;
+    const bool is_near = reach > 0 && qmat_surface_distance(solid, point, reach, NULL, NULL) <= reach;
+    if (!is_near && !qmat_surface_inside(solid, point)) return false;
   }
   return true;
 }
 
 /* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
- * nothing. */
-static qmat_status drop_inner_sheets(solidifier *s) {
-  if (s->sheets.count == 0 || s->solids.count == 0) return QMAT_OK;
-  const size_t sheet_count = s->sheets.count;
-  qmat_mesh *mesh = qmat_mesh_new();
-  qmat_surface *surface = NULL;
-  qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
-  if (status == QMAT_OK) status = qmat_surface_new_of_solids(s->context, mesh, &surface);
+ * nothing. `mesh` is the result so far, and `solids` its surface without sheets. */
+static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const qmat_surface *solids) {
+  const size_t count = s->sheets.count, first = mesh->triangle_count - count;
+  qmat_status status = QMAT_OK;
   s->sheets.count = 0;
-  for (size_t t = 0; status == QMAT_OK && t < sheet_count; t++) {
+  for (size_t t = 0; status == QMAT_OK && t < count; t++) {
     const uint32_t *c = s->sheets.corners + 3 * t;
-    if (is_inside(surface, qmat_surface_positions(surface),
-                  mesh->triangles + 3 * (mesh->triangle_count - sheet_count + t)))
+    if (is_inside(solids, qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), 0))
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
-    if (t % 64 == 0) status = qmat_progress(s->context, t, sheet_count, "triangles of sheets");
+    if (t % 64 == 0) status = qmat_progress(s->context, t, count, "triangles of sheets");
   }
-  qmat_surface_free(surface);
+  return status;
+}
+
+/* Where a part crosses itself, some of its triangles may have the outside on both sides. The union leaves them out, but
+ * they were given: they become sheets. */
+static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *solids) {
+  enum { SLICE = 4096 };
+  const double reach = least_gap * epsilon_of(s);
+  const int threads = qmat_threads(s->context);
+  uint8_t covered[SLICE];
+  double *positions = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *positions);
+  if (!positions) return fail_shortage(s);
+  qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, positions);
+  for (size_t first = 0; first < s->given_count; first += SLICE) {
+    const size_t left = s->given_count - first, count = left < SLICE ? left : SLICE;
+    qmat_status status = qmat_progress(s->context, first, s->given_count, "triangles of solids");
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
+    for (size_t i = 0; i < count; i++)
+      covered[i] = is_inside(solids, positions, s->solids.corners + 3 * (first + i), reach);
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      const uint32_t *c = s->solids.corners + 3 * (first + i);
+      if (covered[i]) continue;
+      status = append(s, &s->sheets, c[0], c[1], c[2]);
+      s->unbounding_triangles++;
+    }
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+static qmat_status review_sheets(solidifier *s) {
+  if (s->solids.count == 0 || (s->sheets.count == 0 && !s->united.changed)) return QMAT_OK;
+  qmat_mesh *mesh = qmat_mesh_new();
+  qmat_surface *solids = NULL;
+  qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
+  if (status == QMAT_OK) status = qmat_surface_new_of_solids(s->context, mesh, &solids);
+  if (status == QMAT_OK) status = drop_inner_sheets(s, mesh, solids);
+  if (status == QMAT_OK && s->united.changed) status = keep_unbounding_triangles(s, solids);
+  qmat_surface_free(solids);
   qmat_value_release(mesh ? &mesh->base : NULL);
   return status;
 }
@@ -456,6 +495,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"sheet_triangles", s->sheets.count},
                                     {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
                                     {"inner_triangles", s->inner_triangles},
+                                    {"unbounding_triangles", s->unbounding_triangles},
                                     {"parts_turned", s->turned_parts},
                                     {"triangles_turned", s->parts.turned},
                                     {"caps", s->caps},
@@ -501,7 +541,7 @@ static qmat_status make_solid(solidifier *s) {
                                  s->solids.corners, &s->united);
   /* The last resort: without their union, the inside of what intersects is not defined. */
   if (status == QMAT_OK && s->united.why_not) status = wrap_triangles(s, s->solids.corners, s->solids.count);
-  return status == QMAT_OK ? drop_inner_sheets(s) : status;
+  return status == QMAT_OK ? review_sheets(s) : status;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -560,7 +600,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 3,
+    .version = 4,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
@@ -571,7 +611,10 @@ const qmat_node qmat_node_mesh_solid = {
         "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
-        "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are.\n\n"
+        "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
+        "crosses itself, some of its triangles may have the outside on both sides, such as those of a folded cuff: "
+        "they "
+        "become sheets.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning.",

@@ -9,6 +9,8 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/sheets.h"
+#include "core/geometry/surface.h"
 #include "io/model.h"
 #include "nodes/mesh/overlaps.h"
 #include "tests/nodes/pipeline.h"
@@ -412,6 +414,57 @@ static void test_parts_that_meet_themselves(void **state) {
   /* What the bar has in common with itself counts once: near 0.5 cubed. */
   assert_in_range((unsigned long)(1e4 * (volume + 1 - united)), 1000, 1300);
   assert_int_equal(euler_of(r.mesh), 0);
+  release(&r);
+}
+
+/* A sleeve with a cuff, made by turning a profile: up the sleeve, then out and down. Its border is that of the cuff,
+ * whose cap cuts through the sleeve. */
+static qmat_mesh *sleeve(uint32_t around) {
+  static const double profile[][2] = {{1, 0}, {1, 1}, {1, 2}, {1.4, 1.8}, {1.4, 1.5}};
+  enum { RINGS = sizeof profile / sizeof *profile };
+  qmat_mesh *mesh = shape_new();
+  for (size_t ring = 0; ring < RINGS; ring++)
+    for (uint32_t i = 0; i < around; i++) {
+      const double turn = 2 * acos(-1) * i / around;
+      shape_vertex(mesh, profile[ring][0] * cos(turn), profile[ring][0] * sin(turn), profile[ring][1]);
+    }
+  const uint32_t bottom = shape_vertex(mesh, 0, 0, 0);
+  for (uint32_t i = 0; i < around; i++) {
+    const uint32_t next = (i + 1) % around;
+    shape_triangle(mesh, bottom, next, i);
+    for (uint32_t ring = 0; ring + 1 < RINGS; ring++)
+      shape_quad(mesh, ring * around + i, ring * around + next, (ring + 1) * around + next, (ring + 1) * around + i);
+  }
+  return mesh;
+}
+
+/* The sleeve above the cap of its cuff, and the cuff, have the outside on both sides: they bound nothing, but were
+ * given. No point of them may be far from the result. */
+static void test_what_bounds_nothing_of_a_union_is_a_sheet(void **state) {
+  (void)state;
+  enum { AROUND = 24 };
+  qmat_mesh *given = shape_seal(sleeve(AROUND));
+  result r = unite_with(sleeve(AROUND), "solid=close");
+  /* Of the sleeve's upper half, the fold and the cuff; a cuff's triangle meets its cap in an edge. */
+  assert_int_equal(pipeline_count(r.report, "unbounding_triangles"), 6 * AROUND);
+  assert_int_equal(r.mesh->sheet_triangle_count, 6 * AROUND);
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
+  const qmat_frame *frame = qmat_surface_frame(surface);
+  for (size_t t = 0; t < given->triangle_count; t++) {
+    double centroid[3] = {0, 0, 0}, unit[3];
+    for (size_t k = 0; k < 9; k++)
+      centroid[k % 3] += given->positions[3 * (size_t)given->triangles[3 * t + k / 3] + k % 3] / 3;
+    qmat_frame_to_unit(frame, centroid, 1, unit);
+    assert_true(qmat_surface_distance(surface, unit, INFINITY, NULL, NULL) < 1e-6);
+  }
+  /* What is left as a solid is the sleeve below the cap. */
+  const qmat_mesh solids = qmat_mesh_of_solids(r.mesh);
+  assert_near(volume_of(&solids), 1.5 * AROUND / 2 * sin(2 * acos(-1) / AROUND), 1e-6);
+  qmat_surface_free(surface);
+  qmat_context_uninit(&context);
+  qmat_value_release(&given->base);
   release(&r);
 }
 
@@ -932,7 +985,6 @@ static void test_each_choice_does_what_it_says(void **state) {
   r = unite_with(curved_shell(3), "solid=close");
   assert_int_equal(r.mesh->sheet_triangle_count, 0);
   assert_int_equal(pipeline_count(r.report, "caps"), 1);
-  print_message("V %g %zu\n", volume_of(r.mesh), r.mesh->triangle_count);
   assert_true(volume_of(r.mesh) > 2.5 && volume_of(r.mesh) < 3.2); /* half a cylinder, turned outwards if need be */
   release(&r);
   r = unite_with(shape_box(1, 1, 1), "solid=sheet");
@@ -1006,6 +1058,7 @@ int main(void) {
       cmocka_unit_test(test_sheets_stay_the_last_triangles_and_cut_nothing),
       cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
       cmocka_unit_test(test_parts_that_meet_themselves),
+      cmocka_unit_test(test_what_bounds_nothing_of_a_union_is_a_sheet),
       cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),
       cmocka_unit_test(test_random_boxes_against_counted_cells),
       cmocka_unit_test(test_the_volume_of_two_spheres),
