@@ -361,24 +361,44 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
 
 /* ---- sheets inside solids, and solids' triangles that bound nothing ---- */
 
+/* Whether a point is inside, or as near as `reach`. */
+static bool is_covered(const qmat_surface *solid, const double *point, double reach) {
+  return (reach > 0 && qmat_surface_distance(solid, point, reach, NULL, NULL) <= reach) ||
+         qmat_surface_inside(solid, point);
+}
+
+static void find_corners(const double *positions, const uint32_t *ids, const double *corners[3]) {
+  for (size_t k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)ids[k];
+}
+
+static void interpolate(const double *const corners[3], double a, double b, double point[3]) {
+  for (size_t k = 0; k < 3; k++) point[k] = a * corners[0][k] + b * corners[1][k] + (1 - a - b) * corners[2][k];
+}
+
 /* Whether the corners, the middles of the sides and the centroid of a triangle, all drawn a little towards the
- * centroid, are inside or as near as `reach`. */
-static bool is_inside(const qmat_surface *solid, const double *positions, const uint32_t *corners, double reach) {
-  enum { POINTS = 7 };
-  static const double weights[POINTS][3] = {{1, 0, 0},     {0, 1, 0},     {0, 0, 1}, {0.5, 0.5, 0},
-                                            {0, 0.5, 0.5}, {0.5, 0, 0.5}, {0, 0, 0}};
-  for (int i = 0; i < POINTS; i++) {
+ * centroid, are covered. */
+static bool is_inside(const qmat_surface *solid, const double *const corners[3], double reach) {
+  static const double weights[][2] = {{1, 0}, {0, 1}, {0, 0}, {0.5, 0.5}, {0, 0.5}, {0.5, 0}, {1.0 / 3, 1.0 / 3}};
+  for (size_t i = 0; i < sizeof weights / sizeof *weights; i++) {
     double point[3];
-    for (int k = 0; k < 3; k++) {
-      const double a = positions[3 * (size_t)corners[0] + (size_t)k], b = positions[3 * (size_t)corners[1] + (size_t)k],
-                   c = positions[3 * (size_t)corners[2] + (size_t)k], centroid = (a + b + c) / 3;
-      const bool is_centroid = i == POINTS - 1;
-      point[k] =
-          is_centroid ? centroid : 0.99 * (weights[i][0] * a + weights[i][1] * b + weights[i][2] * c) + 0.01 * centroid;
-    }
-    const bool is_near = reach > 0 && qmat_surface_distance(solid, point, reach, NULL, NULL) <= reach;
-    if (!is_near && !qmat_surface_inside(solid, point)) return false;
+    interpolate(corners, 0.99 * weights[i][0] + 0.01 / 3, 0.99 * weights[i][1] + 0.01 / 3, point);
+    if (!is_covered(solid, point, reach)) return false;
   }
+  return true;
+}
+
+/* The same of further points, evenly spread: as far apart as `spacing`, or MOST_ROWS rows. */
+static bool is_inside_between(const qmat_surface *solid, const double *const corners[3], double reach, double spacing) {
+  enum { MOST_ROWS = 32 };
+  const double length = qmat_triangle_longest_side(corners[0], corners[1], corners[2]).length;
+  const int rows = (int)fmin(ceil(length / spacing), MOST_ROWS);
+  for (int i = 0; i < rows; i++)
+    for (int k = 0; k < 2 * (rows - i) - 1; k++) {
+      const double third = k % 2 == 0 ? 1.0 / 3 : 2.0 / 3;
+      double point[3];
+      interpolate(corners, (i + third) / rows, (k / 2 + third) / rows, point);
+      if (!is_covered(solid, point, reach)) return false;
+    }
   return true;
 }
 
@@ -390,7 +410,9 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
   s->sheets.count = 0;
   for (size_t t = 0; status == QMAT_OK && t < count; t++) {
     const uint32_t *c = s->sheets.corners + 3 * t;
-    if (is_inside(solids, qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), 0))
+    const double *corners[3];
+    find_corners(qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), corners);
+    if (is_inside(solids, corners, 0))
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
@@ -414,8 +436,11 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
     qmat_status status = qmat_progress(s->context, first, s->given_count, "triangles of solids");
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
-    for (size_t i = 0; i < count; i++)
-      covered[i] = is_inside(solids, positions, s->solids.corners + 3 * (first + i), reach);
+    for (size_t i = 0; i < count; i++) {
+      const double *corners[3];
+      find_corners(positions, s->solids.corners + 3 * (first + i), corners);
+      covered[i] = is_inside(solids, corners, reach) && is_inside_between(solids, corners, reach, epsilon_of(s));
+    }
     for (size_t i = 0; i < count && status == QMAT_OK; i++) {
       const uint32_t *c = s->solids.corners + 3 * (first + i);
       if (covered[i]) continue;

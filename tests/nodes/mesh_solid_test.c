@@ -417,12 +417,12 @@ static void test_parts_that_meet_themselves(void **state) {
   release(&r);
 }
 
-/* A sleeve with a cuff, made by turning a profile: up the sleeve, then out and down. Its border is that of the cuff,
- * whose cap cuts through the sleeve. */
-static qmat_mesh *sleeve(uint32_t around) {
-  static const double profile[][2] = {{1, 0}, {1, 1}, {1, 2}, {1.4, 1.8}, {1.4, 1.5}};
+/* Adds a sleeve of height 2 with a cuff, made by turning a profile: up the sleeve, then out and down. Its border is
+ * that of the cuff, whose cap cuts through the sleeve. */
+static void add_sleeve(qmat_mesh *mesh, uint32_t around) {
+  static const double profile[][2] = {{1, 0}, {1, 2}, {1.4, 1.8}, {1.4, 1.5}};
   enum { RINGS = sizeof profile / sizeof *profile };
-  qmat_mesh *mesh = shape_new();
+  const uint32_t first = (uint32_t)mesh->vertex_count;
   for (size_t ring = 0; ring < RINGS; ring++)
     for (uint32_t i = 0; i < around; i++) {
       const double turn = 2 * acos(-1) * i / around;
@@ -430,41 +430,59 @@ static qmat_mesh *sleeve(uint32_t around) {
     }
   const uint32_t bottom = shape_vertex(mesh, 0, 0, 0);
   for (uint32_t i = 0; i < around; i++) {
-    const uint32_t next = (i + 1) % around;
-    shape_triangle(mesh, bottom, next, i);
+    const uint32_t a = first + i, b = first + (i + 1) % around;
+    shape_triangle(mesh, bottom, b, a);
     for (uint32_t ring = 0; ring + 1 < RINGS; ring++)
-      shape_quad(mesh, ring * around + i, ring * around + next, (ring + 1) * around + next, (ring + 1) * around + i);
+      shape_quad(mesh, ring * around + a, ring * around + b, (ring + 1) * around + b, (ring + 1) * around + a);
   }
-  return mesh;
+}
+
+/* Points of all given triangles have to be inside or near the result, for each `steps` along a side. */
+static void assert_nothing_is_lost(const result *r, int steps, double distance) {
+  qmat_context context = {0};
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, r->mesh, &surface), QMAT_OK);
+  for (size_t t = 0; t < r->from->triangle_count; t++)
+    for (int i = 0; i <= steps; i++)
+      for (int j = 0; j <= steps - i; j++) {
+        const double weights[3] = {(double)i / steps, (double)j / steps, (double)(steps - i - j) / steps};
+        double point[3] = {0, 0, 0}, unit[3];
+        for (size_t k = 0; k < 9; k++)
+          point[k % 3] += weights[k / 3] * r->from->positions[3 * (size_t)r->from->triangles[3 * t + k / 3] + k % 3];
+        qmat_frame_to_unit(qmat_surface_frame(surface), point, 1, unit);
+        assert_true(qmat_surface_inside(surface, unit) ||
+                    qmat_surface_distance(surface, unit, INFINITY, NULL, NULL) <= distance);
+      }
+  qmat_surface_free(surface);
+  qmat_context_uninit(&context);
 }
 
 /* The sleeve above the cap of its cuff, and the cuff, have the outside on both sides: they bound nothing, but were
- * given. No point of them may be far from the result. */
+ * given. */
 static void test_what_bounds_nothing_of_a_union_is_a_sheet(void **state) {
   (void)state;
   enum { AROUND = 24 };
-  qmat_mesh *given = shape_seal(sleeve(AROUND));
-  result r = unite_with(sleeve(AROUND), "solid=close");
-  /* Of the sleeve's upper half, the fold and the cuff; a cuff's triangle meets its cap in an edge. */
-  assert_int_equal(pipeline_count(r.report, "unbounding_triangles"), 6 * AROUND);
+  qmat_mesh *mesh = shape_new();
+  add_sleeve(mesh, AROUND);
+  result r = unite_with(mesh, "solid=close");
+  assert_int_equal(pipeline_count(r.report, "unbounding_triangles"), 6 * AROUND); /* all but the bottom */
   assert_int_equal(r.mesh->sheet_triangle_count, 6 * AROUND);
-  qmat_context context = {0};
-  qmat_surface *surface;
-  assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
-  const qmat_frame *frame = qmat_surface_frame(surface);
-  for (size_t t = 0; t < given->triangle_count; t++) {
-    double centroid[3] = {0, 0, 0}, unit[3];
-    for (size_t k = 0; k < 9; k++)
-      centroid[k % 3] += given->positions[3 * (size_t)given->triangles[3 * t + k / 3] + k % 3] / 3;
-    qmat_frame_to_unit(frame, centroid, 1, unit);
-    assert_true(qmat_surface_distance(surface, unit, INFINITY, NULL, NULL) < 1e-6);
-  }
+  assert_nothing_is_lost(&r, 20, 1e-6);
   /* What is left as a solid is the sleeve below the cap. */
   const qmat_mesh solids = qmat_mesh_of_solids(r.mesh);
   assert_near(volume_of(&solids), 1.5 * AROUND / 2 * sin(2 * acos(-1) / AROUND), 1e-6);
-  qmat_surface_free(surface);
-  qmat_context_uninit(&context);
-  qmat_value_release(&given->base);
+  release(&r);
+}
+
+/* A plate around the top: corners, middles of sides and centroids of the sleeve's triangles are all inside now, but a
+ * band between the cap and the plate bounds nothing. */
+static void test_what_bounds_nothing_is_found_between_plates(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  add_sleeve(mesh, 24);
+  shape_add_box(mesh, -2, -2, 1.7, 2, 2, 2.1, false);
+  result r = unite_with(mesh, "solid=close");
+  assert_nothing_is_lost(&r, 50, 0.01);
   release(&r);
 }
 
@@ -1059,6 +1077,7 @@ int main(void) {
       cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
       cmocka_unit_test(test_parts_that_meet_themselves),
       cmocka_unit_test(test_what_bounds_nothing_of_a_union_is_a_sheet),
+      cmocka_unit_test(test_what_bounds_nothing_is_found_between_plates),
       cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),
       cmocka_unit_test(test_random_boxes_against_counted_cells),
       cmocka_unit_test(test_the_volume_of_two_spheres),
