@@ -261,10 +261,13 @@ class Union {
     }
   }
 
+  bool is_united(uint32_t triangle) const {
+    return is_active(triangle) && changed_[cluster_of(triangle)];
+  }
+
   void copy_out(qmat_united *united) {
     bool changed = false;
-    for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
-      changed = changed || (is_active(t) && changed_[cluster_of(t)]);
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++) changed = changed || is_united(t);
     if (!changed) return;
     merge_rounded();
     check_edges();
@@ -272,7 +275,7 @@ class Union {
     std::vector<bool> counted(mesh_.triangle_count());
     size_t next = 0;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) {
-      if (is_active(t) && changed_[cluster_of(t)]) {
+      if (is_united(t)) {
         for (; next < pieces_.size() && pieces_[next].source == t; next++)
           triangles.insert(triangles.end(), pieces_[next].corners.begin(), pieces_[next].corners.end());
         united->shells_united += !counted[mesh_.shell(t)];
@@ -291,7 +294,9 @@ class Union {
     }
     united->positions = static_cast<double *>(qmat_alloc(3 * used.size(), sizeof(double)));
     united->triangles = static_cast<uint32_t *>(qmat_alloc(triangles.size(), sizeof(uint32_t)));
-    if (!united->positions || !united->triangles) throw std::bad_alloc();
+    united->is_united = static_cast<uint8_t *>(qmat_alloc(mesh_.triangle_count(), 1));
+    if (!united->positions || !united->triangles || !united->is_united) throw std::bad_alloc();
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++) united->is_united[t] = is_united(t);
     for (size_t i = 0; i < used.size(); i++) {
       const std::array<double, 3> p = rounded(used[i]);
       std::copy(p.begin(), p.end(), united->positions + 3 * i);
@@ -327,6 +332,7 @@ qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, 
   }
   qmat_free(united->positions);
   qmat_free(united->triangles);
+  qmat_free(united->is_united);
   *united = {};
   return status;
 }
