@@ -438,7 +438,7 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t i = 0; i < count; i++) {
       const double *corners[3];
-      covered[i] = !s->united.is_united[first + i];
+      covered[i] = !s->united.is_cut[first + i];
       if (covered[i]) continue;
       find_corners(positions, s->solids.corners + 3 * (first + i), corners);
       covered[i] = is_inside(solids, corners, reach) && is_inside_between(solids, corners, reach, epsilon_of(s));
@@ -589,7 +589,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = fill_report(&s, made, report);
   qmat_free(s.united.positions);
   qmat_free(s.united.triangles);
-  qmat_free(s.united.is_united);
+  qmat_free(s.united.is_cut);
   qmat_free(s.wrap.positions);
   qmat_free(s.wrap.triangles);
   qmat_free(s.solids.corners);

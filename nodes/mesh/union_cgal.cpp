@@ -273,11 +273,17 @@ class Union {
     check_edges();
     std::vector<uint32_t> triangles;
     std::vector<bool> counted(mesh_.triangle_count());
+    united->is_cut = static_cast<uint8_t *>(qmat_calloc(mesh_.triangle_count(), 1));
+    if (!united->is_cut) throw std::bad_alloc();
     size_t next = 0;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) {
       if (is_united(t)) {
-        for (; next < pieces_.size() && pieces_[next].source == t; next++)
-          triangles.insert(triangles.end(), pieces_[next].corners.begin(), pieces_[next].corners.end());
+        united->is_cut[t] = true;
+        for (; next < pieces_.size() && pieces_[next].source == t; next++) {
+          const Corners &piece = pieces_[next].corners;
+          triangles.insert(triangles.end(), piece.begin(), piece.end());
+          if (std::is_permutation(piece.begin(), piece.end(), mesh_.corners(t))) united->is_cut[t] = false;
+        }
         united->shells_united += !counted[mesh_.shell(t)];
         counted[mesh_.shell(t)] = true;
       } else {
@@ -294,9 +300,7 @@ class Union {
     }
     united->positions = static_cast<double *>(qmat_alloc(3 * used.size(), sizeof(double)));
     united->triangles = static_cast<uint32_t *>(qmat_alloc(triangles.size(), sizeof(uint32_t)));
-    united->is_united = static_cast<uint8_t *>(qmat_alloc(mesh_.triangle_count(), 1));
-    if (!united->positions || !united->triangles || !united->is_united) throw std::bad_alloc();
-    for (uint32_t t = 0; t < mesh_.triangle_count(); t++) united->is_united[t] = is_united(t);
+    if (!united->positions || !united->triangles) throw std::bad_alloc();
     for (size_t i = 0; i < used.size(); i++) {
       const std::array<double, 3> p = rounded(used[i]);
       std::copy(p.begin(), p.end(), united->positions + 3 * i);
@@ -319,6 +323,8 @@ qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, 
     qmat::Union(context, *shells).make(united);
     return QMAT_OK;
   } catch (const qmat::UnionRefused &refused) {
+    qmat_free(united->is_cut);
+    *united = {};
     united->why_not = refused.why;
     return QMAT_OK;
   } catch (const qmat::UnionStopped &stopped) {
@@ -332,7 +338,7 @@ qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, 
   }
   qmat_free(united->positions);
   qmat_free(united->triangles);
-  qmat_free(united->is_united);
+  qmat_free(united->is_cut);
   *united = {};
   return status;
 }

@@ -16,7 +16,7 @@ typedef struct qmat_united {
   size_t vertex_count, triangle_count;
   double *positions;    /* 3 * vertex_count: the used vertices of the mesh in their order, then vertices on cuts */
   uint32_t *triangles;  /* 3 * triangle_count: in the order of the triangles that they are cut from */
-  uint8_t *is_united;   /* per triangle of the mesh: whether its shell is cut or left out, and it may be missing */
+  uint8_t *is_cut;      /* per triangle of the mesh: whether it is cut or left out */
   size_t shells_united; /* cut or left out */
   size_t cut_triangles; /* of the mesh */
 } qmat_united;
