@@ -375,27 +375,22 @@ static void interpolate(const double *const corners[3], double a, double b, doub
   for (size_t k = 0; k < 3; k++) point[k] = a * corners[0][k] + b * corners[1][k] + (1 - a - b) * corners[2][k];
 }
 
-/* Whether the corners, the middles of the sides and the centroid of a triangle, all drawn a little towards the
- * centroid, are covered. */
-static bool is_inside(const qmat_surface *solid, const double *const corners[3], double reach) {
+/* Whether a triangle is covered at points `spacing` apart, or in MOST_ROWS rows. Its corners, the middles of its sides
+ * and its centroid, all drawn a little towards the centroid, are first: most triangles end there. */
+static bool is_triangle_covered(const qmat_surface *solid, const double *const corners[3], double reach,
+                                double spacing) {
+  enum { MOST_ROWS = 128 };
   static const double weights[][2] = {{1, 0}, {0, 1}, {0, 0}, {0.5, 0.5}, {0, 0.5}, {0.5, 0}, {1.0 / 3, 1.0 / 3}};
+  const double length = qmat_triangle_longest_side(corners[0], corners[1], corners[2]).length;
+  const int rows = (int)fmin(ceil(length / spacing), MOST_ROWS);
+  double point[3];
   for (size_t i = 0; i < sizeof weights / sizeof *weights; i++) {
-    double point[3];
     interpolate(corners, 0.99 * weights[i][0] + 0.01 / 3, 0.99 * weights[i][1] + 0.01 / 3, point);
     if (!is_covered(solid, point, reach)) return false;
   }
-  return true;
-}
-
-/* The same of further points, evenly spread: as far apart as `spacing`, or MOST_ROWS rows. */
-static bool is_inside_between(const qmat_surface *solid, const double *const corners[3], double reach, double spacing) {
-  enum { MOST_ROWS = 32 };
-  const double length = qmat_triangle_longest_side(corners[0], corners[1], corners[2]).length;
-  const int rows = (int)fmin(ceil(length / spacing), MOST_ROWS);
   for (int i = 0; i < rows; i++)
     for (int k = 0; k < 2 * (rows - i) - 1; k++) {
       const double third = k % 2 == 0 ? 1.0 / 3 : 2.0 / 3;
-      double point[3];
       interpolate(corners, (i + third) / rows, (k / 2 + third) / rows, point);
       if (!is_covered(solid, point, reach)) return false;
     }
@@ -412,7 +407,7 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
     const uint32_t *c = s->sheets.corners + 3 * t;
     const double *corners[3];
     find_corners(qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), corners);
-    if (is_inside(solids, corners, 0))
+    if (is_triangle_covered(solids, corners, 0, epsilon_of(s)))
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
@@ -441,7 +436,7 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
       covered[i] = !s->united.is_cut[first + i];
       if (covered[i]) continue;
       find_corners(positions, s->solids.corners + 3 * (first + i), corners);
-      covered[i] = is_inside(solids, corners, reach) && is_inside_between(solids, corners, reach, epsilon_of(s));
+      covered[i] = is_triangle_covered(solids, corners, reach, epsilon_of(s));
     }
     for (size_t i = 0; i < count && status == QMAT_OK; i++) {
       const uint32_t *c = s->solids.corners + 3 * (first + i);

@@ -486,6 +486,22 @@ static void test_what_bounds_nothing_is_found_between_plates(void **state) {
   release(&r);
 }
 
+/* A sheet through plates around its corners, the middles of its sides and its centroids leaves them in between. */
+static void test_a_sheet_through_solids_stays_where_it_leaves_them(void **state) {
+  (void)state;
+  static const double plates[][2] = {{-0.1, 0.1}, {0.3, 0.35}, {0.45, 0.55}, {0.65, 0.7}, {0.9, 1.1}};
+  qmat_mesh *mesh = shape_new();
+  for (size_t i = 0; i < sizeof plates / sizeof *plates; i++)
+    shape_add_box(mesh, -1, -1, plates[i][0], 2, 2, plates[i][1], false);
+  const uint32_t a = shape_vertex(mesh, 0, 0, 0), b = shape_vertex(mesh, 1, 0, 0), c = shape_vertex(mesh, 1, 0, 1),
+                 d = shape_vertex(mesh, 0, 0, 1);
+  shape_quad(mesh, a, b, c, d);
+  result r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "inner_triangles"), 0);
+  assert_int_equal(r.mesh->sheet_triangle_count, 2);
+  release(&r);
+}
+
 /* A triangle without area in a part, where an edge of one neighbour is two edges of others. */
 static void test_triangles_without_area_in_parts_that_meet(void **state) {
   (void)state;
@@ -1078,6 +1094,7 @@ int main(void) {
       cmocka_unit_test(test_parts_that_meet_themselves),
       cmocka_unit_test(test_what_bounds_nothing_of_a_union_is_a_sheet),
       cmocka_unit_test(test_what_bounds_nothing_is_found_between_plates),
+      cmocka_unit_test(test_a_sheet_through_solids_stays_where_it_leaves_them),
       cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),
       cmocka_unit_test(test_random_boxes_against_counted_cells),
       cmocka_unit_test(test_the_volume_of_two_spheres),
