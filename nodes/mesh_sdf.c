@@ -6,6 +6,7 @@
 #include "core/geometry/sheets.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
+#include "core/geometry/vertex_facets.h"
 #include "core/node.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/initial/sample_thinning.h"
@@ -36,12 +37,6 @@ typedef struct cone_ray {
   double direction[3];
   double weight;
 } cone_ray;
-
-/* The facets around each vertex, in rising order: those of vertex v are facets[offsets[v] .. offsets[v + 1]). */
-typedef struct vertex_facets {
-  size_t *offsets;
-  uint32_t *facets;
-} vertex_facets;
 
 /* Spreads rays evenly over the cone's solid angle, with the golden angle between successive rays (Vogel 1979). The
  * weight is the inverse of the angle to the axis (Shapira et al. 2008, section 3.1). */
@@ -125,18 +120,6 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
   return MEASURED;
 }
 
-static qmat_status collect_vertex_facets(qmat_context *context, const qmat_mesh *mesh, vertex_facets *around) {
-  around->offsets = qmat_arena_calloc(&context->arena, mesh->vertex_count + 2, sizeof *around->offsets);
-  around->facets = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *around->facets);
-  if (!around->offsets || !around->facets) return qmat_fail_memory(context, "the facets around vertices");
-  size_t *offsets = around->offsets;
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) offsets[mesh->triangles[i] + 2]++;
-  for (size_t v = 0; v < mesh->vertex_count; v++) offsets[v + 2] += offsets[v + 1];
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
-    around->facets[offsets[mesh->triangles[i] + 1]++] = (uint32_t)(i / 3);
-  return QMAT_OK;
-}
-
 static double squared_centroid_distance(const qmat_surface *surface, uint32_t left, uint32_t right) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
@@ -154,7 +137,7 @@ static double squared_centroid_distance(const qmat_surface *surface, uint32_t le
 
 /* A value for a facet without one, from the known facets at its corners: that of the nearest, or the median of all;
  * `otherwise` if no facet there is known. */
-static double borrow_value(const qmat_surface *surface, const vertex_facets *around, const double *values,
+static double borrow_value(const qmat_surface *surface, const qmat_vertex_facets *around, const double *values,
                            const uint8_t *known, uint32_t facet, bool nearest, double otherwise) {
   const uint32_t *ids = qmat_surface_mesh(surface)->triangles + 3 * (size_t)facet;
   double found[3 * MOST_NEIGHBOURS], best = INFINITY;
@@ -204,10 +187,10 @@ static qmat_status fill_gaps(qmat_context *context, const qmat_surface *surface,
                           "and sheets of any surface");
   }
   const double mean = sum / (double)measured;
-  vertex_facets around;
+  qmat_vertex_facets around;
   uint8_t *known = qmat_arena_alloc(&context->arena, count, sizeof *known);
   if (!known) return qmat_fail_memory(context, "the facets' states");
-  qmat_status status = collect_vertex_facets(context, mesh, &around);
+  qmat_status status = qmat_vertex_facets_find(context, mesh, &around);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < count; i++) known[i] = states[i] == MEASURED;
   for (size_t i = 0; i < count; i++) {

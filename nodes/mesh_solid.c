@@ -375,25 +375,29 @@ static void interpolate(const double *const corners[3], double a, double b, doub
   for (size_t k = 0; k < 3; k++) point[k] = a * corners[0][k] + b * corners[1][k] + (1 - a - b) * corners[2][k];
 }
 
-/* Whether a triangle is covered at points `spacing` apart, or in MOST_ROWS rows. Its corners, the middles of its sides
- * and its centroid, all drawn a little towards the centroid, are first: most triangles end there. */
+/* Whether a triangle is covered: its corners, the middles of its sides and its centroid, all drawn a little towards the
+ * centroid, where most searches end; then points in rows along its longest side, `spacing` or the MOSTth part of a side
+ * apart. */
 static bool is_triangle_covered(const qmat_surface *solid, const double *const corners[3], double reach,
                                 double spacing) {
-  enum { MOST_ROWS = 128 };
+  enum { MOST = 128 };
   static const double weights[][2] = {{1, 0}, {0, 1}, {0, 0}, {0.5, 0.5}, {0, 0.5}, {0.5, 0}, {1.0 / 3, 1.0 / 3}};
-  const double length = qmat_triangle_longest_side(corners[0], corners[1], corners[2]).length;
-  const int rows = (int)fmin(ceil(length / spacing), MOST_ROWS);
   double point[3];
   for (size_t i = 0; i < sizeof weights / sizeof *weights; i++) {
     interpolate(corners, 0.99 * weights[i][0] + 0.01 / 3, 0.99 * weights[i][1] + 0.01 / 3, point);
     if (!is_covered(solid, point, reach)) return false;
   }
-  for (int i = 0; i < rows; i++)
-    for (int k = 0; k < 2 * (rows - i) - 1; k++) {
-      const double third = k % 2 == 0 ? 1.0 / 3 : 2.0 / 3;
-      interpolate(corners, (i + third) / rows, (k / 2 + third) / rows, point);
+  const qmat_longest_side side = qmat_triangle_longest_side(corners[0], corners[1], corners[2]);
+  const double *const turned[3] = {corners[(side.base + 2) % 3], corners[side.base], corners[(side.base + 1) % 3]};
+  const int rows = (int)fmin(ceil(side.height / spacing), MOST);
+  for (int i = 0; i < rows; i++) {
+    const double up = (i + 0.5) / rows;
+    const int count = (int)fmin(ceil((1 - up) * side.length / spacing), MOST);
+    for (int k = 0; k < count; k++) {
+      interpolate(turned, up, (1 - up) * (k + 0.5) / count, point);
       if (!is_covered(solid, point, reach)) return false;
     }
+  }
   return true;
 }
 
@@ -411,7 +415,7 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
-    if (t % 64 == 0) status = qmat_progress(s->context, t, count, "triangles of sheets");
+    if (t % 16 == 0) status = qmat_progress(s->context, t, count, "triangles of sheets");
   }
   return status;
 }
@@ -419,7 +423,7 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
 /* Where a part crosses itself, some of its triangles may have the outside on both sides. The union leaves them out, but
  * they were given: they become sheets. */
 static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *solids) {
-  enum { SLICE = 4096 };
+  enum { SLICE = 512 };
   const double reach = least_gap * epsilon_of(s);
   const int threads = qmat_threads(s->context);
   uint8_t covered[SLICE];
@@ -635,9 +639,8 @@ const qmat_node qmat_node_mesh_solid = {
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
-        "crosses itself, some of its triangles may have the outside on both sides, such as those of a folded cuff: "
-        "they "
-        "become sheets.\n\n"
+        "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
+        "they become sheets.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning.",

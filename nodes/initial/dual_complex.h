@@ -27,7 +27,7 @@ typedef struct qmat_dual_complex {
   const uint8_t *thin;                /* per point */
   const uint32_t *facets;             /* per point */
   const uint32_t *surface_components; /* per mesh vertex: smallest vertex of its component; NULL: one component */
-  const uint32_t *representatives;    /* per sample: the triangulated sample that represents it, possibly itself */
+  const uint32_t *representatives;    /* per point: the triangulated one that represents it, possibly itself */
   size_t site_count;                  /* triangulated points */
   qmat_tetrahedra cells;              /* corners are points */
   uint8_t *kinds;                     /* per cell: a qmat_cell_kind */

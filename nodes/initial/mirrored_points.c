@@ -6,6 +6,7 @@
 
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
+#include "core/geometry/vertex_facets.h"
 #include "nodes/measure/point_grid.h"
 
 /* A wall is thin up to this share of the distance between samples. */
@@ -28,12 +29,6 @@ static const double inset = 1e-6;
 /* Of a sample; with the mean one more. */
 enum { MOST_NORMALS = 7, SAMPLES_A_SLICE = 16384 };
 
-/* The facets around the vertices of a mesh: those of vertex i are items[starts[i] .. starts[i + 1]). */
-typedef struct stars {
-  size_t *starts;
-  uint32_t *items;
-} stars;
-
 /* Where a ray from a sample leaves the solid. */
 typedef struct crossing {
   double point[3], thickness;
@@ -52,7 +47,7 @@ typedef struct mirror {
   const qmat_samples *samples;
   const double *points; /* 3 per sample */
   const uint32_t *representatives;
-  stars around;
+  qmat_vertex_facets around;
   double *thin; /* per facet: a wall is thin up to this */
 } mirror;
 
@@ -63,17 +58,6 @@ typedef struct sample_normals {
   double inside[MOST_NORMALS][3]; /* towards the middle of a facet with this normal, no longer than `inset` */
   double thin;                    /* the largest of the facets */
 } sample_normals;
-
-static qmat_status find_stars(qmat_context *context, const qmat_mesh *mesh, stars *s) {
-  s->starts = qmat_arena_calloc(&context->arena, mesh->vertex_count + 2, sizeof *s->starts);
-  s->items = qmat_arena_alloc(&context->arena, 3 * mesh->triangle_count, sizeof *s->items);
-  if (!s->starts || !s->items) return qmat_fail_memory(context, "the facets around vertices");
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) s->starts[mesh->triangles[i] + 2]++;
-  for (size_t i = 0; i < mesh->vertex_count; i++) s->starts[i + 2] += s->starts[i + 1];
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
-    s->items[s->starts[mesh->triangles[i] + 1]++] = (uint32_t)(i / 3);
-  return QMAT_OK;
-}
 
 /* The distance between the samples of each facet gives the thickness of a thin wall. */
 static qmat_status find_thin(qmat_context *context, mirror *m, double closest) {
@@ -114,21 +98,21 @@ static void add_normal(const mirror *m, const double *point, uint32_t facet, sam
 static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
   const uint32_t facet = m->samples->facets[sample], *ids = &m->mesh->triangles[3 * (size_t)facet];
   const double *weights = &m->samples->barycentrics[3 * sample], *point = &m->points[3 * sample];
-  const uint32_t *items = m->around.items;
-  const size_t *starts = m->around.starts;
+  const uint32_t *facets = m->around.facets;
+  const size_t *offsets = m->around.offsets;
   n->count = 0;
   n->thin = 0;
   if (sample < m->samples->vertex_count) {
-    for (size_t i = starts[sample]; i < starts[sample + 1]; i++) add_normal(m, point, items[i], n);
+    for (size_t i = offsets[sample]; i < offsets[sample + 1]; i++) add_normal(m, point, facets[i], n);
     return;
   }
   add_normal(m, point, facet, n);
   for (size_t k = 0; k < 3; k++) {
     if (weights[k] > 0) continue;
     const uint32_t a = ids[(k + 1) % 3], b = ids[(k + 2) % 3];
-    for (size_t i = starts[a]; i < starts[a + 1]; i++) {
-      const uint32_t *other = &m->mesh->triangles[3 * (size_t)items[i]];
-      if (other[0] == b || other[1] == b || other[2] == b) add_normal(m, point, items[i], n);
+    for (size_t i = offsets[a]; i < offsets[a + 1]; i++) {
+      const uint32_t *other = &m->mesh->triangles[3 * (size_t)facets[i]];
+      if (other[0] == b || other[1] == b || other[2] == b) add_normal(m, point, facets[i], n);
     }
   }
 }
@@ -218,7 +202,7 @@ qmat_status qmat_mirrored_points_find(qmat_context *context, const qmat_surface 
   *mirrored = (qmat_mirrored_points){.count = 0};
   qmat_point_grid known;
   qmat_status status = find_known(context, &m, &known);
-  if (status == QMAT_OK) status = find_stars(context, m.mesh, &m.around);
+  if (status == QMAT_OK) status = qmat_vertex_facets_find(context, m.mesh, &m.around);
   if (status == QMAT_OK) status = find_thin(context, &m, closest);
   if (status != QMAT_OK) return status;
   const size_t slice = samples->count < SAMPLES_A_SLICE ? samples->count : SAMPLES_A_SLICE;
