@@ -96,12 +96,14 @@ static bool is_alive(const char *job) {
   return ask(&command, line, sizeof line) && *line;
 }
 
+/* Cancels the job, and waits for at most 20 seconds until its tasks have ended: they write files to the last. */
 static void cancel(const char *job) {
   qmat_writer command = {0};
   char line[64];
   qmat_put_text(&command, "scancel ");
   qmat_put_text(&command, job);
   ask(&command, line, sizeof line);
+  for (int i = 0; i < 100 && is_alive(job); i++) nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
 }
 
 static void exit_path(const char *folder, size_t index, char path[4200]) {
