@@ -30,6 +30,10 @@ static const double spacing_share = 0.5;
  * of an open surface there is no solid that a sphere could fill. */
 static const double nearer_share = 0.9;
 
+/* Samples at most this far apart, in limits, show whether they help: a spike that is narrower than their spacing stays
+ * as far as it was. */
+static const double fine_share = 0.25;
+
 /* Samples are added up to this distance from a far place, as a multiple of their spacing. */
 static const double reach_of_samples = 3;
 
@@ -231,15 +235,17 @@ static qmat_status find_widest_gap(const refiner *r, const refinement *from, dou
 
 /* --- the node ---------------------------------------------------------------------------------------------------- */
 
-static bool is_better(const refinement *a, const refinement *b) {
-  return a->excess < b->excess;
+/* A round within epsilon is better than one that is not, then the one with less excess. */
+static bool is_better(const refinement *a, const refinement *b, double epsilon) {
+  const bool within = a->farthest <= epsilon;
+  return within == (b->farthest <= epsilon) ? a->excess < b->excess : within;
 }
 
 /* Repeats with half the spacing until no place is farther than `enough`, or all that are have been given up. The first
  * samples are as far apart as the gaps between those around: much finer ones would leave the places between both too
- * far. Where the spacing is at most the limit, a round that does not improve is the last one, and places are given up:
- * coarser samples may only be too coarse. `*best` is the round with the least excess. */
-static qmat_status refine_in_rounds(refiner *r, double limit, double enough, refinement *rounds, size_t *best) {
+ * far. Where the spacing is fine, a round that does not improve is the last one, and places are given up. */
+static qmat_status refine_in_rounds(refiner *r, double epsilon, double limit, double enough, refinement *rounds,
+                                    size_t *best) {
   qmat_surface *surface;
   qmat_status status = qmat_surface_new_of_solids(r->context, r->mesh, &surface);
   if (status == QMAT_OK) status = give_up_without_solid(r, surface, &rounds[0], limit);
@@ -249,7 +255,7 @@ static qmat_status refine_in_rounds(refiner *r, double limit, double enough, ref
   double spacing = qmat_larger(gap, limit);
   for (int64_t i = 0; i < r->params->rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
-    const bool is_fine = spacing <= limit;
+    const bool is_fine = spacing <= fine_share * limit;
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
     spacing *= 0.5;
     if (status != QMAT_OK) break;
@@ -258,7 +264,7 @@ static qmat_status refine_in_rounds(refiner *r, double limit, double enough, ref
       continue;
     }
     newest++;
-    if (is_better(next, &rounds[*best]))
+    if (is_better(next, &rounds[*best], epsilon))
       *best = newest;
     else if (is_fine)
       break;
@@ -284,7 +290,7 @@ static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best
   if (status != QMAT_OK || rounds[0].far_count == 0) return status;
   status = qmat_crease_spheres_of_medial(r->context, rounds[0].medial, &r->creases);
   if (status == QMAT_OK) status = find_far_places(r, limit, &rounds[0]);
-  return status == QMAT_OK ? refine_in_rounds(r, limit, enough, rounds, best) : status;
+  return status == QMAT_OK ? refine_in_rounds(r, epsilon, limit, enough, rounds, best) : status;
 }
 
 static qmat_status make_report(qmat_context *context, const refinement *rounds, size_t best, qmat_report *report) {
@@ -363,15 +369,16 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 16,
+    .version = 17,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
         "distance at all samples and at a grid between them. If a point is farther than the trigger, evenly spaced "
         "samples are added around all points farther than the target, and the medial mesh is made again. The first "
         "ones are as far apart as the gaps between the samples there. Each further round halves that, until no point "
-        "is farther than the trigger. Places that a round brings no nearer are given up, as are those of an open "
-        "surface without solid below. The result is the round that leaves the least excess over the target.\n\n"
+        "is farther than the trigger. Places that fine samples bring no nearer are given up, as are those of an "
+        "open surface without solid below. The result is the round that leaves the least excess over the target, of "
+        "those within epsilon if there are any.\n\n"
         "The spheres that medial.features has added stay as they are and are linked again in each round. No samples "
         "are needed next to them.\n\n"
         "If no point is that far, samples and medial mesh pass through unchanged, so a new epsilon recomputes nothing "

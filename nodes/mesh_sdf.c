@@ -109,7 +109,7 @@ static facet_state measure_facet(const qmat_surface *surface, const cone_ray *ra
     const double *local = rays[i].direction;
     double direction[3], hit_normal[3], distance;
     for (int k = 0; k < 3; k++) direction[k] = local[0] * first[k] + local[1] * second[k] - local[2] * normal[k];
-    if (!qmat_surface_cast(surface, centroid, direction, RAY_START, &distance, NULL, hit_normal)) continue;
+    if (!qmat_surface_cast(surface, centroid, direction, RAY_START, INFINITY, &distance, NULL, hit_normal)) continue;
     /* A surface that faces the same way is hit from outside (Shapira et al. 2008, section 3.1). */
     if (qmat_dot(hit_normal, normal) > SAME_SIDE) continue;
     lengths[count] = distance;

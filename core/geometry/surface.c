@@ -137,7 +137,7 @@ static void set_ray(struct RTCRay *ray, const double origin[3], const double dir
 }
 
 bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], const double direction[3], double start,
-                       double *distance, uint32_t *triangle, double *normal) {
+                       double end, double *distance, uint32_t *triangle, double *normal) {
   query_context query;
   rtcInitIntersectContext(&query.base);
   query.kind = NEAREST_HIT;
@@ -150,20 +150,22 @@ bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], cons
   query.offset = start - TIE;
   if (foot - 1 > query.offset) query.offset = foot - 1;
   if (!(foot + 1 > query.offset)) return false;
+  const double length = end - query.offset + 2 * LONGEST_CORRECTION; /* beyond what rounding can hide */
+  if (!(length > 0)) return false;
 
   /* One query that visits all hits is faster than one for the nearest hit and another for its ties. */
   struct RTCRay ray;
   query.distance = INFINITY;
   query.triangle = UINT32_MAX;
-  set_ray(&ray, origin, direction, query.offset, 0, INFINITY);
+  set_ray(&ray, origin, direction, query.offset, 0, (float)length);
   rtcOccluded1(surface->scene, &query.base, &ray);
-  if (query.triangle == UINT32_MAX) return false;
+  if (query.triangle == UINT32_MAX || query.distance > end) return false;
   if (distance) *distance = query.distance;
   if (triangle) *triangle = query.triangle;
   if (normal) {
     triangle_normal(surface, query.triangle, normal);
-    const double length = sqrt(qmat_dot(normal, normal));
-    for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
+    const double twice_area = sqrt(qmat_dot(normal, normal));
+    for (int i = 0; i < 3; i++) normal[i] = twice_area > 0 ? normal[i] / twice_area : 0;
   }
   return true;
 }

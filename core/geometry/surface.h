@@ -75,10 +75,10 @@ bool qmat_surface_is_watertight(const qmat_surface *surface);
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
                                  double limit, uint32_t *failed);
 
-/* The first hit beyond `start` (>= 0) of a ray from `origin` along the unit vector `direction`: its distance in double
- * precision, its triangle (the smallest of equally distant ones), and the triangle's unit normal (3 doubles, zero for a
- * degenerate triangle). Each may be NULL. False when nothing is hit. */
+/* The first hit beyond `start` (>= 0) and up to `end` (INFINITY: anywhere) of a ray from `origin` along the unit vector
+ * `direction`: its distance in double precision, its triangle (the smallest of equally distant ones), and the
+ * triangle's unit normal (3 doubles, zero for a degenerate triangle). Each may be NULL. False when nothing is hit. */
 bool qmat_surface_cast(const qmat_surface *surface, const double origin[3], const double direction[3], double start,
-                       double *distance, uint32_t *triangle, double *normal);
+                       double end, double *distance, uint32_t *triangle, double *normal);
 
 #endif

@@ -22,7 +22,7 @@ typedef struct qmat_dual_complex {
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   const qmat_surface *surface;
-  size_t point_count;                 /* the samples, then the points across thin walls from them */
+  size_t point_count;                 /* the samples, then the mirrored points */
   const double *points;               /* 3 per point */
   const uint8_t *thin;                /* per point */
   const uint32_t *facets;             /* per point */

@@ -9,36 +9,36 @@
 #include "core/geometry/vertex_facets.h"
 #include "nodes/measure/point_grid.h"
 
-/* A wall is thin up to this share of the distance between samples. */
-static const double thin_share = 0.25;
+/* A wall or gap is narrow up to this share of the distance between samples. */
+static const double narrow_share = 0.5;
 
-/* A point is not added within this share of the thickness around a sample. */
+/* A point is not added within this share of the width around a sample. */
 static const double near_share = 0.25;
 
 /* Normals with a larger cosine are one normal. */
 static const double same_normal = 0.98;
 
-/* The least cosine between a ray and the outward normal of the facet where it leaves the solid: at the corner of a box
- * the mean of the normals has 0.58 with each. */
+/* The least cosine between a ray along a normal and the normal of the facet that it hits. Rays along the mean of
+ * normals have none: in a narrow spike they meet the other side at any angle. */
 static const double facing = 0.5;
 
-/* Rays start this far (unit frame) beside their sample, where that lies on the side of a facet. A thinner wall has no
+/* Rays start this far (unit frame) beside their sample, where that lies on the side of a facet. What is narrower has no
  * inside that could be told from its surface. */
 static const double inset = 1e-6;
 
 /* Of a sample; with the mean one more. */
 enum { MOST_NORMALS = 7, SAMPLES_A_SLICE = 16384 };
 
-/* Where a ray from a sample leaves the solid. */
+/* Where a ray from a sample leaves the solid, or enters it again. */
 typedef struct crossing {
-  double point[3], thickness;
+  double point[3], width;
   uint32_t facet;
 } crossing;
 
 /* Those of a sample. */
 typedef struct crossings {
   size_t count;
-  crossing items[MOST_NORMALS + 1];
+  crossing items[2 * (MOST_NORMALS + 1)];
 } crossings;
 
 typedef struct mirror {
@@ -48,7 +48,7 @@ typedef struct mirror {
   const double *points; /* 3 per sample */
   const uint32_t *representatives;
   qmat_vertex_facets around;
-  double *thin; /* per facet: a wall is thin up to this */
+  double *narrow; /* per facet: a wall or gap is narrow up to this */
 } mirror;
 
 /* The different normals of the facets of a sample. */
@@ -56,16 +56,16 @@ typedef struct sample_normals {
   size_t count;
   double items[MOST_NORMALS][3];
   double inside[MOST_NORMALS][3]; /* towards the middle of a facet with this normal, no longer than `inset` */
-  double thin;                    /* the largest of the facets */
+  double narrow;                  /* the largest of the facets */
 } sample_normals;
 
-/* The distance between the samples of each facet gives the thickness of a thin wall. */
-static qmat_status find_thin(qmat_context *context, mirror *m, double closest) {
+/* The distance between the samples of each facet says what is narrow there. */
+static qmat_status find_narrow(qmat_context *context, mirror *m, double closest) {
   const qmat_mesh *mesh = m->mesh;
   const double *positions = qmat_surface_positions(m->surface);
   uint32_t *added = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *added);
-  m->thin = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *m->thin);
-  if (!added || !m->thin) return qmat_fail_memory(context, "the distances between samples");
+  m->narrow = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *m->narrow);
+  if (!added || !m->narrow) return qmat_fail_memory(context, "the distances between samples");
   for (size_t i = m->samples->vertex_count; i < m->samples->count; i++)
     if (m->samples->facets[i] < mesh->triangle_count) added[m->samples->facets[i]]++;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -75,7 +75,7 @@ static qmat_status find_thin(qmat_context *context, mirror *m, double closest) {
     double normal[3], apart = longest.length;
     const double area = qmat_triangle_area(corners[0], corners[1], corners[2], normal);
     if (added[t] > 0) apart = qmat_smaller(apart, sqrt(2 * area / added[t]));
-    m->thin[t] = thin_share * qmat_larger(apart, closest);
+    m->narrow[t] = narrow_share * qmat_larger(apart, closest);
   }
   return QMAT_OK;
 }
@@ -85,7 +85,7 @@ static void add_normal(const mirror *m, const double *point, uint32_t facet, sam
   for (size_t k = 0; k < 3; k++) corners[k] = &positions[3 * (size_t)m->mesh->triangles[3 * (size_t)facet + k]];
   double normal[3], *inside = n->inside[n->count];
   if (n->count == MOST_NORMALS || !(qmat_triangle_area(corners[0], corners[1], corners[2], normal) > 0)) return;
-  n->thin = qmat_larger(n->thin, m->thin[facet]);
+  n->narrow = qmat_larger(n->narrow, m->narrow[facet]);
   for (size_t i = 0; i < n->count; i++)
     if (qmat_dot(n->items[i], normal) > same_normal) return;
   for (size_t k = 0; k < 3; k++) inside[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3 - point[k];
@@ -101,7 +101,7 @@ static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
   const uint32_t *facets = m->around.facets;
   const size_t *offsets = m->around.offsets;
   n->count = 0;
-  n->thin = 0;
+  n->narrow = 0;
   if (sample < m->samples->vertex_count) {
     for (size_t i = offsets[sample]; i < offsets[sample + 1]; i++) add_normal(m, point, facets[i], n);
     return;
@@ -117,19 +117,20 @@ static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
   }
 }
 
-/* Casts a ray from `beside` the sample against the normal. */
-static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double thin,
-                  crossings *found) {
-  crossing *c = &found->items[found->count];
-  double origin[3], inward[3], far_normal[3];
-  for (size_t k = 0; k < 3; k++) {
-    origin[k] = sample[k] + beside[k];
-    inward[k] = -normal[k];
+/* Casts rays from `beside` the sample against the normal through the solid, and along it through what is outside. */
+static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double narrow,
+                  double least_cosine, crossings *found) {
+  double origin[3];
+  for (size_t k = 0; k < 3; k++) origin[k] = sample[k] + beside[k];
+  for (int side = -1; side <= 1; side += 2) {
+    crossing *c = &found->items[found->count];
+    double direction[3], far_normal[3];
+    for (size_t k = 0; k < 3; k++) direction[k] = side * normal[k];
+    if (!qmat_surface_cast(m->surface, origin, direction, inset, narrow, &c->width, &c->facet, far_normal)) continue;
+    if (!(-side * qmat_dot(direction, far_normal) > least_cosine)) continue;
+    for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + c->width * direction[k];
+    found->count++;
   }
-  if (!qmat_surface_cast(m->surface, origin, inward, inset, &c->thickness, &c->facet, far_normal)) return;
-  if (c->thickness > thin || qmat_dot(inward, far_normal) < facing) return;
-  for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + c->thickness * inward[k];
-  found->count++;
 }
 
 static void find_crossings(const mirror *m, size_t sample, crossings *found) {
@@ -140,13 +141,13 @@ static void find_crossings(const mirror *m, size_t sample, crossings *found) {
   sample_normals n;
   find_normals(m, sample, &n);
   for (size_t i = 0; i < n.count; i++) {
-    cross(m, point, n.inside[i], n.items[i], n.thin, found);
+    cross(m, point, n.inside[i], n.items[i], n.narrow, facing, found);
     for (size_t k = 0; k < 3; k++) mean[k] += n.items[i][k];
   }
   const double length = sqrt(qmat_dot(mean, mean));
   if (n.count < 2 || !(length > inset)) return;
   for (size_t k = 0; k < 3; k++) mean[k] /= length;
-  cross(m, point, (const double[3]){0, 0, 0}, mean, n.thin, found);
+  cross(m, point, (const double[3]){0, 0, 0}, mean, n.narrow, 0, found);
 }
 
 /* Makes room for one more point. */
@@ -155,7 +156,7 @@ static qmat_status reserve(qmat_context *context, qmat_mirrored_points *mirrored
   const size_t larger = *room > 0 ? 2 * *room : 1024;
   double *points = qmat_arena_alloc(&context->arena, larger, 3 * sizeof *points);
   uint32_t *facets = qmat_arena_alloc(&context->arena, larger, sizeof *facets);
-  if (!points || !facets) return qmat_fail_memory(context, "points across thin walls");
+  if (!points || !facets) return qmat_fail_memory(context, "mirrored points");
   if (*room > 0) {
     memcpy(points, mirrored->points, 3 * *room * sizeof *points);
     memcpy(facets, mirrored->facets, *room * sizeof *facets);
@@ -172,7 +173,7 @@ static qmat_status add_crossings(qmat_context *context, const qmat_point_grid *k
   const size_t first = mirrored->count;
   for (size_t i = 0; i < found->count; i++) {
     const crossing *c = &found->items[i];
-    const double near = qmat_larger(near_share * c->thickness, 2 * inset);
+    const double near = qmat_larger(near_share * c->width, 2 * inset);
     bool is_near = qmat_point_grid_has_within(known, c->point, near);
     for (size_t k = first; k < mirrored->count && !is_near; k++)
       is_near = qmat_point_distance(&mirrored->points[3 * k], c->point) <= near;
@@ -203,11 +204,11 @@ qmat_status qmat_mirrored_points_find(qmat_context *context, const qmat_surface 
   qmat_point_grid known;
   qmat_status status = find_known(context, &m, &known);
   if (status == QMAT_OK) status = qmat_vertex_facets_find(context, m.mesh, &m.around);
-  if (status == QMAT_OK) status = find_thin(context, &m, closest);
+  if (status == QMAT_OK) status = find_narrow(context, &m, closest);
   if (status != QMAT_OK) return status;
   const size_t slice = samples->count < SAMPLES_A_SLICE ? samples->count : SAMPLES_A_SLICE;
   crossings *found = qmat_arena_alloc(&context->arena, slice, sizeof *found);
-  if (!found) return qmat_fail_memory(context, "points across thin walls");
+  if (!found) return qmat_fail_memory(context, "mirrored points");
   const int threads = qmat_threads(context);
   size_t room = 0;
   for (size_t first = 0; first < samples->count; first += slice) {

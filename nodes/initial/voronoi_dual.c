@@ -142,8 +142,8 @@ static void sort_numbers(uint32_t *row, size_t length) {
   }
 }
 
-/* The samples that a triangulated point represents, in rising order: itself and others, or none if it lies across a
- * thin wall from one. Those of point i are items[starts[i] .. starts[i + 1]). */
+/* The samples that a triangulated point represents, in rising order: itself and others, or none if it is a
+ * mirrored point. Those of point i are items[starts[i] .. starts[i + 1]). */
 typedef struct {
   size_t *starts;
   uint32_t *items;
@@ -258,7 +258,7 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
       {"samples", d->samples->count},
       {"sheet_spheres", medial->sheet_sphere_count},
       {"samples_triangulated", d->site_count - (d->point_count - d->samples->count)},
-      {"points_across_thin_walls", d->point_count - d->samples->count},
+      {"mirrored_points", d->point_count - d->samples->count},
       {"tetrahedra", d->cells.count},
       {"circumcentres", made->by_kind[QMAT_CELL_CIRCUMCENTRE]},
       {"incentres", made->by_kind[QMAT_CELL_INCENTRE]},
@@ -277,7 +277,7 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
   return bad ? qmat_fail_memory(d->context, "the report") : QMAT_OK;
 }
 
-/* Finds the points to triangulate: the samples with their representatives, then those across thin walls. */
+/* Finds the points to triangulate: the samples with their representatives, then the mirrored points. */
 static qmat_status find_points(qmat_dual_complex *d, const qmat_field *thickness, const double *reaches) {
   qmat_context *context = d->context;
   qmat_arena *arena = &context->arena;

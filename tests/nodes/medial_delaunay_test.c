@@ -280,7 +280,25 @@ static void test_walls_much_thinner_than_the_spacing_are_filled(void **state) {
     assert_near(area, expected, 0.05 * expected);
     assert_int_equal(pipeline_components(p.medial), 1);
     assert_int_equal(pipeline_count(p.report, "links"), 0);
-    assert_true(pipeline_count(p.report, "points_across_thin_walls") > 1000);
+    assert_true(pipeline_count(p.report, "mirrored_points") > 1000);
+    pipeline_free(&p);
+  }
+}
+
+/* Two boxes beside a gap much narrower than the spacing have the medial mesh that each has alone. */
+static void test_gaps_much_narrower_than_the_spacing_separate(void **state) {
+  (void)state;
+  static const double gaps[] = {0.3, 0.01, 0.001, 0.0001};
+  double first = 0;
+  for (size_t i = 0; i < sizeof gaps / sizeof *gaps; i++) {
+    qmat_mesh *mesh = shape_box(1, 1, 0.34);
+    shape_add_box(mesh, 0.1, 0.1, 0.34 + gaps[i], 0.9, 0.9, 0.43 + gaps[i], false);
+    pipeline p;
+    pipeline_make(&p, shape_seal(mesh), "", "");
+    assert_int_equal(pipeline_components(p.medial), 2);
+    assert_int_equal(pipeline_count(p.report, "links"), 0);
+    if (i == 0) first = (double)p.medial->sphere_count;
+    assert_true((double)p.medial->sphere_count < 1.5 * first);
     pipeline_free(&p);
   }
 }
@@ -789,6 +807,7 @@ int main(void) {
       cmocka_unit_test(test_capsule_gives_its_axis),
       cmocka_unit_test(test_thin_sheet_gives_one_piece_near_its_middle),
       cmocka_unit_test(test_walls_much_thinner_than_the_spacing_are_filled),
+      cmocka_unit_test(test_gaps_much_narrower_than_the_spacing_separate),
       cmocka_unit_test(test_torus_keeps_its_loop),
       cmocka_unit_test(test_two_solids_give_two_pieces),
       cmocka_unit_test(test_spheres_beside_each_other_are_not_joined),

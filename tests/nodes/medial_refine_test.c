@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/envelope.h"
+#include "core/geometry/vector.h"
 #include "core/hash.h"
 #include "tests/nodes/pipeline.h"
 
@@ -339,6 +340,51 @@ static void test_the_first_samples_are_not_much_finer_than_those_around(void **s
   pipeline_free(&p);
 }
 
+/* Adds `count` tetrahedra in the unit cube, much longer than wide. */
+static void add_spikes(qmat_mesh *mesh, size_t count, uint64_t seed) {
+  static const int facets[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  for (size_t i = 0; i < count; i++) {
+    double u[18], p[4][3], edges[3][3], normal[3];
+    for (size_t k = 0; k < 18; k++) u[k] = qmat_hash_unit(qmat_hash3(seed, i, k));
+    const double width = 0.003 + 0.017 * u[0], length = 0.05 + 0.25 * u[1];
+    double direction[3];
+    for (size_t k = 0; k < 3; k++) direction[k] = 2 * u[2 + k] - 1;
+    const double scale = length / sqrt(qmat_dot(direction, direction));
+    for (size_t c = 0; c < 4; c++)
+      for (size_t k = 0; k < 3; k++)
+        p[c][k] = u[5 + k] + (c < 3 ? 4 * width * (u[8 + 3 * c + k] - 0.5) : scale * direction[k]);
+    for (size_t c = 0; c < 3; c++) qmat_subtract(p[c + 1], p[0], edges[c]);
+    qmat_cross(edges[0], edges[1], normal);
+    const bool turned = qmat_dot(normal, edges[2]) < 0;
+    uint32_t ids[4];
+    for (size_t c = 0; c < 4; c++) ids[c] = shape_vertex(mesh, p[c][0], p[c][1], p[c][2]);
+    for (size_t f = 0; f < 4; f++)
+      shape_triangle(mesh, ids[facets[f][0]], ids[facets[f][turned ? 2 : 1]], ids[facets[f][turned ? 1 : 2]]);
+  }
+}
+
+/* Near their tips the samples of two edges represent those of the third, and the first samples of a round are farther
+ * apart than spikes are wide. */
+static void test_narrow_spikes_are_filled_to_their_tips(void **state) {
+  (void)state;
+  double farthest = 0, left = 0;
+  for (uint64_t seed = 3; seed < 6; seed++) {
+    qmat_mesh *mesh = qmat_mesh_new();
+    add_spikes(mesh, 100, seed);
+    pipeline p;
+    pipeline_make(&p, mesh, "", "");
+    qmat_value *outputs[PIPELINE_MOST_PORTS];
+    must_refine(&p, 0, "epsilon=2%", outputs);
+    const qmat_report *report = (const qmat_report *)outputs[REFINED_REPORT];
+    farthest = fmax(farthest, pipeline_number(report, "farthest_place"));
+    left = fmax(left, pipeline_number(report, "farthest_place_left"));
+    release(outputs);
+    pipeline_free(&p);
+  }
+  assert_true(farthest > 0.02);
+  assert_true(left <= 0.02);
+}
+
 static void test_nothing_is_refined_where_the_mesh_itself_is_farther_than_epsilon(void **state) {
   (void)state;
   pipeline p;
@@ -391,6 +437,7 @@ int main(void) {
       cmocka_unit_test(test_threads_do_not_change_a_byte),
       cmocka_unit_test(test_spheres_on_creases_stay_and_are_linked_again),
       cmocka_unit_test(test_the_first_samples_are_not_much_finer_than_those_around),
+      cmocka_unit_test(test_narrow_spikes_are_filled_to_their_tips),
       cmocka_unit_test(test_nothing_is_refined_where_the_mesh_itself_is_farther_than_epsilon),
       cmocka_unit_test(test_what_does_not_belong_together_is_named),
   };

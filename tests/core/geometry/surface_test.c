@@ -194,13 +194,17 @@ static void check_against_brute_force(qmat_mesh *mesh, size_t count) {
     if (clearance < 1e-4) continue;
     double distance, normal[3];
     uint32_t triangle;
-    const bool hit = qmat_surface_cast(surface, p, direction, start, &distance, &triangle, normal);
+    const bool hit = qmat_surface_cast(surface, p, direction, start, INFINITY, &distance, &triangle, normal);
     assert_int_equal(hit, isfinite(expected));
     hits += hit;
     misses += !hit;
     if (!hit) continue;
     assert_near(distance, expected, 1e-12);
     assert_near(dot(normal, normal), 1, 1e-12);
+    double near;
+    assert_true(qmat_surface_cast(surface, p, direction, start, distance, &near, NULL, NULL));
+    assert_near(near, distance, 0);
+    assert_false(qmat_surface_cast(surface, p, direction, start, distance * (1 - 1e-9), &near, NULL, NULL));
     double q[3];
     for (int k = 0; k < 3; k++) q[k] = p[k] + distance * direction[k];
     assert_true(distance_to_triangle(corner(surface, triangle, 0), corner(surface, triangle, 1),
@@ -420,10 +424,10 @@ static void test_equally_close_triangles_give_the_smallest(void **state) {
   const double centre[3] = {0, 0, 0}, up[3] = {0, 0, 1}, s = sqrt(1.0 / 3), diagonal[3] = {s, s, s};
   uint32_t triangle;
   double distance;
-  assert_true(qmat_surface_cast(surface, centre, up, 0, &distance, &triangle, NULL));
+  assert_true(qmat_surface_cast(surface, centre, up, 0, INFINITY, &distance, &triangle, NULL));
   assert_near(distance, s / 2, 1e-15);
   assert_int_equal(triangle, 2);
-  assert_true(qmat_surface_cast(surface, centre, diagonal, 0, &distance, &triangle, NULL));
+  assert_true(qmat_surface_cast(surface, centre, diagonal, 0, INFINITY, &distance, &triangle, NULL));
   assert_near(distance, 0.5, 1e-15);
   release(surface);
 }
@@ -471,7 +475,7 @@ static void test_doubled_triangles_give_the_first_of_each_pair(void **state) {
     uint32_t triangle;
     qmat_surface_distance(surface, p, INFINITY, NULL, &triangle);
     assert_true(triangle < count);
-    if (qmat_surface_cast(surface, p, down, 0, NULL, &triangle, NULL)) assert_true(triangle < count);
+    if (qmat_surface_cast(surface, p, down, 0, INFINITY, NULL, &triangle, NULL)) assert_true(triangle < count);
   }
   release(surface);
 }
@@ -540,9 +544,9 @@ static void test_far_points_are_outside_at_the_right_distance(void **state) {
   for (size_t i = 0; i < 3; i++) {
     const double origin[3] = {aim[0], aim[1], far[i]}, down[3] = {0, 0, -1}, up[3] = {0, 0, 1};
     double distance;
-    assert_true(qmat_surface_cast(surface, origin, down, 0, &distance, NULL, NULL));
+    assert_true(qmat_surface_cast(surface, origin, down, 0, INFINITY, &distance, NULL, NULL));
     assert_near(distance, far[i] - 1.0 / 6, 1e-15 * far[i]);
-    assert_false(qmat_surface_cast(surface, origin, up, 0, &distance, NULL, NULL));
+    assert_false(qmat_surface_cast(surface, origin, up, 0, INFINITY, &distance, NULL, NULL));
   }
   release(surface);
 }
@@ -557,7 +561,7 @@ static void test_rays_from_the_surface_leave_their_own_triangle(void **state) {
     double p[3], direction[3] = {0, 0, t < 2 ? 1 : -1}, distance, normal[3];
     for (int k = 0; k < 3; k++)
       p[k] = (corner(surface, t, 0)[k] + corner(surface, t, 1)[k] + corner(surface, t, 2)[k]) / 3;
-    assert_true(qmat_surface_cast(surface, p, direction, 1e-9, &distance, NULL, normal));
+    assert_true(qmat_surface_cast(surface, p, direction, 1e-9, INFINITY, &distance, NULL, normal));
     assert_near(distance, 1e-6, 1e-15);
     assert_near(normal[2], direction[2], 1e-15);
   }
@@ -590,7 +594,7 @@ static void test_thread_count_does_not_change_an_answer(void **state) {
       for (int k = 0; k < 3; k++) direction[k] /= length;
       answer[0] = qmat_surface_distance(surface, points + 3 * i, INFINITY, answer + 1, &near);
       answer[4] = near;
-      qmat_surface_cast(surface, points + 3 * i, direction, 0, answer + 5, &hit, NULL);
+      qmat_surface_cast(surface, points + 3 * i, direction, 0, INFINITY, answer + 5, &hit, NULL);
       answer[6] = hit;
       answer[7] = inside[i];
     }

@@ -116,7 +116,7 @@ static void test_samples_on_a_plate_have_points_across_it(void **state) {
 static void test_thick_solids_have_none_unless_samples_are_far_apart(void **state) {
   (void)state;
   setting s;
-  prepare(&s, shape_seal(shape_box(1, 1, 0.5)), 1);
+  prepare(&s, shape_seal(shape_box(1, 1, 1)), 1);
   find(&s, 0);
   assert_int_equal(s.found.count, 0);
   find(&s, 5);
@@ -148,6 +148,31 @@ static void test_edges_of_a_tray_lie_across_each_other(void **state) {
   double across[3];
   for (size_t k = 0; k < 3; k++) across[k] = s.points[3 * moved + k] + (k < 2 ? thickness / diagonal : 0);
   assert_true(distance_to_others(s.found.points, s.found.count, across) < 1e-6);
+  finish(&s);
+}
+
+/* Samples inside the sides of a gap between two thick boxes have a point straight across it: also those of the larger
+ * side, as far as the smaller one reaches. */
+static void test_samples_on_a_gap_have_points_across_it(void **state) {
+  (void)state;
+  setting s;
+  const double gap = 0.001;
+  qmat_mesh *mesh = shape_box(1, 1, 0.5);
+  shape_add_box(mesh, 0.2, 0.2, 0.5 + gap, 0.8, 0.8, 1, false);
+  prepare(&s, shape_seal(mesh), 5);
+  find(&s, 0);
+  const double width = gap / qmat_surface_frame(s.surface)->diagonal;
+  size_t on_the_larger = 0, on_the_smaller = 0;
+  for (size_t i = 0; i < s.found.count; i++) {
+    const double *point = &s.found.points[3 * i], nearest = distance_to_others(s.points, s.samples->count, point);
+    assert_true(nearest > 0.25 * width && nearest < 1.8 * width);
+    assert_near(qmat_surface_distance_to_triangle(s.surface, point, s.found.facets[i]), 0, 1e-9);
+    /* Each box has twelve facets. */
+    on_the_larger += s.found.facets[i] < 12;
+    on_the_smaller += s.found.facets[i] >= 12;
+  }
+  assert_true(on_the_larger >= 10); /* from two facets of five samples each, and from corners */
+  assert_true(on_the_smaller > 0);
   finish(&s);
 }
 
@@ -189,6 +214,7 @@ int main(void) {
       cmocka_unit_test(test_samples_on_a_plate_have_points_across_it),
       cmocka_unit_test(test_thick_solids_have_none_unless_samples_are_far_apart),
       cmocka_unit_test(test_edges_of_a_tray_lie_across_each_other),
+      cmocka_unit_test(test_samples_on_a_gap_have_points_across_it),
       cmocka_unit_test(test_threads_and_position_do_not_matter),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
