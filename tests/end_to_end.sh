@@ -84,9 +84,9 @@ done
 for name in sphere capsule tapered-capsule torus sheet box; do
   if [ ! -s "$name.ma" ]; then continue; fi
   holds "$name: its known medial mesh is made" "$build/qmat_models" "$name" --medial "$name-known.ma"
-  # The sheet is 1 % thick, so its spheres are checked to three tenths of that.
+  # The sheet is 1 % thick, so its spheres are checked to a quarter of that.
   near=1%
-  if [ "$name" = sheet ]; then near=0.3%; fi
+  if [ "$name" = sheet ]; then near=0.25%; fi
   judge "$name: the true medial axis" "models/$name.off" "$name.ma" --known "$name-known.ma" --near $near --samples 1000
 done
 

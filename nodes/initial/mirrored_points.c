@@ -9,8 +9,11 @@
 #include "core/geometry/vertex_facets.h"
 #include "nodes/measure/point_grid.h"
 
-/* A wall or gap is narrow up to this share of the distance between samples. */
+/* A gap is narrow up to this share of the distance between samples. */
 static const double narrow_share = 0.5;
+
+/* A wall is narrow up to this share of what a gap is. */
+static const double wall_share = 0.5;
 
 /* A point is not added within this share of the width around a sample. */
 static const double near_share = 0.25;
@@ -126,7 +129,9 @@ static void cross(const mirror *m, const double *sample, const double beside[3],
     crossing *c = &found->items[found->count];
     double direction[3], far_normal[3];
     for (size_t k = 0; k < 3; k++) direction[k] = side * normal[k];
-    if (!qmat_surface_cast(m->surface, origin, direction, inset, narrow, &c->width, &c->facet, far_normal)) continue;
+    if (!qmat_surface_cast(m->surface, origin, direction, inset, side < 0 ? wall_share * narrow : narrow, &c->width,
+                           &c->facet, far_normal))
+      continue;
     if (!(-side * qmat_dot(direction, far_normal) > least_cosine)) continue;
     for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + c->width * direction[k];
     found->count++;

@@ -11,11 +11,11 @@ typedef struct qmat_mirrored_points {
   uint32_t *facets; /* per point: the facet on which it lies */
 } qmat_mirrored_points;
 
-/* Finds the points straight across the solid from samples, and straight across what is outside, where that is narrower
- * than half the distance between samples. Triangulated with the samples, they make the Delaunay tetrahedra fill a thin
- * wall, and keep apart what a narrow gap separates: where the samples of the two sides are not opposite each other,
- * Voronoi cells of one side reach through the other one, as far as the square of the distance between samples divided
- * by twice the width.
+/* Finds the points straight across the solid from samples, and straight across what is outside: walls thinner than a
+ * quarter of the distance between samples, and gaps narrower than half of it. Triangulated with the samples, they make
+ * the Delaunay tetrahedra fill a thin wall, and keep apart what a narrow gap separates: where the samples of the two
+ * sides are not opposite each other, Voronoi cells of one side reach through the other one, as far as the square of the
+ * distance between samples divided by twice the width.
  *
  * Rays start at the samples that are their own representatives, against and along the normal of each of their facets
  * and the mean of these normals. Nothing is added where a sample lies across already. `points` (unit frame) holds 3
