@@ -243,7 +243,8 @@ static bool is_better(const refinement *a, const refinement *b, double epsilon) 
 
 /* Repeats with half the spacing until no place is farther than `enough`, or all that are have been given up. The first
  * samples are as far apart as the gaps between those around: much finer ones would leave the places between both too
- * far. Where the spacing is fine, a round that does not improve is the last one, and places are given up. */
+ * far. Where the spacing is fine, a round that does not improve is the last one, and places are given up. `*best`
+ * becomes the best round. */
 static qmat_status refine_in_rounds(refiner *r, double epsilon, double limit, double enough, refinement *rounds,
                                     size_t *best) {
   qmat_surface *surface;

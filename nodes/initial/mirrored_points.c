@@ -9,11 +9,8 @@
 #include "core/geometry/vertex_facets.h"
 #include "nodes/measure/point_grid.h"
 
-/* A gap is narrow up to this share of the distance between samples. */
-static const double narrow_share = 0.5;
-
-/* A wall is narrow up to this share of what a gap is. */
-static const double wall_share = 0.5;
+/* Walls are thin, and gaps narrow, up to these shares of the distance between samples. */
+static const double wall_share = 0.25, gap_share = 0.5;
 
 /* A point is not added within this share of the width around a sample. */
 static const double near_share = 0.25;
@@ -51,7 +48,7 @@ typedef struct mirror {
   const double *points; /* 3 per sample */
   const uint32_t *representatives;
   qmat_vertex_facets around;
-  double *narrow; /* per facet: a wall or gap is narrow up to this */
+  double *apart; /* per facet: the distance between samples */
 } mirror;
 
 /* The different normals of the facets of a sample. */
@@ -59,16 +56,15 @@ typedef struct sample_normals {
   size_t count;
   double items[MOST_NORMALS][3];
   double inside[MOST_NORMALS][3]; /* towards the middle of a facet with this normal, no longer than `inset` */
-  double narrow;                  /* the largest of the facets */
+  double apart;                   /* the largest distance between samples of the facets */
 } sample_normals;
 
-/* The distance between the samples of each facet says what is narrow there. */
-static qmat_status find_narrow(qmat_context *context, mirror *m, double closest) {
+static qmat_status find_distances_between_samples(qmat_context *context, mirror *m, double closest) {
   const qmat_mesh *mesh = m->mesh;
   const double *positions = qmat_surface_positions(m->surface);
   uint32_t *added = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *added);
-  m->narrow = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *m->narrow);
-  if (!added || !m->narrow) return qmat_fail_memory(context, "the distances between samples");
+  m->apart = qmat_arena_alloc(&context->arena, mesh->triangle_count, sizeof *m->apart);
+  if (!added || !m->apart) return qmat_fail_memory(context, "the distances between samples");
   for (size_t i = m->samples->vertex_count; i < m->samples->count; i++)
     if (m->samples->facets[i] < mesh->triangle_count) added[m->samples->facets[i]]++;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -78,7 +74,7 @@ static qmat_status find_narrow(qmat_context *context, mirror *m, double closest)
     double normal[3], apart = longest.length;
     const double area = qmat_triangle_area(corners[0], corners[1], corners[2], normal);
     if (added[t] > 0) apart = qmat_smaller(apart, sqrt(2 * area / added[t]));
-    m->narrow[t] = narrow_share * qmat_larger(apart, closest);
+    m->apart[t] = qmat_larger(apart, closest);
   }
   return QMAT_OK;
 }
@@ -88,7 +84,7 @@ static void add_normal(const mirror *m, const double *point, uint32_t facet, sam
   for (size_t k = 0; k < 3; k++) corners[k] = &positions[3 * (size_t)m->mesh->triangles[3 * (size_t)facet + k]];
   double normal[3], *inside = n->inside[n->count];
   if (n->count == MOST_NORMALS || !(qmat_triangle_area(corners[0], corners[1], corners[2], normal) > 0)) return;
-  n->narrow = qmat_larger(n->narrow, m->narrow[facet]);
+  n->apart = qmat_larger(n->apart, m->apart[facet]);
   for (size_t i = 0; i < n->count; i++)
     if (qmat_dot(n->items[i], normal) > same_normal) return;
   for (size_t k = 0; k < 3; k++) inside[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3 - point[k];
@@ -104,7 +100,7 @@ static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
   const uint32_t *facets = m->around.facets;
   const size_t *offsets = m->around.offsets;
   n->count = 0;
-  n->narrow = 0;
+  n->apart = 0;
   if (sample < m->samples->vertex_count) {
     for (size_t i = offsets[sample]; i < offsets[sample + 1]; i++) add_normal(m, point, facets[i], n);
     return;
@@ -121,7 +117,7 @@ static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
 }
 
 /* Casts rays from `beside` the sample against the normal through the solid, and along it through what is outside. */
-static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double narrow,
+static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double apart,
                   double least_cosine, crossings *found) {
   double origin[3];
   for (size_t k = 0; k < 3; k++) origin[k] = sample[k] + beside[k];
@@ -129,9 +125,8 @@ static void cross(const mirror *m, const double *sample, const double beside[3],
     crossing *c = &found->items[found->count];
     double direction[3], far_normal[3];
     for (size_t k = 0; k < 3; k++) direction[k] = side * normal[k];
-    if (!qmat_surface_cast(m->surface, origin, direction, inset, side < 0 ? wall_share * narrow : narrow, &c->width,
-                           &c->facet, far_normal))
-      continue;
+    const double widest = (side < 0 ? wall_share : gap_share) * apart;
+    if (!qmat_surface_cast(m->surface, origin, direction, inset, widest, &c->width, &c->facet, far_normal)) continue;
     if (!(-side * qmat_dot(direction, far_normal) > least_cosine)) continue;
     for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + c->width * direction[k];
     found->count++;
@@ -146,13 +141,13 @@ static void find_crossings(const mirror *m, size_t sample, crossings *found) {
   sample_normals n;
   find_normals(m, sample, &n);
   for (size_t i = 0; i < n.count; i++) {
-    cross(m, point, n.inside[i], n.items[i], n.narrow, facing, found);
+    cross(m, point, n.inside[i], n.items[i], n.apart, facing, found);
     for (size_t k = 0; k < 3; k++) mean[k] += n.items[i][k];
   }
   const double length = sqrt(qmat_dot(mean, mean));
   if (n.count < 2 || !(length > inset)) return;
   for (size_t k = 0; k < 3; k++) mean[k] /= length;
-  cross(m, point, (const double[3]){0, 0, 0}, mean, n.narrow, 0, found);
+  cross(m, point, (const double[3]){0, 0, 0}, mean, n.apart, 0, found);
 }
 
 /* Makes room for one more point. */
@@ -209,7 +204,7 @@ qmat_status qmat_mirrored_points_find(qmat_context *context, const qmat_surface 
   qmat_point_grid known;
   qmat_status status = find_known(context, &m, &known);
   if (status == QMAT_OK) status = qmat_vertex_facets_find(context, m.mesh, &m.around);
-  if (status == QMAT_OK) status = find_narrow(context, &m, closest);
+  if (status == QMAT_OK) status = find_distances_between_samples(context, &m, closest);
   if (status != QMAT_OK) return status;
   const size_t slice = samples->count < SAMPLES_A_SLICE ? samples->count : SAMPLES_A_SLICE;
   crossings *found = qmat_arena_alloc(&context->arena, slice, sizeof *found);

@@ -116,7 +116,7 @@ static void test_samples_on_a_plate_have_points_across_it(void **state) {
 static void test_thick_solids_have_none_unless_samples_are_far_apart(void **state) {
   (void)state;
   setting s;
-  prepare(&s, shape_seal(shape_box(1, 1, 1)), 1);
+  prepare(&s, shape_seal(shape_box(1, 1, 0.5)), 1);
   find(&s, 0);
   assert_int_equal(s.found.count, 0);
   find(&s, 5);
