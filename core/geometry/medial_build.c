@@ -26,11 +26,15 @@ static bool is_degenerate(const uint32_t *row, size_t width) {
 }
 
 /* Sorts the rows lexicographically, by one stable counting sort per column from last to first, and drops repeats.
- * `swap` is as large as `rows`; `starts` has sphere_count + 1 elements. Returns the number of rows left. */
-static size_t sort_rows(uint32_t *rows, uint32_t *swap, size_t *starts, size_t count, size_t width,
-                        size_t sphere_count) {
+ * `swap` is as large as `rows`; `starts` has sphere_count + 1 elements. `*row_count` becomes the number of rows left.
+ */
+static qmat_status sort_rows(qmat_context *context, uint32_t *rows, uint32_t *swap, size_t *starts, size_t *row_count,
+                             size_t width, size_t sphere_count) {
+  const size_t count = *row_count;
   uint32_t *from = rows, *to = swap;
   for (size_t column = width; column-- > 0;) {
+    const qmat_status status = qmat_progress(context, width - column, width + 1, "sorted columns");
+    if (status != QMAT_OK) return status;
     memset(starts, 0, (sphere_count + 1) * sizeof *starts);
     for (size_t i = 0; i < count; i++) starts[from[i * width + column] + 1]++;
     for (size_t i = 0; i < sphere_count; i++) starts[i + 1] += starts[i];
@@ -49,7 +53,8 @@ static size_t sort_rows(uint32_t *rows, uint32_t *swap, size_t *starts, size_t c
     if (from != rows || kept != i) memcpy(rows + kept * width, row, width * sizeof *row);
     kept++;
   }
-  return kept;
+  *row_count = kept;
+  return QMAT_OK;
 }
 
 qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial, const uint32_t *edges,
@@ -73,29 +78,31 @@ qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial
     goto done;
   }
 
-  size_t kept = 0;
+  size_t new_triangle_count = 0;
   for (size_t i = 0; i < triangle_count; i++) {
-    uint32_t *row = new_triangles + 3 * kept;
+    uint32_t *row = new_triangles + 3 * new_triangle_count;
     memcpy(row, triangles + 3 * i, 3 * sizeof *row);
     put_ids_in_order(row, 3);
-    if (!is_degenerate(row, 3)) kept++;
+    if (!is_degenerate(row, 3)) new_triangle_count++;
   }
-  size_t new_triangle_count = sort_rows(new_triangles, swap, starts, kept, 3, sphere_count);
+  status = sort_rows(context, new_triangles, swap, starts, &new_triangle_count, 3, sphere_count);
+  if (status != QMAT_OK) goto done;
 
-  kept = 0;
+  size_t new_edge_count = 0;
   for (size_t i = 0; i < edge_count; i++) {
-    uint32_t *row = new_edges + 2 * kept;
+    uint32_t *row = new_edges + 2 * new_edge_count;
     memcpy(row, edges + 2 * i, 2 * sizeof *row);
     put_ids_in_order(row, 2);
-    if (!is_degenerate(row, 2)) kept++;
+    if (!is_degenerate(row, 2)) new_edge_count++;
   }
   for (size_t i = 0; i < new_triangle_count; i++) {
     const uint32_t *t = new_triangles + 3 * i;
     const uint32_t sides[6] = {t[0], t[1], t[0], t[2], t[1], t[2]};
-    memcpy(new_edges + 2 * kept, sides, sizeof sides);
-    kept += 3;
+    memcpy(new_edges + 2 * new_edge_count, sides, sizeof sides);
+    new_edge_count += 3;
   }
-  size_t new_edge_count = sort_rows(new_edges, swap, starts, kept, 2, sphere_count);
+  status = sort_rows(context, new_edges, swap, starts, &new_edge_count, 2, sphere_count);
+  if (status != QMAT_OK) goto done;
 
   qmat_free(medial->edges);
   qmat_free(medial->triangles);
