@@ -19,6 +19,9 @@ static const double most_gap = 0.005;
  * larger set counts as connected with the outside, since those of slivers have a handful. */
 enum { MOST_POCKET = 64 };
 
+/* A pass repeats while a round changes more than this share of what the pass has changed. */
+static const double least_change = 0.005;
+
 enum { CELLS_A_REPORT = 1024 };
 
 /* Betti numbers of the interior of the kept tetrahedra. Samples of the complement are connected by dropped tetrahedra.
@@ -322,10 +325,11 @@ static void revert_neutral(mending *m) {
   } while (reverted > 0);
 }
 
-/* Keeps (or drops) tetrahedra, the nearest to the surface first, until the Betti numbers are right or nothing changes.
+/* Keeps (or drops) tetrahedra, the nearest to the surface first, until the Betti numbers are right or little changes.
  * With `neutral`, changes that leave the homotopy type as it is make way for others, and are reverted at the end. */
 static qmat_status change_side(mending *m, bool keep, bool neutral) {
   const qmat_dual_complex *d = m->d;
+  const size_t start = m->changed_count;
   size_t before, tried = 0;
   qmat_status status = QMAT_OK;
   if (!keep) find_pockets(m);
@@ -345,7 +349,8 @@ static qmat_status change_side(mending *m, bool keep, bool neutral) {
       }
     }
     m->queue.count = 0;
-  } while (status == QMAT_OK && m->changed_count > before && !is_mended(m));
+  } while (status == QMAT_OK && !is_mended(m) &&
+           (double)(m->changed_count - before) > least_change * (double)(m->changed_count - start));
   revert_neutral(m);
   return status;
 }
