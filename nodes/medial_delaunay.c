@@ -46,7 +46,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 15,
+    .version = 16,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
@@ -55,10 +55,9 @@ const qmat_node qmat_node_medial_delaunay = {
         "Delaunay edges that they surround.\n\n"
         "A sliver on the surface can be on the wrong side of it, which makes a loop or a void. Where incentres is all, "
         "the tetrahedra nearest to the surface change sides until the loops and voids are those of the solid.\n\n"
-        "Across a wall thinner than a quarter of the distance between samples, or a gap narrower than half of it, "
-        "each sample has a point on the other "
-        "side that is triangulated too. Otherwise the tetrahedra would not fill such a wall, and would join the sides "
-        "of such a gap.\n\n"
+        "Across a wall thinner than a quarter of the distance between samples, or a gap narrower than half of it, each "
+        "sample has a point on the other side that is triangulated too, and so on through a stack of such walls. "
+        "Otherwise the tetrahedra would not fill such a wall, and would join the sides of such a gap.\n\n"
         "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
         "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
         "where one surface component contains several, unless the link leaves the solid by more than epsilon.\n\n"

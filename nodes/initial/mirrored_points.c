@@ -26,10 +26,10 @@ static const double facing = 0.5;
  * inside that could be told from its surface. */
 static const double inset = 1e-6;
 
-/* Of a sample; with the mean one more. */
-enum { MOST_NORMALS = 7, SAMPLES_A_SLICE = 16384 };
+/* Normals of a sample (with the mean one more), and walls and gaps that a ray crosses one after the other. */
+enum { MOST_NORMALS = 7, MOST_LAYERS = 16, SAMPLES_A_SLICE = 1024 };
 
-/* Where a ray from a sample leaves the solid, or enters it again. */
+/* Where a ray from a sample leaves the solid, or enters it again; `width` is that of the wall or gap before it. */
 typedef struct crossing {
   double point[3], width;
   uint32_t facet;
@@ -38,7 +38,7 @@ typedef struct crossing {
 /* Those of a sample. */
 typedef struct crossings {
   size_t count;
-  crossing items[2 * (MOST_NORMALS + 1)];
+  crossing items[2 * MOST_LAYERS * (MOST_NORMALS + 1)];
 } crossings;
 
 typedef struct mirror {
@@ -116,21 +116,29 @@ static void find_normals(const mirror *m, size_t sample, sample_normals *n) {
   }
 }
 
-/* Casts rays from `beside` the sample against the normal through the solid, and along it through what is outside. */
-static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double apart,
-                  double least_cosine, crossings *found) {
-  double origin[3];
-  for (size_t k = 0; k < 3; k++) origin[k] = sample[k] + beside[k];
-  for (int side = -1; side <= 1; side += 2) {
+/* Follows a ray from `beside` the sample through walls and gaps, as long as they are thin. */
+static void follow(const mirror *m, const double *sample, const double beside[3], const double direction[3],
+                   bool inside, double apart, double least_cosine, crossings *found) {
+  double length = 0;
+  for (int layer = 0; layer < MOST_LAYERS; layer++, inside = !inside) {
     crossing *c = &found->items[found->count];
-    double direction[3], far_normal[3];
-    for (size_t k = 0; k < 3; k++) direction[k] = side * normal[k];
-    const double widest = (side < 0 ? wall_share : gap_share) * apart;
-    if (!qmat_surface_cast(m->surface, origin, direction, inset, widest, &c->width, &c->facet, far_normal)) continue;
-    if (!(-side * qmat_dot(direction, far_normal) > least_cosine)) continue;
-    for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + c->width * direction[k];
+    double origin[3], normal[3];
+    for (size_t k = 0; k < 3; k++) origin[k] = sample[k] + beside[k] + length * direction[k];
+    const double widest = (inside ? wall_share : gap_share) * apart;
+    if (!qmat_surface_cast(m->surface, origin, direction, inset, widest, &c->width, &c->facet, normal)) return;
+    if (!((inside ? 1 : -1) * qmat_dot(direction, normal) > least_cosine)) return;
+    length += c->width;
+    for (size_t k = 0; k < 3; k++) c->point[k] = sample[k] + length * direction[k];
     found->count++;
   }
+}
+
+/* Casts rays against the normal through the solid, and along it through what is outside. */
+static void cross(const mirror *m, const double *sample, const double beside[3], const double normal[3], double apart,
+                  double least_cosine, crossings *found) {
+  const double against[3] = {-normal[0], -normal[1], -normal[2]};
+  follow(m, sample, beside, against, true, apart, least_cosine, found);
+  follow(m, sample, beside, normal, false, apart, least_cosine, found);
 }
 
 static void find_crossings(const mirror *m, size_t sample, crossings *found) {
@@ -214,7 +222,7 @@ qmat_status qmat_mirrored_points_find(qmat_context *context, const qmat_surface 
   for (size_t first = 0; first < samples->count; first += slice) {
     const size_t left = samples->count - first, count = left < slice ? left : slice;
     if ((status = qmat_progress(context, first, samples->count, "samples")) != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t i = 0; i < count; i++) find_crossings(&m, first + i, &found[i]);
     for (size_t i = 0; i < count && status == QMAT_OK; i++)
       status = add_crossings(context, &known, &found[i], mirrored, &room);

@@ -18,10 +18,10 @@ typedef struct qmat_mirrored_points {
  * distance between samples divided by twice the width.
  *
  * Rays start at the samples that are their own representatives, against and along the normal of each of their facets
- * and the mean of these normals. Nothing is added where a sample lies across already. `points` (unit frame) holds 3
- * doubles, `representatives` one number per sample; `closest` (unit frame) is the least distance between samples.
- * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. Cost: about a microsecond
- * per sample and normal. */
+ * and the mean of these normals, and go on through up to 16 such walls and gaps. Nothing is added where a sample lies
+ * across already. `points` (unit frame) holds 3 doubles, `representatives` one number per sample; `closest` (unit
+ * frame) is the least distance between samples. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not
+ * depend on their number. Cost: about a microsecond per ray and wall. */
 qmat_status qmat_mirrored_points_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                       const double *points, const uint32_t *representatives, double closest,
                                       qmat_mirrored_points *mirrored);

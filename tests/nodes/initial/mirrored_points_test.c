@@ -176,6 +176,32 @@ static void test_samples_on_a_gap_have_points_across_it(void **state) {
   finish(&s);
 }
 
+/* A ray goes on through all plates of a stack: each sample of a large side has a point on each of the other five. */
+static void test_samples_on_a_stack_of_plates_have_points_on_all(void **state) {
+  (void)state;
+  setting s;
+  const double thickness = 0.002, gap = 0.001;
+  qmat_mesh *mesh = shape_box(1, 1, thickness);
+  for (int i = 1; i < 3; i++) {
+    const double bottom = i * (thickness + gap);
+    shape_add_box(mesh, 0, 0, bottom, 1, 1, bottom + thickness, false);
+  }
+  prepare(&s, shape_seal(mesh), 1);
+  for (size_t i = 0; i < s.mesh->vertex_count; i++) s.representatives[i] = (uint32_t)s.mesh->vertex_count;
+  find(&s, 0);
+  assert_int_equal(s.found.count, 3 * 2 * 2 * 5); /* a large side has two facets of one sample each */
+  size_t in_facet[36] = {0};
+  for (size_t i = 0; i < s.found.count; i++) {
+    assert_near(qmat_surface_distance_to_triangle(s.surface, &s.found.points[3 * i], s.found.facets[i]), 0, 1e-9);
+    in_facet[s.found.facets[i]]++;
+  }
+  for (size_t i = 0; i < 36; i += 2) {
+    const size_t in_side = in_facet[i] + in_facet[i + 1];
+    assert_true(in_side == 10 || in_side == 0); /* on large sides and on narrow ones */
+  }
+  finish(&s);
+}
+
 static void test_threads_and_position_do_not_matter(void **state) {
   (void)state;
   setting s, turned;
@@ -215,6 +241,7 @@ int main(void) {
       cmocka_unit_test(test_thick_solids_have_none_unless_samples_are_far_apart),
       cmocka_unit_test(test_edges_of_a_tray_lie_across_each_other),
       cmocka_unit_test(test_samples_on_a_gap_have_points_across_it),
+      cmocka_unit_test(test_samples_on_a_stack_of_plates_have_points_on_all),
       cmocka_unit_test(test_threads_and_position_do_not_matter),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
