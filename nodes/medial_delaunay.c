@@ -46,7 +46,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 16,
+    .version = 17,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
@@ -60,7 +60,7 @@ const qmat_node qmat_node_medial_delaunay = {
         "Otherwise the tetrahedra would not fill such a wall, and would join the sides of such a gap.\n\n"
         "Samples in flat regions that a kept neighbour represents are not triangulated, which saves time but no "
         "accuracy beyond thinning_tolerance. Components that add no sample are dropped, and the others are linked "
-        "where one surface component contains several, unless the link leaves the solid by more than epsilon.\n\n"
+        "where one solid contains several, unless the link leaves the solid by more than epsilon.\n\n"
         "Sheets are medial meshes already: each of their triangles becomes a slab, with spheres of half the sheet "
         "thickness at its corners.",
     .citation = "Section 3.2, Algorithm 1",

@@ -22,17 +22,18 @@ typedef struct qmat_dual_complex {
   const qmat_mesh *mesh;
   const qmat_samples *samples;
   const qmat_surface *surface;
-  size_t point_count;                 /* the samples, then the mirrored points */
-  const double *points;               /* 3 per point */
-  const uint8_t *thin;                /* per point */
-  const uint32_t *facets;             /* per point */
-  const uint32_t *surface_components; /* per mesh vertex: smallest vertex of its component; NULL: one component */
-  const uint32_t *representatives;    /* per point: the triangulated one that represents it, possibly itself */
-  size_t site_count;                  /* triangulated points */
-  qmat_tetrahedra cells;              /* corners are points */
-  uint8_t *kinds;                     /* per cell: a qmat_cell_kind */
-  double *spheres;                    /* 4 per cell */
-  uint32_t *sphere_of;                /* per cell: its medial vertex, or QMAT_NO_ID */
+  size_t point_count;              /* the samples, then the mirrored points */
+  const double *points;            /* 3 per point */
+  const uint8_t *thin;             /* per point */
+  const uint32_t *facets;          /* per point */
+  const uint32_t *solids;          /* per mesh vertex: smallest vertex of the solid that it bounds; NULL: one solid */
+  const uint32_t *representatives; /* per point: the triangulated one that represents it, possibly itself */
+  size_t site_count;               /* triangulated points */
+  qmat_tetrahedra cells;           /* corners are points */
+  uint8_t *kinds;                  /* per cell: a qmat_cell_kind */
+  double *spheres;                 /* 4 per cell */
+  uint32_t *solid_of;              /* per cell: the solid in which its sphere is, or QMAT_NO_ID; NULL: one solid */
+  uint32_t *sphere_of;             /* per cell: its medial vertex, or QMAT_NO_ID */
   size_t sphere_count;
   uint32_t *edges, *triangles; /* of medial vertices */
   size_t edge_count, triangle_count;
@@ -42,10 +43,9 @@ typedef struct qmat_dual_complex {
   uint32_t *edge_duals, *triangle_duals;
 } qmat_dual_complex;
 
-/* The surface component of a point. */
-static inline uint32_t qmat_dual_surface_component(const qmat_dual_complex *dual, uint32_t point) {
-  const uint32_t *components = dual->surface_components;
-  return components ? components[dual->mesh->triangles[3 * (size_t)dual->facets[point]]] : 0;
+/* The solid that a point bounds. */
+static inline uint32_t qmat_dual_solid_of_point(const qmat_dual_complex *dual, uint32_t point) {
+  return dual->solids ? dual->solids[dual->mesh->triangles[3 * (size_t)dual->facets[point]]] : 0;
 }
 
 /* A step around the Delaunay edge (a, b) of a tetrahedron: the neighbour across the facet opposite the corner

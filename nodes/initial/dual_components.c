@@ -147,7 +147,7 @@ static medial_link measured_link(const qmat_dual_complex *d, const double *spher
   return link;
 }
 
-/* A sphere at a site: a sample, or a component of the surface. */
+/* A sphere at a site: a sample, or a solid. */
 typedef struct {
   uint32_t site, sphere;
 } contact;
@@ -158,8 +158,8 @@ static int by_site(const void *left, const void *right) {
   return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
 }
 
-/* Sorted contacts without duplicates: of all spheres with the components of the surface in which they lie (`homes`, per
- * component), or, where that is NULL, with the samples that several components are responsible for. */
+/* Sorted contacts without duplicates: of all spheres with the solids in which they lie (`homes`, per component), or,
+ * where that is NULL, with the samples that several components are responsible for. */
 static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, size_t *count) {
   qmat_arena *arena = &d->context->arena;
   const size_t points = d->point_count;
@@ -192,17 +192,14 @@ static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const
   return contacts;
 }
 
-/* Per component of the medial mesh, the component of the surface that has most corners of its tetrahedra. Where solids
- * touch, tetrahedra of one have corners on others. NULL when memory is short. */
+/* Per component of the medial mesh, the solid in which it lies. A tetrahedron that mending the topology kept has none
+ * of its own. NULL when memory is short. */
 static const uint32_t *find_homes(qmat_dual_complex *d, const uint32_t *index, size_t count) {
-  qmat_vote *corners = qmat_arena_alloc(&d->context->arena, 4 * d->cells.count, sizeof *corners);
-  size_t corner_count = 0;
-  if (!corners) return NULL;
-  for (size_t i = 0; i < 4 * d->cells.count; i++)
-    if (d->kinds[i / 4])
-      corners[corner_count++] =
-          (qmat_vote){index[d->sphere_of[i / 4]], qmat_dual_surface_component(d, d->cells.corners[i])};
-  return qmat_majorities(d->context, corners, corner_count, count);
+  uint32_t *homes = qmat_arena_calloc(&d->context->arena, count, sizeof *homes);
+  if (!homes) return NULL;
+  for (size_t i = 0; i < d->cells.count && d->solid_of; i++)
+    if (d->kinds[i] && d->solid_of[i] != QMAT_NO_ID) homes[index[d->sphere_of[i]]] = d->solid_of[i];
+  return homes;
 }
 
 /* Whether the link leaves the solid by at most the limit. */
@@ -231,7 +228,7 @@ static qmat_status add_link(qmat_dual_complex *d, const double *spheres, const u
   return QMAT_OK;
 }
 
-/* Links components of one surface component by edges between spheres that are responsible for a common sample, so that
+/* Links components of one solid by edges between spheres that are responsible for a common sample, so that
  * they touch the surface at the same place. The edges that stay inside come first. */
 static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                    const double *spheres, size_t *links) {
@@ -256,7 +253,7 @@ static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, 
   return status;
 }
 
-/* A sphere in one component of the surface, and the shortest link from it to the spheres that are reached. */
+/* A sphere in one solid, and the shortest link from it to the spheres that are reached. */
 typedef struct {
   double along; /* its centre, along one axis */
   medial_link best;
@@ -325,7 +322,7 @@ static qmat_status reach_set(qmat_dual_complex *d, const double *spheres, uint32
   return QMAT_OK;
 }
 
-/* Links the nearest two spheres of different components in the same component of the surface, until that has only one,
+/* Links the nearest two spheres of different components in the same solid, until that has only one,
  * but for those whose link would leave the solid too far (Prim 1957). */
 static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                 const double *spheres, size_t *links) {

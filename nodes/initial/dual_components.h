@@ -10,7 +10,7 @@ typedef struct qmat_dual_component_counts {
 } qmat_dual_component_counts;
 
 /* Drops every component of the medial mesh whose samples larger components are responsible for too: slivers on the
- * surface. Then links the components that lie in the same component of the surface by medial edges; the solid tears
+ * surface. Then links the components that lie in the same solid by medial edges; the solid tears
  * apart where it is thinner than the samples are dense. An edge that would leave the solid by more than `link_limit` is
  * not made: the components then stay apart. Changes the simplices and the numbers of the medial vertices.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear, and a sort of the pairs of spheres that share a sample;

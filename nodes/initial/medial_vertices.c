@@ -40,24 +40,6 @@ static bool deep_inside(const qmat_surface *surface, const double *point) {
          !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
 }
 
-/* Names each connected component of the surface by its smallest vertex. */
-static qmat_status find_surface_components(qmat_dual_complex *d) {
-  const qmat_mesh *mesh = d->mesh;
-  uint32_t *component = qmat_sets_new(d->context, mesh->vertex_count);
-  if (!component) return qmat_fail_memory(d->context, "the surface's components");
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    qmat_sets_join(component, mesh->triangles[3 * t], mesh->triangles[3 * t + 1]);
-    qmat_sets_join(component, mesh->triangles[3 * t], mesh->triangles[3 * t + 2]);
-  }
-  size_t count = 0;
-  for (size_t i = 0; i < mesh->vertex_count; i++) {
-    component[i] = qmat_set_leader(component, (uint32_t)i);
-    count += component[i] == i;
-  }
-  d->surface_components = count > 1 ? component : NULL;
-  return QMAT_OK;
-}
-
 double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b, double least, double limit) {
   double middle[3];
   for (size_t k = 0; k < 3; k++) middle[k] = 0.5 * (d->points[3 * (size_t)a + k] + d->points[3 * (size_t)b + k]);
@@ -65,13 +47,13 @@ double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b
   return distance <= least || qmat_surface_inside(d->surface, middle) ? 0 : distance;
 }
 
-/* Whether a tetrahedron connects two components of the surface through the outside. The incentre of such a needle can
+/* Whether a tetrahedron connects two solids through the outside. The incentre of such a needle can
  * still be inside, between the samples and a surface that bulges past them. */
 static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
   const double tolerance = d->thinning_tolerance;
-  for (int a = 0; a < 3 && d->surface_components; a++)
+  for (int a = 0; a < 3 && d->solids; a++)
     for (int b = a + 1; b < 4; b++)
-      if (qmat_dual_surface_component(d, corners[a]) != qmat_dual_surface_component(d, corners[b]) &&
+      if (qmat_dual_solid_of_point(d, corners[a]) != qmat_dual_solid_of_point(d, corners[b]) &&
           qmat_dual_edge_outside(d, corners[a], corners[b], tolerance, tolerance) > 0)
         return true;
   return false;
@@ -111,7 +93,7 @@ qmat_status qmat_medial_vertices_select(qmat_dual_complex *d) {
   d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);
   d->spheres = qmat_arena_alloc(&context->arena, count, 4 * sizeof *d->spheres);
   if (!d->kinds || !d->spheres) return qmat_fail_memory(context, "medial vertices");
-  qmat_status status = find_surface_components(d);
+  qmat_status status = QMAT_OK;
   const int threads = qmat_threads(context);
   for (size_t first = 0; first < count && status == QMAT_OK; first += slice) {
     if ((status = qmat_progress(context, first, count, "tetrahedra")) != QMAT_OK) break;

@@ -4,8 +4,8 @@
 
 #include "nodes/initial/dual_complex.h"
 
-/* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Reads `points`, `thin` and `cells`, and sets
- * `surface_components`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
+/* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Reads `points`, `thin`, `cells` and
+ * `solids`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
 qmat_status qmat_medial_vertices_select(qmat_dual_complex *dual);
 
 /* The centre (3 doubles, unit frame) of the sphere inscribed in a tetrahedron. Thread-safe. */

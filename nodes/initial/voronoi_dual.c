@@ -16,6 +16,7 @@
 #include "nodes/initial/medial_vertices.h"
 #include "nodes/initial/mirrored_points.h"
 #include "nodes/initial/sample_thinning.h"
+#include "nodes/initial/solid_labels.h"
 #include "nodes/initial/tetrahedra_topology.h"
 
 /* --- connectivity ------------------------------------------------------------------------------------------------ */
@@ -246,8 +247,9 @@ static qmat_status triangulate(qmat_dual_complex *d) {
 }
 
 typedef struct {
-  size_t by_kind[3]; /* tetrahedra */
-  size_t refined;    /* spheres that halve an edge */
+  size_t by_kind[3];     /* tetrahedra */
+  size_t refined;        /* spheres that halve an edge */
+  size_t between_solids; /* tetrahedra that are dropped there */
   qmat_mended_tetrahedra mended;
   qmat_dual_component_counts joined;
 } dual_counts;
@@ -262,6 +264,7 @@ static qmat_status make_report(const qmat_dual_complex *d, const qmat_medial *me
       {"tetrahedra", d->cells.count},
       {"circumcentres", made->by_kind[QMAT_CELL_CIRCUMCENTRE]},
       {"incentres", made->by_kind[QMAT_CELL_INCENTRE]},
+      {"dropped_between_solids", made->between_solids},
       {"kept_for_topology", made->mended.kept},
       {"dropped_for_topology", made->mended.dropped},
       {"spheres", medial->sphere_count},
@@ -322,7 +325,9 @@ static qmat_status find_dual(qmat_dual_complex *d, const qmat_field *thickness, 
   qmat_context *context = d->context;
   qmat_status status = find_points(d, thickness, reaches);
   if (status == QMAT_OK) status = triangulate(d);
+  if (status == QMAT_OK) status = qmat_solids_find(d);
   if (status == QMAT_OK) status = qmat_medial_vertices_select(d);
+  if (status == QMAT_OK) status = qmat_solids_part(d, &made->between_solids);
   if (status == QMAT_OK && d->params->incentres == QMAT_INCENTRES_ALL) status = qmat_tetrahedra_mend(d, &made->mended);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < d->cells.count; i++) made->by_kind[d->kinds[i]]++;

@@ -768,6 +768,16 @@ static double farthest_middle(const pipeline *p) {
   return farthest;
 }
 
+/* Adds a copy of `part`, with its facets turned around where it is a void, and releases `part`. */
+static void add_part(qmat_mesh *mesh, qmat_mesh *part, bool is_void) {
+  const uint32_t first = (uint32_t)mesh->vertex_count, *corners = part->triangles;
+  for (const double *p = part->positions; p < part->positions + 3 * part->vertex_count; p += 3)
+    shape_vertex(mesh, p[0], p[1], p[2]);
+  for (size_t t = 0; t < part->triangle_count; t++, corners += 3)
+    shape_triangle(mesh, first + corners[0], first + corners[is_void ? 2 : 1], first + corners[is_void ? 1 : 2]);
+  qmat_value_release(&part->base);
+}
+
 /* L-brackets and tori that reach into each other have more loops than the solid of their surfaces, which starts a
  * search for tetrahedra outside that close them. Needles between distant parts have their incentres beside the surface
  * too. */
@@ -782,17 +792,56 @@ static void test_no_needle_closes_a_loop(void **state) {
       shape_map(part, random_between(&random, 0.1, 0.3), 0, 0, 0);
       const double x = random_between(&random, -1, 1), y = random_between(&random, -1, 1);
       const double z = random_between(&random, -1, 1), flatness = random_between(&random, 0.02, 1);
-      const uint32_t first = (uint32_t)mesh->vertex_count, *corners = part->triangles;
-      for (const double *p = part->positions; p < part->positions + 3 * part->vertex_count; p += 3)
-        shape_vertex(mesh, x + p[0], y + flatness * p[1], z + p[2]);
-      for (size_t t = 0; t < part->triangle_count; t++, corners += 3)
-        shape_triangle(mesh, first + corners[0], first + corners[1], first + corners[2]);
-      qmat_value_release(&part->base);
+      for (double *p = part->positions; p < part->positions + 3 * part->vertex_count; p += 3) {
+        p[0] += x;
+        p[1] = y + flatness * p[1];
+        p[2] += z;
+      }
+      add_part(mesh, part, false);
     }
     pipeline p;
     pipeline_make(&p, mesh, "spacing=0", "");
     assert_true(pipeline_count(p.report, "kept_for_topology") > 0);
     assert_true(farthest_middle(&p) < 0.005);
+    pipeline_free(&p);
+  }
+}
+
+static size_t count_components(const pipeline *p) {
+  qmat_context context = {0};
+  qmat_topology topology;
+  assert_int_equal(qmat_topology_of_medial(&context, p->medial, &topology), QMAT_OK);
+  qmat_context_uninit(&context);
+  return topology.components;
+}
+
+/* Around the rim of the column samples of the table lie nearer to it than its own. */
+static void test_solids_with_a_narrow_gap_stay_apart(void **state) {
+  (void)state;
+  static const double gaps[] = {1e-3, 1e-4, 1e-5, 1e-6};
+  for (size_t i = 0; i < sizeof gaps / sizeof *gaps; i++) {
+    qmat_mesh *mesh = shape_prism(40, 3);
+    shape_add_box(mesh, -2, -2, 3 + gaps[i], 2, 2, 3.2, false);
+    pipeline p;
+    pipeline_make(&p, mesh, "", "");
+    assert_int_equal(count_components(&p), 2);
+    if (gaps[i] < 1e-4) assert_true(pipeline_count(p.report, "dropped_between_solids") > 0);
+    pipeline_free(&p);
+  }
+}
+
+/* The surface of a void bounds the same solid as the outer surface, and not that of what floats in the void. */
+static void test_void_is_no_gap_between_solids(void **state) {
+  (void)state;
+  for (size_t floating = 0; floating < 2; floating++) {
+    qmat_mesh *mesh = shape_new();
+    add_part(mesh, shape_sphere(1, 12), false);
+    add_part(mesh, shape_sphere(0.98, 12), true);
+    if (floating > 0) add_part(mesh, shape_sphere(0.97, 12), false);
+    pipeline p;
+    pipeline_make(&p, mesh, "", "");
+    assert_int_equal(count_components(&p), 1 + floating);
+    if (floating == 0) assert_int_equal(pipeline_count(p.report, "dropped_between_solids"), 0);
     pipeline_free(&p);
   }
 }
@@ -829,6 +878,8 @@ int main(void) {
       cmocka_unit_test(test_progress_function_cancels),
       cmocka_unit_test(test_loops_are_those_of_the_solid),
       cmocka_unit_test(test_no_needle_closes_a_loop),
+      cmocka_unit_test(test_solids_with_a_narrow_gap_stay_apart),
+      cmocka_unit_test(test_void_is_no_gap_between_solids),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
