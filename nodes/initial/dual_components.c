@@ -8,7 +8,6 @@
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/vector.h"
-#include "nodes/initial/majority.h"
 #include "nodes/measure/envelope_to_surface.h"
 
 #define NONE QMAT_NO_ID
