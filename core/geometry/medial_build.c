@@ -26,8 +26,8 @@ static bool is_degenerate(const uint32_t *row, size_t width) {
 }
 
 /* Sorts the rows lexicographically, by one stable counting sort per column from last to first, and drops repeats.
- * `swap` is as large as `rows`; `starts` has sphere_count + 1 elements. `*row_count` becomes the number of rows left.
- */
+ * `swap` is as large as `rows`; `starts` has sphere_count + 1 elements. `*row_count` is the number of rows, and becomes
+ * that of the rows left. */
 static qmat_status sort_rows(qmat_context *context, uint32_t *rows, uint32_t *swap, size_t *starts, size_t *row_count,
                              size_t width, size_t sphere_count) {
   const size_t count = *row_count;

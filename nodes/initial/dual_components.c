@@ -227,8 +227,8 @@ static qmat_status add_link(qmat_dual_complex *d, const double *spheres, const u
   return QMAT_OK;
 }
 
-/* Links components of one solid by edges between spheres that are responsible for a common sample, so that
- * they touch the surface at the same place. The edges that stay inside come first. */
+/* Links components of one solid by edges between spheres that are responsible for a common sample, so that they touch
+ * the surface at the same place. The edges that stay inside come first. */
 static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                    const double *spheres, size_t *links) {
   size_t count = 0, candidate_count = 0, capacity = 0;
@@ -321,8 +321,8 @@ static qmat_status reach_set(qmat_dual_complex *d, const double *spheres, uint32
   return QMAT_OK;
 }
 
-/* Links the nearest two spheres of different components in the same solid, until that has only one,
- * but for those whose link would leave the solid too far (Prim 1957). */
+/* Links the nearest two spheres of different components in the same solid, until that has only one, but for those whose
+ * link would leave the solid too far (Prim 1957). */
 static qmat_status link_nearest(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                 const double *spheres, size_t *links) {
   qmat_arena *arena = &d->context->arena;

@@ -19,7 +19,8 @@ static const double most_gap = 0.005;
  * larger set counts as connected with the outside, since those of slivers have a handful. */
 enum { MOST_POCKET = 64 };
 
-/* A pass repeats while a round changes more than this share of what the pass has changed. */
+/* A pass repeats while a round changes more than this share of what the pass has changed. A round tries every
+ * tetrahedron beside the surface, and late rounds change few. */
 static const double least_change = 0.005;
 
 enum { CELLS_A_REPORT = 1024 };

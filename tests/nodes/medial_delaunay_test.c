@@ -725,6 +725,14 @@ static void test_progress_function_cancels(void **state) {
   pipeline_free(&p);
 }
 
+static qmat_topology topology_of(const pipeline *p) {
+  qmat_context context = {0};
+  qmat_topology topology;
+  assert_int_equal(qmat_topology_of_medial(&context, p->medial, &topology), QMAT_OK);
+  qmat_context_uninit(&context);
+  return topology;
+}
+
 /* Slivers on the wrong side of the surface make seven loops in the octopus, at this resolution. */
 static void test_loops_are_those_of_the_solid(void **state) {
   (void)state;
@@ -739,11 +747,7 @@ static void test_loops_are_those_of_the_solid(void **state) {
     const int64_t changed =
         pipeline_count(p.report, "kept_for_topology") + pipeline_count(p.report, "dropped_for_topology");
     assert_int_equal(changed > 0, models[i].is_changed);
-    qmat_context context = {0};
-    qmat_topology topology;
-    assert_int_equal(qmat_topology_of_medial(&context, p.medial, &topology), QMAT_OK);
-    assert_int_equal(topology.loops, models[i].loops);
-    qmat_context_uninit(&context);
+    assert_int_equal(topology_of(&p).loops, models[i].loops);
     pipeline_free(&p);
   }
 }
@@ -807,14 +811,6 @@ static void test_no_needle_closes_a_loop(void **state) {
   }
 }
 
-static size_t count_components(const pipeline *p) {
-  qmat_context context = {0};
-  qmat_topology topology;
-  assert_int_equal(qmat_topology_of_medial(&context, p->medial, &topology), QMAT_OK);
-  qmat_context_uninit(&context);
-  return topology.components;
-}
-
 /* Around the rim of the column samples of the table lie nearer to it than its own. */
 static void test_solids_with_a_narrow_gap_stay_apart(void **state) {
   (void)state;
@@ -824,7 +820,7 @@ static void test_solids_with_a_narrow_gap_stay_apart(void **state) {
     shape_add_box(mesh, -2, -2, 3 + gaps[i], 2, 2, 3.2, false);
     pipeline p;
     pipeline_make(&p, mesh, "", "");
-    assert_int_equal(count_components(&p), 2);
+    assert_int_equal(topology_of(&p).components, 2);
     if (gaps[i] < 1e-4) assert_true(pipeline_count(p.report, "dropped_between_solids") > 0);
     pipeline_free(&p);
   }
@@ -840,7 +836,7 @@ static void test_void_is_no_gap_between_solids(void **state) {
     if (floating > 0) add_part(mesh, shape_sphere(0.97, 12), false);
     pipeline p;
     pipeline_make(&p, mesh, "", "");
-    assert_int_equal(count_components(&p), 1 + floating);
+    assert_int_equal(topology_of(&p).components, 1 + floating);
     if (floating == 0) assert_int_equal(pipeline_count(p.report, "dropped_between_solids"), 0);
     pipeline_free(&p);
   }
