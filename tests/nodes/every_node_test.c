@@ -24,7 +24,7 @@
 
 /* A run at the bound of a parameter can take hours. Its progress function stops it after PATIENCE seconds, and it must
  * return within LATENCY seconds. */
-static const double PATIENCE = 1, LATENCY = 20;
+static const double PATIENCE = 0.5, LATENCY = 20;
 
 /* The number of points at which a run is stopped or runs out of memory; fewer if the run is one of many (with each
  * choice of a parameter). */
@@ -103,14 +103,19 @@ static void use_world(subject *run, world from) {
     run->inputs[i] = made.values[from][run->node->inputs[i].type];
 }
 
-/* Sets lengths to five times their default, within their range. Work grows with the inverse square of lengths, and
- * every node is run hundreds of times. */
+/* Sets lengths to five times their default, and widths and heights in pixels to a tenth, within their range. Every node
+ * is run hundreds of times, and work grows with the inverse square of lengths and with the number of pixels. */
 static void make_coarse(const qmat_node *node, void *params) {
   for (size_t row = 0; row < qmat_param_count(node); row++) {
     const qmat_param *param = &node->params[row];
-    if (!(param->flags & QMAT_PARAM_RELATIVE)) continue;
-    const double length = fmin(5 * param->default_number, param->max);
-    memcpy((char *)params + param->offset, &length, sizeof length);
+    char *value = (char *)params + param->offset;
+    if (param->flags & QMAT_PARAM_RELATIVE) {
+      const double length = fmin(5 * param->default_number, param->max);
+      memcpy(value, &length, sizeof length);
+    } else if (param->type == QMAT_PARAM_INT && strcmp(param->unit, "pixels") == 0) {
+      const int64_t pixels = (int64_t)fmax(param->default_number / 10, param->min);
+      memcpy(value, &pixels, sizeof pixels);
+    }
   }
 }
 

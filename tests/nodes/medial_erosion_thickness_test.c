@@ -422,15 +422,6 @@ static void test_progress_function_cancels(void **state) {
   pipeline_free(&p);
 }
 
-static void test_it_can_be_cancelled_within_half_a_second(void **state) {
-  (void)state;
-  pipeline p;
-  pipeline_make(&p, pipeline_model("octopus", 24), "spacing=0.5%", "thinning_tolerance=0");
-  pipeline_must_stop_within(0.5, "medial.erosion_thickness", "prune=1%",
-                            (const qmat_value *[]){&p.mesh->base, &p.medial->base});
-  pipeline_free(&p);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_thickness_of_a_rectangle_is_the_distance_to_its_border),
@@ -445,7 +436,6 @@ int main(void) {
       cmocka_unit_test(test_threads_do_not_change_a_byte),
       cmocka_unit_test(test_sheets_of_the_model_stay),
       cmocka_unit_test(test_progress_function_cancels),
-      cmocka_unit_test(test_it_can_be_cancelled_within_half_a_second),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -155,7 +155,7 @@ static const setting settings[] = {
     {"octopus", 6, "finest=3% error=one_sided on_exceed=stop protect=late",
      "finest=3% error=one_sided on_exceed=stop protect=late", false},
     {"torus", 6, "finest=3% error=one_sided", "finest=3% error=one_sided on_exceed=raise", false},
-    {"capsule", 8, "finest=3% cost=hausdorff", "finest=3% cost=hausdorff on_exceed=raise", false},
+    {"capsule", 4, "finest=3% cost=hausdorff", "finest=3% cost=hausdorff on_exceed=raise", false},
     {"torus", 6, "finest=3% cost=pmat on_exceed=stop", "finest=3% cost=pmat on_exceed=stop", false},
     {"torus", 6, "finest=3% compat=qmat", "finest=3% compat=qmat", false},
     {"box", 4, "finest=3%", "finest=3% on_exceed=raise", true},

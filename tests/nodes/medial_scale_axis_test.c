@@ -183,15 +183,6 @@ static void test_progress_function_cancels(void **state) {
   pipeline_free(&p);
 }
 
-/* 118 thousand samples. */
-static void test_it_can_be_cancelled_within_half_a_second(void **state) {
-  (void)state;
-  pipeline p;
-  pipeline_sample(&p, pipeline_model("octopus", 48), "spacing=0.29%");
-  pipeline_must_stop_within(0.5, "medial.scale_axis", "", (const qmat_value *[]){&p.mesh->base, &p.samples->base});
-  pipeline_free(&p);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_two_balls_and_the_edge_between_them_come_out_at_any_scale),
@@ -205,7 +196,6 @@ int main(void) {
       cmocka_unit_test(test_samples_of_another_mesh_are_named),
       cmocka_unit_test(test_mesh_without_an_inside_is_named),
       cmocka_unit_test(test_progress_function_cancels),
-      cmocka_unit_test(test_it_can_be_cancelled_within_half_a_second),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

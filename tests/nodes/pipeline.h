@@ -6,7 +6,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/geometry/frame.h"
 #include "core/node.h"
@@ -53,55 +52,8 @@ static inline void pipeline_must_run(int threads, const char *name, const char *
   qmat_context_uninit(&context);
 }
 
-/* The processor time between the calls of a progress function. */
-typedef struct pipeline_gaps {
-  double last, longest;
-} pipeline_gaps;
-
-static inline void pipeline_note_gap(pipeline_gaps *gaps) {
-  struct timespec time;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  const double now = (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-  if (gaps->last > 0 && now - gaps->last > gaps->longest) gaps->longest = now - gaps->last;
-  gaps->last = now;
-}
-
-static inline bool pipeline_on_progress(void *user, const char *node_id, const char *node_type, uint64_t done,
-                                        uint64_t total, const char *unit) {
-  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  pipeline_note_gap(user);
-  return true;
-}
-
-/* How much longer a sanitizer makes code take. */
-#if defined __has_feature
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define PIPELINE_SLOWDOWN 20
-#endif
-#elif defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
-#define PIPELINE_SLOWDOWN 20
-#endif
-#ifndef PIPELINE_SLOWDOWN
-#define PIPELINE_SLOWDOWN 1
-#endif
-
 static inline void pipeline_release(const char *name, qmat_value *outputs[]) {
   for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
-}
-
-/* Runs a node on one thread and checks that it could have been cancelled within `limit` processor seconds at any
- * time. */
-static inline void pipeline_must_stop_within(double limit, const char *name, const char *text,
-                                             const qmat_value *const inputs[]) {
-  pipeline_gaps gaps = {0};
-  qmat_context context = {.threads = 1, .progress = pipeline_on_progress, .progress_user = &gaps};
-  qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_note_gap(&gaps);
-  assert_int_equal(pipeline_run(&context, name, text, inputs, outputs), QMAT_OK);
-  pipeline_note_gap(&gaps);
-  pipeline_release(name, outputs);
-  qmat_context_uninit(&context);
-  if (!(gaps.longest <= PIPELINE_SLOWDOWN * limit)) fail_msg("%s cannot be cancelled for %.2f s", name, gaps.longest);
 }
 
 /* A progress function that cancels after `*user` calls. */
