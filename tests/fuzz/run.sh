@@ -1,31 +1,31 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Searches for inputs that break a reader, with libFuzzer: run.sh [--minutes M] [TARGET...]
-# M minutes (default: 1) are divided among the targets (default: all). Builds the preset fuzz (build/fuzz) first. Inputs
-# that break a reader stay in build/fuzz/found; exit code 1 then. Exit code 77: clang or one of its libraries is missing.
+# Searches for inputs that break a reader, with libFuzzer: run.sh [--minutes M] [--program FILE] [TARGET...]
+# M minutes (default: 1) are divided among the targets (default: all). FILE is a built qmat_fuzz; without it the preset
+# asan builds one. Inputs that break a reader stay in build/fuzz/found; exit code 1 then.
 # Add an input that broke a reader to tests/fuzz/corpus/TARGET: the test fuzz.corpus repeats it with every compiler.
 set -u
 top=$(cd "$(dirname "$0")/../.." && pwd) || exit 2
 build=$top/build/fuzz
 minutes=1
-if [ "${1:-}" = --minutes ]; then
-  minutes=$2
+program=
+while :; do
+  case ${1:-} in
+    --minutes) minutes=$2 ;;
+    --program) program=$2 ;;
+    *) break ;;
+  esac
   shift 2
-fi
+done
 
 work=$(mktemp -d) || exit 2
 trap 'rm -rf "$work"' EXIT
-echo 'int LLVMFuzzerTestOneInput(const char *bytes, long size) { return size > 0 && *bytes > 9; }' >"$work/try.c"
-if ! command -v clang++ >"$work/which"; then
-  echo "skipped: clang is missing (Debian: clang)"
-  exit 77
-elif ! clang -fopenmp -fsanitize=fuzzer,address,undefined "$work/try.c" -o "$work/try" >"$work/said" 2>&1; then
-  echo "skipped: clang cannot link libFuzzer, its sanitizers or OpenMP (Debian: clang, libclang-rt-14-dev, libomp-dev)"
-  exit 77
-fi
-if ! (cd "$top" && cmake --preset fuzz && cmake --build --preset fuzz) >"$work/build.log" 2>&1; then
-  tail -n 40 "$work/build.log"
-  exit 1
+if [ -z "$program" ]; then
+  program=$top/build/asan/qmat_fuzz
+  if ! (cd "$top" && cmake --preset asan && cmake --build --preset asan --target qmat_fuzz) >"$work/build.log" 2>&1; then
+    tail -n 40 "$work/build.log"
+    exit 1
+  fi
 fi
 
 if [ $# -eq 0 ]; then
@@ -45,7 +45,7 @@ for target in "$@"; do
   find "$top/../shared/data" -name "*.$target" -size -64k -exec cp {} "$work/real/$target" \; 2>"$work/said"
   if [ -e "$dictionary" ]; then dictionary=-dict=$dictionary; else dictionary=-use_value_profile=1; fi
   # Inputs that reach new code stay in build/fuzz/grown, where the next run continues.
-  if "$build/qmat_fuzz" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=65536 \
+  if "$program" "$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -max_len=65536 \
     -print_final_stats=1 -artifact_prefix="$build/found/$target-" "$dictionary" "$build/grown/$target" "$corpus" \
     "$work/real/$target" >"$work/said" 2>&1; then
     echo "ok      fuzz: $target: $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/said") inputs in $seconds s"
