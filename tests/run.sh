@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Installs packages, builds and tests everything:
 # - with gcc, optimised: all tests, and the whole program on generated and, where present, real models;
-# - with gcc and the address and undefined-behaviour sanitizers: all tests but the long ones;
+# - with clang and the address and undefined-behaviour sanitizers: all tests but the long ones, and a minute of fuzzing;
 # - with clang and the thread sanitizer: the tests of code that runs on several threads.
 # A compiler warning is an error. The last line counts: N passed, N failed, N skipped. The lines before it list each skip
 # with its reason and the disk space that was used. Exit code 0 when nothing failed.

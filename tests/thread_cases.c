@@ -7,4 +7,6 @@
 
 #include <cmocka.h>
 
-__attribute__((constructor)) static void choose_cases(void) { cmocka_set_test_filter("*thread*"); }
+__attribute__((constructor)) static void choose_cases(void) {
+  cmocka_set_test_filter("*thread*");
+}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Nodes that work for seconds ask often whether to go on: a run that is cancelled ends within half a second of processor
- * time. A sanitizer would be what is measured, so builds with one leave these tests out. */
+/* Nodes that work for seconds ask often whether to go on: a run that is cancelled ends within half a second of
+ * processor time. A sanitizer would be what is measured, so builds with one leave these tests out. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
