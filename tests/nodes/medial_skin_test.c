@@ -394,9 +394,9 @@ static void test_a_number_of_triangles_comes_before_the_error(void **unused) {
 
 static void test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology(void **unused) {
   (void)unused;
-  static const char *const plain[] = {"resolution=8 detail=0", "resolution=16 detail=2", "resolution=20 detail=0"};
+  static const char *const plain[] = {"resolution=8 detail=0", "resolution=16 detail=2", "resolution=28 detail=0"};
   static const char *const lean[] = {"resolution=8 detail=0 error=2%", "resolution=16 detail=2 error=1%",
-                                     "resolution=20 detail=0 error=0.6%"};
+                                     "resolution=28 detail=0 error=0.4%"};
   size_t fewer = 0;
   for (uint64_t seed = 0; seed < 12; seed++) {
     skin_result before = skin(soup(seed), plain[seed % 3]), after = skin(soup(seed), lean[seed % 3]);
