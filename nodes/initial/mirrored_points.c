@@ -27,7 +27,7 @@ static const double facing = 0.5;
 static const double inset = 1e-6;
 
 /* Normals of a sample (with the mean one more), and walls and gaps that a ray crosses one after the other. */
-enum { MOST_NORMALS = 7, MOST_LAYERS = 16, SAMPLES_A_SLICE = 1024 };
+enum { MOST_NORMALS = 7, MOST_LAYERS = 16, SAMPLES_A_SLICE = 256 };
 
 /* Where a ray from a sample leaves the solid, or enters it again; `width` is that of the wall or gap before it. */
 typedef struct crossing {

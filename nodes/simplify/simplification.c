@@ -107,10 +107,24 @@ static qmat_decimation *take_round(qmat_simplification *s) {
   s->newest = next;
   qmat_decimation *round = &s->rounds[next];
   qmat_decimation_uninit(round);
+  qmat_arena_uninit(&s->round_memory[next]);
   *round = (qmat_decimation){
       .context = s->context, .surface = s->surface, .rules = qmat_simplify_rules(&s->params, &s->state, s->seed)};
   round->rules.share = s->share;
   return round;
+}
+
+/* Runs the newest round, which continues `from`, in scratch memory that is freed with the round. */
+static qmat_status run_newest(qmat_simplification *s, const qmat_decimation *from, const qmat_medial *left,
+                              const qmat_extra_points *extra) {
+  const qmat_arena arena = s->context->arena;
+  s->context->arena = (qmat_arena){NULL};
+  const qmat_status status =
+      qmat_decimation_run_copies(from, left, extra, &s->dense.envelope_tracker.lattice, &s->depths,
+                                 &s->round_constraints[s->newest], &s->rounds[s->newest]);
+  s->round_memory[s->newest] = s->context->arena;
+  s->context->arena = arena;
+  return status;
 }
 
 /* Whether places beyond epsilon were found. */
@@ -129,9 +143,7 @@ static qmat_status repair_round(qmat_simplification *s, const qmat_medial_errors
   qmat_decimation *round = take_round(s);
   round->rules.repairs = true;
   round->failed_places = failed;
-  if (status == QMAT_OK)
-    status = qmat_decimation_run_copies(from, *medial, &extra, &s->dense.envelope_tracker.lattice, &s->depths,
-                                        &s->round_constraints[s->newest], round);
+  if (status == QMAT_OK) status = run_newest(s, from, *medial, &extra);
   if (status != QMAT_OK) return status;
   *has_moved = round->moves > from->moves;
   status = qmat_decimation_drop_exceeded(round, &s->round_constraints[s->newest]);
@@ -247,8 +259,7 @@ static qmat_status run_round(qmat_simplification *s, const qmat_decimation *from
   if (!a->medial) return qmat_fail_memory(s->context, "the medial mesh");
   round->rules.neighbourhoods = neighbourhoods;
   round->rules.final_refit = final_refit;
-  const qmat_status status = qmat_decimation_run_copies(from, left, extra, &s->dense.envelope_tracker.lattice,
-                                                        &s->depths, &s->round_constraints[s->newest], round);
+  const qmat_status status = run_newest(s, from, left, extra);
   return status == QMAT_OK ? judge_round(s, a, found) : status;
 }
 

@@ -27,7 +27,10 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
 }
 
 void qmat_simplification_uninit(qmat_simplification *s) {
-  for (int i = 0; i < 3; i++) qmat_decimation_uninit(&s->rounds[i]);
+  for (int i = 0; i < 3; i++) {
+    qmat_decimation_uninit(&s->rounds[i]);
+    qmat_arena_uninit(&s->round_memory[i]);
+  }
   qmat_decimation_uninit(&s->dense);
   qmat_copy_depths_uninit(&s->depths);
   qmat_surface_free(s->surface);

@@ -25,6 +25,7 @@ typedef struct qmat_simplification {
   /* Of the newest round, of the round that it continues, and of a repair. */
   qmat_constraint_points round_constraints[3];
   qmat_decimation rounds[3];
+  qmat_arena round_memory[3];
   int newest, base;        /* numbers of the first two */
   double share;            /* of the error: what rounds use */
   qmat_copy_depths depths; /* of the copies of rounds */
