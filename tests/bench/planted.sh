@@ -9,6 +9,10 @@ set -eu
 epsilon=1%
 shapes=200
 . "$(dirname "$0")/functions.sh"
+if [ ! -x "$build/qmat_planted" ]; then
+  echo "planted.sh: $build/qmat_planted is missing: cmake --build $build --target qmat_planted" >&2
+  exit 1
+fi
 if [ "${1:-}" = --shapes ]; then shapes=$2; fi
 QMAT_CACHE=off
 export QMAT_CACHE
