@@ -90,6 +90,17 @@ void qmat_arena_uninit(qmat_arena *arena) {
   arena->newest = NULL;
 }
 
+qmat_arena qmat_arena_set_aside(qmat_arena *arena) {
+  const qmat_arena aside = *arena;
+  arena->newest = NULL;
+  return aside;
+}
+
+void qmat_arena_put_back(qmat_arena *arena, qmat_arena aside) {
+  qmat_arena_uninit(arena);
+  *arena = aside;
+}
+
 void *qmat_alloc(size_t count, size_t size) {
   const size_t bytes = padded_bytes(count, size);
   if (bytes == 0) return NULL;

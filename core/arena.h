@@ -24,8 +24,15 @@ void *qmat_arena_calloc(qmat_arena *arena, size_t count, size_t size);
 /* Frees all memory of the arena, which is then empty and usable again. NULL is allowed. */
 void qmat_arena_uninit(qmat_arena *arena);
 
-/* The same on the heap, for memory that outlives a run: 64-byte aligned, padded by 16 readable bytes, NULL on shortage
- * or overflow. Free with qmat_free; NULL is allowed. Safe from any thread. */
+/* Returns what the arena holds; the arena is then empty. For memory that is freed earlier than the rest, or later: the
+ * caller puts it back, or owns it. */
+qmat_arena qmat_arena_set_aside(qmat_arena *arena);
+
+/* Frees all memory of the arena, which then holds `aside` again. */
+void qmat_arena_put_back(qmat_arena *arena, qmat_arena aside);
+
+/* The allocations above on the heap, for memory that outlives a run: 64-byte aligned, padded by 16 readable bytes, NULL
+ * on shortage or overflow. Free with qmat_free; NULL is allowed. Safe from any thread. */
 void *qmat_alloc(size_t count, size_t size);
 void *qmat_calloc(size_t count, size_t size);
 void qmat_free(void *memory);

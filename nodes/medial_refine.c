@@ -196,8 +196,7 @@ static qmat_status make_medial(const refiner *r, const qmat_surface *surface, re
 static qmat_status refine(refiner *r, const qmat_surface *surface, const refinement *from, double spacing, double limit,
                           refinement *to) {
   qmat_context *context = r->context;
-  const qmat_arena kept = context->arena; /* a round's scratch memory is released before the next round */
-  context->arena = (qmat_arena){NULL};
+  const qmat_arena aside = qmat_arena_set_aside(&context->arena); /* each round frees its scratch memory */
   qmat_point_grid far;
   const qmat_resampling where = {&r->solids, &r->frame, r->positions, &far, reach_of_samples * spacing, spacing};
   double *targets;
@@ -210,8 +209,7 @@ static qmat_status refine(refiner *r, const qmat_surface *surface, const refinem
     if (status == QMAT_OK && to->samples) status = make_medial(r, surface, to);
     if (status == QMAT_OK && to->samples) status = find_far_places(r, limit, to);
   }
-  qmat_arena_uninit(&context->arena);
-  context->arena = kept;
+  qmat_arena_put_back(&context->arena, aside);
   return status;
 }
 

@@ -33,20 +33,21 @@ static qmat_status call(qmat_context *context, const char *name, char *const *wo
   return status;
 }
 
-/* Memory comes from the system in huge pages and in few steps. A run needs tens of thousands of pages of 4 kB, and the
- * first touch of each costs a fault: together a fifth of the time of a small model. */
+/* Memory comes from the system in huge pages, and the heap grows by 64 MB for blocks of up to 1 GB. A run needs tens of
+ * thousands of pages of 4 kB, and the first touch of each costs a fault: a fifth of the time of a small model. */
 static const char memory_settings[] =
     "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=1073741824:glibc.malloc.top_pad=67108864";
 
-/* Libraries read these settings from the environment before `main`, so the program starts itself once more. A setting
- * of the user stays as it is. Where the second start fails the program runs without them. */
+/* Libraries read these settings from the environment before `main`, so the program starts itself once more. What the
+ * user has set stays as it is. Where the second start fails the program runs without them. */
 static void start_with_settings(char **argv) {
-  bool memory = !getenv("GLIBC_TUNABLES"), threads = !getenv("OMP_WAIT_POLICY");
-  if (!(memory || threads) || getauxval(AT_SECURE)) return;
-  if (memory && setenv("GLIBC_TUNABLES", memory_settings, 0) != 0) return;
-  /* Threads that wait for others give their processor away, GCC's after some ten microseconds: most waits are shorter.
-   */
-  if (threads && (setenv("OMP_WAIT_POLICY", "passive", 0) != 0 || setenv("GOMP_SPINCOUNT", "3000", 0) != 0)) return;
+  const bool set_memory = !getenv("GLIBC_TUNABLES");
+  /* Threads that wait for others give their processor away, GCC's after ten microseconds. Most waits are shorter. */
+  const bool set_threads = !getenv("OMP_WAIT_POLICY") && !getenv("GOMP_SPINCOUNT");
+  if (!(set_memory || set_threads)) return;
+  if (getauxval(AT_SECURE)) return; /* the loader would remove the first again, and each start would start another */
+  if (set_memory && setenv("GLIBC_TUNABLES", memory_settings, 1) != 0) return;
+  if (set_threads && (setenv("OMP_WAIT_POLICY", "passive", 1) != 0 || setenv("GOMP_SPINCOUNT", "3000", 1) != 0)) return;
   execv("/proc/self/exe", argv);
 }
 

@@ -78,12 +78,10 @@ qmat_status qmat_chain_set_bounds(qmat_context *context, const qmat_surface *sur
   qmat_status status = QMAT_OK;
   for (size_t i = count, n = first; i > 0 && status == QMAT_OK; n = next_level(n)) {
     const size_t collapses = chain->sphere_count - n;
-    const qmat_arena arena = context->arena; /* each level frees its scratch memory */
-    context->arena = (qmat_arena){NULL};
+    const qmat_arena aside = qmat_arena_set_aside(&context->arena); /* each level frees its scratch memory */
     chain->bounded[--i] = (uint32_t)collapses;
     status = bound_level(context, surface, chain, collapses, level_error(chain, n, finest), &chain->bounds[2 * i]);
-    qmat_arena_uninit(&context->arena);
-    context->arena = arena;
+    qmat_arena_put_back(&context->arena, aside);
     for (size_t k = 0; k < 2; k++) chain->bounds[2 * i + k] += deviation;
   }
   return status;

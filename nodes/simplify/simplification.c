@@ -117,13 +117,13 @@ static qmat_decimation *take_round(qmat_simplification *s) {
 /* Runs the newest round, which continues `from`, in scratch memory that is freed with the round. */
 static qmat_status run_newest(qmat_simplification *s, const qmat_decimation *from, const qmat_medial *left,
                               const qmat_extra_points *extra) {
-  const qmat_arena arena = s->context->arena;
-  s->context->arena = (qmat_arena){NULL};
+  qmat_arena *arena = &s->context->arena;
+  const qmat_arena aside = qmat_arena_set_aside(arena);
   const qmat_status status =
       qmat_decimation_run_copies(from, left, extra, &s->dense.envelope_tracker.lattice, &s->depths,
                                  &s->round_constraints[s->newest], &s->rounds[s->newest]);
-  s->round_memory[s->newest] = s->context->arena;
-  s->context->arena = arena;
+  s->round_memory[s->newest] = qmat_arena_set_aside(arena);
+  qmat_arena_put_back(arena, aside);
   return status;
 }
 

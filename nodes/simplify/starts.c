@@ -146,11 +146,9 @@ static qmat_status run_left_out(void *user, qmat_context *own, size_t i) {
 
 /* A single start uses all threads by itself. */
 static qmat_status run_alone(qmat_context *context, all_starts *all) {
-  const qmat_arena arena = context->arena;
-  context->arena = (qmat_arena){0};
+  const qmat_arena aside = qmat_arena_set_aside(&context->arena);
   const qmat_status status = run_first(all, context, 0);
-  qmat_arena_uninit(&context->arena);
-  context->arena = arena;
+  qmat_arena_put_back(&context->arena, aside);
   return status;
 }
 

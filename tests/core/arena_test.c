@@ -77,6 +77,22 @@ static void test_uninit_takes_empty_arenas_and_null(void **state) {
   qmat_arena_uninit(NULL);
 }
 
+static void test_what_is_set_aside_outlives_what_comes_after(void **state) {
+  (void)state;
+  qmat_arena arena = {0};
+  uint32_t *first = qmat_arena_calloc(&arena, 100, sizeof *first);
+  first[99] = 7;
+  const qmat_arena aside = qmat_arena_set_aside(&arena);
+  assert_null(arena.newest);
+  uint32_t *second = qmat_arena_calloc(&arena, 100, sizeof *second);
+  second[99] = 8;
+  assert_ptr_not_equal(first, second);
+  qmat_arena_put_back(&arena, aside);
+  assert_ptr_equal(arena.newest, aside.newest);
+  assert_int_equal(first[99], 7);
+  qmat_arena_uninit(&arena);
+}
+
 static void test_sizes_that_overflow_give_null(void **state) {
   (void)state;
   qmat_arena arena = {0};
@@ -162,6 +178,7 @@ int main(void) {
       cmocka_unit_test(test_a_large_array_leaves_the_rest_of_the_block_in_use),
       cmocka_unit_test(test_calloc_clears_memory_that_was_used_before),
       cmocka_unit_test(test_uninit_takes_empty_arenas_and_null),
+      cmocka_unit_test(test_what_is_set_aside_outlives_what_comes_after),
       cmocka_unit_test(test_sizes_that_overflow_give_null),
       cmocka_unit_test(test_zero_elements_give_a_valid_pointer),
       cmocka_unit_test(test_heap_arrays_are_aligned_and_padded),
