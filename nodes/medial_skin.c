@@ -230,10 +230,11 @@ enum { MOST_CONTOUR_CELLS = 300000 };
 /* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
  */
 static const double CONTOUR_SHARE = 0.3;
-/* So many contours are decimated for all of the error, each with finer cells where the one before exceeds it; then one
- * for the share. */
+/* So many contours are decimated, each with finer cells where the one before exceeds the error. */
 enum { MOST_CONTOURS = 4 };
-static const double SECOND_SHARE = 0.6;
+/* Beyond this multiple of the error the contour itself is too far, in crevices narrower than the finest cells. Only the
+ * second contour is tried then. */
+static const double HOPELESS_EXCESS = 1.5;
 
 static void drop_triangles(qmat_skin_triangles *surface) {
   qmat_free(surface->positions);
@@ -374,13 +375,13 @@ static qmat_status refine_contour(skin *s, int detail) {
 
 /* Decimates a copy of the contour, and bounds the errors of what is left, which becomes the surface. `far` gets the
  * places beyond the error; free it with qmat_skin_distance_uninit, also after a failure. */
-static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, double error, qmat_skin_distance *far) {
+static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, qmat_skin_distance *far) {
   const medial_skin_params *p = s->params;
   *far = (qmat_skin_distance){0};
   drop_triangles(&s->surface);
   qmat_status status = copy_triangles(s, contour, &s->surface);
   if (status == QMAT_OK)
-    status = qmat_skin_decimate(s->context, s->envelope, error, (size_t)p->triangles, &s->surface, &s->errors);
+    status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
   return status == QMAT_OK ? bound_distance(s, far) : status;
 }
 
@@ -392,24 +393,12 @@ static qmat_status refine_places(skin *s, const qmat_skin_distance *far, int det
   return status == QMAT_OK && far->far_count > 0 ? make_finer_contour(s, detail, contour, is_finer) : status;
 }
 
-/* Decimates the contour for a share of the error. The surface stays as it is where that does not help. */
-static qmat_status decimate_more_closely(skin *s, const qmat_skin_triangles *contour) {
-  skin before = *s;
-  qmat_skin_distance far;
-  s->surface = (qmat_skin_triangles){.vertex_count = 0};
-  const qmat_status status = decimate_copy(s, contour, SECOND_SHARE * s->params->error, &far);
-  qmat_skin_distance_uninit(&far);
-  if (status == QMAT_OK && distance_of(s) <= s->params->error) {
-    drop_triangles(&before.surface);
-    return status;
-  }
-  drop_triangles(&s->surface);
-  *s = before;
-  return status;
+/* Whether finer cells may bring the surface within the error. */
+static bool may_come_closer(const skin *s, int attempt) {
+  return attempt == 1 || (attempt < MOST_CONTOURS && distance_of(s) <= HOPELESS_EXCESS * s->params->error);
 }
 
-/* Decimates the contour. Where the result exceeds the error, the contour gets the finest cells. If that does not help,
- * it is decimated for a share of the error. */
+/* Decimates the contour. Where the result exceeds the error, the contour gets the finest cells. */
 static qmat_status decimate_contour(skin *s, int detail) {
   qmat_skin_triangles contour = s->surface;
   qmat_status status = QMAT_OK;
@@ -418,14 +407,13 @@ static qmat_status decimate_contour(skin *s, int detail) {
   for (int attempt = 1; status == QMAT_OK && exceeds && is_finer; attempt++) {
     qmat_skin_distance far;
     s->contour_triangle_count = contour.triangle_count;
-    status = decimate_copy(s, &contour, s->params->error, &far);
+    status = decimate_copy(s, &contour, &far);
     exceeds = s->params->triangles == 0 && distance_of(s) > s->params->error;
     is_finer = false;
-    if (status == QMAT_OK && exceeds && attempt < MOST_CONTOURS)
+    if (status == QMAT_OK && exceeds && may_come_closer(s, attempt))
       status = refine_places(s, &far, detail, &contour, &is_finer);
     qmat_skin_distance_uninit(&far);
   }
-  if (status == QMAT_OK && exceeds) status = decimate_more_closely(s, &contour);
   drop_triangles(&contour);
   return status;
 }
@@ -582,7 +570,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 14,
+    .version = 15,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
