@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/skin/skin_thin.h"
 
+#include <math.h>
 #include <string.h>
 
 #include <meshoptimizer.h>
@@ -8,8 +9,10 @@
 #include "core/disjoint_sets.h"
 #include "core/node.h"
 
-/* The first round thins out everything; each later one leaves the triangles around all faults so far as they are. */
-enum { MOST_ROUNDS = 24 };
+/* The first round thins out everything; each later one leaves the triangles around all faults so far as they are. A
+ * component whose topology changes is thinned out for half of the error instead, and stays as it is after so many
+ * halvings. */
+enum { MOST_ROUNDS = 24, MOST_HALVINGS = 6 };
 
 typedef struct thinning {
   qmat_context *context;
@@ -24,6 +27,7 @@ typedef struct thinning {
   uint32_t *corners;    /* corners of the thinned surface by their vertices */
   uint32_t *leaders;    /* disjoint sets of vertices: the components of the surface */
   int64_t *euler;       /* per leader: twice what thinning changes in the Euler characteristic of the component */
+  uint8_t *halvings;    /* per leader: how often the error of the component was halved */
 } thinning;
 
 static qmat_status start(qmat_context *context, const qmat_skin_triangles *surface, thinning *t) {
@@ -39,22 +43,23 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
                   .firsts = qmat_arena_alloc(arena, vertices + 1, sizeof *t->firsts),
                   .corners = qmat_arena_alloc(arena, corners, sizeof *t->corners),
                   .leaders = qmat_sets_new(context, vertices),
-                  .euler = qmat_arena_alloc(arena, vertices, sizeof *t->euler)};
-  if (!t->leaders || !t->euler || !t->positions || !t->locked || !t->is_fault || !t->thinned || !t->open ||
-      !t->firsts || !t->corners)
+                  .euler = qmat_arena_alloc(arena, vertices, sizeof *t->euler),
+                  .halvings = qmat_arena_calloc(arena, vertices, sizeof *t->halvings)};
+  if (!t->leaders || !t->euler || !t->halvings || !t->positions || !t->locked || !t->is_fault || !t->thinned ||
+      !t->open || !t->firsts || !t->corners)
     return qmat_fail_memory(context, "the skin");
   for (size_t i = 0; i < 3 * vertices; i++) t->positions[i] = (float)surface->positions[i];
   for (size_t i = 0; i < corners; i++) qmat_sets_join(t->leaders, surface->triangles[i], surface->triangles[i - i % 3]);
   return QMAT_OK;
 }
 
-/* Thins out the triangles without a locked vertex; their border stays. */
-static void thin(thinning *t, double error) {
+/* Thins out the triangles without a locked vertex, of the components with so many halvings; their border stays. */
+static void thin_components(thinning *t, double error, int halvings) {
   const qmat_skin_triangles *surface = t->surface;
   size_t count = 0;
-  t->thinned_count = 0;
   for (size_t i = 0; i < surface->triangle_count; i++) {
     const uint32_t *from = surface->triangles + 3 * i;
+    if (t->halvings[qmat_set_leader(t->leaders, *from)] != halvings) continue;
     const bool stays = t->locked[from[0]] || t->locked[from[1]] || t->locked[from[2]];
     memcpy(stays ? t->thinned + 3 * t->thinned_count++ : t->open + 3 * count++, from, 3 * sizeof *from);
   }
@@ -65,6 +70,11 @@ static void thin(thinning *t, double error) {
       meshopt_simplify(t->thinned + 3 * t->thinned_count, t->open, 3 * count, t->positions, surface->vertex_count,
                        stride, 0, (float)error / scale, meshopt_SimplifyLockBorder, NULL) /
       3;
+}
+
+static void thin(thinning *t, double error) {
+  t->thinned_count = 0;
+  for (int halvings = 0; halvings <= MOST_HALVINGS; halvings++) thin_components(t, ldexp(error, -halvings), halvings);
 }
 
 static void sort_corners(thinning *t) {
@@ -120,8 +130,9 @@ static bool lock_faults(thinning *t) {
   return any;
 }
 
-/* Locks the components that are gone, or whose Euler characteristic changed. False where there are none. */
-static bool lock_changed_components(thinning *t) {
+/* Locks the components that are gone, and halves the error of those whose Euler characteristic changed. False where
+ * there are none. */
+static bool spare_changed_components(thinning *t) {
   const qmat_skin_triangles *surface = t->surface;
   const size_t count = surface->vertex_count;
   bool any = false;
@@ -140,8 +151,11 @@ static bool lock_changed_components(thinning *t) {
   for (uint32_t v = 0; v < count; v++) {
     const uint32_t leader = qmat_set_leader(t->leaders, v);
     if (is_left[leader] && t->euler[leader] == 0) continue;
-    t->locked[v] = any = true;
+    any = true;
+    if (!is_left[leader] || t->halvings[leader] == MOST_HALVINGS) t->locked[v] = true;
   }
+  for (uint32_t v = 0; v < count; v++)
+    if (is_left[v] && t->euler[v] != 0 && t->halvings[v] < MOST_HALVINGS) t->halvings[v]++;
   return any;
 }
 
@@ -166,7 +180,7 @@ qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triang
     thin(&t, error);
     sort_corners(&t);
     status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
-    if (status != QMAT_OK || lock_faults(&t) || lock_changed_components(&t)) continue;
+    if (status != QMAT_OK || lock_faults(&t) || spare_changed_components(&t)) continue;
     take(&t, surface);
     return status;
   }

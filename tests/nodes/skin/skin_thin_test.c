@@ -152,8 +152,9 @@ static void test_faults_keep_few_triangles(void **state) {
   drop(&surface);
 }
 
-/* A ring thinner than the error closes its hole: it stays as it is. The box beside it is thinned out all the same. */
-static void test_a_component_that_would_change_its_topology_stays_alone(void **state) {
+/* A ring thinner than the error closes its hole: it is thinned out for less. The box beside it loses nothing by that.
+ */
+static void test_a_component_that_would_change_its_topology_is_thinned_out_for_less(void **state) {
   (void)state;
   qmat_mesh *mesh = gridded_box(16), *ring = shape_torus(0.5, 0.05, 48, 12);
   const uint32_t first = (uint32_t)mesh->vertex_count;
@@ -167,7 +168,7 @@ static void test_a_component_that_would_change_its_topology_stays_alone(void **s
   }
   const size_t of_ring = ring->triangle_count;
   qmat_skin_triangles surface = thinned(shape_seal(mesh), 0.1);
-  assert_int_equal(surface.triangle_count, of_ring + 12);
+  assert_in_range(surface.triangle_count, 12 + 14, 12 + of_ring / 3);
   drop(&surface);
   qmat_value_release(&ring->base);
 }
@@ -195,7 +196,7 @@ int main(void) {
       cmocka_unit_test(test_any_error_leaves_a_manifold_of_the_same_topology),
       cmocka_unit_test(test_a_component_stays_where_it_is_smaller_than_the_error),
       cmocka_unit_test(test_faults_keep_few_triangles),
-      cmocka_unit_test(test_a_component_that_would_change_its_topology_stays_alone),
+      cmocka_unit_test(test_a_component_that_would_change_its_topology_is_thinned_out_for_less),
       cmocka_unit_test(test_a_cancel_is_obeyed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
