@@ -339,7 +339,7 @@ static const qmat_param params[] = {
     QMAT_LENGTH(
         qmat_voronoi_dual_params, epsilon, 0.01, 0, 1,
         "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
-    QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.75, 0.1, 1,
+    QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.95, 0.1, 1,
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
                "Refinement then adds samples around all points that are farther than this"),
@@ -368,7 +368,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 17,
+    .version = 18,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "
