@@ -20,8 +20,8 @@ void qmat_simplify_figures_of(const qmat_decimation *run, qmat_simplify_figures 
  * the edges of the mesh lengthen it. */
 static const double longest_loop = 12;
 
-/* So many lost handles are named. */
-enum { MOST_NAMED = 16 };
+/* The report has so many lost handles, and the warnings so many one by one. */
+enum { MOST_NAMED = 16, MOST_WARNED = 3 };
 
 static int add_warning(json_t *root, const char *text) {
   json_t *warnings = json_object_get(root, "warnings");
@@ -45,21 +45,43 @@ static size_t count_at(const json_t *root, const char *key) {
   return (size_t)json_integer_value(json_object_get(root, key));
 }
 
-static int add_handle(json_t *root, json_t *list, const qmat_frame *frame, const qmat_lost_handle *handle) {
+static int list_handle(json_t *list, const qmat_frame *frame, const qmat_lost_handle *handle) {
   double at[3];
-  char text[200];
   qmat_frame_to_model(frame, handle->place, 1, at);
-  snprintf(text, sizeof text, "a %s at (%.5g, %.5g, %.5g), %.2g %% of the diagonal across, is not in the result",
-           handle->is_hole ? "hole" : "handle", at[0], at[1], at[2], 100 * handle->size);
-  return add_warning(root, text) |
-         json_array_append_new(list, json_pack("{s:s, s:[fff], s:f}", "kind", handle->is_hole ? "hole" : "handle",
+  return json_array_append_new(list, json_pack("{s:s, s:[fff], s:f}", "kind", handle->is_hole ? "hole" : "handle",
                                                "place", at[0], at[1], at[2], "size", handle->size));
+}
+
+/* One warning for each of a few handles, or one for all: `lost` of `wanted`, `count` of which are located. */
+static int warn_of_handles(json_t *root, const qmat_frame *frame, const qmat_lost_handle *handles, size_t count,
+                           size_t lost, size_t wanted) {
+  char text[200];
+  int bad = 0;
+  if (count == lost && count <= MOST_WARNED) {
+    for (size_t i = 0; i < count; i++) {
+      double at[3];
+      qmat_frame_to_model(frame, handles[i].place, 1, at);
+      snprintf(text, sizeof text, "a %s at (%.5g, %.5g, %.5g), %.2g %% of the diagonal across, is not in the result",
+               handles[i].is_hole ? "hole" : "handle", at[0], at[1], at[2], 100 * handles[i].size);
+      bad |= add_warning(root, text);
+    }
+    return bad;
+  }
+  double largest = 0;
+  for (size_t i = 0; i < count; i++) largest = fmax(largest, handles[i].size);
+  const int length = snprintf(text, sizeof text, "the result lacks %zu of the solid's %zu handles", lost, wanted);
+  if (count > 0)
+    snprintf(text + length, sizeof text - (size_t)length,
+             "; the report (lost_handles) has the places of %zu, up to %.2g %% of the diagonal across", count,
+             100 * largest);
+  return add_warning(root, text);
 }
 
 /* Names the handles of the solid that the result has lost, where their numbers differ. */
 static qmat_status name_lost_handles(qmat_context *context, const qmat_medial *unit, const qmat_surface *surface,
                                      double error, json_t *root) {
   const size_t loops = count_at(root, "loops"), wanted = count_at(root, "loops_of_solid");
+  const qmat_frame *frame = qmat_surface_frame(surface);
   qmat_lost_handle *handles;
   size_t count;
   if (!json_object_get(root, "loops") || loops >= wanted || !(error < INFINITY)) return QMAT_OK;
@@ -69,13 +91,8 @@ static qmat_status name_lost_handles(qmat_context *context, const qmat_medial *u
   if (status != QMAT_OK) return status;
   json_t *list = json_array();
   int bad = json_object_set_new(root, "lost_handles", list);
-  for (size_t i = 0; i < count && !bad; i++) bad |= add_handle(root, list, qmat_surface_frame(surface), &handles[i]);
-  if (count < wanted - loops && !bad) {
-    char text[120];
-    snprintf(text, sizeof text, "%zu of %zu handles of the solid that are not in the result were not located",
-             wanted - loops - count, wanted - loops);
-    bad |= add_warning(root, text);
-  }
+  for (size_t i = 0; i < count && !bad; i++) bad |= list_handle(list, frame, &handles[i]);
+  if (!bad) bad |= warn_of_handles(root, frame, handles, count, wanted - loops, wanted);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 

@@ -706,6 +706,36 @@ static void test_a_lost_handle_is_named_with_its_size(void **state) {
   release(&r);
 }
 
+static void test_many_lost_handles_are_one_warning(void **state) {
+  (void)state;
+  enum { COUNT = 4 };
+  qmat_mesh *one = shape_frame(0.3), *row = qmat_mesh_new();
+  for (int i = 0; i < COUNT; i++) {
+    const uint32_t first = (uint32_t)row->vertex_count;
+    for (size_t v = 0; v < one->vertex_count; v++) {
+      const double *at = one->positions + 3 * v;
+      shape_vertex(row, at[0], at[1], at[2] + 3 * i);
+    }
+    for (size_t t = 0; t < one->triangle_count; t++) {
+      const uint32_t *ids = one->triangles + 3 * t;
+      shape_triangle(row, first + ids[0], first + ids[1], first + ids[2]);
+    }
+  }
+  pipeline p;
+  pipeline_make(&p, row, sampling, "");
+  result r = simplify(&p, "epsilon=8%");
+  assert_int_equal(pipeline_count(r.report, "loops_of_solid"), COUNT);
+  assert_int_equal(pipeline_count(r.report, "loops"), 0);
+  assert_int_equal(json_array_size(json_object_get(r.report->root, "lost_handles")), COUNT);
+  const json_t *warnings = json_object_get(r.report->root, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_non_null(
+      strstr(json_string_value(json_array_get(warnings, 0)), "the result lacks 4 of the solid's 4 handles"));
+  release(&r);
+  pipeline_free(&p);
+  qmat_value_release(&one->base);
+}
+
 static void test_a_number_of_vertices_that_is_not_reached_is_a_warning(void **state) {
   (void)state;
   const pipeline *p = model(SMALL);
@@ -1087,6 +1117,7 @@ int main(void) {
       cmocka_unit_test(test_a_number_of_vertices_that_is_not_reached_is_a_warning),
       cmocka_unit_test(test_a_number_of_vertices_that_epsilon_prevents_is_a_warning),
       cmocka_unit_test(test_a_lost_handle_is_named_with_its_size),
+      cmocka_unit_test(test_many_lost_handles_are_one_warning),
       cmocka_unit_test(test_more_vertices_than_there_are_change_nothing),
       cmocka_unit_test(test_cost_stops_before_dear_collapses),
       cmocka_unit_test(test_one_sided_holds_the_surface_alone),
