@@ -34,6 +34,8 @@ static const double least_wrap_epsilon = 0.004;
 static const double weld_tolerance = 1e-5;
 /* A triangle that the union leaves out is within it if it leaves it by at most this share of epsilon. */
 static const double least_gap = 0.01;
+/* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
+static const double least_left = 0.2;
 /* Components and caps that the report lists. */
 enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
 
@@ -505,6 +507,19 @@ static int report_parts(const solidifier *s, json_t *root) {
   return bad | json_object_set_new(root, "components", list);
 }
 
+/* Warns where the union leaves few triangles. */
+static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
+  const size_t given = s->solids.count, left = s->united.triangle_count;
+  if (!s->united.changed || (double)left >= least_left * (double)given) return 0;
+  char text[200];
+  snprintf(
+      text, sizeof text,
+      "at least %zu of %zu triangles of solids lie in or on other solids, and are left out; if that is not wanted, "
+      "remove the part around them, such as a sky or a room",
+      given - left, given);
+  return json_object_set_new(root, "warnings", json_pack("[s]", text));
+}
+
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
   json_t *root = report->root;
   size_t kinds[QMAT_PART_KIND_COUNT] = {0}, open = 0;
@@ -540,6 +555,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
     bad |= qmat_json_set_count(root, "triangles", made->triangle_count);
   }
   if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
+  bad |= warn_of_hidden_solids(s, root);
   if (s->united.why_not) {
     char text[160];
     snprintf(text, sizeof text, "the solids are wrapped: those that intersect cannot be united: %s", s->united.why_not);
@@ -627,7 +643,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 4,
+    .version = 5,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "

@@ -959,6 +959,24 @@ static void test_a_card_of_two_sides_is_a_sheet_of_one(void **state) {
   }
 }
 
+/* A box around a hundred small ones: as a sky around a scene. */
+static void test_a_part_that_hides_all_others_is_a_warning(void **state) {
+  (void)state;
+  for (int is_around = 0; is_around < 2; is_around++) {
+    qmat_mesh *mesh = shape_box(100, 1, 1);
+    if (is_around) shape_add_box(mesh, -1, -1, -1, 101, 9, 9, false);
+    for (int i = 0; i < 100; i++) shape_add_box(mesh, i + 0.2, 3, 3, i + 0.8, 4, 4, false);
+    result r = unite(mesh);
+    const json_t *warnings = json_object_get(r.report->root, "warnings");
+    assert_int_equal(json_array_size(warnings), is_around);
+    if (is_around) {
+      assert_int_equal(r.mesh->triangle_count, 12);
+      assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "1212 of 1224 triangles"));
+    }
+    release(&r);
+  }
+}
+
 /* A cube with a fin on an edge, a wall across its middle, or one of its sides twice. */
 static void test_fins_are_sheets_and_walls_inside_are_left_out(void **state) {
   (void)state;
@@ -1108,6 +1126,7 @@ int main(void) {
       cmocka_unit_test(test_seams_that_rounding_opened_are_welded_and_their_width_is_part_of_the_deviation),
       cmocka_unit_test(test_surfaces_without_volume_are_sheets_as_they_are),
       cmocka_unit_test(test_a_card_of_two_sides_is_a_sheet_of_one),
+      cmocka_unit_test(test_a_part_that_hides_all_others_is_a_warning),
       cmocka_unit_test(test_fins_are_sheets_and_walls_inside_are_left_out),
       cmocka_unit_test(test_what_faces_inwards_is_turned_unless_it_is_a_cavity),
       cmocka_unit_test(test_each_choice_does_what_it_says),
