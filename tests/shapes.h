@@ -274,6 +274,19 @@ static inline qmat_mesh *shape_seal(qmat_mesh *mesh) {
   return mesh;
 }
 
+/* Adds a copy of another mesh, moved. */
+static inline void shape_add_copy(qmat_mesh *mesh, const qmat_mesh *other, double x, double y, double z) {
+  const uint32_t first = (uint32_t)mesh->vertex_count;
+  for (size_t v = 0; v < other->vertex_count; v++) {
+    const double *p = other->positions + 3 * v;
+    shape_vertex(mesh, p[0] + x, p[1] + y, p[2] + z);
+  }
+  for (size_t t = 0; t < other->triangle_count; t++) {
+    const uint32_t *ids = other->triangles + 3 * t;
+    shape_triangle(mesh, first + ids[0], first + ids[1], first + ids[2]);
+  }
+}
+
 /* A sealed square plate of size 10 and thickness 1 around the origin with a square hole through its middle. Corner k of
  * ring i (outer below, inner below, outer above, inner above) is vertex 4 i + k, counted around the hole. */
 static inline qmat_mesh *shape_frame(double hole) {

@@ -709,18 +709,8 @@ static void test_a_lost_handle_is_named_with_its_size(void **state) {
 static void test_many_lost_handles_are_one_warning(void **state) {
   (void)state;
   enum { COUNT = 4 };
-  qmat_mesh *one = shape_frame(0.3), *row = qmat_mesh_new();
-  for (int i = 0; i < COUNT; i++) {
-    const uint32_t first = (uint32_t)row->vertex_count;
-    for (size_t v = 0; v < one->vertex_count; v++) {
-      const double *at = one->positions + 3 * v;
-      shape_vertex(row, at[0], at[1], at[2] + 3 * i);
-    }
-    for (size_t t = 0; t < one->triangle_count; t++) {
-      const uint32_t *ids = one->triangles + 3 * t;
-      shape_triangle(row, first + ids[0], first + ids[1], first + ids[2]);
-    }
-  }
+  qmat_mesh *one = shape_frame(0.3), *row = shape_new();
+  for (int i = 0; i < COUNT; i++) shape_add_copy(row, one, 0, 0, 3 * i);
   pipeline p;
   pipeline_make(&p, row, sampling, "");
   result r = simplify(&p, "epsilon=8%");

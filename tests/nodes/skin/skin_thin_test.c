@@ -157,15 +157,7 @@ static void test_faults_keep_few_triangles(void **state) {
 static void test_a_component_that_would_change_its_topology_is_thinned_out_for_less(void **state) {
   (void)state;
   qmat_mesh *mesh = gridded_box(16), *ring = shape_torus(0.5, 0.05, 48, 12);
-  const uint32_t first = (uint32_t)mesh->vertex_count;
-  for (size_t v = 0; v < ring->vertex_count; v++) {
-    const double *p = ring->positions + 3 * v;
-    shape_vertex(mesh, p[0] + 5, p[1], p[2]);
-  }
-  for (size_t i = 0; i < ring->triangle_count; i++) {
-    const uint32_t *t = ring->triangles + 3 * i;
-    shape_triangle(mesh, first + t[0], first + t[1], first + t[2]);
-  }
+  shape_add_copy(mesh, ring, 5, 0, 0);
   const size_t of_ring = ring->triangle_count;
   qmat_skin_triangles surface = thinned(shape_seal(mesh), 0.1);
   assert_in_range(surface.triangle_count, 12 + 14, 12 + of_ring / 3);
