@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/json_text.h"
 
+#include <stdarg.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -51,4 +52,14 @@ int qmat_json_set_counts(json_t *object, const qmat_json_count *rows, size_t row
   int bad = 0;
   for (size_t i = 0; i < row_count; i++) bad |= qmat_json_set_count(object, rows[i].key, rows[i].count);
   return bad;
+}
+
+int qmat_json_add_warning(json_t *report, const char *format, ...) {
+  json_t *warnings = json_object_get(report, "warnings");
+  if (!warnings && json_object_set_new(report, "warnings", warnings = json_array()) != 0) return -1;
+  va_list values;
+  va_start(values, format);
+  json_t *text = json_vsprintf(format, values);
+  va_end(values);
+  return json_array_append_new(warnings, text);
 }

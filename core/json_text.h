@@ -27,4 +27,8 @@ typedef struct qmat_json_count {
 /* Sets `row_count` whole numbers, in their order. Returns as qmat_json_set_count. */
 int qmat_json_set_counts(json_t *object, const qmat_json_count *rows, size_t row_count);
 
+/* Appends a warning, as printf makes it of UTF-8 text, to the list "warnings" of a report. Returns as
+ * qmat_json_set_count. */
+int qmat_json_add_warning(json_t *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 #endif

@@ -5,6 +5,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
+#include "core/json_text.h"
 #include "core/node.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/skin/envelope_surface.h"
@@ -435,12 +436,10 @@ static qmat_status make_envelope_surface(skin *s) {
 /* Says that the mesh is farther from the envelope than it should be. Nonzero when memory is short. */
 static int add_warning(const skin *s, json_t *root) {
   if (s->params->triangles > 0 || distance_of(s) <= s->params->error) return 0;
-  char text[160];
-  snprintf(text, sizeof text,
-           "the visible mesh is up to %.2g %% of the diagonal from the envelope, not %.2g %%; a finer one: --set "
-           "skin.detail=%d",
-           100 * distance_of(s), 100 * s->params->error, (int)s->params->detail + 2);
-  return json_object_set_new(root, "warnings", json_pack("[s]", text));
+  return qmat_json_add_warning(root,
+                               "the visible mesh is up to %.2g %% of the diagonal from the envelope, not %.2g %%; a "
+                               "finer one: --set skin.detail=%d",
+                               100 * distance_of(s), 100 * s->params->error, (int)s->params->detail + 2);
 }
 
 static qmat_status fill_report(skin *s, qmat_report *report) {

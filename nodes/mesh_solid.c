@@ -511,13 +511,10 @@ static int report_parts(const solidifier *s, json_t *root) {
 static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
   const size_t given = s->solids.count, left = s->united.triangle_count;
   if (!s->united.changed || (double)left >= least_left * (double)given) return 0;
-  char text[200];
-  snprintf(
-      text, sizeof text,
-      "at least %zu of %zu triangles of solids lie in or on other solids, and are left out; if that is not wanted, "
-      "remove the part around them, such as a sky or a room",
-      given - left, given);
-  return json_object_set_new(root, "warnings", json_pack("[s]", text));
+  return qmat_json_add_warning(root,
+                               "at least %zu of %zu triangles of solids lie in or on other solids, and are left out; "
+                               "if that is not wanted, remove the part around them, such as a sky or a room",
+                               given - left, given);
 }
 
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
@@ -556,11 +553,9 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
   }
   if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
   bad |= warn_of_hidden_solids(s, root);
-  if (s->united.why_not) {
-    char text[160];
-    snprintf(text, sizeof text, "the solids are wrapped: those that intersect cannot be united: %s", s->united.why_not);
-    bad |= json_object_set_new(root, "warnings", json_pack("[s]", text));
-  }
+  if (s->united.why_not)
+    bad |= qmat_json_add_warning(root, "the solids are wrapped: those that intersect cannot be united: %s",
+                                 s->united.why_not);
   return bad ? qmat_fail_memory(s->context, "the report") : QMAT_OK;
 }
 

@@ -387,13 +387,6 @@ static qmat_status find_level(const subdivision *s, double allowed, int *level, 
 
 /* ---- the node ---- */
 
-static int add_warning(json_t *root, size_t creases) {
-  char text[128];
-  snprintf(text, sizeof text, "%zu creases of subdivision surfaces are not edges of their cages and are ignored",
-           creases);
-  return json_object_set_new(root, "warnings", json_pack("[s]", text));
-}
-
 static qmat_status fill_report(qmat_context *context, const subdivision *s, int level, int depth, const attempt *a,
                                const json_t *facts, qmat_report *report) {
   static const char *const kept[] = {"vertices",          "triangles",  "vertices_welded",      "border_edges",
@@ -411,7 +404,10 @@ static qmat_status fill_report(qmat_context *context, const subdivision *s, int 
     bad |= qmat_json_set_count(root, "creases_without_edge", a->creases_without_edge);
     for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
       bad |= json_object_set(root, kept[i], json_object_get(facts, kept[i]));
-    if (a->creases_without_edge > 0) bad |= add_warning(root, a->creases_without_edge);
+    if (a->creases_without_edge > 0)
+      bad |= qmat_json_add_warning(root,
+                                   "%zu creases of subdivision surfaces are not edges of their cages and are ignored",
+                                   a->creases_without_edge);
   }
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }

@@ -23,12 +23,6 @@ static const double longest_loop = 12;
 /* The report has so many lost handles, and the warnings so many one by one. */
 enum { MOST_NAMED = 16, MOST_WARNED = 3 };
 
-static int add_warning(json_t *root, const char *text) {
-  json_t *warnings = json_object_get(root, "warnings");
-  if (!warnings && json_object_set_new(root, "warnings", warnings = json_array())) return -1;
-  return json_array_append_new(warnings, json_string(text));
-}
-
 static int warn_of_spheres(json_t *root, const qmat_simplify_figures *f, const qmat_medial *unit, double epsilon) {
   char text[200];
   int length =
@@ -38,61 +32,56 @@ static int warn_of_spheres(json_t *root, const qmat_simplify_figures *f, const q
   else if (epsilon > 0)
     snprintf(text + length, sizeof text - (size_t)length, ": fewer are farther than %.3g %% from the surface",
              100 * epsilon);
-  return add_warning(root, text);
+  return qmat_json_add_warning(root, "%s", text);
 }
 
 static size_t count_at(const json_t *root, const char *key) {
   return (size_t)json_integer_value(json_object_get(root, key));
 }
 
-static int list_handle(json_t *list, const qmat_frame *frame, const qmat_lost_handle *handle) {
+/* Lists a handle, with a warning of its own if `warns`. */
+static int add_handle(json_t *root, json_t *list, const qmat_frame *frame, const qmat_lost_handle *handle, bool warns) {
+  const char *kind = handle->is_hole ? "hole" : "handle";
   double at[3];
   qmat_frame_to_model(frame, handle->place, 1, at);
-  return json_array_append_new(list, json_pack("{s:s, s:[fff], s:f}", "kind", handle->is_hole ? "hole" : "handle",
-                                               "place", at[0], at[1], at[2], "size", handle->size));
+  int bad = json_array_append_new(
+      list, json_pack("{s:s, s:[fff], s:f}", "kind", kind, "place", at[0], at[1], at[2], "size", handle->size));
+  if (warns)
+    bad |=
+        qmat_json_add_warning(root, "a %s at (%.5g, %.5g, %.5g), %.2g %% of the diagonal across, is not in the result",
+                              kind, at[0], at[1], at[2], 100 * handle->size);
+  return bad;
 }
 
-/* One warning for each of a few handles, or one for all: `lost` of `wanted`, `count` of which are located. */
-static int warn_of_handles(json_t *root, const qmat_frame *frame, const qmat_lost_handle *handles, size_t count,
-                           size_t lost, size_t wanted) {
-  char text[200];
-  int bad = 0;
-  if (count == lost && count <= MOST_WARNED) {
-    for (size_t i = 0; i < count; i++) {
-      double at[3];
-      qmat_frame_to_model(frame, handles[i].place, 1, at);
-      snprintf(text, sizeof text, "a %s at (%.5g, %.5g, %.5g), %.2g %% of the diagonal across, is not in the result",
-               handles[i].is_hole ? "hole" : "handle", at[0], at[1], at[2], 100 * handles[i].size);
-      bad |= add_warning(root, text);
-    }
-    return bad;
-  }
-  double largest = 0;
-  for (size_t i = 0; i < count; i++) largest = fmax(largest, handles[i].size);
-  const int length = snprintf(text, sizeof text, "the result lacks %zu of the solid's %zu handles", lost, wanted);
-  if (count > 0)
-    snprintf(text + length, sizeof text - (size_t)length,
-             "; the report (lost_handles) has the places of %zu, up to %.2g %% of the diagonal across", count,
-             100 * largest);
-  return add_warning(root, text);
+/* One warning for all lost handles. The first `count` are located; without them `largest` is 0. */
+static int warn_of_handles(json_t *root, size_t lost, size_t wanted, size_t count, double largest) {
+  if (count == 0) return qmat_json_add_warning(root, "the result lacks %zu of the solid's %zu handles", lost, wanted);
+  return qmat_json_add_warning(root,
+                               "the result lacks %zu of the solid's %zu handles; the report (lost_handles) has the "
+                               "places of %zu, up to %.2g %% of the diagonal across",
+                               lost, wanted, count, 100 * largest);
 }
 
 /* Names the handles of the solid that the result has lost, where their numbers differ. */
 static qmat_status name_lost_handles(qmat_context *context, const qmat_medial *unit, const qmat_surface *surface,
                                      double error, json_t *root) {
   const size_t loops = count_at(root, "loops"), wanted = count_at(root, "loops_of_solid");
-  const qmat_frame *frame = qmat_surface_frame(surface);
   qmat_lost_handle *handles;
   size_t count;
   if (!json_object_get(root, "loops") || loops >= wanted || !(error < INFINITY)) return QMAT_OK;
-  const size_t most = wanted - loops < MOST_NAMED ? wanted - loops : MOST_NAMED;
+  const size_t lost = wanted - loops, most = lost < MOST_NAMED ? lost : MOST_NAMED;
   const qmat_status status =
       qmat_lost_handles_find(context, surface, unit, longest_loop * error, most, &handles, &count);
   if (status != QMAT_OK) return status;
   json_t *list = json_array();
   int bad = json_object_set_new(root, "lost_handles", list);
-  for (size_t i = 0; i < count && !bad; i++) bad |= list_handle(list, frame, &handles[i]);
-  if (!bad) bad |= warn_of_handles(root, frame, handles, count, wanted - loops, wanted);
+  const bool are_few = count == lost && count <= MOST_WARNED;
+  double largest = 0;
+  for (size_t i = 0; i < count && !bad; i++) {
+    bad |= add_handle(root, list, qmat_surface_frame(surface), &handles[i], are_few);
+    largest = fmax(largest, handles[i].size);
+  }
+  if (!bad && !are_few) bad |= warn_of_handles(root, lost, wanted, count, largest);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 

@@ -53,28 +53,33 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
   return QMAT_OK;
 }
 
-/* Thins out the triangles without a locked vertex, of the components with so many halvings; their border stays. */
-static void thin_components(thinning *t, double error, int halvings) {
+/* Thins out the triangles without a locked vertex, of the components with so many halvings; their border stays. Returns
+ * the number of triangles of these components. */
+static size_t thin_components(thinning *t, double error, int halvings) {
   const qmat_skin_triangles *surface = t->surface;
-  size_t count = 0;
+  size_t count = 0, taken = 0;
   for (size_t i = 0; i < surface->triangle_count; i++) {
     const uint32_t *from = surface->triangles + 3 * i;
     if (t->halvings[qmat_set_leader(t->leaders, *from)] != halvings) continue;
+    taken++;
     const bool stays = t->locked[from[0]] || t->locked[from[1]] || t->locked[from[2]];
     memcpy(stays ? t->thinned + 3 * t->thinned_count++ : t->open + 3 * count++, from, 3 * sizeof *from);
   }
-  if (count == 0) return;
+  if (count == 0) return taken;
   const size_t stride = 3 * sizeof *t->positions;
   const float scale = meshopt_simplifyScale(t->positions, surface->vertex_count, stride);
   t->thinned_count +=
       meshopt_simplify(t->thinned + 3 * t->thinned_count, t->open, 3 * count, t->positions, surface->vertex_count,
                        stride, 0, (float)error / scale, meshopt_SimplifyLockBorder, NULL) /
       3;
+  return taken;
 }
 
 static void thin(thinning *t, double error) {
+  size_t taken = 0;
   t->thinned_count = 0;
-  for (int halvings = 0; halvings <= MOST_HALVINGS; halvings++) thin_components(t, ldexp(error, -halvings), halvings);
+  for (int halvings = 0; taken < t->surface->triangle_count; halvings++)
+    taken += thin_components(t, ldexp(error, -halvings), halvings);
 }
 
 static void sort_corners(thinning *t) {

@@ -88,12 +88,25 @@ static void test_a_count_is_a_whole_number_and_no_object_takes_none(void **state
   assert_int_not_equal(qmat_json_set_counts(NULL, rows, 2), 0);
 }
 
+static void test_warnings_are_a_list_in_their_order(void **state) {
+  (void)state;
+  json_t *report = json_object();
+  assert_int_equal(qmat_json_add_warning(report, "%zu of %d", (size_t)2, 3), 0);
+  assert_int_equal(qmat_json_add_warning(report, "%s", "50 %"), 0);
+  char *text = json_dumps(report, JSON_COMPACT);
+  assert_string_equal(text, "{\"warnings\":[\"2 of 3\",\"50 %\"]}");
+  free(text);
+  json_decref(report);
+  assert_int_equal(qmat_json_add_warning(NULL, "nothing"), -1);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_it_is_the_text_that_jansson_makes),
       cmocka_unit_test(test_a_shortage_of_memory_gives_nothing_and_never_a_part),
       cmocka_unit_test(test_what_json_cannot_say_gives_nothing),
       cmocka_unit_test(test_a_count_is_a_whole_number_and_no_object_takes_none),
+      cmocka_unit_test(test_warnings_are_a_list_in_their_order),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
