@@ -159,11 +159,8 @@ static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
     double sphere[4], before, after;
     memcpy(sphere, &s->complex.spheres[4 * (size_t)v], sizeof sphere);
     if (status == QMAT_OK)
-      status = qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, sphere,
-                                     INFINITY, &before);
-    if (status == QMAT_OK)
       status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, INFINITY,
-                                   sphere, &after);
+                                   sphere, &before, &after);
     if (status != QMAT_OK) return status;
     if (!(after <= (1 - qmat_least_gain) * before)) continue;
     qmat_collapse_outcome result;

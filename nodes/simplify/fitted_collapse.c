@@ -9,13 +9,14 @@
 
 qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const qmat_candidates *c, double sphere[4],
                                        qmat_collapse_outcome *result) {
-  double errors[QMAT_MOST_CANDIDATES], error = INFINITY, needed;
+  const double hopeless = qmat_give_up_ratios[0] * s->threshold;
+  double errors[QMAT_MOST_CANDIDATES], before, error = INFINITY, needed;
   int least = 0;
   s->fit.keeps_radius = qmat_decimation_is_of_sheet(s, s->collapse.kept);
   qmat_status status = qmat_sphere_fit_gather(s->context, &s->fit, &s->surface_tracker, &s->collapse,
                                               s->constraints->surface_count, QMAT_FITTED_POINTS);
   for (int i = 0; i < c->count && status == QMAT_OK; i++) {
-    const double enough = i > 0 ? qmat_larger(errors[least], qmat_test_ratio * s->threshold) : INFINITY;
+    const double enough = i > 0 ? qmat_larger(errors[least], qmat_test_ratio * s->threshold) : hopeless;
     status = qmat_sphere_fit_error(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, c->spheres[i],
                                    enough, &errors[i]);
     if (errors[i] < errors[least]) least = i;
@@ -23,9 +24,8 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const 
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   s->refusal = QMAT_REFUSED_BY_NOTHING;
   if (status == QMAT_OK)
-    status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse,
-                                 s->rules.neighbourhoods ? qmat_early_exit_share * s->threshold : s->threshold, sphere,
-                                 &error);
+    status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, s->threshold,
+                                 sphere, &before, &error);
   s->fitted_errors[edge] = error;
   memcpy(s->fitted, sphere, sizeof s->fitted);
   if (status == QMAT_OK && error <= qmat_test_ratio * s->threshold)

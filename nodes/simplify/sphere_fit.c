@@ -7,6 +7,7 @@
 #include "core/geometry/quadric.h"
 #include "core/geometry/vector.h"
 #include "nodes/simplify/fit_steps.h"
+#include "nodes/simplify/thresholds.h"
 
 void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   qmat_free(fit->points);
@@ -62,11 +63,6 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, qmat_sphere_fit *fit, q
   return QMAT_OK;
 }
 
-/* A fit ends early when its error exceeds this multiple of `give_up_error` after this many steps: 1 of 5,000 such fits
- * would come below it. */
-enum { EARLY_EXIT_STEP = 2 };
-static const double early_exit_ratio = 2;
-
 /* Adds weight times the square of the linearised F of a point whose foot moves with `share` of the sphere: a tangent
  * plane in the coordinates of the sphere. */
 static void add_residual(qmat_quadric *sum, const double *point, const double *foot, double share, double f,
@@ -96,32 +92,36 @@ static void add_damping(qmat_quadric *sum, const double *sphere) {
 
 qmat_status qmat_sphere_fit_run(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                 const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
-                                double sphere[4], double *error) {
+                                double sphere[4], double *before, double *error) {
   double current[4], worst = 0, last_worst = INFINITY;
   memcpy(current, sphere, sizeof current);
-  *error = INFINITY;
+  *before = *error = INFINITY;
   for (int step = 0;; step++) {
     const qmat_status status = qmat_surface_to_envelope_prepare(context, tracker, complex, collapse, current);
     if (status != QMAT_OK) return status;
     qmat_quadric sum = {.c = 0};
     last_worst = worst;
     worst = 0;
-    for (size_t i = 0; i < fit->count && (step < QMAT_FIT_STEPS || worst < *error); i++) {
+    /* The error at which the fit ends: the last step only has to lower it. */
+    const double hopeless = step < QMAT_FIT_STEPS ? qmat_give_up_ratios[step] * give_up_error : *error;
+    const double enough = *error >= hopeless ? hopeless : INFINITY;
+    for (size_t i = 0; i < fit->count; i++) {
       const double *point = &tracker->points[3 * (size_t)fit->points[i]];
       double foot[4], share;
       const double f = qmat_surface_to_envelope_star_foot(tracker, complex, collapse, current, point, &fit->nearest[i],
                                                           foot, &share);
       worst = qmat_larger(worst, fabs(f));
+      if (worst > enough) return QMAT_OK;
       if (step == QMAT_FIT_STEPS || !(share > 1e-3)) continue;
       const double weight = qmat_fit_weight(last_worst > 0 ? f / last_worst : 1, step);
       add_residual(&sum, point, foot, share, f, current, weight);
     }
+    if (step == 0) *before = worst;
     if (worst < *error) {
       *error = worst;
       memcpy(sphere, current, sizeof current);
     }
-    if (step == QMAT_FIT_STEPS || (step >= EARLY_EXIT_STEP && *error > early_exit_ratio * give_up_error))
-      return QMAT_OK;
+    if (step == QMAT_FIT_STEPS) return QMAT_OK;
     add_damping(&sum, current);
     double next[4] = {0, 0, 0, current[3]};
     if (fit->keeps_radius ? !qmat_quadric_minimise_centre(&sum, next)

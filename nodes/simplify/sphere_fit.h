@@ -29,10 +29,11 @@ qmat_status qmat_sphere_fit_error(qmat_context *context, qmat_sphere_fit *fit, q
 
 /* Moves and resizes `sphere` so that the largest |F| at the chosen points becomes small: least squares with weights
  * that rise with the error from step to step (Gauss-Newton on norms of rising order). Ends early where the error stays
- * well above `give_up_error`. `*error` is the largest |F| of the returned sphere, no more than before.
- * QMAT_ERROR_MEMORY. Cost: ten queries at each point. */
+ * well above `give_up_error`. `*before` is the largest |F| of the given sphere and `*error` that of the returned one,
+ * which is no more; both are INFINITY where the given one is hopeless. QMAT_ERROR_MEMORY. Cost: at most five queries at
+ * each point. */
 qmat_status qmat_sphere_fit_run(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                 const qmat_complex *complex, const qmat_collapse *collapse, double give_up_error,
-                                double sphere[4], double *error);
+                                double sphere[4], double *before, double *error);
 
 #endif
