@@ -297,61 +297,62 @@ static qmat_status allocate(qmat_context *context, qmat_constraint_points *const
   return QMAT_OK;
 }
 
-/* A point almost epsilon below the surface, and the cube of a lattice that it lies in. */
+/* A point and the cube of a lattice that it lies in. */
 typedef struct {
   uint64_t cube;
-  uint32_t facet;
-  double point[3];
-  witness witness;
-} shell_place;
+  uint32_t id;
+} cube_point;
 
+static int by_cube_and_id(const void *left, const void *right) {
+  const cube_point *a = left, *b = right;
+  if (a->cube != b->cube) return a->cube < b->cube ? -1 : 1;
+  return a->id < b->id ? -1 : a->id > b->id;
+}
+
+/* Sorts points by their cubes; NULL when memory is short. */
+static cube_point *sort_into_cubes(qmat_arena *arena, const double *points, size_t count, double side) {
+  cube_point *sorted = qmat_arena_alloc(arena, count, sizeof *sorted);
+  const double width = fmax(side, 4.0 / (1 << 20));
+  for (size_t i = 0; i < count && sorted; i++) {
+    sorted[i] = (cube_point){.id = (uint32_t)i};
+    for (size_t k = 0; k < 3; k++)
+      sorted[i].cube =
+          sorted[i].cube << 21 | ((uint64_t)(int64_t)floor(points[3 * i + k] / width + (1 << 20)) & 0x1fffff);
+  }
+  if (count && sorted) qsort(sorted, count, sizeof *sorted, by_cube_and_id);
+  return sorted;
+}
+
+/* Whether a point is the first one in its cube. */
+static bool is_first(const cube_point *sorted, size_t i) {
+  return i == 0 || sorted[i].cube != sorted[i - 1].cube;
+}
+
+/* Points almost epsilon below the surface. */
 typedef struct {
   size_t count;
-  shell_place *places;
+  double *points; /* 3 per point */
+  witness *witnesses;
 } shell_points;
 
-/* One point is kept in each cube whose side is this share of epsilon. */
+/* One point of the shell is kept in each cube whose side is this share of epsilon. */
 static const double shell_share = 0.6;
 
 /* The depth of the shell as a share of epsilon; the margin covers the envelope between its points. */
 static const double shell_depth = 0.98;
 
-static int by_cube_and_facet(const void *left, const void *right) {
-  const shell_place *a = left, *b = right;
-  if (a->cube != b->cube) return a->cube < b->cube ? -1 : 1;
-  return a->facet < b->facet ? -1 : a->facet > b->facet;
-}
-
-static shell_place shell_place_below(const double *corners, const double *normal, uint32_t facet, double depth,
-                                     double side) {
-  shell_place place = {.facet = facet};
-  for (int k = 0; k < 3; k++) {
-    place.point[k] = corners[k] - depth * normal[k];
-    place.cube = place.cube << 21 | ((uint64_t)(int64_t)floor(place.point[k] / side + (1 << 20)) & 0x1fffff);
-  }
-  return place;
-}
-
-/* Spreads points almost epsilon below the surface, wherever the solid is thick enough and the initial medial mesh
- * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. No solid is as thick as an
- * infinite epsilon. */
-static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
-                              shell_points *shell) {
-  qmat_arena *arena = &context->arena;
-  const qmat_mesh *mesh = a->mesh;
-  const double *positions = qmat_surface_positions(surface);
-  if (isinf(epsilon)) return QMAT_OK;
-  const double depth = shell_depth * epsilon, side = fmax(shell_share * epsilon, 4.0 / (1 << 20));
-  size_t capacity = 0;
+/* Places a point `depth` below each point of the facets' grids, and below the facets' centres; 3 doubles each. */
+static qmat_status place_shell(qmat_context *context, const qmat_mesh *mesh, const double *positions, double epsilon,
+                               double depth, double **below, size_t *count) {
   const size_t facets = qmat_solid_triangle_count(mesh);
+  size_t capacity = 0;
+  *count = 0;
   for (size_t t = 0; t < facets; t++) {
     const grid g = grid_of(positions, &mesh->triangles[3 * t], epsilon);
     capacity += grid_points(&g) + 1;
   }
-  shell->places = qmat_arena_alloc(arena, capacity, sizeof *shell->places);
-  double *points = qmat_arena_alloc(arena, 3 * (size_t)FINEST_GRID * (FINEST_GRID + 1), sizeof *points);
-  if (!shell->places || !points) return qmat_fail_memory(context, "constraint points");
-  size_t count = 0;
+  *below = qmat_arena_alloc(&context->arena, capacity, 3 * sizeof **below);
+  if (!*below || capacity >= QMAT_NONE) return qmat_fail_memory(context, "constraint points");
   for (size_t t = 0; t < facets; t++) {
     if (t % SLICE == 0) {
       const qmat_status status = qmat_progress(context, t, facets, "constraint points");
@@ -361,32 +362,55 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
     double normal[3];
     if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
     const size_t on_grid = grid_points(&g);
+    double *points = &(*below)[3 * *count];
     fill_grid(&g, points);
     for (int k = 0; k < 3; k++)
       points[3 * on_grid + (size_t)k] = (g.corners[0][k] + g.corners[1][k] + g.corners[2][k]) / 3;
-    for (size_t i = 0; i <= on_grid; i++)
-      shell->places[count++] = shell_place_below(&points[3 * i], normal, (uint32_t)t, depth, side);
+    for (size_t i = 0; i < 3 * (on_grid + 1); i++) points[i] -= depth * normal[i % 3];
+    *count += on_grid + 1;
   }
-  if (count) qsort(shell->places, count, sizeof *shell->places, by_cube_and_facet);
-  size_t kept = 0;
+  return QMAT_OK;
+}
+
+/* Spreads points almost epsilon below the surface, wherever the solid is thick enough and the initial medial mesh
+ * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. No solid is as thick as an
+ * infinite epsilon. */
+static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
+                              shell_points *shell) {
+  qmat_arena *arena = &context->arena;
+  const double depth = shell_depth * epsilon;
+  double *below;
+  size_t count, kept = 0;
+  if (isinf(epsilon)) return QMAT_OK;
+  const qmat_status placed =
+      place_shell(context, a->mesh, qmat_surface_positions(surface), epsilon, depth, &below, &count);
+  if (placed != QMAT_OK) return placed;
+  const cube_point *sorted = sort_into_cubes(arena, below, count, shell_share * epsilon);
+  shell->points = qmat_arena_alloc(arena, count, 3 * sizeof *shell->points);
+  if (!sorted || !shell->points) return qmat_fail_memory(context, "constraint points");
   for (size_t i = 0; i < count; i++)
-    if (i == 0 || shell->places[i].cube != shell->places[i - 1].cube) shell->places[kept++] = shell->places[i];
+    if (is_first(sorted, i)) memcpy(&shell->points[3 * kept++], &below[3 * (size_t)sorted[i].id], 3 * sizeof *below);
+  shell->witnesses = qmat_arena_alloc(arena, kept, sizeof *shell->witnesses);
+  if (!shell->witnesses) return qmat_fail_memory(context, "constraint points");
   const int threads = qmat_threads(context);
   for (size_t first = 0, last; first < kept; first = last) {
     const qmat_status status = next_slice(context, first, kept, &last);
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
     for (size_t i = first; i < last; i++) {
-      shell_place *place = &shell->places[i];
-      place->witness.distance = INFINITY;
-      if (!qmat_surface_inside(surface, place->point) ||
-          qmat_surface_distance(surface, place->point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
+      const double *point = &shell->points[3 * i];
+      shell->witnesses[i].distance = INFINITY;
+      if (!qmat_surface_inside(surface, point) ||
+          qmat_surface_distance(surface, point, (1 - 1e-6) * depth, NULL, NULL) < INFINITY)
         continue;
-      place->witness = search_nearest_region(a, place->point, 0);
+      shell->witnesses[i] = search_nearest_region(a, point, 0);
     }
   }
-  for (size_t i = 0; i < kept; i++)
-    if (shell->places[i].witness.distance <= 0) shell->places[shell->count++] = shell->places[i];
+  for (size_t i = 0; i < kept; i++) {
+    if (!(shell->witnesses[i].distance <= 0)) continue;
+    memmove(&shell->points[3 * shell->count], &shell->points[3 * i], 3 * sizeof *shell->points);
+    shell->witnesses[shell->count++] = shell->witnesses[i];
+  }
   return QMAT_OK;
 }
 
@@ -404,54 +428,57 @@ static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, 
   return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
 }
 
-/* Finds where the points of each facet's grid start, after the samples. `*spacing` grows until at most `most` points
- * are added. */
-static qmat_status place_grids(qmat_context *context, const qmat_mesh *mesh, const double *positions, size_t most,
-                               double *spacing, size_t *starts, qmat_constraint_points *constraints) {
-  for (;; *spacing *= 1.25) {
+/* The points on the surface: the samples, then the points of each facet's grid. */
+typedef struct {
+  size_t count;
+  double *points; /* 3 per point */
+} surface_places;
+
+/* Places them. `spacing` grows until the grids have at most `most` points. */
+static qmat_status place_points(qmat_context *context, const qmat_mesh *mesh, const double *positions,
+                                const qmat_samples *samples, const double *unit_samples, double spacing, size_t most,
+                                surface_places *places) {
+  size_t added;
+  for (;; spacing *= 1.25) {
     const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
     if (status != QMAT_OK) return status;
-    size_t added = 0;
+    added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-      const grid g = grid_of(positions, &mesh->triangles[3 * t], *spacing);
-      starts[t] = constraints->sample_count + added;
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
       added += grid_points(&g);
     }
-    constraints->surface_count = constraints->sample_count + added;
-    if (added <= most) return QMAT_OK;
+    if (added <= most) break;
   }
+  places->count = samples->count + added;
+  places->points = qmat_arena_alloc(&context->arena, places->count, 3 * sizeof *places->points);
+  if (!places->points || places->count >= QMAT_NONE) return qmat_fail_memory(context, "constraint points");
+  memcpy(places->points, unit_samples, 3 * samples->count * sizeof *unit_samples);
+  double *next = places->points + 3 * samples->count;
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    fill_grid(&g, next);
+    next += 3 * grid_points(&g);
+  }
+  return QMAT_OK;
 }
 
-/* Makes the points on the surface, with witnesses from the regions around them. */
-static qmat_status make_surface_points(qmat_context *context, const regions *a, const double *positions,
-                                       const double *unit_samples, double spacing, const size_t *starts,
-                                       double accepted, qmat_constraint_points *constraints) {
-  const qmat_mesh *mesh = a->mesh;
-  const size_t samples = constraints->sample_count;
-  memcpy(constraints->points, unit_samples, 3 * samples * sizeof *unit_samples);
+/* Makes the points on the surface, with witnesses from the regions around them. `ids`: their places, in rising order;
+ * NULL: all are taken. */
+static qmat_status make_surface_points(qmat_context *context, const regions *a, const surface_places *places,
+                                       const uint32_t *ids, size_t samples, double accepted,
+                                       qmat_constraint_points *constraints) {
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < samples; first = last) {
-    const qmat_status status = next_slice(context, first, samples, &last);
+  for (size_t first = 0, last; first < constraints->surface_count; first = last) {
+    const qmat_status status = next_slice(context, first, constraints->surface_count, &last);
     if (status != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t i = first; i < last; i++) {
-      const witness w = search_region(a, &constraints->points[3 * i], (uint32_t)i, accepted);
+      const size_t id = ids ? ids[i] : i;
+      double *point = &constraints->points[3 * i];
+      memcpy(point, &places->points[3 * id], 3 * sizeof *point);
+      const witness w =
+          id < samples ? search_region(a, point, (uint32_t)id, accepted) : search_nearest_region(a, point, accepted);
       store(constraints, i, &w);
-    }
-  }
-  for (size_t first = 0, last; first < mesh->triangle_count; first = last) {
-    const qmat_status status = next_slice(context, first, mesh->triangle_count, &last);
-    if (status != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
-    for (size_t t = first; t < last; t++) {
-      const uint32_t *corners = &mesh->triangles[3 * t];
-      const grid g = grid_of(positions, corners, spacing);
-      const size_t count = grid_points(&g);
-      if (count) fill_grid(&g, &constraints->points[3 * starts[t]]);
-      for (size_t i = starts[t]; i < starts[t] + count; i++) {
-        const witness w = search_nearest_region(a, &constraints->points[3 * i], accepted);
-        store(constraints, i, &w);
-      }
     }
   }
   return QMAT_OK;
@@ -462,16 +489,49 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
                                      qmat_constraint_points *constraints) {
   *constraints = (qmat_constraint_points){.sample_count = samples->count};
-  size_t *starts = qmat_arena_calloc(&context->arena, mesh->triangle_count + 1, sizeof *starts);
-  if (!starts) return qmat_fail_memory(context, "constraint points");
   regions a;
+  surface_places places;
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
-  if (status == QMAT_OK) status = place_grids(context, mesh, positions, most, &spacing, starts, constraints);
-  constraints->count = constraints->surface_count;
-  if (status == QMAT_OK) status = allocate(context, constraints);
-  if (status == QMAT_OK)
-    status = make_surface_points(context, &a, positions, unit_samples, spacing, starts, enough, constraints);
+  if (status == QMAT_OK) status = place_points(context, mesh, positions, samples, unit_samples, spacing, most, &places);
+  if (status != QMAT_OK) return status;
+  constraints->count = constraints->surface_count = places.count;
+  status = allocate(context, constraints);
+  if (status == QMAT_OK) status = make_surface_points(context, &a, &places, NULL, samples->count, enough, constraints);
   return status == QMAT_OK ? search_everywhere(context, &a, enough, constraints) : status;
+}
+
+/* Facets much smaller or narrower than epsilon have far more points than its bounds need. Where one point in each cube
+ * whose side is the first share of epsilon is at most the second share of all points, only these are kept. */
+static const double surface_share = 0.3, few_share = 0.5;
+
+/* Thins out the places where that leaves few. `ids` gets those that are kept, in rising order, and the constraints what
+ * points and samples have to do with each other; both stay as they are otherwise. */
+static qmat_status thin_out(qmat_context *context, const surface_places *places, size_t samples, double epsilon,
+                            uint32_t **ids, qmat_constraint_points *constraints) {
+  qmat_arena *arena = &context->arena;
+  const cube_point *sorted = sort_into_cubes(arena, places->points, places->count, surface_share * epsilon);
+  uint32_t *first = qmat_arena_alloc(arena, places->count, sizeof *first);
+  uint32_t *kept = qmat_arena_alloc(arena, places->count, sizeof *kept), count = 0;
+  if (!sorted || !first || !kept) return qmat_fail_memory(context, "constraint points");
+  for (size_t i = 0; i < places->count; i++)
+    first[sorted[i].id] = is_first(sorted, i) ? sorted[i].id : first[sorted[i - 1].id];
+  size_t sample_points = 0;
+  for (uint32_t i = 0; i < places->count; i++) {
+    if (first[i] == i) {
+      kept[count] = i;
+      first[i] = count++;
+    } else {
+      first[i] = first[first[i]];
+    }
+    if (i < samples) sample_points = count;
+  }
+  if (!(count <= few_share * (double)places->count)) return QMAT_OK;
+  *ids = kept;
+  constraints->surface_count = count;
+  constraints->sample_point_count = sample_points;
+  constraints->sample_points = first;
+  constraints->point_samples = kept;
+  return QMAT_OK;
 }
 
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
@@ -479,26 +539,29 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
                                         size_t most, bool inside, qmat_constraint_points *constraints) {
   qmat_arena *arena = &context->arena;
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
-  const double *positions = qmat_surface_positions(surface);
-  *constraints = (qmat_constraint_points){.sample_count = samples->count};
-  double spacing = spacing_share * epsilon;
-  size_t *starts = qmat_arena_calloc(arena, mesh->triangle_count + 1, sizeof *starts);
+  *constraints = (qmat_constraint_points){.sample_count = samples->count, .sample_point_count = samples->count};
   regions a;
+  surface_places places;
+  uint32_t *ids = NULL;
   qmat_interior_points inner = {.count = 0};
   double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
-  if (!starts || !unit_samples) return qmat_fail_memory(context, "constraint points");
+  if (!unit_samples) return qmat_fail_memory(context, "constraint points");
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
   if (status == QMAT_OK && inside) status = qmat_interior_points_find(context, complex, epsilon, &inner);
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
+  if (status == QMAT_OK)
+    status = place_points(context, mesh, qmat_surface_positions(surface), samples, unit_samples,
+                          spacing_share * epsilon, most, &places);
   if (status != QMAT_OK) return status;
-  if ((status = place_grids(context, mesh, positions, most, &spacing, starts, constraints)) != QMAT_OK) return status;
+  constraints->surface_count = places.count;
+  if (epsilon < INFINITY) status = thin_out(context, &places, samples->count, epsilon, &ids, constraints);
   constraints->count = constraints->surface_count + inner.count + shell.count;
-  if ((status = allocate(context, constraints)) != QMAT_OK) return status;
-  const double enough = accepted_with_star * epsilon;
-  status = make_surface_points(context, &a, positions, unit_samples, spacing, starts, accepted_with_sphere * epsilon,
-                               constraints);
+  if (status == QMAT_OK) status = allocate(context, constraints);
+  if (status == QMAT_OK)
+    status =
+        make_surface_points(context, &a, &places, ids, samples->count, accepted_with_sphere * epsilon, constraints);
   if (status != QMAT_OK) return status;
   size_t next = constraints->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {
@@ -508,10 +571,10 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
     store(constraints, next, &own);
   }
   for (size_t i = 0; i < shell.count; i++, next++) {
-    memcpy(&constraints->points[3 * next], shell.places[i].point, 3 * sizeof(double));
-    store(constraints, next, &shell.places[i].witness);
+    memcpy(&constraints->points[3 * next], &shell.points[3 * i], 3 * sizeof(double));
+    store(constraints, next, &shell.witnesses[i]);
   }
-  return search_everywhere(context, &a, enough, constraints);
+  return search_everywhere(context, &a, accepted_with_star * epsilon, constraints);
 }
 
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
@@ -560,6 +623,9 @@ qmat_status qmat_constraint_points_join(qmat_context *context, const qmat_constr
                                         const qmat_constraint_points *extra, qmat_constraint_points *joined) {
   *joined = (qmat_constraint_points){.count = base->count + extra->count,
                                      .sample_count = base->sample_count,
+                                     .sample_point_count = base->sample_point_count,
+                                     .sample_points = base->sample_points,
+                                     .point_samples = base->point_samples,
                                      .surface_count = base->surface_count + extra->surface_count};
   const qmat_status status = allocate(context, joined);
   if (status != QMAT_OK) return status;

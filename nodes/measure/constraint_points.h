@@ -6,19 +6,27 @@
 #include "core/geometry/surface.h"
 
 /* The points at which medial.simplify enforces the surface-to-envelope error. On the surface they are the samples, and
- * a grid on every facet that is large compared with epsilon. Inside the solid they are points that the envelope has to
- * contain: interior points (nodes/measure/interior_points.h), and a shell of points almost epsilon below the surface.
- * Every point has a first witness: the medial point that is known to be near it. All arrays live in the context's
- * arena. */
+ * a grid on every facet that is large compared with epsilon, thinned out where they are much closer than that. Inside
+ * the solid they are points that the envelope has to contain: interior points (nodes/measure/interior_points.h), and a
+ * shell of points almost epsilon below the surface. Every point has a first witness: the medial point that is known to
+ * be near it. All arrays live in the context's arena. */
 typedef struct qmat_constraint_points {
-  size_t count, sample_count;
-  size_t surface_count; /* those on the surface; they come first */
-  double *inner_limits; /* per point inside the solid: the largest F allowed there */
-  double *points;       /* 3 per point, unit frame */
-  uint32_t *witnesses;  /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
-  double *weights;      /* 3 per point */
-  double *distances;    /* per point: F at the witness */
+  size_t count, surface_count; /* those on the surface come first */
+  size_t sample_count;         /* of the surface */
+  size_t sample_point_count;   /* the points that are samples come first of all */
+  uint32_t *sample_points;     /* per sample: the point that it is, or that stands for it; NULL: that of its number */
+  uint32_t *point_samples;     /* per point that is a sample: which; NULL: that of its number */
+  double *inner_limits;        /* per point inside the solid: the largest F allowed there */
+  double *points;              /* 3 per point, unit frame */
+  uint32_t *witnesses;         /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
+  double *weights;             /* 3 per point */
+  double *distances;           /* per point: F at the witness */
 } qmat_constraint_points;
+
+/* The point that a sample is, or that stands for it. */
+static inline size_t qmat_point_of_sample(const qmat_constraint_points *c, size_t sample) {
+  return c->sample_points ? c->sample_points[sample] : sample;
+}
 
 /* The usual limit of the points that grids add. */
 enum { QMAT_MOST_CONSTRAINT_POINTS = 600000 };

@@ -13,8 +13,9 @@ static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   for (int k = 0; k < 2; k++)
     for (uint32_t slot = qmat_surface_to_envelope_first(&s->surface_tracker, ends[k]); slot != QMAT_NONE;
          slot = s->surface_tracker.next[slot]) {
-      if (slot / 3 >= s->constraints->sample_count) continue;
-      if (!s->rules.thin[slot / 3]) return false;
+      const uint32_t point = slot / 3;
+      if (point >= s->constraints->sample_point_count) continue;
+      if (!s->rules.thin[s->constraints->point_samples ? s->constraints->point_samples[point] : point]) return false;
       any = true;
     }
   return any;

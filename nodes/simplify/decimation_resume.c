@@ -15,8 +15,9 @@ static qmat_status set_regions(const qmat_decimation *s, const uint32_t *ids, qm
   if (!owners || !roots) return qmat_fail_memory(s->context, "responsible regions");
   if (qmat_decimation_in_order(s)) qmat_collapse_roots(s->log.ends, s->log.count, s->complex.vertex_count, roots);
   for (size_t i = 0; i < samples; i++) {
-    uint32_t owner =
-        qmat_decimation_in_order(s) ? s->log.owners[i] : qmat_surface_to_envelope_owner(&s->surface_tracker, i);
+    uint32_t owner = qmat_decimation_in_order(s)
+                         ? s->log.owners[i]
+                         : qmat_surface_to_envelope_owner(&s->surface_tracker, qmat_point_of_sample(s->constraints, i));
     if (qmat_decimation_in_order(s) && owner != QMAT_NONE) owner = roots[owner];
     owners[i] = owner == QMAT_NONE ? QMAT_NONE : ids[owner];
   }

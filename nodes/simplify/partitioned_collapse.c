@@ -181,7 +181,6 @@ static qmat_status take_points(qmat_context *context, const partition *d, size_t
     memcpy(&own->points[3 * i], &all->points[3 * j], 3 * sizeof(double));
     memcpy(&own->weights[3 * i], &all->weights[3 * j], 3 * sizeof(double));
     own->distances[i] = all->distances[j];
-    own->sample_count += j < all->sample_count;
     own->surface_count += j < all->surface_count;
     if (j >= all->surface_count) own->inner_limits[i - own->surface_count] = all->inner_limits[j - all->surface_count];
   }

@@ -39,7 +39,8 @@ qmat_status qmat_rising_threshold_start(qmat_decimation *s) {
   s->log.owners = qmat_arena_alloc(arena, samples, sizeof(uint32_t));
   if (!s->log.ends || !s->log.merged || !s->log.errors || !s->log.owners)
     return qmat_fail_memory(s->context, "the collapses");
-  for (size_t i = 0; i < samples; i++) s->log.owners[i] = qmat_surface_to_envelope_owner(&s->surface_tracker, i);
+  for (size_t i = 0; i < samples; i++)
+    s->log.owners[i] = qmat_surface_to_envelope_owner(&s->surface_tracker, qmat_point_of_sample(s->constraints, i));
   return QMAT_OK;
 }
 

@@ -227,6 +227,18 @@ static void test_both_errors_stay_within_epsilon(void **state) {
   }
 }
 
+/* Most samples have no constraint point of their own here, but all have an owner (check_partition). */
+static void test_facets_much_narrower_than_epsilon(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_prism(400, 2), "n_f=0", "");
+  result r = simplify(&p, "epsilon=5% vertices=0");
+  check_errors(&p, &r, 0.05, true);
+  assert_true(r.medial->sphere_count <= 14);
+  release(&r);
+  pipeline_free(&p);
+}
+
 /* --- what is known of the models ---------------------------------------------------------------------------------- */
 
 static void test_capsule_becomes_its_axis(void **state) {
@@ -1095,6 +1107,7 @@ static void test_threads_do_not_change_a_byte(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_both_errors_stay_within_epsilon),
+      cmocka_unit_test(test_facets_much_narrower_than_epsilon),
       cmocka_unit_test(test_capsule_becomes_its_axis),
       cmocka_unit_test(test_tapered_capsule_keeps_both_radii),
       cmocka_unit_test(test_torus_keeps_its_loop),

@@ -134,11 +134,64 @@ static void test_places_inside_large_facets_are_farther_apart_than_on_sides(void
   free_model(&m);
 }
 
+static void make_constraints(model *m, double epsilon, qmat_constraint_points *constraints) {
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&m->context, m->p.mesh, &surface), QMAT_OK);
+  assert_int_equal(qmat_constraint_points_make(&m->context, surface, m->p.samples, m->p.medial, &m->complex, epsilon,
+                                               QMAT_MOST_CONSTRAINT_POINTS, false, constraints),
+                   QMAT_OK);
+  qmat_surface_free(surface);
+}
+
+/* The sides of a cylinder of 400 sides are much narrower than the error. */
+static void test_points_on_narrow_facets_are_thinned_out(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_prism(400, 2), "spacing=20% n_f=0");
+  const double epsilon = 0.05;
+  qmat_constraint_points c;
+  make_constraints(&m, epsilon, &c);
+  const size_t samples = m.p.samples->count;
+  assert_int_equal(c.sample_count, samples);
+  assert_true(c.sample_point_count < samples / 3);
+  assert_true(c.surface_count < 4 * samples);
+  for (size_t i = 0; i < samples; i++) {
+    const size_t point = qmat_point_of_sample(&c, i);
+    assert_true(point < c.sample_point_count);
+    /* It lies in the same cube. */
+    const double *own = &m.unit_samples[3 * i], *other = &c.points[3 * point];
+    assert_true(sqrt(pow(own[0] - other[0], 2) + pow(own[1] - other[1], 2) + pow(own[2] - other[2], 2)) <=
+                0.3 * sqrt(3) * epsilon + ROUNDING);
+  }
+  for (size_t i = 0; i < c.sample_point_count; i++) {
+    const uint32_t sample = c.point_samples[i];
+    assert_int_equal(qmat_point_of_sample(&c, sample), i);
+    assert_memory_equal(&c.points[3 * i], &m.unit_samples[3 * (size_t)sample], 3 * sizeof(double));
+  }
+  for (size_t i = 0; i < c.surface_count; i++)
+    assert_true(fabs(at_witness(&m.complex, &c, i) - c.distances[i]) < ROUNDING);
+  free_model(&m);
+}
+
+static void test_other_points_stay(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_box(1, 2, 3), "spacing=20% n_f=0");
+  qmat_constraint_points c;
+  make_constraints(&m, 0.05, &c);
+  assert_null(c.sample_points);
+  assert_int_equal(c.sample_point_count, m.p.samples->count);
+  assert_int_equal(qmat_point_of_sample(&c, 5), 5);
+  free_model(&m);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_far_places_have_their_distance_and_others_an_upper_bound),
       cmocka_unit_test(test_places_on_large_facets_are_measured),
       cmocka_unit_test(test_places_inside_large_facets_are_farther_apart_than_on_sides),
+      cmocka_unit_test(test_points_on_narrow_facets_are_thinned_out),
+      cmocka_unit_test(test_other_points_stay),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
