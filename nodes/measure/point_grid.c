@@ -66,22 +66,45 @@ static void search_cell(const qmat_point_grid *grid, size_t cell, const double *
   }
 }
 
-/* Searches the cells whose largest offset from `middle` along an axis is `ring`. */
-static void search_ring(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
+/* Cells are a little larger than their width here: rounding may put a point beyond the side of its cell. */
+static const double side_margin = 1e-9;
+
+/* The square of a lower bound of the distance along an axis from `x`, which lies in cell `middle`, to the points of
+ * cell `cell`. */
+static double square_to_cell(const qmat_point_grid *grid, size_t axis, size_t middle, size_t cell, double x) {
+  if (cell == middle) return 0;
+  const double side = grid->low[axis] + grid->width * (double)(cell > middle ? cell : cell + 1);
+  const double d = (cell > middle ? side - x : x - side) - side_margin * grid->width;
+  return d > 0 ? d * d : 0;
+}
+
+/* Searches the cells whose largest offset from `middle` along an axis is `ring`, where they may have a nearer point.
+ * Whether there is any such cell. */
+static bool search_ring(const qmat_point_grid *grid, const size_t middle[3], size_t ring, const double *place,
                         nearest_point *best) {
   size_t first[3], last[3], cell[3];
+  bool any = false;
   for (size_t k = 0; k < 3; k++) {
     first[k] = middle[k] > ring ? middle[k] - ring : 0;
     last[k] = middle[k] + ring < grid->along[k] ? middle[k] + ring : grid->along[k] - 1;
   }
-  for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++)
+  for (cell[0] = first[0]; cell[0] <= last[0]; cell[0]++) {
+    const double square0 = square_to_cell(grid, 0, middle[0], cell[0], place[0]);
+    if (square0 > best->square) continue;
     for (cell[1] = first[1]; cell[1] <= last[1]; cell[1]++) {
+      const double square1 = square0 + square_to_cell(grid, 1, middle[1], cell[1], place[1]);
+      if (square1 > best->square) continue;
       const bool on_side = cell[0] + ring == middle[0] || cell[0] == middle[0] + ring || cell[1] + ring == middle[1] ||
                            cell[1] == middle[1] + ring;
-      for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++)
-        if (on_side || cell[2] + ring == middle[2] || cell[2] == middle[2] + ring)
-          search_cell(grid, cell_index(grid, cell), place, best);
+      for (cell[2] = first[2]; cell[2] <= last[2]; cell[2]++) {
+        if (!on_side && cell[2] + ring != middle[2] && cell[2] != middle[2] + ring) continue;
+        if (square1 + square_to_cell(grid, 2, middle[2], cell[2], place[2]) > best->square) continue;
+        any = true;
+        search_cell(grid, cell_index(grid, cell), place, best);
+      }
     }
+  }
+  return any;
 }
 
 uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place[3]) {
@@ -91,12 +114,8 @@ uint32_t qmat_point_grid_nearest(const qmat_point_grid *grid, const double place
     if (grid->along[k] > rings) rings = grid->along[k];
   }
   nearest_point best = {INFINITY, UINT32_MAX};
-  for (size_t ring = 0; ring < rings; ring++) {
-    search_ring(grid, middle, ring, place, &best);
-    /* All other cells are at least so many cells away. */
-    const double beyond = (double)ring * grid->width;
-    if (best.square < beyond * beyond) break;
-  }
+  for (size_t ring = 0; ring < rings; ring++)
+    if (!search_ring(grid, middle, ring, place, &best)) break; /* no cell farther away can have a nearer one */
   return best.point;
 }
 
