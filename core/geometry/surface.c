@@ -282,11 +282,10 @@ double qmat_surface_distance(const qmat_surface *surface, const double point[3],
   return sheet;
 }
 
-/* The signed distance where its size is at most `limit`; else it may be infinite. */
-static double signed_distance_within(const qmat_surface *surface, const double point[3], double limit) {
-  const bool inside = qmat_surface_inside(surface, point);
+double qmat_surface_signed_distance_within(const qmat_surface *surface, const double point[3], double limit) {
   double distance = solid_distance(surface, point, limit, NULL, NULL);
-  if (inside) distance = -distance;
+  if (isinf(distance) && !surface->sheet_blocks) return distance; /* whatever its side */
+  if (qmat_surface_inside(surface, point)) distance = -distance;
   const double reach = fmin(limit, distance) + surface->half_thickness;
   if (!surface->sheet_blocks || !(reach >= 0)) return distance;
   return fmin(distance,
@@ -301,7 +300,7 @@ double qmat_surface_distance_to_triangle(const qmat_surface *surface, const doub
 }
 
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]) {
-  return signed_distance_within(surface, point, INFINITY);
+  return qmat_surface_signed_distance_within(surface, point, INFINITY);
 }
 
 double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap) {
@@ -312,7 +311,7 @@ double qmat_surface_signed_distance_near(const qmat_surface *surface, const doub
   else if (near < -gap && (!surface->sheet_blocks || surface->half_thickness == 0))
     distance = -solid_distance(surface, point, limit, NULL, NULL);
   else
-    distance = signed_distance_within(surface, point, limit);
+    distance = qmat_surface_signed_distance_within(surface, point, limit);
   return isfinite(distance) ? distance : qmat_surface_signed_distance(surface, point);
 }
 

@@ -58,6 +58,9 @@ double qmat_surface_distance_to_triangle(const qmat_surface *surface, const doub
  * between two points. */
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]);
 
+/* The same where its size is at most `limit` (>= 0); else it may be infinite, of either sign, which takes less time. */
+double qmat_surface_signed_distance_within(const qmat_surface *surface, const double point[3], double limit);
+
 /* The same, faster where it is known that the signed distance differs from `near` by at most `gap`. */
 double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap);
 

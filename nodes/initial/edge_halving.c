@@ -22,8 +22,9 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   for (int k = 0; k < 3; k++) square += (a[k] - b[k]) * (a[k] - b[k]);
   const double change = a[3] - b[3];
   if (!(square - change * change > 2 * tolerance * sqrt(square))) return false;
-  const double depth = -qmat_surface_signed_distance(surface, middle);
-  if (!(middle[3] - depth > tolerance) || depth <= 0) return false;
+  const double limit = middle[3] - tolerance;
+  const double depth = limit > 0 ? -qmat_surface_signed_distance_within(surface, middle, limit) : 0;
+  if (!(depth > 0 && depth < limit)) return false;
   middle[3] = depth;
   return true;
 }

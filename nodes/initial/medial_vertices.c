@@ -74,9 +74,11 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
   const bool all = d->params->incentres == QMAT_INCENTRES_ALL;
   const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
   if (all && (!in_solid || spans_gap(d, corner))) return QMAT_CELL_DROPPED;
-  if (qmat_circumsphere(p, 0.5, sphere) && qmat_surface_inside(d->surface, sphere)) {
+  if (qmat_circumsphere(p, 0.5, sphere)) {
     const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
-    if (nearest > least_depth) {
+    /* No surface comes between a circumcentre and an incentre that is nearer than the surface. */
+    const bool is_beside = in_solid && qmat_point_distance(sphere, centre) < (1 - 1e-9) * nearest;
+    if (nearest > least_depth && (is_beside || qmat_surface_inside(d->surface, sphere))) {
       if (d->params->radius == QMAT_RADIUS_DISTANCE) sphere[3] = nearest;
       return QMAT_CELL_CIRCUMCENTRE;
     }

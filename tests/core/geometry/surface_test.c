@@ -179,6 +179,8 @@ static void check_against_brute_force(qmat_mesh *mesh, size_t count) {
     /* The dipoles are an approximation: only what they can decide. */
     if (closed ? expected > 1e-7 : fabs(winding - 0.5) > 0.02) assert_int_equal(inside, boxed && winding > 0.5);
     assert_near(qmat_surface_signed_distance(surface, p), inside ? -distance : distance, 0);
+    assert_near(qmat_surface_signed_distance_within(surface, p, distance), inside ? -distance : distance, 0);
+    assert_true(isinf(qmat_surface_signed_distance_within(surface, p, distance * (1 - 1e-9))));
     inside_count += inside;
   }
   assert_true(inside_count > 0 && inside_count < count);
