@@ -23,11 +23,6 @@ static double cosine(double x) {
   return sqrt((1 - x) * (1 + x));
 }
 
-double qmat_sphere_distance(const double sphere[4], const double point[3]) {
-  double d[3] = {point[0] - sphere[0], point[1] - sphere[1], point[2] - sphere[2]};
-  return sqrt(qmat_dot(d, d)) - sphere[3];
-}
-
 void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]) {
   double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   double length = sqrt(qmat_dot(d, d)), growth = b[3] - a[3];

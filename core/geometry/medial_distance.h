@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#include "core/geometry/vector.h"
+
 /* Signed distances to medial primitives (paper section 3.1.1; eq. 9 takes their minimum). A primitive is the union of
  * the spheres (c(x), r(x)) that interpolate its corners linearly over a simplex, and
  *
@@ -51,7 +53,10 @@ typedef struct qmat_slab {
 } qmat_slab;
 
 /* |p - c| - r. */
-double qmat_sphere_distance(const double sphere[4], const double point[3]);
+static inline double qmat_sphere_distance(const double sphere[4], const double point[3]) {
+  const double d[3] = {point[0] - sphere[0], point[1] - sphere[1], point[2] - sphere[2]};
+  return sqrt(qmat_dot(d, d)) - sphere[3];
+}
 
 /* The signed distance to the cone of two spheres; their order does not matter, up to rounding. */
 double qmat_cone_distance(const double a[4], const double b[4], const double point[3]);

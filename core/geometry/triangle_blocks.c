@@ -62,7 +62,7 @@ static void closest_on_segment(const double a[3], const double b[3], const doubl
   qmat_subtract(b, a, ab);
   qmat_subtract(point, a, ap);
   const double length = qmat_dot(ab, ab);
-  const double t = length > 0 ? fmin(fmax(qmat_dot(ap, ab) / length, 0), 1) : 0;
+  const double t = length > 0 ? qmat_smaller(qmat_larger(qmat_dot(ap, ab) / length, 0), 1) : 0;
   for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
 }
 
