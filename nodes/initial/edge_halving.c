@@ -29,8 +29,10 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   return true;
 }
 
-/* The vertex that halves an edge, or NONE. */
-static uint32_t middle_of(const qmat_medial *medial, const uint32_t *middles, uint32_t a, uint32_t b) {
+/* The vertex that halves an edge, or NONE. `is_end`, per vertex: whether an edge of it is halved. */
+static uint32_t middle_of(const qmat_medial *medial, const uint32_t *middles, const uint8_t *is_end, uint32_t a,
+                          uint32_t b) {
+  if (!is_end[a] || !is_end[b]) return NONE;
   const uint32_t ends[2] = {a < b ? a : b, a < b ? b : a};
   return middles[qmat_simplex_find(medial->edges, medial->edge_count, 2, ends)];
 }
@@ -67,7 +69,8 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
   double *all = qmat_alloc(spheres + count, 4 * sizeof *all);
   uint32_t *new_edges = qmat_arena_alloc(arena, edges + count, 2 * sizeof *new_edges);
   uint32_t *new_triangles = qmat_arena_alloc(arena, 4 * triangles, 3 * sizeof *new_triangles);
-  if (!all || !new_edges || !new_triangles) {
+  uint8_t *is_end = qmat_arena_calloc(arena, spheres, sizeof *is_end);
+  if (!all || !new_edges || !new_triangles || !is_end) {
     qmat_free(all);
     return qmat_fail_memory(context, "medial spheres");
   }
@@ -79,12 +82,14 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
     const size_t pieces = middles[e] == NONE ? 1 : 2;
     memcpy(&new_edges[2 * edge_count], halves, pieces * sizeof halves[0]);
     edge_count += pieces;
-    if (pieces == 2) memcpy(&all[4 * (size_t)middles[e]], &middle_spheres[4 * e], 4 * sizeof *all);
+    if (pieces == 1) continue;
+    memcpy(&all[4 * (size_t)middles[e]], &middle_spheres[4 * e], 4 * sizeof *all);
+    is_end[a] = is_end[b] = 1;
   }
   for (size_t t = 0; t < triangles; t++) {
     const uint32_t *corners = &medial->triangles[3 * t];
     uint32_t sides[3], pieces[12];
-    for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, middles, corners[k], corners[(k + 1) % 3]);
+    for (int k = 0; k < 3; k++) sides[k] = middle_of(medial, middles, is_end, corners[k], corners[(k + 1) % 3]);
     const size_t made = qmat_triangle_divide(corners, sides, pieces);
     memcpy(&new_triangles[3 * triangle_count], pieces, 3 * made * sizeof *pieces);
     triangle_count += made;
