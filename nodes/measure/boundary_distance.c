@@ -166,10 +166,11 @@ static void raise_lower_bound(const search *s, bool is_cell, double middle[3], u
     result->found[OUTSIDE] = result->found[EITHER_SIDE];
 }
 
-/* An upper bound over a piece: the distance to one triangle is convex, so over a hull its maximum is at a corner. */
-static double hull_bound(const search *s, const hull *h, uint32_t triangle) {
+/* An upper bound over a piece: the distance to one triangle is convex, so over a hull its maximum is at a corner. Above
+ * `enough` any value above. */
+static double hull_bound(const search *s, const hull *h, uint32_t triangle, double enough) {
   double bound = h->count > 0 ? 0 : INFINITY;
-  for (int i = 0; i < h->count; i++)
+  for (int i = 0; i < h->count && bound + h->bulge <= enough; i++)
     bound = qmat_larger(bound, qmat_surface_distance_to_triangle(s->surface, h->points[i], triangle));
   return bound + h->bulge;
 }
@@ -196,8 +197,9 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
   const bool is_short = !s->last && *wanted == WANT_EITHER_SIDE;
   double known = INFINITY; /* by the triangle that is nearest to what the piece is a part of */
   if (p->near != QMAT_NONE) {
-    const double bound = is_short ? hull_bound(s, &h, p->near) : INFINITY;
-    if (bound <= qmat_smaller(s->epsilon, s->target[EITHER_SIDE])) {
+    const double enough = qmat_smaller(s->epsilon, s->target[EITHER_SIDE]);
+    const double bound = is_short ? hull_bound(s, &h, p->near, enough) : INFINITY;
+    if (bound <= enough) {
       result.bound[EITHER_SIDE] = bound;
       *wanted = 0;
       return result;
@@ -213,7 +215,8 @@ static finding evaluate_ball(const search *s, const qmat_boundary_piece *p, doub
     return (finding){.children = 0};
   }
   if (!(d < INFINITY)) d = qmat_surface_distance(s->surface, middle, known, NULL, &result.near);
-  if (*wanted) finish_with(s, hull_bound(s, &h, result.near), wanted, &result);
+  const double largest = qmat_larger(s->target[EITHER_SIDE], s->target[OUTSIDE]);
+  if (*wanted) finish_with(s, hull_bound(s, &h, result.near, largest), wanted, &result);
   if (result.undecided) memcpy(result.place, middle, sizeof result.place);
   if (!*wanted) return result;
   const bool inside = (*wanted & WANT_OUTSIDE) && qmat_surface_inside(s->surface, middle);
