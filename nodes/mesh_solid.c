@@ -654,9 +654,8 @@ const qmat_node qmat_node_mesh_solid = {
         "they become sheets.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
-        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says so "
-        "where "
-        "solids hide most others, such as a sky around a scene.",
+        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "
+        "where solids hide most others, such as a sky around a scene.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,

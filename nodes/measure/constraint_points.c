@@ -462,22 +462,20 @@ static qmat_status place_points(qmat_context *context, const qmat_mesh *mesh, co
   return QMAT_OK;
 }
 
-/* Makes the points on the surface, with witnesses from the regions around them. `ids`: their places, in rising order;
- * NULL: all are taken. */
+/* Makes the points on the surface, with witnesses from the regions around them. */
 static qmat_status make_surface_points(qmat_context *context, const regions *a, const surface_places *places,
-                                       const uint32_t *ids, size_t samples, double accepted,
-                                       qmat_constraint_points *constraints) {
+                                       double accepted, qmat_constraint_points *constraints) {
   const int threads = qmat_threads(context);
-  for (size_t first = 0, last; first < constraints->surface_count; first = last) {
-    const qmat_status status = next_slice(context, first, constraints->surface_count, &last);
+  memcpy(constraints->points, places->points, 3 * places->count * sizeof *places->points);
+  for (size_t first = 0, last; first < places->count; first = last) {
+    const qmat_status status = next_slice(context, first, places->count, &last);
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t i = first; i < last; i++) {
-      const size_t id = ids ? ids[i] : i;
-      double *point = &constraints->points[3 * i];
-      memcpy(point, &places->points[3 * id], 3 * sizeof *point);
-      const witness w =
-          id < samples ? search_region(a, point, (uint32_t)id, accepted) : search_nearest_region(a, point, accepted);
+      const double *point = &places->points[3 * i];
+      const witness w = i < constraints->sample_point_count
+                            ? search_region(a, point, (uint32_t)qmat_sample_of_point(constraints, i), accepted)
+                            : search_nearest_region(a, point, accepted);
       store(constraints, i, &w);
     }
   }
@@ -488,7 +486,7 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
                                      const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
                                      const qmat_complex *complex, double spacing, size_t most, double enough,
                                      qmat_constraint_points *constraints) {
-  *constraints = (qmat_constraint_points){.sample_count = samples->count};
+  *constraints = (qmat_constraint_points){.sample_count = samples->count, .sample_point_count = samples->count};
   regions a;
   surface_places places;
   qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
@@ -496,7 +494,7 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
   if (status != QMAT_OK) return status;
   constraints->count = constraints->surface_count = places.count;
   status = allocate(context, constraints);
-  if (status == QMAT_OK) status = make_surface_points(context, &a, &places, NULL, samples->count, enough, constraints);
+  if (status == QMAT_OK) status = make_surface_points(context, &a, &places, enough, constraints);
   return status == QMAT_OK ? search_everywhere(context, &a, enough, constraints) : status;
 }
 
@@ -504,32 +502,29 @@ qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mes
  * whose side is the first share of epsilon is at most the second share of all points, only these are kept. */
 static const double surface_share = 0.3, few_share = 0.5;
 
-/* Thins out the places where that leaves few. `ids` gets those that are kept, in rising order, and the constraints what
- * points and samples have to do with each other; both stay as they are otherwise. */
-static qmat_status thin_out(qmat_context *context, const surface_places *places, size_t samples, double epsilon,
-                            uint32_t **ids, qmat_constraint_points *constraints) {
+/* Thins out the places where that leaves few, and tells the constraints what points and samples then have to do with
+ * each other. */
+static qmat_status thin_out(qmat_context *context, double epsilon, surface_places *places,
+                            qmat_constraint_points *constraints) {
   qmat_arena *arena = &context->arena;
-  const cube_point *sorted = sort_into_cubes(arena, places->points, places->count, surface_share * epsilon);
-  uint32_t *first = qmat_arena_alloc(arena, places->count, sizeof *first);
-  uint32_t *kept = qmat_arena_alloc(arena, places->count, sizeof *kept), count = 0;
-  if (!sorted || !first || !kept) return qmat_fail_memory(context, "constraint points");
-  for (size_t i = 0; i < places->count; i++)
-    first[sorted[i].id] = is_first(sorted, i) ? sorted[i].id : first[sorted[i - 1].id];
-  size_t sample_points = 0;
-  for (uint32_t i = 0; i < places->count; i++) {
-    if (first[i] == i) {
-      kept[count] = i;
-      first[i] = count++;
-    } else {
-      first[i] = first[first[i]];
-    }
-    if (i < samples) sample_points = count;
+  const size_t all = places->count;
+  const cube_point *sorted = sort_into_cubes(arena, places->points, all, surface_share * epsilon);
+  uint32_t *first = qmat_arena_alloc(arena, all, sizeof *first); /* per place: the first one in its cube */
+  uint32_t *kept = qmat_arena_alloc(arena, all, sizeof *kept), count = 0, of_samples = 0;
+  uint32_t *numbers = qmat_arena_alloc(arena, all, sizeof *numbers); /* per place: that of `first` among the kept */
+  if (!sorted || !first || !kept || !numbers) return qmat_fail_memory(context, "constraint points");
+  for (size_t i = 0; i < all; i++) first[sorted[i].id] = is_first(sorted, i) ? sorted[i].id : first[sorted[i - 1].id];
+  for (uint32_t i = 0; i < all; i++) {
+    if (first[i] == i) kept[count++] = i;
+    numbers[i] = first[i] == i ? count - 1 : numbers[first[i]];
+    if (i < constraints->sample_count) of_samples = count;
   }
-  if (!(count <= few_share * (double)places->count)) return QMAT_OK;
-  *ids = kept;
-  constraints->surface_count = count;
-  constraints->sample_point_count = sample_points;
-  constraints->sample_points = first;
+  if (!(count <= few_share * (double)all)) return QMAT_OK;
+  for (size_t i = 0; i < count; i++)
+    memmove(&places->points[3 * i], &places->points[3 * (size_t)kept[i]], 3 * sizeof *places->points);
+  places->count = count;
+  constraints->sample_point_count = of_samples;
+  constraints->sample_points = numbers;
   constraints->point_samples = kept;
   return QMAT_OK;
 }
@@ -542,7 +537,6 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   *constraints = (qmat_constraint_points){.sample_count = samples->count, .sample_point_count = samples->count};
   regions a;
   surface_places places;
-  uint32_t *ids = NULL;
   qmat_interior_points inner = {.count = 0};
   double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
   if (!unit_samples) return qmat_fail_memory(context, "constraint points");
@@ -555,13 +549,12 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
     status = place_points(context, mesh, qmat_surface_positions(surface), samples, unit_samples,
                           spacing_share * epsilon, most, &places);
   if (status != QMAT_OK) return status;
+  if (epsilon < INFINITY) status = thin_out(context, epsilon, &places, constraints);
   constraints->surface_count = places.count;
-  if (epsilon < INFINITY) status = thin_out(context, &places, samples->count, epsilon, &ids, constraints);
-  constraints->count = constraints->surface_count + inner.count + shell.count;
+  constraints->count = places.count + inner.count + shell.count;
   if (status == QMAT_OK) status = allocate(context, constraints);
   if (status == QMAT_OK)
-    status =
-        make_surface_points(context, &a, &places, ids, samples->count, accepted_with_sphere * epsilon, constraints);
+    status = make_surface_points(context, &a, &places, accepted_with_sphere * epsilon, constraints);
   if (status != QMAT_OK) return status;
   size_t next = constraints->surface_count;
   for (size_t i = 0; i < inner.count; i++, next++) {

@@ -28,6 +28,11 @@ static inline size_t qmat_point_of_sample(const qmat_constraint_points *c, size_
   return c->sample_points ? c->sample_points[sample] : sample;
 }
 
+/* The sample that a point is; `point` is below `sample_point_count`. */
+static inline size_t qmat_sample_of_point(const qmat_constraint_points *c, size_t point) {
+  return c->point_samples ? c->point_samples[point] : point;
+}
+
 /* The usual limit of the points that grids add. */
 enum { QMAT_MOST_CONSTRAINT_POINTS = 600000 };
 

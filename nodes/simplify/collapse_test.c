@@ -15,7 +15,7 @@ static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
          slot = s->surface_tracker.next[slot]) {
       const uint32_t point = slot / 3;
       if (point >= s->constraints->sample_point_count) continue;
-      if (!s->rules.thin[s->constraints->point_samples ? s->constraints->point_samples[point] : point]) return false;
+      if (!s->rules.thin[qmat_sample_of_point(s->constraints, point)]) return false;
       any = true;
     }
   return any;

@@ -23,7 +23,7 @@ qmat_status qmat_decimation_try_fitted(qmat_decimation *s, uint32_t edge, const 
   }
   memcpy(sphere, c->spheres[least], sizeof c->spheres[least]);
   s->refusal = QMAT_REFUSED_BY_NOTHING;
-  if (status == QMAT_OK)
+  if (status == QMAT_OK && errors[least] <= hopeless)
     status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, s->threshold,
                                  sphere, &before, &error);
   s->fitted_errors[edge] = error;
