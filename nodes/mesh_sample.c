@@ -363,7 +363,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_mesh_sample = {
     .name = "mesh.sample",
-    .version = 4,
+    .version = 5,
     .summary = "Spreads points over a surface, more of them on large and on thin facets",
     .doc =
         "Every vertex is a sample. Sheets have no other samples. A facet of a solid gets further samples for its area "
@@ -373,8 +373,9 @@ const qmat_node qmat_node_mesh_sample = {
         "A single sample lies at the centroid. Several start at random and are spread by Lloyd's relaxation on the "
         "facet's bounded Voronoi diagram, with fixed corners.\n\n"
         "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "
-        "and large facets are therefore filled evenly at the given spacing. A facet more than four spacings high has a "
-        "quarter of its height as spacing, at most 2.5 times the given one.",
+        "and large facets are therefore filled evenly. The spacing on a facet is 0.35 of its height, but at least the "
+        "given "
+        "one and at most 2.5 times that.",
     .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,

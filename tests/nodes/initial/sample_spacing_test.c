@@ -88,7 +88,7 @@ static void test_shared_side_has_the_spacing_of_the_facet_that_needs_more(void *
 }
 
 /* The height over the side of 5 is 2.4. */
-static void test_spacing_of_a_facet_is_a_quarter_of_its_height(void **state) {
+static void test_spacing_of_a_facet_is_a_share_of_its_height(void **state) {
   (void)state;
   const double a[3] = {0, 0, 0}, b[3] = {4, 0, 0}, c[3] = {0, 3, 0};
   const double *orders[3][3] = {{a, b, c}, {b, c, a}, {c, b, a}};
@@ -97,8 +97,8 @@ static void test_spacing_of_a_facet_is_a_quarter_of_its_height(void **state) {
     assert_ptr_equal(orders[i][(side.base + 2) % 3], a);
     assert_true(side.length == 5 && fabs(side.height - 2.4) < 1e-15);
   }
-  assert_true(fabs(qmat_triangle_spacing(2.4, 0.5) - 0.6) < 1e-15);
-  assert_true(qmat_triangle_spacing(2.4, 0.7) == 0.7);
+  assert_true(fabs(qmat_triangle_spacing(2.4, 0.5) - 0.84) < 1e-15);
+  assert_true(qmat_triangle_spacing(2.4, 0.9) == 0.9);
   assert_true(qmat_triangle_spacing(2.4, 0.1) == 0.25);
   assert_true(qmat_triangle_longest_side(a, a, a).height == 0);
   assert_true(qmat_triangle_longest_side(a, b, b).height == 0);
@@ -316,7 +316,7 @@ int main(void) {
       cmocka_unit_test(test_sides_of_three_four_five),
       cmocka_unit_test(test_shared_side_belongs_to_its_first_facet),
       cmocka_unit_test(test_shared_side_has_the_spacing_of_the_facet_that_needs_more),
-      cmocka_unit_test(test_spacing_of_a_facet_is_a_quarter_of_its_height),
+      cmocka_unit_test(test_spacing_of_a_facet_is_a_share_of_its_height),
       cmocka_unit_test(test_degenerate_facets_count_without_harm),
       cmocka_unit_test(test_box_has_points_on_each_edge_once),
       cmocka_unit_test(test_points_of_a_side_divide_it_evenly),
