@@ -326,6 +326,13 @@ bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, con
   return depth > least && sphere[3] - depth <= tracker->limit;
 }
 
+/* Whether a point, `gap` from a place at the depth `near`, is inside the solid or a thick sheet. */
+static bool is_inside(qmat_depth_lattice *lattice, const double *point, double near, double gap) {
+  return qmat_surface_half_thickness(lattice->surface) > 0
+             ? qmat_depth_lattice_exact_near(lattice, point, near, gap) > 0
+             : qmat_surface_inside(lattice->surface, point);
+}
+
 bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                              const qmat_collapse *collapse, const double sphere[4],
                                              double exempt_radius) {
@@ -339,7 +346,7 @@ bool qmat_envelope_to_surface_test_midpoints(qmat_envelope_to_surface *tracker, 
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (sphere[k] + other[k]);
     const double near = qmat_depth_lattice_near(&tracker->lattice, middle, &gap);
     if (near > gap) continue;
-    if (near < -gap || !qmat_surface_inside(tracker->lattice.surface, middle)) return false;
+    if (near < -gap || !is_inside(&tracker->lattice, middle, near, gap)) return false;
   }
   return true;
 }
