@@ -88,7 +88,8 @@ static void test_torus_gives_a_ring_around_its_hole(void **state) {
 static void test_envelope_of_a_box_is_near_its_surface(void **state) {
   (void)state;
   pipeline p;
-  axis a = make_sampled(&p, shape_box(3, 2, 1), "");
+  pipeline_sample(&p, shape_box(3, 2, 1), "spacing=2%");
+  axis a = make_axis(&p, 0, "");
   assert_int_equal(pipeline_components(a.medial), 1);
   const double missing = pipeline_error(p.mesh, a.medial, "surface_to_envelope");
   const double beyond = pipeline_error(p.mesh, a.medial, "envelope_out_of_solid");
