@@ -15,6 +15,8 @@
 /* Neighbours count in eq. 7 as a square whose side is at least this share of the spacing. Otherwise a few slivers would
  * force dozens of samples, far closer than any epsilon needs, on each facet around them. */
 #define LEAST_NEIGHBOUR_SIDE 0.15
+/* The spacing on a facet, as a share of its height. A third would put the number of rows on a border of rounding. */
+static const double height_share = 0.35;
 /* Facets that are equal up to rounding get no sample for their area. */
 #define AREA_TOLERANCE 1e-9
 
@@ -101,8 +103,8 @@ static qmat_status count_samples(qmat_context *context, const mesh_sample_params
     for (size_t i = 0; i < mesh->triangle_count; i++) {
       const double *corners[3];
       find_corners(unit_positions, mesh->triangles + 3 * i, corners);
-      spaced->spacings[i] =
-          qmat_triangle_spacing(qmat_triangle_longest_side(corners[0], corners[1], corners[2]).height, params->spacing);
+      spaced->spacings[i] = qmat_triangle_spacing(qmat_triangle_longest_side(corners[0], corners[1], corners[2]).height,
+                                                  height_share, params->spacing);
     }
     const qmat_status status =
         qmat_side_points_count(context, mesh, unit_positions, spaced->spacings, spaced->on_sides);
@@ -374,8 +376,7 @@ const qmat_node qmat_node_mesh_sample = {
         "facet's bounded Voronoi diagram, with fixed corners.\n\n"
         "Eq. 7 only compares facets with each other, so a mesh that is coarse everywhere gets few samples. Long sides "
         "and large facets are therefore filled evenly. The spacing on a facet is 0.35 of its height, but at least the "
-        "given "
-        "one and at most 2.5 times that.",
+        "given one and at most 2.5 times that.",
     .citation = "Section 3.2, eq. 7 and 8; Tournois et al. 2010",
     .params_size = sizeof(mesh_sample_params),
     .params = params,

@@ -63,10 +63,10 @@ static inline qmat_longest_side qmat_triangle_longest_side(const double a[3], co
   return side;
 }
 
-/* The spacing of points inside a triangle of this height: 0.35 of the height, but at least `spacing` and at most
+/* The spacing of points inside a triangle of this height: a share of the height, but at least `spacing` and at most
  * 2.5 times that. Large plane facets need fewer points than others. */
-static inline double qmat_triangle_spacing(double height, double spacing) {
-  return qmat_smaller(qmat_larger(0.35 * height, spacing), 2.5 * spacing);
+static inline double qmat_triangle_spacing(double height, double share, double spacing) {
+  return qmat_smaller(qmat_larger(share * height, spacing), 2.5 * spacing);
 }
 
 /* Divides a triangle at the middles of its sides. `corners`: 3 vertices; `middles`: the vertex between corners k and

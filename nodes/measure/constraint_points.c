@@ -20,6 +20,10 @@ enum { FINEST_GRID = 256 };
  * (nodes/measure/medial_errors.h). */
 static const double spacing_share = 0.6;
 
+/* The spacing inside a facet, as a share of its height. With the share of mesh.sample the torus's spheres are farther
+ * from its ring, and a damaged capsule takes 154 spheres instead of 131. */
+static const double height_share = 0.25;
+
 /* The number of equal divisions of a length. */
 static uint32_t divisions_of(double length, double spacing) {
   const double divisions = ceil(length / spacing);
@@ -41,7 +45,7 @@ static grid grid_of(const double *positions, const uint32_t *corners, double spa
   const double *at[3];
   for (size_t k = 0; k < 3; k++) at[k] = &positions[3 * (size_t)corners[k]];
   const qmat_longest_side longest = qmat_triangle_longest_side(at[0], at[1], at[2]);
-  grid g = {.longest = longest.length, .spacing = qmat_triangle_spacing(longest.height, spacing)};
+  grid g = {.longest = longest.length, .spacing = qmat_triangle_spacing(longest.height, height_share, spacing)};
   for (size_t k = 0; k < 3; k++) {
     const size_t side = ((size_t)longest.base + k) % 3, next = (side + 1) % 3;
     g.corners[k] = at[side];

@@ -52,7 +52,7 @@ asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
 # epsilon in the first, and a place beyond epsilon hides others in the second. The models are files: after the smallest
 # change of its numbers such a model ends another way.
 asset torn_capsule 176 solids=0 sheets=33
-asset creased_capsule 160 solids=0 sheets=8
+asset creased_capsule 136 solids=0 sheets=8
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
 # The cap is the disc that cut the neck: of 32 sides, in a circle of the radius sin(3/16 pi).

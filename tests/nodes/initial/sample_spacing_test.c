@@ -97,9 +97,9 @@ static void test_spacing_of_a_facet_is_a_share_of_its_height(void **state) {
     assert_ptr_equal(orders[i][(side.base + 2) % 3], a);
     assert_true(side.length == 5 && fabs(side.height - 2.4) < 1e-15);
   }
-  assert_true(fabs(qmat_triangle_spacing(2.4, 0.5) - 0.84) < 1e-15);
-  assert_true(qmat_triangle_spacing(2.4, 0.9) == 0.9);
-  assert_true(qmat_triangle_spacing(2.4, 0.1) == 0.25);
+  assert_true(fabs(qmat_triangle_spacing(2.4, 0.25, 0.5) - 0.6) < 1e-15);
+  assert_true(qmat_triangle_spacing(2.4, 0.25, 0.7) == 0.7);
+  assert_true(qmat_triangle_spacing(2.4, 0.25, 0.1) == 0.25);
   assert_true(qmat_triangle_longest_side(a, a, a).height == 0);
   assert_true(qmat_triangle_longest_side(a, b, b).height == 0);
 }
