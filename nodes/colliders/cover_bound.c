@@ -22,6 +22,7 @@ typedef struct region {
 
 typedef struct gathered {
   double tolerance, bound;
+  bool only_parts;
   qmat_uncovered *parts;
   size_t count, capacity;
 } gathered;
@@ -70,6 +71,8 @@ static void finish(region *r, const qmat_uncovered *part) {
 /* Divides a cube whose part of the solid no shape contains. */
 static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
   const gathered *all = s->visitor->all;
+  const region *r = s->region;
+  if (all->only_parts && r->count == MOST_PARTS) return false;
   qmat_uncovered part = {.value = INFINITY, .shape = c->candidates[0]};
   memcpy(part.point, c->centre, sizeof part.point);
   for (size_t i = 0; i < c->candidate_count; i++) {
@@ -96,8 +99,8 @@ static qmat_status gather(void *data, void *found) {
 }
 
 qmat_status qmat_cover_bound_measure(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
-                                     double tolerance, qmat_cover_bound *result) {
-  gathered all = {.tolerance = tolerance};
+                                     double tolerance, bool only_parts, qmat_cover_bound *result) {
+  gathered all = {.tolerance = tolerance, .only_parts = only_parts};
   const qmat_cube_visitor visitor = {.region_size = sizeof(region),
                                      .visit = visit,
                                      .gather = gather,

@@ -246,7 +246,7 @@ static qmat_status cover_solid(fit *t) {
   const size_t room = t->sample_count + MOST_PARTS;
   qmat_status status = fit_samples(t, STEPS, least_penalty);
   for (int i = 0; i < ROUNDS + PROOFS && status == QMAT_OK; i++) {
-    status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, &bound);
+    status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, true, &bound);
     if (status != QMAT_OK || bound.bound <= 0) return status;
     if (i >= ROUNDS) {
       grow_parts(t, &bound);
@@ -260,7 +260,7 @@ static qmat_status cover_solid(fit *t) {
     }
     status = fit_samples(t, MORE_STEPS, most_penalty / 4);
   }
-  if (status == QMAT_OK) status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, &bound);
+  if (status == QMAT_OK) status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, false, &bound);
   for (size_t i = 0; i < t->set->sphere_count && status == QMAT_OK; i++) t->set->spheres[4 * i + 3] += bound.bound;
   return status;
 }
