@@ -25,6 +25,8 @@ typedef struct gathered {
   bool only_parts;
   qmat_uncovered *parts;
   size_t count, capacity;
+  bool *covered;
+  size_t next; /* the region that is gathered next */
 } gathered;
 
 /* How far the solid's part in the cube, and the sheets around their middle in it, may leave a shape, as far as that
@@ -91,6 +93,7 @@ static bool visit(const qmat_cube_search *s, qmat_solid_cube *c) {
 static qmat_status gather(void *data, void *found) {
   gathered *all = data;
   const region *r = found;
+  all->covered[all->next++] = r->count == 0;
   all->bound = fmax(all->bound, r->bound);
   if (qmat_grow((void **)&all->parts, &all->capacity, all->count + r->count, sizeof *all->parts) != 0)
     return QMAT_ERROR_MEMORY;
@@ -99,16 +102,21 @@ static qmat_status gather(void *data, void *found) {
 }
 
 qmat_status qmat_cover_bound_measure(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
-                                     double tolerance, bool only_parts, qmat_cover_bound *result) {
-  gathered all = {.tolerance = tolerance, .only_parts = only_parts};
+                                     double tolerance, bool only_parts, const qmat_cover_bound *before,
+                                     qmat_cover_bound *result) {
+  gathered all = {.tolerance = tolerance,
+                  .only_parts = only_parts,
+                  .covered = qmat_arena_calloc(&context->arena, QMAT_CUBE_REGIONS, sizeof *all.covered)};
+  if (!all.covered) return qmat_fail_memory(context, "the proof of colliders");
   const qmat_cube_visitor visitor = {.region_size = sizeof(region),
                                      .visit = visit,
                                      .gather = gather,
                                      .all = &all,
+                                     .skipped = before ? before->covered : NULL,
                                      .skips_covered = true,
                                      .what = "regions searched"};
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
-  *result = (qmat_cover_bound){.bound = all.bound, .count = all.count};
+  *result = (qmat_cover_bound){.bound = all.bound, .count = all.count, .covered = all.covered};
   result->parts = qmat_arena_alloc(&context->arena, result->count, sizeof *all.parts);
   if (status == QMAT_OK && !result->parts) status = qmat_fail_memory(context, "the proof of colliders");
   if (status == QMAT_OK && result->count > 0) memcpy(result->parts, all.parts, result->count * sizeof *all.parts);

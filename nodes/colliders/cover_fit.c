@@ -12,10 +12,13 @@
 
 /* Samples: as many as the spheres need to be fixed, spread over the area, and all vertices of a mesh that has few. */
 enum { SAMPLES_PER_SPHERE = 120, LEAST_SAMPLES = 4000, MOST_SAMPLES = 20000, MOST_VERTICES = 40000 };
-enum { STEPS = 60, MORE_STEPS = 12, ROUNDS = 4, CONJUGATE_STEPS = 30, PROOFS = 12, MOST_PARTS = 20000 };
+enum { STEPS = 60, MORE_STEPS = 12, ROUNDS = 4, CONJUGATE_STEPS = 30, PROOFS = 64, MOST_PARTS = 20000 };
 
 /* Lengths in diagonals. Fitted F is below -margin; a slack of `level` counts half as much per length as none. */
 static const double margin = 2e-4, level = 1e-3, most_step = 0.01, tolerance = 4e-4;
+/* A step is solved until what is left of the gradient, in the norm of the preconditioner, is a tenth: weights change
+ * from step to step, and with less left shapes contain the solid no closer. */
+static const double unsolved_share = 0.01;
 /* The weight of a sample outside, per length, over that of one inside; it rises from step to step. */
 static const double least_penalty = 4, most_penalty = 400;
 
@@ -33,6 +36,7 @@ typedef struct fit {
   double least_radius;
   size_t sample_count, even_count; /* all samples; the first are spread evenly and count as slack */
   double *samples;                 /* 4 per sample: a point, and how far the solid reaches around it */
+  qmat_prepared_shape *shapes;     /* those of the set */
   row *rows;
   double *vectors; /* 6 vectors of 4 numbers per sphere, and those below */
   double *best, *step;
@@ -84,6 +88,7 @@ static qmat_status take_samples(fit *t) {
 static qmat_status evaluate(fit *t, double *slack, double *outside) {
   const qmat_shape_set *set = t->set;
   const int threads = qmat_threads(t->context);
+  for (size_t i = 0; i < set->shape_count; i++) qmat_shape_prepare(&t->shapes[i], set->spheres, &set->shapes[3 * i]);
   qmat_envelope *envelope;
   const qmat_status status = qmat_shape_set_envelope(t->context, set, &envelope);
   if (status != QMAT_OK) return status;
@@ -93,11 +98,9 @@ static qmat_status evaluate(fit *t, double *slack, double *outside) {
     const double *point = &t->samples[4 * i];
     double medial[4];
     size_t primitive = 0;
-    qmat_prepared_shape shape;
     r->f = qmat_envelope_nearest(envelope, point, &primitive, medial) + point[3];
     memcpy(r->ids, &set->shapes[3 * primitive], sizeof r->ids);
-    qmat_shape_prepare(&shape, set->spheres, r->ids);
-    qmat_shape_distance(&shape, point, r->shares);
+    qmat_shape_distance(&t->shapes[primitive], point, r->shares);
     const double away = qmat_point_distance(point, medial);
     for (int k = 0; k < 3; k++) r->normal[k] = away > 0 ? (point[k] - medial[k]) / away : 0;
   }
@@ -160,7 +163,8 @@ static void solve(const fit *t, const double *gradient, const double *diagonal, 
     way[i] = rest[i] / (diagonal[i] + damping[i]);
     product += rest[i] * way[i];
   }
-  for (int round = 0; round < CONJUGATE_STEPS && product > 0; round++) {
+  const double enough = unsolved_share * product;
+  for (int round = 0; round < CONJUGATE_STEPS && product > enough; round++) {
     double along = 0, next = 0;
     multiply(t, damping, way, image);
     for (size_t i = 0; i < n; i++) along += way[i] * image[i];
@@ -238,15 +242,18 @@ static void grow_parts(fit *t, const qmat_cover_bound *bound) {
  * until the whole solid is covered. */
 static qmat_status cover_solid(fit *t) {
   const size_t n = 4 * t->set->sphere_count;
-  qmat_cover_bound bound;
+  qmat_cover_bound bound, before;
   t->vectors = qmat_arena_alloc(&t->context->arena, 8 * n, sizeof *t->vectors);
-  if (!t->vectors) return qmat_fail_memory(t->context, "the fitted colliders");
+  t->shapes = qmat_arena_alloc(&t->context->arena, t->set->shape_count, sizeof *t->shapes);
+  if (!t->vectors || !t->shapes) return qmat_fail_memory(t->context, "the fitted colliders");
   t->best = t->vectors + 6 * n;
   t->step = t->vectors + 7 * n;
   const size_t room = t->sample_count + MOST_PARTS;
   qmat_status status = fit_samples(t, STEPS, least_penalty);
   for (int i = 0; i < ROUNDS + PROOFS && status == QMAT_OK; i++) {
-    status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, true, &bound);
+    status =
+        qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, true, i > ROUNDS ? &before : NULL, &bound);
+    before = bound;
     if (status != QMAT_OK || bound.bound <= 0) return status;
     if (i >= ROUNDS) {
       grow_parts(t, &bound);
@@ -260,7 +267,8 @@ static qmat_status cover_solid(fit *t) {
     }
     status = fit_samples(t, MORE_STEPS, most_penalty / 4);
   }
-  if (status == QMAT_OK) status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, false, &bound);
+  if (status == QMAT_OK)
+    status = qmat_cover_bound_measure(t->context, t->surface, t->set, tolerance, false, &before, &bound);
   for (size_t i = 0; i < t->set->sphere_count && status == QMAT_OK; i++) t->set->spheres[4 * i + 3] += bound.bound;
   return status;
 }

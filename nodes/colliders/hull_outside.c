@@ -6,8 +6,11 @@
 
 #include "core/geometry/vector.h"
 
-/* Facets between two looks whether the run is cancelled. */
-enum { SLICE = 4096 };
+/* Facets between two looks whether the run is cancelled; corners of a triangle that is cut by three planes, at most. */
+enum { SLICE = 4096, MOST_CORNERS = 6 };
+
+/* A point is over a triangle where it is farther than this from the planes through its sides. */
+static const double rounding = 1e-9;
 
 /* The largest distance outside of a solid over triangles. A search ends where it exceeds the limit. It misses distances
  * that are below `least`, or above what is found by at most `slack`, or by at most the reach of triangles that are not
@@ -17,6 +20,87 @@ typedef struct search {
   double limit, least, slack, reach;
   double found;
 } search;
+
+static void search_triangle(search *s, double corners[3][3], int halvings);
+
+typedef struct plane {
+  double normal[3], offset;
+} plane;
+
+static double height(const plane *p, const double *point) {
+  return qmat_dot(p->normal, point) - p->offset;
+}
+
+/* Cuts a convex polygon. What is on the side of `sign` goes to `kept`; returns the number of its corners. */
+static int cut(const plane *p, double sign, double polygon[][3], int count, double kept[MOST_CORNERS][3]) {
+  int corners = 0;
+  for (int i = 0; i < count; i++) {
+    const double *x = polygon[i], *y = polygon[(i + 1) % count];
+    const double a = sign * height(p, x), b = sign * height(p, y);
+    if (a >= 0) memcpy(kept[corners++], x, sizeof kept[0]);
+    if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
+    for (int k = 0; k < 3; k++) kept[corners][k] = x[k] + a / (a - b) * (y[k] - x[k]);
+    corners++;
+  }
+  return corners;
+}
+
+/* Makes the normal's length 1. False where it has none. */
+static bool set_length(plane *p, const double *point) {
+  const double length = sqrt(qmat_dot(p->normal, p->normal));
+  for (int k = 0; k < 3 && length > 0; k++) p->normal[k] /= length;
+  p->offset = qmat_dot(p->normal, point);
+  return length > 0;
+}
+
+/* The planes at right angles to a triangle of the solid through its sides, which look away from it, and its own plane.
+ * False where it has no area. */
+static bool make_planes(const qmat_surface *solid, uint32_t triangle, plane sides[3], plane *own) {
+  const double *positions = qmat_surface_positions(solid), *corners[3];
+  const uint32_t *ids = &qmat_surface_mesh(solid)->triangles[3 * (size_t)triangle];
+  double along[3][3];
+  for (int i = 0; i < 3; i++) corners[i] = &positions[3 * (size_t)ids[i]];
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) along[i][k] = corners[(i + 1) % 3][k] - corners[i][k];
+  qmat_cross(along[0], along[1], own->normal);
+  bool has_area = set_length(own, corners[0]);
+  for (int i = 0; i < 3; i++) {
+    qmat_cross(along[i], own->normal, sides[i].normal);
+    has_area = set_length(&sides[i], corners[i]) && has_area;
+  }
+  return has_area;
+}
+
+/* Searches what of a piece of a facet is not over the triangle of the solid that is nearest to its centre, if what is
+ * over it is at most `enough` from it: a point over a triangle is as far from it as from its plane. Otherwise, and
+ * where the centre is not over it, this does nothing and returns false. */
+static bool search_around(search *s, double corners[3][3], const double centre[3], uint32_t nearest, double enough,
+                          int halvings) {
+  plane sides[3], own;
+  double over[MOST_CORNERS][3], around[3][MOST_CORNERS][3];
+  int count = 3, counts[3];
+  if (!make_planes(s->solid, nearest, sides, &own)) return false;
+  for (int i = 0; i < 3; i++)
+    if (height(&sides[i], centre) > -rounding) return false;
+  memcpy(over, corners, 3 * sizeof over[0]);
+  for (int i = 0; i < 3; i++) {
+    double rest[MOST_CORNERS][3];
+    counts[i] = cut(&sides[i], 1, over, count, around[i]);
+    count = cut(&sides[i], -1, over, count, rest);
+    memcpy(over, rest, sizeof over);
+  }
+  for (int i = 0; i < count; i++)
+    if (fabs(height(&own, over[i])) > enough) return false;
+  for (int i = 0; i < 3; i++)
+    for (int k = 2; k < counts[i] && !(s->found > s->limit); k++) {
+      double piece[3][3];
+      memcpy(piece[0], around[i][0], sizeof piece[0]);
+      memcpy(piece[1], around[i][k - 1], sizeof piece[1]);
+      memcpy(piece[2], around[i][k], sizeof piece[2]);
+      search_triangle(s, piece, halvings);
+    }
+  return true;
+}
 
 static void search_triangle(search *s, double corners[3][3], int halvings) {
   double centre[3], reach = 0, longest = -1, to_triangle = 0;
@@ -40,7 +124,9 @@ static void search_triangle(search *s, double corners[3][3], int halvings) {
     else
       s->found = distance;
   }
-  if (s->found > s->limit || halvings == 0 || reach <= s->reach || bound <= fmax(s->found + s->slack, s->least)) return;
+  const double enough = fmax(s->found + s->slack, s->least);
+  if (s->found > s->limit || halvings == 0 || reach <= s->reach || bound <= enough) return;
+  if (search_around(s, corners, centre, nearest, enough, halvings)) return;
   const int b = (a + 1) % 3;
   double low[3][3], high[3][3];
   memcpy(low, corners, sizeof low);

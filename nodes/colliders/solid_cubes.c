@@ -8,8 +8,9 @@
 #include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 
-/* The unit frame's box is cut into GRID^3 regions, which are searched independently, SLICE at a time. */
+/* The regions are a grid of GRID^3, searched SLICE at a time. */
 enum { GRID = 16, SLICE = 64 };
+_Static_assert(GRID *GRID *GRID == QMAT_CUBE_REGIONS, "the header says how many regions there are");
 
 /* Cubes are larger by the first, so that none is missed between them. Corners count so near to the surface. */
 static const double rounding = 1e-9, beside_surface = 1e-6;
@@ -141,7 +142,7 @@ static void range_of(const double *positions, const uint32_t *row, int range[3][
 static qmat_status fill_buckets(qmat_context *context, const qmat_surface *surface, const char *what, buckets *b) {
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   const double *positions = qmat_surface_positions(surface);
-  const size_t regions = (size_t)GRID * GRID * GRID;
+  const size_t regions = QMAT_CUBE_REGIONS;
   *b = (buckets){.starts = qmat_arena_calloc(&context->arena, regions + 2, sizeof *b->starts)};
   if (!b->starts) return qmat_fail_memory(context, what);
   for (int pass = 0; pass < 2; pass++) {
@@ -183,7 +184,7 @@ static void search_region(qmat_cube_search *s, const buckets *b, size_t id, cons
 
 qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                     const qmat_cube_visitor *visitor) {
-  const size_t count = set->shape_count, regions = (size_t)GRID * GRID * GRID;
+  const size_t count = set->shape_count, regions = QMAT_CUBE_REGIONS;
   const int threads = qmat_threads(context);
   buckets b;
   qmat_status status = fill_buckets(context, surface, visitor->what, &b);
@@ -205,6 +206,7 @@ qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *s
     memset(found, 0, SLICE * visitor->region_size);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t i = first; i < first + SLICE; i++) {
+      if (visitor->skipped && visitor->skipped[i]) continue;
       const size_t thread = (size_t)omp_get_thread_num();
       qmat_cube_search s = {.surface = surface,
                             .positions = qmat_surface_positions(surface),

@@ -7,8 +7,9 @@
 
 /* A search of a solid by cubes that are divided into eight. All is in the unit frame. */
 
-/* The corners of a triangle that is clipped to a cube, at most; cubes of this depth are not divided. */
-enum { QMAT_CUBE_MOST_CORNERS = 9, QMAT_CUBE_DEEPEST = 16 };
+/* The corners of a triangle that is clipped to a cube, at most; cubes of this depth are not divided. The unit frame's
+ * box is cut into so many regions, which are searched independently. */
+enum { QMAT_CUBE_MOST_CORNERS = 9, QMAT_CUBE_DEEPEST = 16, QMAT_CUBE_REGIONS = 4096 };
 
 /* A cube that meets the solid, and what of the shapes and of the surface matters in it. */
 typedef struct qmat_solid_cube {
@@ -45,8 +46,9 @@ typedef struct qmat_cube_visitor {
   void (*finish)(void *region);                                         /* after its last cube; may be NULL */
   qmat_status (*gather)(void *all, void *region);                       /* QMAT_OK or QMAT_ERROR_MEMORY */
   void *all;
-  bool skips_covered; /* cubes are not visited that the first candidate contains, and the sheets in them */
-  const char *what;   /* for progress and errors: "regions searched" */
+  const bool *skipped; /* per region: whether it is not searched; NULL: all are */
+  bool skips_covered;  /* cubes are not visited that the first candidate contains, and the sheets in them */
+  const char *what;    /* for progress and errors: "regions searched" */
 } qmat_cube_visitor;
 
 /* How far the solid reaches around a facet: half the thickness of a sheet, or 0. */
