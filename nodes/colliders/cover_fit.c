@@ -16,8 +16,8 @@ enum { STEPS = 60, MORE_STEPS = 12, ROUNDS = 4, CONJUGATE_STEPS = 30, PROOFS = 6
 
 /* Lengths in diagonals. Fitted F is below -margin; a slack of `level` counts half as much per length as none. */
 static const double margin = 2e-4, level = 1e-3, most_step = 0.01, tolerance = 4e-4;
-/* A step is solved until what is left of the gradient, in the norm of the preconditioner, is a tenth: weights change
- * from step to step, and with less left shapes contain the solid no closer. */
+/* A step is solved until the norm of the residual is a tenth of what it was; this is the share of its square. Weights
+ * change from step to step, and solving further does not make shapes tighter. */
 static const double unsolved_share = 0.01;
 /* The weight of a sample outside, per length, over that of one inside; it rises from step to step. */
 static const double least_penalty = 4, most_penalty = 400;

@@ -4,12 +4,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/convex_polygon.h"
 #include "core/geometry/vector.h"
 
 /* Facets between two looks whether the run is cancelled; corners of a triangle that is cut by three planes, at most. */
 enum { SLICE = 4096, MOST_CORNERS = 6 };
 
-/* A point is over a triangle where it is farther than this from the planes through its sides. */
+/* A point is over a triangle where it is inside of the planes through its sides by more than this. */
 static const double rounding = 1e-9;
 
 /* The largest distance outside of a solid over triangles. A search ends where it exceeds the limit. It misses distances
@@ -31,28 +32,6 @@ static double height(const plane *p, const double *point) {
   return qmat_dot(p->normal, point) - p->offset;
 }
 
-/* Cuts a convex polygon. What is on the side of `sign` goes to `kept`; returns the number of its corners. */
-static int cut(const plane *p, double sign, double polygon[][3], int count, double kept[MOST_CORNERS][3]) {
-  int corners = 0;
-  for (int i = 0; i < count; i++) {
-    const double *x = polygon[i], *y = polygon[(i + 1) % count];
-    const double a = sign * height(p, x), b = sign * height(p, y);
-    if (a >= 0) memcpy(kept[corners++], x, sizeof kept[0]);
-    if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
-    for (int k = 0; k < 3; k++) kept[corners][k] = x[k] + a / (a - b) * (y[k] - x[k]);
-    corners++;
-  }
-  return corners;
-}
-
-/* Makes the normal's length 1. False where it has none. */
-static bool set_length(plane *p, const double *point) {
-  const double length = sqrt(qmat_dot(p->normal, p->normal));
-  for (int k = 0; k < 3 && length > 0; k++) p->normal[k] /= length;
-  p->offset = qmat_dot(p->normal, point);
-  return length > 0;
-}
-
 /* The planes at right angles to a triangle of the solid through its sides, which look away from it, and its own plane.
  * False where it has no area. */
 static bool make_planes(const qmat_surface *solid, uint32_t triangle, plane sides[3], plane *own) {
@@ -60,15 +39,17 @@ static bool make_planes(const qmat_surface *solid, uint32_t triangle, plane side
   const uint32_t *ids = &qmat_surface_mesh(solid)->triangles[3 * (size_t)triangle];
   double along[3][3];
   for (int i = 0; i < 3; i++) corners[i] = &positions[3 * (size_t)ids[i]];
-  for (int i = 0; i < 3; i++)
-    for (int k = 0; k < 3; k++) along[i][k] = corners[(i + 1) % 3][k] - corners[i][k];
+  for (int i = 0; i < 3; i++) qmat_subtract(corners[(i + 1) % 3], corners[i], along[i]);
   qmat_cross(along[0], along[1], own->normal);
-  bool has_area = set_length(own, corners[0]);
+  if (!(qmat_dot(own->normal, own->normal) > 0)) return false;
+  qmat_normalize(own->normal);
+  own->offset = qmat_dot(own->normal, corners[0]);
   for (int i = 0; i < 3; i++) {
     qmat_cross(along[i], own->normal, sides[i].normal);
-    has_area = set_length(&sides[i], corners[i]) && has_area;
+    qmat_normalize(sides[i].normal);
+    sides[i].offset = qmat_dot(sides[i].normal, corners[i]);
   }
-  return has_area;
+  return true;
 }
 
 /* Searches what of a piece of a facet is not over the triangle of the solid that is nearest to its centre, if what is
@@ -84,9 +65,10 @@ static bool search_around(search *s, double corners[3][3], const double centre[3
     if (height(&sides[i], centre) > -rounding) return false;
   memcpy(over, corners, 3 * sizeof over[0]);
   for (int i = 0; i < 3; i++) {
-    double rest[MOST_CORNERS][3];
-    counts[i] = cut(&sides[i], 1, over, count, around[i]);
-    count = cut(&sides[i], -1, over, count, rest);
+    double rest[MOST_CORNERS][3], inward[MOST_CORNERS], outward[MOST_CORNERS];
+    for (int k = 0; k < count; k++) inward[k] = -(outward[k] = height(&sides[i], over[k]));
+    counts[i] = qmat_convex_polygon_cut(over, inward, count, around[i]);
+    count = qmat_convex_polygon_cut(over, outward, count, rest);
     memcpy(over, rest, sizeof over);
   }
   for (int i = 0; i < count; i++)

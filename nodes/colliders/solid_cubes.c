@@ -5,6 +5,7 @@
 #include <omp.h>
 #include <string.h>
 
+#include "core/geometry/convex_polygon.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 
@@ -17,26 +18,16 @@ static const double rounding = 1e-9, beside_surface = 1e-6;
 
 int qmat_cube_clip(const qmat_cube_search *s, const qmat_solid_cube *c, uint32_t facet,
                    double polygon[QMAT_CUBE_MOST_CORNERS][3]) {
-  double other[QMAT_CUBE_MOST_CORNERS][3];
+  double other[QMAT_CUBE_MOST_CORNERS][3], heights[QMAT_CUBE_MOST_CORNERS];
   int count = 3;
   for (int k = 0; k < 3; k++)
     memcpy(polygon[k], &s->positions[3 * (size_t)s->triangles[3 * (size_t)facet + (size_t)k]], sizeof polygon[k]);
   for (int plane = 0; plane < 6 && count > 0; plane++) {
     const int axis = plane / 2;
     const double sign = plane % 2 ? 1 : -1, limit = c->half * (1 + rounding);
-    int kept = 0;
-    for (int i = 0; i < count; i++) {
-      const double *p = polygon[i], *q = polygon[(i + 1) % count];
-      const double a = sign * (p[axis] - c->centre[axis]) - limit, b = sign * (q[axis] - c->centre[axis]) - limit;
-      if (a <= 0) memcpy(other[kept++], p, sizeof other[0]);
-      if ((a < 0 && b > 0) || (a > 0 && b < 0)) {
-        const double t = a / (a - b);
-        for (int k = 0; k < 3; k++) other[kept][k] = p[k] + t * (q[k] - p[k]);
-        kept++;
-      }
-    }
+    for (int i = 0; i < count; i++) heights[i] = sign * (polygon[i][axis] - c->centre[axis]) - limit;
+    count = qmat_convex_polygon_cut(polygon, heights, count, other);
     memcpy(polygon, other, sizeof other);
-    count = kept;
   }
   return count;
 }
