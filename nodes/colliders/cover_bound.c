@@ -115,7 +115,9 @@ qmat_status qmat_cover_bound_measure(qmat_context *context, const qmat_surface *
                                      .skipped = before ? before->covered : NULL,
                                      .skips_covered = true,
                                      .what = "regions searched"};
+  const qmat_arena aside = qmat_arena_set_aside(&context->arena); /* a fit searches many times */
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
+  qmat_arena_put_back(&context->arena, aside);
   *result = (qmat_cover_bound){.bound = all.bound, .count = all.count, .covered = all.covered};
   result->parts = qmat_arena_alloc(&context->arena, result->count, sizeof *all.parts);
   if (status == QMAT_OK && !result->parts) status = qmat_fail_memory(context, "the proof of colliders");
