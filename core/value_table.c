@@ -147,6 +147,7 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
 static const qmat_value_row mesh_rows[] = {ARRAY(qmat_mesh, positions, F64, vertex_count, 3),
                                            ARRAY(qmat_mesh, triangles, U32, triangle_count, 3),
                                            SCALAR(qmat_mesh, sheet_triangle_count, SIZE),
+                                           SCALAR(qmat_mesh, flap_triangle_count, SIZE),
                                            SCALAR(qmat_mesh, sheet_thickness, NUMBER),
                                            SCALAR(qmat_mesh, closed, BOOL),
                                            SCALAR(qmat_mesh, oriented, BOOL),
@@ -224,6 +225,11 @@ static qmat_status check_mesh(qmat_context *context, const qmat_value *value) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu of %zu triangles%s", mesh->sheet_triangle_count, mesh->triangle_count,
               mesh->cage.face_count > 0 ? " of a mesh that is to be subdivided" : "");
     return qmat_fail_field(context, "sheet_triangle_count");
+  }
+  if (mesh->flap_triangle_count > mesh->sheet_triangle_count) {
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu of %zu triangles of sheets", mesh->flap_triangle_count,
+              mesh->sheet_triangle_count);
+    return qmat_fail_field(context, "flap_triangle_count");
   }
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     if (mesh->triangles[i] < mesh->vertex_count) continue;

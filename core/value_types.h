@@ -79,7 +79,10 @@ typedef struct qmat_mesh {
   double *positions;           /* 3 * vertex_count: x y z */
   uint32_t *triangles;         /* 3 * triangle_count */
   size_t sheet_triangle_count; /* the last so many triangles are sheets; 0 for a mesh with a cage */
-  double sheet_thickness;      /* of sheets, in model units; 0: none */
+  /* Of these, the last so many are flaps: they stick out of a solid by less than an error that is allowed. They count
+   * as surface, but no medial slabs are made of them. */
+  size_t flap_triangle_count;
+  double sheet_thickness; /* of sheets, in model units; 0: none */
   /* Of the triangles that bound solids. */
   bool closed;      /* every edge has two triangles, or an even number where surfaces touch */
   bool oriented;    /* neighbouring triangles agree on which side is outside */

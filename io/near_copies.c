@@ -17,10 +17,10 @@ static bool are_equal(const void *a, const void *b, size_t bytes) {
 /* Whether two meshes differ at most in their positions. A subdivision surface has a cage with positions of its own. */
 static bool are_alike(const qmat_mesh *a, const qmat_mesh *b) {
   return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
-         a->sheet_triangle_count == b->sheet_triangle_count && a->sheet_thickness == b->sheet_thickness &&
-         a->closed == b->closed && a->oriented == b->oriented && a->deviation == b->deviation &&
-         a->meters_per_unit == b->meters_per_unit && a->skinned_count == b->skinned_count && a->cage.face_count == 0 &&
-         b->cage.face_count == 0 &&
+         a->sheet_triangle_count == b->sheet_triangle_count && a->flap_triangle_count == b->flap_triangle_count &&
+         a->sheet_thickness == b->sheet_thickness && a->closed == b->closed && a->oriented == b->oriented &&
+         a->deviation == b->deviation && a->meters_per_unit == b->meters_per_unit &&
+         a->skinned_count == b->skinned_count && a->cage.face_count == 0 && b->cage.face_count == 0 &&
          are_equal(a->triangles, b->triangles, 3 * a->triangle_count * sizeof *a->triangles) &&
          are_equal(a->joints, b->joints, 4 * a->skinned_count * sizeof *a->joints) &&
          are_equal(a->weights, b->weights, 4 * a->skinned_count * sizeof *a->weights);
@@ -51,6 +51,7 @@ static qmat_mesh *with_deviation(qmat_context *context, const qmat_mesh *mesh, d
   made->vertex_count = mesh->vertex_count;
   made->triangle_count = mesh->triangle_count;
   made->sheet_triangle_count = mesh->sheet_triangle_count;
+  made->flap_triangle_count = mesh->flap_triangle_count;
   made->sheet_thickness = mesh->sheet_thickness;
   made->closed = mesh->closed;
   made->oriented = mesh->oriented;

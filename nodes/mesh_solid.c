@@ -16,6 +16,7 @@
 #include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/overlaps.h"
 #include "nodes/mesh/parts.h"
+#include "nodes/mesh/triangle_cover.h"
 #include "nodes/mesh/wrap_cgal.h"
 
 typedef enum solid_choice { SOLID_AUTO, SOLID_AS_IS, SOLID_CLOSE, SOLID_WRAP, SOLID_SHEET } solid_choice;
@@ -32,8 +33,10 @@ static const double least_wrap_epsilon = 0.004;
 /* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
  */
 static const double weld_tolerance = 1e-5;
-/* A triangle that the union leaves out is within it if it leaves it by at most this share of epsilon. */
-static const double least_gap = 0.01;
+/* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
+static const double least_gap = 1e-9;
+/* It is a flap if it sticks out by at most this share of epsilon: an envelope near the solid covers it then. */
+static const double flap_reach = 0.5;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
 /* Components and caps that the report lists. */
@@ -60,7 +63,7 @@ typedef struct solidifier {
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
   size_t given_count; /* of the solids' triangles; behind these are the caps */
-  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles;
+  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -143,6 +146,11 @@ static qmat_status split_pairs(solidifier *s) {
 
 static double epsilon_of(const solidifier *s) {
   return s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
+}
+
+/* Of sheets, in model units. */
+static double sheet_thickness(const solidifier *s) {
+  return s->params->thickness > 0 ? s->params->thickness * s->frame.diagonal : s->mesh->sheet_thickness;
 }
 
 /* The triangles that may bound solids, with the seams of open meshes welded. */
@@ -333,9 +341,8 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   mesh->closed = mesh->oriented = true;
   mesh->deviation = s->mesh->deviation + s->weld.moved * s->frame.diagonal;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
-  if (s->sheets.count > 0)
-    mesh->sheet_thickness =
-        s->params->thickness > 0 ? s->params->thickness * s->frame.diagonal : s->mesh->sheet_thickness;
+  mesh->flap_triangle_count = s->flaps;
+  if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
   return QMAT_OK;
 }
 
@@ -363,44 +370,8 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
 
 /* ---- sheets inside solids, and solids' triangles that bound nothing ---- */
 
-/* Whether a point is inside, or as near as `reach`. */
-static bool is_covered(const qmat_surface *solid, const double *point, double reach) {
-  return (reach > 0 && qmat_surface_distance(solid, point, reach, NULL, NULL) <= reach) ||
-         qmat_surface_inside(solid, point);
-}
-
 static void find_corners(const double *positions, const uint32_t *ids, const double *corners[3]) {
   for (size_t k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)ids[k];
-}
-
-static void interpolate(const double *const corners[3], double a, double b, double point[3]) {
-  for (size_t k = 0; k < 3; k++) point[k] = a * corners[0][k] + b * corners[1][k] + (1 - a - b) * corners[2][k];
-}
-
-/* Whether a triangle is covered: its corners, the middles of its sides and its centroid, all drawn a little towards the
- * centroid, where most searches end; then points in rows along its longest side, `spacing` or the MOSTth part of a side
- * apart. */
-static bool is_triangle_covered(const qmat_surface *solid, const double *const corners[3], double reach,
-                                double spacing) {
-  enum { MOST = 128 };
-  static const double weights[][2] = {{1, 0}, {0, 1}, {0, 0}, {0.5, 0.5}, {0, 0.5}, {0.5, 0}, {1.0 / 3, 1.0 / 3}};
-  double point[3];
-  for (size_t i = 0; i < sizeof weights / sizeof *weights; i++) {
-    interpolate(corners, 0.99 * weights[i][0] + 0.01 / 3, 0.99 * weights[i][1] + 0.01 / 3, point);
-    if (!is_covered(solid, point, reach)) return false;
-  }
-  const qmat_longest_side side = qmat_triangle_longest_side(corners[0], corners[1], corners[2]);
-  const double *const turned[3] = {corners[(side.base + 2) % 3], corners[side.base], corners[(side.base + 1) % 3]};
-  const int rows = (int)fmin(ceil(side.height / spacing), MOST);
-  for (int i = 0; i < rows; i++) {
-    const double up = (i + 0.5) / rows;
-    const int count = (int)fmin(ceil((1 - up) * side.length / spacing), MOST);
-    for (int k = 0; k < count; k++) {
-      interpolate(turned, up, (1 - up) * (k + 0.5) / count, point);
-      if (!is_covered(solid, point, reach)) return false;
-    }
-  }
-  return true;
 }
 
 /* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
@@ -413,7 +384,7 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
     const uint32_t *c = s->sheets.corners + 3 * t;
     const double *corners[3];
     find_corners(qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), corners);
-    if (is_triangle_covered(solids, corners, 0, epsilon_of(s)))
+    if (qmat_triangle_is_covered(solids, corners, 0, epsilon_of(s)))
       s->inner_triangles++;
     else
       memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
@@ -422,37 +393,62 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const
   return status;
 }
 
-/* Where a part crosses itself, some of its triangles may have the outside on both sides. The union leaves them out, but
- * they were given: they become sheets. */
-static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *solids) {
+/* What is left of a given triangle of a solid in the union. */
+enum { COVERED, FLAP, UNBOUNDING };
+
+static uint8_t classify_triangle(const qmat_surface *solids, const double *const corners[3], double reach,
+                                 double spacing) {
+  if (qmat_triangle_is_covered(solids, corners, least_gap, spacing)) return COVERED;
+  return reach > least_gap && qmat_triangle_is_covered(solids, corners, reach, spacing) ? FLAP : UNBOUNDING;
+}
+
+/* `classes` gets what is left of each given triangle of solids. */
+static qmat_status classify_triangles(const solidifier *s, const qmat_surface *solids, uint8_t *classes) {
   enum { SLICE = 512 };
-  const double reach = least_gap * epsilon_of(s);
+  /* In the frame of the solids, which may be smaller than the given mesh's. */
+  const double scale = s->frame.diagonal / qmat_surface_frame(solids)->diagonal, spacing = scale * epsilon_of(s);
+  const double reach = scale * (flap_reach * epsilon_of(s) - 0.5 * sheet_thickness(s) / s->frame.diagonal);
   const int threads = qmat_threads(s->context);
-  uint8_t covered[SLICE];
   double *positions = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *positions);
   if (!positions) return fail_shortage(s);
   qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, positions);
   for (size_t first = 0; first < s->given_count; first += SLICE) {
-    const size_t left = s->given_count - first, count = left < SLICE ? left : SLICE;
-    qmat_status status = qmat_progress(s->context, first, s->given_count, "triangles of solids");
+    const size_t left = s->given_count - first, last = first + (left < SLICE ? left : SLICE);
+    const qmat_status status = qmat_progress(s->context, first, s->given_count, "triangles of solids");
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
-    for (size_t i = 0; i < count; i++) {
+    for (size_t t = first; t < last; t++) {
       const double *corners[3];
-      covered[i] = !s->united.is_cut[first + i];
-      if (covered[i]) continue;
-      find_corners(positions, s->solids.corners + 3 * (first + i), corners);
-      covered[i] = is_triangle_covered(solids, corners, reach, epsilon_of(s));
+      classes[t] = COVERED;
+      if (!s->united.is_cut[t]) continue;
+      find_corners(positions, s->solids.corners + 3 * t, corners);
+      classes[t] = classify_triangle(solids, corners, reach, spacing);
     }
-    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
-      const uint32_t *c = s->solids.corners + 3 * (first + i);
-      if (covered[i]) continue;
-      status = append(s, &s->sheets, c[0], c[1], c[2]);
-      s->unbounding_triangles++;
-    }
-    if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
+}
+
+static qmat_status append_class(solidifier *s, const uint8_t *classes, uint8_t wanted) {
+  qmat_status status = QMAT_OK;
+  for (size_t t = 0; t < s->given_count && status == QMAT_OK; t++) {
+    const uint32_t *c = s->solids.corners + 3 * t;
+    if (classes[t] == wanted) status = append(s, &s->sheets, c[0], c[1], c[2]);
+  }
+  return status;
+}
+
+/* Where a part crosses itself, some of its triangles may have the outside on both sides. The union leaves them out, but
+ * they were given: they become sheets, and flaps where they hardly stick out. */
+static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *solids) {
+  uint8_t *classes = qmat_arena_alloc(&s->context->arena, s->given_count, 1);
+  if (!classes) return fail_shortage(s);
+  qmat_status status = classify_triangles(s, solids, classes);
+  const size_t given = s->sheets.count;
+  if (status == QMAT_OK) status = append_class(s, classes, UNBOUNDING);
+  s->unbounding_triangles = s->sheets.count - given;
+  if (status == QMAT_OK) status = append_class(s, classes, FLAP);
+  s->flaps = s->sheets.count - given - s->unbounding_triangles;
+  return status;
 }
 
 static qmat_status review_sheets(solidifier *s) {
@@ -534,6 +530,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
                                     {"inner_triangles", s->inner_triangles},
                                     {"unbounding_triangles", s->unbounding_triangles},
+                                    {"flap_triangles", s->flaps},
                                     {"parts_turned", s->turned_parts},
                                     {"triangles_turned", s->parts.turned},
                                     {"caps", s->caps},
@@ -619,7 +616,8 @@ static const qmat_param params[] = {
         "auto: each component by its winding number; as_is: nothing is done; close: all borders are closed; wrap: "
         "one closed surface around everything; sheet: everything is a sheet"),
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
-    QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1, "A wrap keeps a quarter of this away; 0: of 1%"),
+    QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1,
+                "A wrap keeps a quarter of this away, and flaps stick out by half of it; 0: of 1%"),
     {0},
 };
 
@@ -638,7 +636,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 5,
+    .version = 6,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
@@ -651,7 +649,8 @@ const qmat_node qmat_node_mesh_solid = {
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
         "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
-        "they become sheets.\n\n"
+        "they become sheets. Those that stick out of the solid by at most half of epsilon, as where noise makes a scan "
+        "cross itself, are flaps: the envelope has to cover them, but no spheres are made for them.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "

@@ -5,11 +5,11 @@
 
 #include "core/geometry/medial_build.h"
 
-/* Numbers the vertices of sheets in their order: `ids` per vertex, UINT32_MAX for others. Returns their count. */
-static size_t number_vertices(const qmat_mesh *mesh, uint32_t *ids) {
+/* Numbers the vertices of `triangles` in their order: `ids` per vertex, UINT32_MAX for others. Returns their count. */
+static size_t number_vertices(const qmat_mesh *mesh, const uint32_t *triangles, size_t triangle_count, uint32_t *ids) {
   size_t count = 0;
   memset(ids, 0xff, mesh->vertex_count * sizeof *ids);
-  for (size_t i = 3 * qmat_solid_triangle_count(mesh); i < 3 * mesh->triangle_count; i++) ids[mesh->triangles[i]] = 0;
+  for (size_t i = 0; i < 3 * triangle_count; i++) ids[triangles[i]] = 0;
   for (size_t v = 0; v < mesh->vertex_count; v++)
     if (ids[v] == 0) ids[v] = (uint32_t)count++;
   return count;
@@ -53,12 +53,13 @@ static qmat_status prepend_spheres(qmat_context *context, const qmat_mesh *mesh,
 }
 
 qmat_status qmat_sheet_slabs_prepend(qmat_context *context, const qmat_mesh *mesh, qmat_medial *medial) {
-  const size_t sheets = mesh->sheet_triangle_count, slabs = medial->triangle_count, cones = medial->edge_count;
+  const size_t sheets = mesh->sheet_triangle_count - mesh->flap_triangle_count, slabs = medial->triangle_count,
+               cones = medial->edge_count;
   uint32_t *ids = qmat_arena_alloc(&context->arena, mesh->vertex_count, sizeof *ids);
   uint32_t *triangles = qmat_arena_alloc(&context->arena, sheets + slabs, 3 * sizeof *triangles);
   if (!ids || !triangles) return qmat_fail_memory(context, "the slabs of sheets");
-  const size_t added = number_vertices(mesh, ids);
   const uint32_t *first = &mesh->triangles[3 * qmat_solid_triangle_count(mesh)];
+  const size_t added = number_vertices(mesh, first, sheets, ids);
   for (size_t i = 0; i < 3 * sheets; i++) triangles[i] = ids[first[i]];
   for (size_t i = 0; i < 3 * slabs; i++) triangles[3 * sheets + i] = (uint32_t)added + medial->triangles[i];
   for (size_t i = 0; i < 2 * cones; i++) medial->edges[i] += (uint32_t)added;

@@ -4,7 +4,7 @@
 
 #include "core/value.h"
 
-/* The triangles of a mesh that bound solids come first; those of sheets follow. */
+/* The triangles of a mesh that bound solids come first; those of sheets follow, and of these, the flaps are last. */
 static inline size_t qmat_solid_triangle_count(const qmat_mesh *mesh) {
   return mesh->triangle_count - mesh->sheet_triangle_count;
 }
@@ -22,9 +22,9 @@ static inline qmat_mesh qmat_mesh_of_solids(const qmat_mesh *mesh) {
   return solids;
 }
 
-/* Puts the sheets of the mesh in front of an unsealed medial mesh, in model units: a slab for each triangle, and a
- * sphere of half the sheet thickness at each of their vertices, in the order of the vertices. A sphere is responsible
- * for its vertex; the first samples are the vertices. QMAT_ERROR_MEMORY. Cost: linear. */
+/* Puts the sheets of the mesh, without flaps, in front of an unsealed medial mesh, in model units: a slab for each
+ * triangle, and a sphere of half the sheet thickness at each of their vertices, in the order of the vertices. A sphere
+ * is responsible for its vertex; the first samples are the vertices. QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_sheet_slabs_prepend(qmat_context *context, const qmat_mesh *mesh, qmat_medial *medial);
 
 #endif

@@ -25,6 +25,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   scaled->vertex_count = mesh->vertex_count;
   scaled->triangle_count = mesh->triangle_count;
   scaled->sheet_triangle_count = mesh->sheet_triangle_count;
+  scaled->flap_triangle_count = mesh->flap_triangle_count;
   scaled->sheet_thickness = params->factor * mesh->sheet_thickness;
   scaled->closed = mesh->closed;
   scaled->oriented = mesh->oriented;

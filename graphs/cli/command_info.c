@@ -100,9 +100,10 @@ static qmat_status run_node(qmat_context *context, const char *name, double epsi
 
 /* Prints what mesh.solid took each component for, and what it did. Lengths are in diagonals. */
 static void print_components(const json_t *report) {
-  static const char *const counts[] = {"components_not_listed",     "vertices_welded", "sheet_triangles",
-                                       "opposite_triangles_merged", "inner_triangles", "unbounding_triangles",
-                                       "triangles_turned",          "parts_united",    "triangles_cut"};
+  static const char *const counts[] = {
+      "components_not_listed", "vertices_welded",      "sheet_triangles", "opposite_triangles_merged",
+      "inner_triangles",       "unbounding_triangles", "flap_triangles",  "triangles_turned",
+      "parts_united",          "triangles_cut"};
   size_t i;
   json_t *part;
   json_array_foreach(json_object_get(report, "components"), i, part) {

@@ -497,7 +497,7 @@ static void test_empty_values_are_valid(void **state) {
 static void test_every_bit_of_content_moves_the_digest(void **state) {
   (void)state;
   qmat_context context = {0};
-  enum { CHANGES = 8 };
+  enum { CHANGES = 9 };
   qmat_digest digests[CHANGES];
   for (int change = 0; change < CHANGES; change++) {
     qmat_mesh *mesh = mesh_example();
@@ -508,6 +508,7 @@ static void test_every_bit_of_content_moves_the_digest(void **state) {
     if (change == 5) mesh->triangle_count = 3;
     if (change == 6) mesh->sheet_triangle_count = 1;
     if (change == 7) mesh->sheet_thickness = 1;
+    if (change == 8) mesh->sheet_triangle_count = mesh->flap_triangle_count = 1;
     assert_sealed(&context, &mesh->base);
     digests[change] = mesh->base.digest;
     qmat_value_release(&mesh->base);
@@ -630,11 +631,13 @@ static void test_sheets_come_back_and_are_no_more_than_the_triangles_and_not_of_
   qmat_value *read;
   qmat_mesh *mesh = mesh_example();
   mesh->sheet_triangle_count = 4;
+  mesh->flap_triangle_count = 3;
   mesh->sheet_thickness = 0.125;
   assert_sealed(&context, &mesh->base);
   assert_int_equal(qmat_value_serialize(&context, &mesh->base, &bytes, &size), QMAT_OK);
   assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &read), QMAT_OK);
   assert_int_equal(((qmat_mesh *)read)->sheet_triangle_count, 4);
+  assert_int_equal(((qmat_mesh *)read)->flap_triangle_count, 3);
   assert_true(((qmat_mesh *)read)->sheet_thickness == 0.125);
   qmat_free(bytes);
   qmat_value_release(read);
@@ -642,6 +645,10 @@ static void test_sheets_come_back_and_are_no_more_than_the_triangles_and_not_of_
   mesh = mesh_example();
   mesh->sheet_triangle_count = 5;
   assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "sheet_triangle_count: 5 of 4 triangles");
+  mesh = mesh_example();
+  mesh->sheet_triangle_count = 2;
+  mesh->flap_triangle_count = 3;
+  assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY, "flap_triangle_count: 3 of 2 triangles of sheets");
   mesh = cage_example();
   mesh->sheet_triangle_count = 1;
   assert_not_sealed(&mesh->base, QMAT_ERROR_GEOMETRY,

@@ -474,6 +474,30 @@ static void test_what_bounds_nothing_of_a_union_is_a_sheet(void **state) {
   release(&r);
 }
 
+/* The sleeve sticks out of its solid by 0.5 of a diagonal of 4.43, which is 11.3 %. */
+static void test_what_bounds_nothing_within_half_of_epsilon_is_a_flap(void **state) {
+  (void)state;
+  enum { AROUND = 24 };
+  static const struct {
+    const char *params;
+    bool is_flap;
+  } cases[] = {{"solid=close epsilon=0.2", false},
+               {"solid=close epsilon=0.23", true},
+               {"solid=close epsilon=0.23 thickness=0.02", false},
+               {"solid=close epsilon=0.25 thickness=0.02", true}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    qmat_mesh *mesh = shape_new();
+    add_sleeve(mesh, AROUND);
+    result r = unite_with(mesh, cases[i].params);
+    assert_int_equal(pipeline_count(r.report, "unbounding_triangles"), cases[i].is_flap ? 0 : 6 * AROUND);
+    assert_int_equal(pipeline_count(r.report, "flap_triangles"), cases[i].is_flap ? 6 * AROUND : 0);
+    assert_int_equal(r.mesh->flap_triangle_count, cases[i].is_flap ? 6 * AROUND : 0);
+    assert_int_equal(r.mesh->sheet_triangle_count, 6 * AROUND);
+    if (r.mesh->sheet_thickness == 0) assert_nothing_is_lost(&r, 20, 1e-6);
+    release(&r);
+  }
+}
+
 /* A plate around the top: corners, middles of sides and centroids of the sleeve's triangles are all inside now, but a
  * band between the cap and the plate bounds nothing. */
 static void test_what_bounds_nothing_is_found_between_plates(void **state) {
@@ -1111,6 +1135,7 @@ int main(void) {
       cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
       cmocka_unit_test(test_parts_that_meet_themselves),
       cmocka_unit_test(test_what_bounds_nothing_of_a_union_is_a_sheet),
+      cmocka_unit_test(test_what_bounds_nothing_within_half_of_epsilon_is_a_flap),
       cmocka_unit_test(test_what_bounds_nothing_is_found_between_plates),
       cmocka_unit_test(test_a_sheet_through_solids_stays_where_it_leaves_them),
       cmocka_unit_test(test_triangles_without_area_in_parts_that_meet),

@@ -34,6 +34,10 @@ static void through_sphere(double u, double v, double p[3]) {
   p[0] = 4 * u - 2, p[1] = 4 * v - 2, p[2] = 0.1;
 }
 
+static void fin_of_sphere(double u, double v, double p[3]) {
+  p[0] = 0.99 + 0.07 * u, p[1] = 0.1 * v, p[2] = 0;
+}
+
 static qmat_mesh *sheet_of(uint32_t across, uint32_t up, void (*place)(double u, double v, double p[3])) {
   qmat_mesh *mesh = shape_new();
   shape_add_sheet(mesh, across, up, place);
@@ -203,6 +207,22 @@ static void test_a_sheet_through_a_solid_leaves_its_spheres_alone(void **state) 
   release(&d);
 }
 
+/* A fin of 1.7 % stays a part of the surface, but has no spheres; the sheet that precedes it has. */
+static void test_a_flap_is_covered_without_spheres(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_sphere(1, 16);
+  shape_add_sheet(mesh, 20, 20, beside_sphere);
+  const size_t sheet_triangles = mesh->sheet_triangle_count;
+  shape_add_sheet(mesh, 3, 2, fin_of_sphere);
+  mesh->flap_triangle_count = mesh->sheet_triangle_count - sheet_triangles;
+  description d = describe(mesh, 0);
+  expect_certified(&d);
+  expect_topology(&d, 2, 0, 0);
+  assert_true(pipeline_number(d.report, "surface_to_envelope_at_least") > 0.005);
+  for (size_t i = 0; i < d.medial->sheet_sphere_count; i++) assert_true(d.medial->spheres[4 * i] >= 1.5 - 1e-9);
+  release(&d);
+}
+
 static void test_a_thickness_is_twice_the_radius_of_the_spheres(void **state) {
   (void)state;
   qmat_mesh *mesh = sheet_of(40, 20, banner);
@@ -332,6 +352,7 @@ int main(void) {
       cmocka_unit_test(test_a_curved_shell_is_certified),
       cmocka_unit_test(test_a_solid_and_a_sheet_share_a_medial_mesh),
       cmocka_unit_test(test_a_sheet_through_a_solid_leaves_its_spheres_alone),
+      cmocka_unit_test(test_a_flap_is_covered_without_spheres),
       cmocka_unit_test(test_a_thickness_is_twice_the_radius_of_the_spheres),
       cmocka_unit_test(test_turned_and_shuffled_sheets_come_out_alike),
       cmocka_unit_test(test_sheets_do_not_depend_on_threads),
