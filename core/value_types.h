@@ -79,7 +79,7 @@ typedef struct qmat_mesh {
   double *positions;           /* 3 * vertex_count: x y z */
   uint32_t *triangles;         /* 3 * triangle_count */
   size_t sheet_triangle_count; /* the last so many triangles are sheets; 0 for a mesh with a cage */
-  /* Of these, the last so many are flaps: they stick out of a solid by less than an error that is allowed. They count
+  /* Of these, the last so many are flaps: they stick out of solids by less than an error that is allowed. They count
    * as surface, but no medial slabs are made of them. */
   size_t flap_triangle_count;
   double sheet_thickness; /* of sheets, in model units; 0: none */

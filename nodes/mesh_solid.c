@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/disjoint_sets.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
 #include "core/json_text.h"
@@ -35,7 +36,8 @@ static const double least_wrap_epsilon = 0.004;
 static const double weld_tolerance = 1e-5;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
-/* It is a flap if it sticks out by at most this share of epsilon: an envelope near the solid covers it then. */
+/* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
+ * solids covers it then. */
 static const double flap_reach = 0.5;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
@@ -62,7 +64,8 @@ typedef struct solidifier {
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
-  size_t given_count; /* of the solids' triangles; behind these are the caps */
+  double *beside_solids; /* the vertices in the frame of the surface of the solids */
+  size_t given_count;    /* of the solids' triangles; behind these are the caps */
   size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
@@ -370,84 +373,82 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
 
 /* ---- sheets inside solids, and solids' triangles that bound nothing ---- */
 
-static void find_corners(const double *positions, const uint32_t *ids, const double *corners[3]) {
-  for (size_t k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)ids[k];
-}
-
-/* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
- * nothing. `mesh` is the result so far, and `solids` its surface without sheets. */
-static qmat_status drop_inner_sheets(solidifier *s, const qmat_mesh *mesh, const qmat_surface *solids) {
-  const size_t count = s->sheets.count, first = mesh->triangle_count - count;
-  qmat_status status = QMAT_OK;
-  s->sheets.count = 0;
-  for (size_t t = 0; status == QMAT_OK && t < count; t++) {
-    const uint32_t *c = s->sheets.corners + 3 * t;
-    const double *corners[3];
-    find_corners(qmat_surface_positions(solids), mesh->triangles + 3 * (first + t), corners);
-    if (qmat_triangle_is_covered(solids, corners, 0, epsilon_of(s)))
-      s->inner_triangles++;
-    else
-      memmove(s->sheets.corners + 3 * s->sheets.count++, c, 3 * sizeof *c);
-    if (t % 16 == 0) status = qmat_progress(s->context, t, count, "triangles of sheets");
-  }
-  return status;
-}
-
-/* What is left of a given triangle of a solid in the union. */
-enum { COVERED, FLAP, UNBOUNDING };
-
-static uint8_t classify_triangle(const qmat_surface *solids, const double *const corners[3], double reach,
-                                 double spacing) {
-  if (qmat_triangle_is_covered(solids, corners, least_gap, spacing)) return COVERED;
-  return reach > least_gap && qmat_triangle_is_covered(solids, corners, reach, spacing) ? FLAP : UNBOUNDING;
-}
-
-/* `classes` gets what is left of each given triangle of solids. */
-static qmat_status classify_triangles(const solidifier *s, const qmat_surface *solids, uint8_t *classes) {
+/* Sets `covered` to 1 for the triangles of the given mesh's vertices that are inside solids, or stick out by at most
+ * `reach` diagonals. Those that are 1 already are passed over. */
+static qmat_status find_covered(const solidifier *s, const qmat_surface *solids, const uint32_t *triangles,
+                                size_t count, double reach, uint8_t *covered) {
   enum { SLICE = 512 };
-  /* In the frame of the solids, which may be smaller than the given mesh's. */
-  const double scale = s->frame.diagonal / qmat_surface_frame(solids)->diagonal, spacing = scale * epsilon_of(s);
-  const double reach = scale * (flap_reach * epsilon_of(s) - 0.5 * sheet_thickness(s) / s->frame.diagonal);
   const int threads = qmat_threads(s->context);
-  double *positions = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *positions);
-  if (!positions) return fail_shortage(s);
-  qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, positions);
-  for (size_t first = 0; first < s->given_count; first += SLICE) {
-    const size_t left = s->given_count - first, last = first + (left < SLICE ? left : SLICE);
-    const qmat_status status = qmat_progress(s->context, first, s->given_count, "triangles of solids");
+  /* The frame of the solids may be smaller than the given mesh's. */
+  const double scale = s->frame.diagonal / qmat_surface_frame(solids)->diagonal;
+  for (size_t first = 0; first < count; first += SLICE) {
+    const size_t last = count - first < SLICE ? count : first + SLICE;
+    const qmat_status status = qmat_progress(s->context, first, count, "triangles of sheets");
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t t = first; t < last; t++) {
       const double *corners[3];
-      classes[t] = COVERED;
-      if (!s->united.is_cut[t]) continue;
-      find_corners(positions, s->solids.corners + 3 * t, corners);
-      classes[t] = classify_triangle(solids, corners, reach, spacing);
+      for (size_t k = 0; k < 3; k++) corners[k] = s->beside_solids + 3 * (size_t)triangles[3 * t + k];
+      if (!covered[t])
+        covered[t] =
+            qmat_triangle_is_covered(solids, (const double *const *)corners, scale * reach, scale * epsilon_of(s));
     }
   }
   return QMAT_OK;
 }
 
-static qmat_status append_class(solidifier *s, const uint8_t *classes, uint8_t wanted) {
-  qmat_status status = QMAT_OK;
-  for (size_t t = 0; t < s->given_count && status == QMAT_OK; t++) {
-    const uint32_t *c = s->solids.corners + 3 * t;
-    if (classes[t] == wanted) status = append(s, &s->sheets, c[0], c[1], c[2]);
-  }
+/* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
+ * nothing. */
+static qmat_status drop_inner_sheets(solidifier *s, const qmat_surface *solids) {
+  const size_t count = s->sheets.count;
+  uint8_t *covered = qmat_arena_calloc(&s->context->arena, count, 1);
+  if (!covered) return fail_shortage(s);
+  const qmat_status status = find_covered(s, solids, s->sheets.corners, count, 0, covered);
+  s->sheets.count = 0;
+  for (size_t t = 0; t < count; t++)
+    if (!covered[t])
+      memmove(s->sheets.corners + 3 * s->sheets.count++, s->sheets.corners + 3 * t, 3 * sizeof(uint32_t));
+  s->inner_triangles = count - s->sheets.count;
   return status;
 }
 
 /* Where a part crosses itself, some of its triangles may have the outside on both sides. The union leaves them out, but
- * they were given: they become sheets, and flaps where they hardly stick out. */
+ * they were given: they become sheets. */
 static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *solids) {
-  uint8_t *classes = qmat_arena_alloc(&s->context->arena, s->given_count, 1);
-  if (!classes) return fail_shortage(s);
-  qmat_status status = classify_triangles(s, solids, classes);
-  const size_t given = s->sheets.count;
-  if (status == QMAT_OK) status = append_class(s, classes, UNBOUNDING);
-  s->unbounding_triangles = s->sheets.count - given;
-  if (status == QMAT_OK) status = append_class(s, classes, FLAP);
-  s->flaps = s->sheets.count - given - s->unbounding_triangles;
+  uint8_t *covered = qmat_arena_alloc(&s->context->arena, s->given_count, 1);
+  if (!covered) return fail_shortage(s);
+  for (size_t t = 0; t < s->given_count; t++) covered[t] = !s->united.is_cut[t];
+  qmat_status status = find_covered(s, solids, s->solids.corners, s->given_count, least_gap, covered);
+  for (size_t t = 0; t < s->given_count && status == QMAT_OK; t++) {
+    const uint32_t *c = s->solids.corners + 3 * t;
+    if (covered[t]) continue;
+    status = append(s, &s->sheets, c[0], c[1], c[2]);
+    s->unbounding_triangles++;
+  }
+  return status;
+}
+
+/* Moves the flaps behind the other sheets: the components whose triangles are all near solids. */
+static qmat_status set_flaps_apart(solidifier *s, const qmat_surface *solids) {
+  qmat_arena *arena = &s->context->arena;
+  const size_t count = s->sheets.count;
+  const double reach = flap_reach * epsilon_of(s) - 0.5 * sheet_thickness(s) / s->frame.diagonal;
+  uint8_t *covered = qmat_arena_calloc(arena, count, 1),
+          *sticks_out = qmat_arena_calloc(arena, s->mesh->vertex_count, 1);
+  uint32_t *sets = qmat_sets_new(s->context, s->mesh->vertex_count);
+  uint32_t *flaps = qmat_arena_alloc(arena, 3 * count, sizeof *flaps), *c = s->sheets.corners;
+  if (!covered || !sticks_out || !sets || !flaps) return fail_shortage(s);
+  if (!(reach > 0)) return QMAT_OK;
+  const qmat_status status = find_covered(s, solids, c, count, reach, covered);
+  for (size_t i = 0; i < 3 * count; i++) qmat_sets_join(sets, c[i], c[i - i % 3]);
+  for (size_t t = 0; t < count; t++)
+    if (!covered[t]) sticks_out[qmat_set_leader(sets, c[3 * t])] = 1;
+  size_t kept = 0;
+  for (size_t t = 0; t < count; t++) {
+    const bool stays = sticks_out[qmat_set_leader(sets, c[3 * t])];
+    memmove(stays ? c + 3 * kept++ : flaps + 3 * s->flaps++, c + 3 * t, 3 * sizeof *c);
+  }
+  memcpy(c + 3 * kept, flaps, 3 * s->flaps * sizeof *c);
   return status;
 }
 
@@ -457,8 +458,13 @@ static qmat_status review_sheets(solidifier *s) {
   qmat_surface *solids = NULL;
   qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
   if (status == QMAT_OK) status = qmat_surface_new_of_solids(s->context, mesh, &solids);
-  if (status == QMAT_OK) status = drop_inner_sheets(s, mesh, solids);
+  s->beside_solids = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *s->beside_solids);
+  if (status == QMAT_OK && !s->beside_solids) status = fail_shortage(s);
+  if (status == QMAT_OK)
+    qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, s->beside_solids);
+  if (status == QMAT_OK) status = drop_inner_sheets(s, solids);
   if (status == QMAT_OK && s->united.changed) status = keep_unbounding_triangles(s, solids);
+  if (status == QMAT_OK) status = set_flaps_apart(s, solids);
   qmat_surface_free(solids);
   qmat_value_release(mesh ? &mesh->base : NULL);
   return status;
@@ -649,8 +655,11 @@ const qmat_node qmat_node_mesh_solid = {
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
         "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
-        "they become sheets. Those that stick out of the solid by at most half of epsilon, as where noise makes a scan "
-        "cross itself, are flaps: the envelope has to cover them, but no spheres are made for them.\n\n"
+        "they become sheets.\n\n"
+        "A connected sheet that sticks out of solids by at most half of epsilon is a flap. Examples are what noise "
+        "turns "
+        "over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, but no spheres are "
+        "made for it.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "
