@@ -433,12 +433,12 @@ static qmat_status set_flaps_apart(solidifier *s, const qmat_surface *solids) {
   qmat_arena *arena = &s->context->arena;
   const size_t count = s->sheets.count;
   const double reach = flap_reach * epsilon_of(s) - 0.5 * sheet_thickness(s) / s->frame.diagonal;
+  if (count == 0 || !(reach > 0)) return QMAT_OK;
   uint8_t *covered = qmat_arena_calloc(arena, count, 1),
           *sticks_out = qmat_arena_calloc(arena, s->mesh->vertex_count, 1);
   uint32_t *sets = qmat_sets_new(s->context, s->mesh->vertex_count);
   uint32_t *flaps = qmat_arena_alloc(arena, 3 * count, sizeof *flaps), *c = s->sheets.corners;
   if (!covered || !sticks_out || !sets || !flaps) return fail_shortage(s);
-  if (!(reach > 0)) return QMAT_OK;
   const qmat_status status = find_covered(s, solids, c, count, reach, covered);
   for (size_t i = 0; i < 3 * count; i++) qmat_sets_join(sets, c[i], c[i - i % 3]);
   for (size_t t = 0; t < count; t++)
