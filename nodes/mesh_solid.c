@@ -383,7 +383,7 @@ static qmat_status find_covered(const solidifier *s, const qmat_surface *solids,
   const double scale = s->frame.diagonal / qmat_surface_frame(solids)->diagonal;
   for (size_t first = 0; first < count; first += SLICE) {
     const size_t last = count - first < SLICE ? count : first + SLICE;
-    const qmat_status status = qmat_progress(s->context, first, count, "triangles of sheets");
+    const qmat_status status = qmat_progress(s->context, first, count, "triangles");
     if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t t = first; t < last; t++) {
@@ -623,7 +623,7 @@ static const qmat_param params[] = {
         "one closed surface around everything; sheet: everything is a sheet"),
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
     QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1,
-                "A wrap keeps a quarter of this away, and flaps stick out by half of it; 0: of 1%"),
+                "A wrap keeps a quarter of this away, a flap sticks out by at most half; 0: of 1%"),
     {0},
 };
 
@@ -657,9 +657,8 @@ const qmat_node qmat_node_mesh_solid = {
         "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
         "they become sheets.\n\n"
         "A connected sheet that sticks out of solids by at most half of epsilon is a flap. Examples are what noise "
-        "turns "
-        "over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, but no spheres are "
-        "made for it.\n\n"
+        "turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, but no "
+        "spheres are made for it.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "

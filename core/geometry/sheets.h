@@ -18,7 +18,7 @@ static inline bool qmat_has_solids(const qmat_mesh *mesh) {
 static inline qmat_mesh qmat_mesh_of_solids(const qmat_mesh *mesh) {
   qmat_mesh solids = *mesh;
   solids.triangle_count = qmat_solid_triangle_count(mesh);
-  solids.sheet_triangle_count = 0;
+  solids.sheet_triangle_count = solids.flap_triangle_count = 0;
   return solids;
 }
 

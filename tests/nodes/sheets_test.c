@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/geometry/sheets.h"
 #include "tests/nodes/pipeline.h"
 
 static const double pi = 3.14159265358979323846;
@@ -215,6 +216,8 @@ static void test_a_flap_is_covered_without_spheres(void **state) {
   const size_t sheet_triangles = mesh->sheet_triangle_count;
   shape_add_sheet(mesh, 3, 2, fin_of_sphere);
   mesh->flap_triangle_count = mesh->sheet_triangle_count - sheet_triangles;
+  const qmat_mesh solids = qmat_mesh_of_solids(mesh);
+  assert_int_equal(solids.sheet_triangle_count + solids.flap_triangle_count, 0);
   description d = describe(mesh, 0);
   expect_certified(&d);
   expect_topology(&d, 2, 0, 0);
