@@ -325,8 +325,29 @@ bool qmat_surface_is_watertight(const qmat_surface *surface) {
   return surface->blocks && surface->leaf_count == 0 && qmat_surface_half_thickness(surface) == 0;
 }
 
+/* The excess over the triangle of a sheet that is nearest to the centre: convex, so largest at a corner. */
+static double excess_of_sheet(const qmat_surface *surface, const double *const spheres[], int count,
+                              const double centre[3]) {
+  double place[3], excess = -INFINITY;
+  uint32_t id;
+  if (isinf(qmat_triangle_blocks_distance(surface->sheet_blocks, centre, surface->half_thickness, place, &id)))
+    return INFINITY;
+  for (int i = 0; i < count; i++)
+    excess = fmax(excess, spheres[i][3] + qmat_triangle_blocks_distance_to(surface->sheet_blocks, id, spheres[i]) -
+                              surface->half_thickness);
+  return excess;
+}
+
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
                                  double limit, uint32_t *failed) {
+  if (qmat_surface_half_thickness(surface) > 0) {
+    double centre[3] = {0, 0, 0};
+    for (int i = 0; i < count; i++)
+      for (int k = 0; k < 3; k++) centre[k] += spheres[i][k] / count;
+    const double excess = excess_of_sheet(surface, spheres, count, centre);
+    if (excess <= limit) return fmax(excess, lowest);
+    if (!qmat_surface_inside(surface, centre)) return INFINITY;
+  }
   if (!surface->blocks || surface->leaf_count > 0) return INFINITY;
   for (int i = 0; i < count; i++) /* the distance then stays positive, so that no point of the simplex is outside */
     if (!(spheres[i][3] > limit)) return INFINITY;

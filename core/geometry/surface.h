@@ -71,8 +71,9 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
  * inside is then the distance to a set of points, and a path at a positive distance does not change its side. */
 bool qmat_surface_is_watertight(const qmat_surface *surface);
 
-/* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), one point of
- * which is known to be inside the solid: at least `lowest`, and exact up to that beside flat or convex surface.
+/* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), whose centre
+ * is known to be inside the solid or a thick sheet: at least `lowest`, and exact up to that beside flat or convex
+ * surface and in a triangle of a thick sheet.
  * INFINITY where it is above `limit` or hard to find. `*failed` is what a failure near by left there, UINT32_MAX at
  * first: it does not change the answer, and a part of a piece mostly fails for the same reason. */
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,

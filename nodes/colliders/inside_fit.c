@@ -105,7 +105,7 @@ static void drop_small(qmat_shape_set *set, double least_radius) {
 /* Proves that every shape is inside; lowers its radii where it is not. */
 static qmat_status prove(qmat_context *context, const qmat_surface *surface, qmat_shape_set *set, double *bounds) {
   const int threads = qmat_threads(context);
-  const size_t slice = 16;
+  const size_t slice = 4; /* a shape may take a second */
   for (size_t first = 0; first < set->shape_count; first += slice) {
     const qmat_status status = qmat_progress(context, first, set->shape_count, "shapes proved");
     if (status != QMAT_OK) return status;

@@ -101,7 +101,11 @@ typedef struct search {
   double place[4];  /* the centre of the piece evaluated last */
   uint32_t failed;  /* of the newest closed formula */
   double tolerance; /* a piece whose bound exceeds `found` by less is finished too */
+  size_t queries;   /* of the surface; without a lattice, so many double the tolerance */
 } search;
+
+/* A primitive that touches the surface along an area would take millions of pieces. */
+enum { QUERIES_A_DOUBLING = 16384 };
 
 static bool is_done(search *s, double bound, double size, bool last) {
   if (!(bound <= s->accepted || bound <= s->found + s->tolerance ||
@@ -112,15 +116,15 @@ static bool is_done(search *s, double bound, double size, bool last) {
 }
 
 /* Larger pieces, in limits, are worth a bound of the whole piece: of second order where the depth is a distance, else a
- * closed formula, which need not be lower than the third share of the limit. */
-static const double squares_size = 0.3, flat_size = 1, flat_share = 0.25;
+ * closed formula, which need not be lower than the third share of the limit. Without a limit the formula is worth it
+ * for pieces larger than so many tolerances: one that touches flat surface would end as thousands. */
+static const double squares_size = 0.3, flat_size = 1, flat_share = 0.25, flat_tolerances = 4;
 
-/* Whether a closed formula accepts a piece with a point inside the solid. */
-static bool is_flat(search *s, const piece *p) {
+/* Whether a closed formula accepts a piece with a point inside the solid. It need not be lower than `lowest`. */
+static bool is_flat(search *s, const piece *p, const qmat_surface *surface, double lowest, double accepted) {
   const double *const spheres[3] = {p->spheres[0], p->spheres[1], p->spheres[2]};
-  const double bound =
-      qmat_surface_excess_bound(s->lattice->surface, spheres, p->count, flat_share * s->limit, s->accepted, &s->failed);
-  if (!(bound <= s->accepted)) return false;
+  const double bound = qmat_surface_excess_bound(surface, spheres, p->count, lowest, accepted, &s->failed);
+  if (!(bound <= accepted)) return false;
   s->bound = qmat_larger(s->bound, bound);
   return true;
 }
@@ -197,13 +201,16 @@ static bool search_piece(search *s, const piece *p, int level) {
     is_large = size > squares_size * s->limit && near > gap;
     if (is_large && s->by_squares && is_below(s, p)) return true;
     /* Where bounds of second order hold, a second formula per piece takes longer than it saves. */
-    if (size > flat_size * s->limit && (level == 0 || !s->by_squares) && near > gap && is_flat(s, p)) return true;
+    if (size > flat_size * s->limit && (level == 0 || !s->by_squares) && near > gap &&
+        is_flat(s, p, s->lattice->surface, flat_share * s->limit, s->accepted))
+      return true;
     ask = size <= s->smallest || last;
   }
   if (ask) {
     const double depth = s->lattice
                              ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->accepted)
                              : -qmat_surface_signed_distance(s->surface, centre);
+    if (!s->lattice && ++s->queries % QUERIES_A_DOUBLING == 0) s->tolerance *= 2, s->smallest *= 2;
     if (depth == INFINITY) { /* the depth is larger: accepted */
       s->bound = qmat_larger(s->bound, s->accepted);
       return true;
@@ -217,6 +224,9 @@ static bool search_piece(search *s, const piece *p, int level) {
       s->bound = qmat_larger(s->bound, farthest - depth);
       return farthest - depth <= s->limit;
     }
+    if (!s->lattice && depth > 0 && size > flat_tolerances * s->tolerance &&
+        is_flat(s, p, s->surface, s->found, qmat_larger(s->accepted, s->found + s->tolerance)))
+      return true;
   }
   piece low, high;
   split(s, p, is_large, &low, &high);

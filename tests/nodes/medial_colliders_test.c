@@ -307,6 +307,29 @@ static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   qmat_context_uninit(&context);
 }
 
+static void place_square(double u, double v, double point[3]) {
+  point[0] = 2 * u - 1, point[1] = 2 * v - 1, point[2] = 0;
+}
+
+/* Slabs touch the sides of a box, and those of a thick sheet, all over. */
+static void test_inside_fills_a_box_and_a_thick_sheet(void **state) {
+  (void)state;
+  result r = make_of_model("box", "fit=inside");
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_true(pipeline_number(r.report, "coverage") > 0.9);
+  result_free(&r);
+  const double half = 0.1, spheres[16] = {-1, -1, 0, half, 1, -1, 0, half, 1, 1, 0, half, -1, 1, 0, half};
+  const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3}, edges[10] = {0, 1, 0, 2, 0, 3, 1, 2, 2, 3};
+  qmat_mesh *mesh = shape_new();
+  shape_add_sheet(mesh, 1, 1, place_square);
+  mesh->closed = mesh->oriented = true;
+  mesh->sheet_thickness = 2 * half;
+  r = make(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=inside", 0);
+  assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+  assert_true(pipeline_number(r.report, "coverage") > 0.99);
+  result_free(&r);
+}
+
 /* Whether a point is in the hull of a shape, or nearer than `slack` to one of its planes. */
 static bool is_in_hull(const qmat_colliders *c, size_t shape, const double point[3], double slack) {
   for (size_t i = shape > 0 ? c->hull_ends[2 * shape - 1] : 0; i < c->hull_ends[2 * shape + 1]; i++) {
@@ -451,10 +474,6 @@ static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) 
   }
 }
 
-static void place_square(double u, double v, double point[3]) {
-  point[0] = 2 * u - 1, point[1] = 2 * v - 1, point[2] = 0;
-}
-
 /* Slabs of radius 0.04 in a square of thickness 0.2: both sides of it are 0.06 away. */
 static void test_the_gap_of_a_thick_sheet_is_that_of_its_sides(void **state) {
   (void)state;
@@ -567,7 +586,7 @@ static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
   (void)state;
   qmat_mesh *mesh;
   qmat_medial *medial;
-  describe("l-bracket", "epsilon=3%", &mesh, &medial);
+  describe("curved-sheet", "epsilon=3%", &mesh, &medial);
   static const char *const params[] = {"fit=contain samples=1000", "fit=inside samples=1000",
                                        "fit=contain kind=hulls samples=1000"};
   for (size_t p = 0; p < 3; p++) {
@@ -596,6 +615,7 @@ int main(void) {
       cmocka_unit_test(test_contain_leaves_none_of_a_million_points_outside),
       cmocka_unit_test(test_contain_grows_shapes_only_where_the_solid_is_outside),
       cmocka_unit_test(test_inside_leaves_no_point_of_a_shape_outside),
+      cmocka_unit_test(test_inside_fills_a_box_and_a_thick_sheet),
       cmocka_unit_test(test_the_hull_of_a_ball_around_a_box_is_the_box),
       cmocka_unit_test(test_hulls_are_joined_where_the_solid_is_convex),
       cmocka_unit_test(test_a_sheet_beside_a_box_has_a_hull_of_its_own),

@@ -236,12 +236,19 @@ static inline double pipeline_number(const qmat_report *report, const char *name
   return json_number_value(number);
 }
 
-/* A bound of medial.evaluate for an epsilon of 3 %, as a share of the diagonal. */
-static inline double pipeline_error(const qmat_mesh *mesh, const qmat_medial *medial, const char *name) {
+/* Bounds of medial.evaluate for an epsilon of 3 %, as shares of the diagonal: those that `names` lists. */
+static inline void pipeline_errors(const qmat_mesh *mesh, const qmat_medial *medial, size_t count,
+                                   const char *const names[], double errors[]) {
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   pipeline_must_run(0, "medial.evaluate", "epsilon=3%", (const qmat_value *[]){&mesh->base, &medial->base}, outputs);
-  const double error = pipeline_number((const qmat_report *)outputs[0], name);
+  for (size_t i = 0; i < count; i++) errors[i] = pipeline_number((const qmat_report *)outputs[0], names[i]);
   pipeline_release("medial.evaluate", outputs);
+}
+
+/* One of them. */
+static inline double pipeline_error(const qmat_mesh *mesh, const qmat_medial *medial, const char *name) {
+  double error;
+  pipeline_errors(mesh, medial, 1, &name, &error);
   return error;
 }
 

@@ -753,7 +753,10 @@ static double check_excess(qmat_mesh *mesh, size_t count) {
       spheres[c][3] = depth + uniform(62, 3 * i + c, -0.02, 0.01);
       inside &= depth > 0 || c >= (size_t)corner_count;
     }
-    if (!inside) continue;
+    double centre[3] = {0, 0, 0};
+    for (int c = 0; c < corner_count; c++)
+      for (int k = 0; k < 3; k++) centre[k] += spheres[c][k] / corner_count;
+    if (!inside || qmat_surface_signed_distance(surface, centre) >= 0) continue;
     tried++;
     uint32_t own = UINT32_MAX;
     const double bound = qmat_surface_excess_bound(surface, corners, corner_count, lowest, limit, &own);
@@ -777,12 +780,26 @@ static double check_excess(qmat_mesh *mesh, size_t count) {
   return (double)bounded / (double)tried;
 }
 
+static void place_roof(double u, double v, double point[3]) {
+  point[0] = 3 * u - 0.5, point[1] = 3 * v - 0.5, point[2] = 2 + fabs(u - 0.5);
+}
+
+/* A box under a thick roof, which has no side in common with it. */
+static qmat_mesh *box_and_thick_roof(void) {
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 2, 2, 1, false);
+  shape_add_sheet(mesh, 2, 1, place_roof);
+  mesh->sheet_thickness = 0.8;
+  return shape_seal(mesh);
+}
+
 static void test_excess_bounds_hold_between_the_spheres(void **state) {
   (void)state;
   assert_true(check_excess(shape_seal(shape_box(1, 2, 3)), 9000) > 0.5); /* linear: only thin spheres have none */
   assert_true(check_excess(shape_seal(shape_l()), 9000) > 0.2);
   assert_true(check_excess(shape_seal(shape_torus(1, 0.3, 40, 20)), 6000) > 0.05);
   assert_true(check_excess(nested_shell(), 9000) > 0.1);
+  assert_true(check_excess(box_and_thick_roof(), 9000) > 0.2);
 }
 
 static void test_excess_in_a_box_is_exact(void **state) {

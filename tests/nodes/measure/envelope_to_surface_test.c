@@ -94,6 +94,37 @@ static void test_bound_between_the_corners_of_an_l_by_hand(void **state) {
   free_solid(&s);
 }
 
+static void place_square(double u, double v, double point[3]) {
+  point[0] = 3 * u, point[1] = 2 * v, point[2] = 0.5;
+}
+
+/* The largest bounds of a slab that touches all of the surface over and under it. Pieces as small as the tolerance
+ * would be thousands of millions. Where it runs over edges of facets of a thick sheet, the tolerance may grow. */
+static void test_a_slab_that_touches_flat_surface_all_over_takes_few_pieces(void **state) {
+  (void)state;
+  qmat_mesh *square = shape_new(), *facets = shape_new();
+  shape_add_sheet(square, 1, 1, place_square);
+  shape_add_sheet(facets, 40, 30, place_square);
+  square->sheet_thickness = facets->sheet_thickness = 1;
+  qmat_mesh *const meshes[] = {shape_box(3, 2, 1), square, facets};
+  static const double slacks[] = {1e-5, 5e-4, 0.01};
+  for (int i = 0; i < 3; i++) {
+    solid s;
+    make_solid(&s, meshes[i]);
+    double corners[3][4] = {{0.5, 0.5, 0.5, 0.5}, {2.5, 0.5, 0.5, 0.5}, {1.5, 1.5, 0.5, 0.5}};
+    const double *const slab[3] = {corners[0], corners[1], corners[2]};
+    qmat_frame_spheres_to_unit(qmat_surface_frame(s.surface), corners[0], 3, corners[0]);
+    for (int raised = 0; raised < 2; raised++) {
+      const double most = 0.02 * raised;
+      corners[2][3] += most;
+      const double bound = qmat_envelope_to_surface_bound(s.surface, slab, 3, -INFINITY, 1e-5);
+      if (!(bound >= most - ROUNDING && bound <= most + slacks[i]))
+        fail_msg("surface %d: %.9g, not %g", i, bound, most);
+    }
+    free_solid(&s);
+  }
+}
+
 static void random_sphere(random_numbers *random, double sphere[4]) {
   for (int k = 0; k < 3; k++) sphere[k] = random_between(random, -0.5, 0.5);
   sphere[3] = random_between(random, 0, 0.3);
@@ -402,6 +433,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_spheres_in_a_cube_by_hand),
       cmocka_unit_test(test_bound_between_the_corners_of_an_l_by_hand),
+      cmocka_unit_test(test_a_slab_that_touches_flat_surface_all_over_takes_few_pieces),
       cmocka_unit_test(test_bound_against_dense_samples_in_a_torus),
       cmocka_unit_test(test_bound_against_dense_samples_in_an_l),
       cmocka_unit_test(test_bounds_hold_after_random_collapses_of_a_torus),
