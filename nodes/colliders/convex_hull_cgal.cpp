@@ -19,13 +19,19 @@ using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data
 
 /* The hull is the border of the Delaunay triangulation: CGAL's perturbation makes that unique where four points are in
  * one plane. CGAL's convex_hull_3 goes by addresses of memory there, so its triangles differ between runs. */
-qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count) {
+struct qmat_hull_points {
+  Delaunay delaunay;
+};
+
+qmat_status qmat_growing_hull_of(qmat_growing_hull *hull, const double *points, size_t count, uint32_t *triangles,
+                                 size_t *triangle_count) {
   try {
-    Delaunay delaunay;
-    for (size_t i = 0; i < count; i++) {
+    if (hull->inserted == nullptr) hull->inserted = new qmat_hull_points;
+    Delaunay &delaunay = hull->inserted->delaunay;
+    for (; hull->count < count; hull->count++) {
       qmat_reserve_cells(delaunay);
-      const double *p = points + 3 * i;
-      delaunay.insert(Kernel::Point_3(p[0], p[1], p[2]))->info() = static_cast<uint32_t>(i);
+      const double *p = points + 3 * hull->count;
+      delaunay.insert(Kernel::Point_3(p[0], p[1], p[2]))->info() = static_cast<uint32_t>(hull->count);
     }
     if (delaunay.dimension() < 3) return QMAT_ERROR_GEOMETRY;
     std::vector<Delaunay::Cell_handle> outside;
@@ -50,4 +56,16 @@ qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *trian
   } catch (const std::exception &) {
     return QMAT_ERROR_GEOMETRY;
   }
+}
+
+void qmat_growing_hull_uninit(qmat_growing_hull *hull) {
+  delete hull->inserted;
+  *hull = {nullptr, 0};
+}
+
+qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count) {
+  qmat_growing_hull hull = {nullptr, 0};
+  const qmat_status status = qmat_growing_hull_of(&hull, points, count, triangles, triangle_count);
+  qmat_growing_hull_uninit(&hull);
+  return status;
 }

@@ -18,6 +18,18 @@ extern "C" {
  * O(n log n). */
 qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count);
 
+/* The same for points that come in several steps: all 0 at first, freed by qmat_growing_hull_uninit, also after an
+ * error. One thread at a time. */
+typedef struct qmat_growing_hull {
+  struct qmat_hull_points *inserted;
+  size_t count; /* of them */
+} qmat_growing_hull;
+
+/* The hull of the first `count` points, of which the first hull->count are those of earlier calls. */
+qmat_status qmat_growing_hull_of(qmat_growing_hull *hull, const double *points, size_t count, uint32_t *triangles,
+                                 size_t *triangle_count);
+void qmat_growing_hull_uninit(qmat_growing_hull *hull);
+
 #ifdef __cplusplus
 }
 #endif

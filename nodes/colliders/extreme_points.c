@@ -16,6 +16,7 @@ static const double least_tolerance = 1e-9;
 
 /* The points: those chosen, those left that may be outside of the hull of these, and those dropped. */
 typedef struct cloud {
+  qmat_growing_hull hull;
   double *points;
   size_t chosen, left; /* left: the end of those that are */
   double *planes;      /* of the facets of the hull: normal, offset */
@@ -73,7 +74,7 @@ static bool make_room(cloud *c) {
 static qmat_status find_planes(cloud *c) {
   size_t count;
   if (!make_room(c)) return QMAT_ERROR_MEMORY;
-  const qmat_status status = qmat_convex_hull(c->points, c->chosen, c->triangles, &count);
+  const qmat_status status = qmat_growing_hull_of(&c->hull, c->points, c->chosen, c->triangles, &count);
   if (status != QMAT_OK) return status;
   c->plane_count = 0;
   for (size_t t = 0; t < count; t++) {
@@ -136,6 +137,7 @@ qmat_status qmat_extreme_points_keep(double *points, size_t *count, double toler
     choose_points(&c);
   }
   if (status == QMAT_OK && c.chosen >= 4) *count = c.chosen;
+  qmat_growing_hull_uninit(&c.hull);
   qmat_free(c.planes);
   qmat_free(c.triangles);
   qmat_free(c.farthest);

@@ -296,11 +296,14 @@ static qmat_status choose(qmat_outer_hull *hull, double error, size_t *triangles
     hull->chosen[best] = 1;
     memcpy(&hull->points[3 * hull->point_count++], &hull->cloud[3 * best], 3 * sizeof *hull->points);
   }
-  for (;;) {
-    if (hull->point_count < 4) return QMAT_ERROR_GEOMETRY;
-    const qmat_status status = qmat_convex_hull(hull->points, hull->point_count, hull->triangles, triangles);
-    if (status != QMAT_OK || add_points(hull, *triangles, error) == 0) return status;
-  }
+  if (hull->point_count < 4) return QMAT_ERROR_GEOMETRY;
+  qmat_growing_hull grown = {0};
+  qmat_status status;
+  do {
+    status = qmat_growing_hull_of(&grown, hull->points, hull->point_count, hull->triangles, triangles);
+  } while (status == QMAT_OK && add_points(hull, *triangles, error) > 0);
+  qmat_growing_hull_uninit(&grown);
+  return status;
 }
 
 /* Moves the cloud to the origin and scales it to half a size of 1. */

@@ -110,10 +110,29 @@ static void test_the_triangles_of_a_plane_do_not_depend_on_memory(void **state) 
   }
 }
 
+/* The first points of the grid are in a line, then in a plane. */
+static void test_a_growing_hull_is_that_of_all_points_so_far(void **state) {
+  (void)state;
+  double points[3 * GRID_POINTS];
+  uint32_t expected[6 * GRID_POINTS], triangles[6 * GRID_POINTS];
+  fill_grid(points);
+  qmat_growing_hull hull = {0};
+  for (size_t count = 1; count <= GRID_POINTS; count += count % 7 + 1) {
+    size_t expected_count = 0, triangle_count = 0;
+    const qmat_status status = qmat_convex_hull(points, count, expected, &expected_count);
+    assert_int_equal(status, count <= SIDE * SIDE ? QMAT_ERROR_GEOMETRY : QMAT_OK);
+    assert_int_equal(qmat_growing_hull_of(&hull, points, count, triangles, &triangle_count), status);
+    assert_int_equal(triangle_count, expected_count);
+    assert_memory_equal(triangles, expected, 3 * expected_count * sizeof *triangles);
+  }
+  qmat_growing_hull_uninit(&hull);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_tetrahedron_is_its_own_hull),
       cmocka_unit_test(test_points_in_a_plane_have_none),
+      cmocka_unit_test(test_a_growing_hull_is_that_of_all_points_so_far),
       cmocka_unit_test(test_random_points_are_within_a_closed_hull),
       cmocka_unit_test(test_the_triangles_of_a_plane_do_not_depend_on_memory),
   };
