@@ -14,8 +14,8 @@ extern "C" {
 /* The convex hull of `count` points (3 doubles each; at least 4, not in one plane), with exact predicates. `triangles`
  * has room for 6 * count ids and receives 3 ids of points per triangle, counter-clockwise from outside, each with its
  * lowest id first, in rising order; points within a facet or an edge are vertices too. `*triangle_count` becomes their
- * number. QMAT_ERROR_MEMORY, or QMAT_ERROR_GEOMETRY for points in a plane. Safe from any thread. Expected cost:
- * O(n log n). */
+ * number. QMAT_ERROR_MEMORY, or QMAT_ERROR_GEOMETRY for points in a plane, up to rounding. Safe from any thread.
+ * Expected cost: O(n log n). */
 qmat_status qmat_convex_hull(const double *points, size_t count, uint32_t *triangles, size_t *triangle_count);
 
 /* The same for points that come in several steps: all 0 at first, freed by qmat_growing_hull_uninit, also after an

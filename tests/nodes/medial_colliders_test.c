@@ -586,7 +586,7 @@ static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
   (void)state;
   qmat_mesh *mesh;
   qmat_medial *medial;
-  describe("curved-sheet", "epsilon=3%", &mesh, &medial);
+  describe("octopus", "epsilon=3%", &mesh, &medial);
   static const char *const params[] = {"fit=contain samples=1000", "fit=inside samples=1000",
                                        "fit=contain kind=hulls samples=1000"};
   for (size_t p = 0; p < 3; p++) {

@@ -110,6 +110,27 @@ static void test_the_triangles_of_a_plane_do_not_depend_on_memory(void **state) 
   }
 }
 
+/* Points in a plane but for rounding, some of them twice: a closed hull of theirs, or none. */
+static void test_points_in_a_plane_up_to_rounding_have_a_hull_of_theirs_or_none(void **state) {
+  (void)state;
+  enum { COUNT = 30 };
+  for (uint64_t seed = 0; seed < 200; seed++) {
+    random_numbers random = {.seed = seed};
+    double points[3 * COUNT], sides[6];
+    uint32_t triangles[6 * COUNT];
+    size_t count = 0;
+    for (size_t i = 0; i < 6; i++) sides[i] = random_between(&random, -1, 1);
+    for (size_t i = 0; i < COUNT; i++) {
+      const double u = random_between(&random, -1, 1), v = random_between(&random, -1, 1);
+      for (size_t k = 0; k < 3; k++)
+        points[3 * i + k] = i % 5 == 4 ? points[3 * (i - 2) + k] : u * sides[k] + v * sides[3 + k];
+    }
+    if (qmat_convex_hull(points, COUNT, triangles, &count) != QMAT_OK) continue;
+    assert_in_range(count, 4, 2 * COUNT);
+    for (size_t i = 0; i < 3 * count; i++) assert_in_range(triangles[i], 0, COUNT - 1);
+  }
+}
+
 /* The first points of the grid are in a line, then in a plane. */
 static void test_a_growing_hull_is_that_of_all_points_so_far(void **state) {
   (void)state;
@@ -117,7 +138,7 @@ static void test_a_growing_hull_is_that_of_all_points_so_far(void **state) {
   uint32_t expected[6 * GRID_POINTS], triangles[6 * GRID_POINTS];
   fill_grid(points);
   qmat_growing_hull hull = {0};
-  for (size_t count = 1; count <= GRID_POINTS; count += count % 7 + 1) {
+  for (size_t count = 2; count <= GRID_POINTS; count += count % 7 + 1) {
     size_t expected_count = 0, triangle_count = 0;
     const qmat_status status = qmat_convex_hull(points, count, expected, &expected_count);
     assert_int_equal(status, count <= SIDE * SIDE ? QMAT_ERROR_GEOMETRY : QMAT_OK);
@@ -132,6 +153,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_tetrahedron_is_its_own_hull),
       cmocka_unit_test(test_points_in_a_plane_have_none),
+      cmocka_unit_test(test_points_in_a_plane_up_to_rounding_have_a_hull_of_theirs_or_none),
       cmocka_unit_test(test_a_growing_hull_is_that_of_all_points_so_far),
       cmocka_unit_test(test_random_points_are_within_a_closed_hull),
       cmocka_unit_test(test_the_triangles_of_a_plane_do_not_depend_on_memory),
