@@ -104,7 +104,7 @@ typedef struct search {
   size_t queries;   /* of the surface; without a lattice, so many double the tolerance */
 } search;
 
-/* A primitive that touches the surface along an area would take millions of pieces. */
+/* A primitive that touches curved surface along an area would take millions of pieces. */
 enum { QUERIES_A_DOUBLING = 16384 };
 
 static bool is_done(search *s, double bound, double size, bool last) {
