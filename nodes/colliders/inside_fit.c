@@ -6,7 +6,7 @@
 
 #include "nodes/measure/envelope_to_surface.h"
 
-enum { STEPS_OF_CONE = 16, STEPS_OF_SLAB = 8, SWEEPS = 40, SLICE = 256 };
+enum { STEPS_OF_CONE = 16, STEPS_OF_SLAB = 8, SWEEPS = 40, SLICE = 256, PATIENCE = 16384 };
 
 static const double tolerance = 1e-5;
 
@@ -115,7 +115,7 @@ static qmat_status prove(qmat_context *context, const qmat_surface *surface, qma
       const uint32_t *ids = &set->shapes[3 * i];
       const double *const spheres[3] = {&set->spheres[4 * (size_t)ids[0]], &set->spheres[4 * (size_t)ids[1]],
                                         &set->spheres[4 * (size_t)ids[2]]};
-      bounds[i] = qmat_envelope_to_surface_bound(surface, spheres, qmat_shape_width(ids), 0, tolerance);
+      bounds[i] = qmat_envelope_to_surface_bound_soon(surface, spheres, qmat_shape_width(ids), 0, tolerance, PATIENCE);
     }
   }
   for (size_t i = 0; i < set->shape_count; i++) {

@@ -101,11 +101,9 @@ typedef struct search {
   double place[4];  /* the centre of the piece evaluated last */
   uint32_t failed;  /* of the newest closed formula */
   double tolerance; /* a piece whose bound exceeds `found` by less is finished too */
-  size_t queries;   /* of the surface; without a lattice, so many double the tolerance */
+  size_t queries;   /* of the surface, so far */
+  size_t patience;  /* so many queries double the tolerance; 0: none do */
 } search;
-
-/* A primitive that touches curved surface along an area would take millions of pieces. */
-enum { QUERIES_A_DOUBLING = 16384 };
 
 static bool is_done(search *s, double bound, double size, bool last) {
   if (!(bound <= s->accepted || bound <= s->found + s->tolerance ||
@@ -121,9 +119,9 @@ static bool is_done(search *s, double bound, double size, bool last) {
 static const double squares_size = 0.3, flat_size = 1, flat_share = 0.25, flat_tolerances = 4;
 
 /* Whether a closed formula accepts a piece with a point inside the solid. It need not be lower than `lowest`. */
-static bool is_flat(search *s, const piece *p, const qmat_surface *surface, double lowest, double accepted) {
+static bool is_flat(search *s, const piece *p, double lowest, double accepted) {
   const double *const spheres[3] = {p->spheres[0], p->spheres[1], p->spheres[2]};
-  const double bound = qmat_surface_excess_bound(surface, spheres, p->count, lowest, accepted, &s->failed);
+  const double bound = qmat_surface_excess_bound(s->surface, spheres, p->count, lowest, accepted, &s->failed);
   if (!(bound <= accepted)) return false;
   s->bound = qmat_larger(s->bound, bound);
   return true;
@@ -202,7 +200,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     if (is_large && s->by_squares && is_below(s, p)) return true;
     /* Where bounds of second order hold, a second formula per piece takes longer than it saves. */
     if (size > flat_size * s->limit && (level == 0 || !s->by_squares) && near > gap &&
-        is_flat(s, p, s->lattice->surface, flat_share * s->limit, s->accepted))
+        is_flat(s, p, flat_share * s->limit, s->accepted))
       return true;
     ask = size <= s->smallest || last;
   }
@@ -210,7 +208,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     const double depth = s->lattice
                              ? qmat_depth_lattice_exact_up_to(s->lattice, centre, near, gap, farthest - s->accepted)
                              : -qmat_surface_signed_distance(s->surface, centre);
-    if (!s->lattice && ++s->queries % QUERIES_A_DOUBLING == 0) s->tolerance *= 2, s->smallest *= 2;
+    if (s->patience > 0 && ++s->queries % s->patience == 0) s->tolerance *= 2, s->smallest *= 2;
     if (depth == INFINITY) { /* the depth is larger: accepted */
       s->bound = qmat_larger(s->bound, s->accepted);
       return true;
@@ -225,7 +223,7 @@ static bool search_piece(search *s, const piece *p, int level) {
       return farthest - depth <= s->limit;
     }
     if (!s->lattice && depth > 0 && size > flat_tolerances * s->tolerance &&
-        is_flat(s, p, s->surface, s->found, qmat_larger(s->accepted, s->found + s->tolerance)))
+        is_flat(s, p, s->found, qmat_larger(s->accepted, s->found + s->tolerance)))
       return true;
   }
   piece low, high;
@@ -237,8 +235,8 @@ double qmat_envelope_to_surface_of_sphere(const qmat_surface *surface, const dou
   return sphere[3] + qmat_surface_signed_distance(surface, sphere);
 }
 
-double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double *const spheres[], int count,
-                                      double enough, double tolerance) {
+double qmat_envelope_to_surface_bound_soon(const qmat_surface *surface, const double *const spheres[], int count,
+                                           double enough, double tolerance, size_t patience) {
   piece p = {.count = count};
   search s = {.surface = surface,
               .accepted = enough,
@@ -247,7 +245,8 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
               .failed = QMAT_NONE,
               .found = -INFINITY,
               .bound = enough,
-              .tolerance = tolerance};
+              .tolerance = tolerance,
+              .patience = patience};
   for (int i = 0; i < count; i++) {
     memcpy(p.spheres[i], spheres[i], 4 * sizeof(double));
     p.depths[i] = -qmat_surface_signed_distance(surface, spheres[i]);
@@ -255,6 +254,11 @@ double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double 
   }
   if (count > 1) search_piece(&s, &p, 0);
   return qmat_larger(s.bound, s.found);
+}
+
+double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double *const spheres[], int count,
+                                      double enough, double tolerance) {
+  return qmat_envelope_to_surface_bound_soon(surface, spheres, count, enough, tolerance, 0);
 }
 
 /* The lattice's spacing as a share of the limit, and the largest spacing. A node is then at most 0.44 of the limit
@@ -381,7 +385,8 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
   const double kept_growth = growth(&complex->spheres[4 * (size_t)collapse->kept], sphere);
   const double removed_growth =
       collapse->removed == QMAT_NONE ? 0 : growth(&complex->spheres[4 * (size_t)collapse->removed], sphere);
-  search s = {.lattice = &tracker->lattice,
+  search s = {.surface = tracker->lattice.surface,
+              .lattice = &tracker->lattice,
               .by_squares = tracker->by_squares,
               .accepted = accepted_share * tracker->limit,
               .limit = tracker->limit,

@@ -71,10 +71,14 @@ void qmat_envelope_to_surface_tighten(qmat_envelope_to_surface *tracker, const q
 double qmat_envelope_to_surface_largest_bound(const qmat_envelope_to_surface *tracker, const qmat_complex *complex);
 
 /* An upper bound of h over a primitive of `count` (1, 2 or 3) spheres (4 doubles each), by branch and bound. It exceeds
- * the largest h by at most `tolerance`, or is `enough` where that is larger. Beside a curved surface that it touches
- * along an area, or in a thick sheet, the tolerance doubles after each 16,384 queries of the surface. Thread-safe. */
+ * the largest h by at most `tolerance`, or is `enough` where that is larger. Thread-safe. */
 double qmat_envelope_to_surface_bound(const qmat_surface *surface, const double *const spheres[], int count,
                                       double enough, double tolerance);
+
+/* The same, but the tolerance doubles after each `patience` queries of the surface; 0: it stays. A primitive that
+ * touches curved surface along an area, or many facets of a thick sheet, may take millions. */
+double qmat_envelope_to_surface_bound_soon(const qmat_surface *surface, const double *const spheres[], int count,
+                                           double enough, double tolerance, size_t patience);
 
 /* r - depth for one sphere (4 doubles). Thread-safe. */
 double qmat_envelope_to_surface_of_sphere(const qmat_surface *surface, const double sphere[4]);

@@ -128,6 +128,7 @@ static void test_points_in_a_plane_up_to_rounding_have_a_hull_of_theirs_or_none(
     if (qmat_convex_hull(points, COUNT, triangles, &count) != QMAT_OK) continue;
     assert_in_range(count, 4, 2 * COUNT);
     for (size_t i = 0; i < 3 * count; i++) assert_in_range(triangles[i], 0, COUNT - 1);
+    assert_convex_and_closed(points, COUNT, triangles, count, 1e-12);
   }
 }
 
