@@ -38,7 +38,7 @@ static const double weld_tolerance = 1e-5;
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
  * solids covers it then. */
-static const double flap_reach = 0.5;
+static const double flap_reach = 0.75;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
 /* Components and caps that the report lists. */
@@ -623,7 +623,7 @@ static const qmat_param params[] = {
         "one closed surface around everything; sheet: everything is a sheet"),
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
     QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1,
-                "A wrap keeps a quarter of this away, a flap sticks out by at most half; 0: of 1%"),
+                "A wrap keeps a quarter of this away, a flap sticks out by at most three quarters; 0: of 1%"),
     {0},
 };
 
@@ -642,7 +642,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 6,
+    .version = 7,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
@@ -656,9 +656,9 @@ const qmat_node qmat_node_mesh_solid = {
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
         "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
         "they become sheets.\n\n"
-        "A connected sheet that sticks out of solids by at most half of epsilon is a flap. Examples are what noise "
-        "turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, but no "
-        "spheres are made for it.\n\n"
+        "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples "
+        "are what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover "
+        "it, but no spheres are made for it.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "
