@@ -28,7 +28,7 @@ static const double PATIENCE = 1, LATENCY = 20;
 
 /* The number of points at which a run is stopped or runs out of memory; fewer if the run is one of many (with each
  * choice of a parameter). */
-enum { MOST_STOPS = 8, MOST_SHORTAGES = 40, FEWER_SHORTAGES = 8 };
+enum { MOST_STOPS = 8, MOST_SHORTAGES = 32, FEWER_SHORTAGES = 6 };
 
 enum { MOST_PORTS = 16 };
 
@@ -1109,11 +1109,11 @@ static void try_shortages(subject *run, const char *what) {
   release_outputs(run);
   qmat_context_uninit(&context);
   assert_true(needed > 0);
-  /* By turns, memory stays short from some point on, or a single allocation fails. */
+  /* Memory stays short from some point on, or a single allocation fails. */
   const size_t most = *what ? FEWER_SHORTAGES : MOST_SHORTAGES;
-  for (size_t k = 0; k < most && k < needed; k++) {
+  for (size_t k = 0; k < 2 * most && k / 2 < needed; k++) {
     context = (qmat_context){.threads = 1};
-    const size_t first = spread(k, needed, most);
+    const size_t first = spread(k / 2, needed, most);
     shortage(first, k % 2 ? 1 : SIZE_MAX);
     const qmat_status status = qmat_node_run(&context, run->node, run->params, run->inputs, run->outputs);
     shortage(SIZE_MAX, 0);
