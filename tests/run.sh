@@ -90,7 +90,7 @@ run_ctest() {
 }
 
 step "What this needs"
-echo "Builds: about 1 GB in $PWD/build. On two cores all of it takes about half an hour."
+echo "Builds: about 1 GB in $PWD/build. On two cores all of it takes about 40 minutes."
 if ! sh .ci/packages.sh packages.txt tests/packages.txt; then
   failed=1
   finish
