@@ -25,20 +25,27 @@ static double sampled_to_surface(const qmat_surface *surface, const qmat_medial 
   return least;
 }
 
-static double largest_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
-                                 double tolerance, double enough, int threads) {
+static qmat_status largest_to_surface(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                      const qmat_envelope *envelope, double tolerance, double enough, double *result) {
+  const int threads = qmat_threads(context);
+  const size_t primitives = qmat_envelope_primitive_count(envelope), slice = 256;
   enough = fmax(enough, sampled_to_surface(surface, unit, envelope, threads) + tolerance);
-  const size_t primitives = qmat_envelope_primitive_count(envelope);
   double largest = 0;
+  for (size_t first = 0; first < primitives; first += slice) {
+    const qmat_status status = qmat_progress(context, first, primitives, "primitives measured");
+    if (status != QMAT_OK) return status;
+    const size_t last = first + slice < primitives ? first + slice : primitives;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(max : largest)
-  for (size_t i = 0; i < primitives; i++) {
-    uint32_t ids[3];
-    const int count = qmat_envelope_primitive(envelope, i, ids);
-    const double *spheres[3];
-    for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
-    largest = fmax(largest, qmat_envelope_to_surface_bound(surface, spheres, count, enough, tolerance));
+    for (size_t i = first; i < last; i++) {
+      uint32_t ids[3];
+      const int count = qmat_envelope_primitive(envelope, i, ids);
+      const double *spheres[3];
+      for (int k = 0; k < count; k++) spheres[k] = &unit->spheres[4 * (size_t)ids[k]];
+      largest = fmax(largest, qmat_envelope_to_surface_bound(surface, spheres, count, enough, tolerance));
+    }
   }
-  return largest;
+  *result = largest;
+  return QMAT_OK;
 }
 
 /* The first lower bound takes one point in so many: more take longer than they save the search. */
@@ -71,9 +78,9 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
-  errors->envelope_to_surface = largest_to_surface(surface, unit, envelope, tolerance, enough, qmat_threads(context));
+  status = largest_to_surface(context, surface, unit, envelope, tolerance, enough, &errors->envelope_to_surface);
   qmat_envelope_free(envelope);
-  return qmat_progress(context, 0, 0, "primitives measured");
+  return status;
 }
 
 /* Keeps the points that lie in the solid; returns their number. */

@@ -195,12 +195,12 @@ qmat_status qmat_topology_find_walls(qmat_context *context, const qmat_medial *m
                                      size_t *count) {
   sides s;
   size_t left;
+  *count = 0;
   qmat_status status = find_sides(context, medial, &s);
   if (status == QMAT_OK) status = remove_free(context, &s, &left);
   if (status != QMAT_OK) return status;
   *walls = qmat_arena_alloc(&context->arena, left, sizeof **walls);
   if (!*walls) return qmat_fail_memory(context, "the topology");
-  *count = 0;
   for (size_t t = 0; t < medial->triangle_count; t++)
     if (!s.removed[t]) (*walls)[(*count)++] = (uint32_t)t;
   return QMAT_OK;

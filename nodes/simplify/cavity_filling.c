@@ -125,6 +125,8 @@ qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surfac
   for (size_t i = 0; i < count; i++) cavities[i] = (cavity){-qmat_surface_signed_distance(surface, &places[3 * i]), i};
   if (count) qsort(cavities, count, sizeof *cavities, compare_depths);
   for (size_t i = 0; i < count; i++) {
+    const qmat_status status = qmat_progress(context, i, count, "cavities");
+    if (status != QMAT_OK) return status;
     const double *place = &places[3 * cavities[i].place];
     double *sphere = &spheres[4 * (before + *added)];
     if (!(cavities[i].depth > 0) || is_covered(&spheres[4 * before], *added, place)) continue;

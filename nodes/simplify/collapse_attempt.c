@@ -53,7 +53,7 @@ qmat_status qmat_decimation_attempt(qmat_decimation *s, uint32_t edge, double sp
     if (needed < INFINITY) *result = QMAT_COLLAPSE_EXCEEDS;
     return QMAT_OK;
   }
-  if (!bound && s->protecting && !qmat_decimation_apply_protection(s, edge, &c, &bound)) {
+  if (!qmat_decimation_apply_protection(s, edge, &c, &bound)) {
     s->counts.refused_by_protection++;
     return QMAT_OK;
   }

@@ -21,7 +21,13 @@ static bool is_tubular(const qmat_decimation *s, uint32_t edge) {
   return any;
 }
 
+static bool is_protecting(const qmat_decimation *s) {
+  return s->rules.protect == QMAT_PROTECT_ALWAYS ||
+         (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= s->rules.late_spheres);
+}
+
 bool qmat_decimation_is_protected(const qmat_decimation *s, uint32_t vertex) {
+  if (!is_protecting(s)) return false;
   size_t count;
   const uint32_t *at = qmat_complex_edges_at(&s->complex, vertex, &count);
   for (size_t i = 0; i < count; i++)
@@ -29,16 +35,25 @@ bool qmat_decimation_is_protected(const qmat_decimation *s, uint32_t vertex) {
   return false;
 }
 
+static bool is_candidate(const qmat_candidates *c, const double *sphere) {
+  for (int i = 0; i < c->count; i++)
+    if (memcmp(c->spheres[i], sphere, sizeof c->spheres[i]) == 0) return true;
+  return false;
+}
+
 bool qmat_decimation_apply_protection(const qmat_decimation *s, uint32_t edge, qmat_candidates *c, bool *bound) {
+  if (!is_protecting(s)) return true;
   if (is_tubular(s, edge)) return false;
   const uint32_t *ends = &s->complex.edges[2 * (size_t)edge];
   const bool first = qmat_decimation_is_protected(s, ends[0]), second = qmat_decimation_is_protected(s, ends[1]);
   if (first && second) return false;
-  *bound = first || second;
-  if (!*bound) return true;
+  if (!first && !second) return true;
+  const double *kept = &s->complex.spheres[4 * (size_t)ends[second]];
+  if (*bound && !is_candidate(c, kept)) return false;
   const qmat_quadric quadric = qmat_merged_quadric(&s->complex, s->quadrics, edge);
   c->count = 0;
-  qmat_candidates_add(c, &quadric, &s->complex.spheres[4 * (size_t)ends[second]]);
+  qmat_candidates_add(c, &quadric, kept);
+  *bound = true;
   return true;
 }
 

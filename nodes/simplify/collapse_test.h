@@ -22,12 +22,12 @@ typedef enum {
   QMAT_REFUSED_BY_ENVELOPE_TO_SURFACE
 } qmat_refusal;
 
-/* Whether an edge at the vertex is a tubular feature: an edge without slabs whose responsible region is all thin
- * (section 3.4). */
+/* Whether the sphere of a vertex has to stay: the rules protect thin features now, and an edge at the vertex is a
+ * tubular one, which is an edge without slabs whose responsible region is all thin (section 3.4). */
 bool qmat_decimation_is_protected(const qmat_decimation *decimation, uint32_t vertex);
 
-/* Restricts the candidates of an edge if one end is protected: that end keeps its sphere, and `*bound` becomes true.
- * False if the edge must not collapse. */
+/* Restricts the candidates of an edge if one end is protected: that end keeps its sphere, and `*bound` becomes true. Of
+ * candidates that are bound already it has to be one. False if the edge must not collapse. */
 bool qmat_decimation_apply_protection(const qmat_decimation *decimation, uint32_t edge, qmat_candidates *candidates,
                                       bool *bound);
 

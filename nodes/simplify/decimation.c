@@ -15,11 +15,6 @@
 /* Progress interval, in cost evaluations and in attempts. The last attempts test thousands of points each. */
 enum { COSTS_A_REPORT = 256, ATTEMPTS_A_REPORT = 16 };
 
-/* Late protection starts at this number of spheres (section 3.4, "a later stage"). */
-static size_t late_stage(size_t initial) {
-  return initial / 50 > 100 ? initial / 50 : 100;
-}
-
 static qmat_status fill_heap(qmat_decimation *s) {
   const size_t count = s->complex.edge_count;
   s->failed_points = qmat_arena_alloc(&s->context->arena, count, sizeof *s->failed_points);
@@ -109,9 +104,9 @@ static qmat_status report_progress(const qmat_decimation *s) {
 }
 
 qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
-  const size_t initial = s->complex.vertex_count;
   for (size_t attempts = 0; s->heap.count > 0 && !*ended; attempts++) {
-    qmat_status status = s->rules.neighbourhoods || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
+    const bool takes_long = s->rules.neighbourhoods || (s->copy && s->copy->ahead > 0);
+    qmat_status status = takes_long || attempts % ATTEMPTS_A_REPORT == 0 ? report_progress(s) : QMAT_OK;
     if (status != QMAT_OK) return status;
     uint32_t edge = qmat_edge_heap_first(&s->heap);
     if (s->stale[edge]) {
@@ -121,8 +116,6 @@ qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
     }
     *ended = !may_continue(s) || (s->rules.most_cost > 0 && s->heap.costs[edge] > s->rules.most_cost);
     if (*ended) return QMAT_OK;
-    s->protecting = s->rules.protect == QMAT_PROTECT_ALWAYS ||
-                    (s->rules.protect == QMAT_PROTECT_LATE && s->complex.live_vertices <= late_stage(initial));
     qmat_edge_heap_remove(&s->heap, edge);
     qmat_collapse_outcome result;
     double sphere[4];
@@ -146,7 +139,7 @@ qmat_status qmat_decimation_collapse_edges(qmat_decimation *s, bool *ended) {
 static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
   *moved = 0;
   for (uint32_t v = 0; v < s->complex.vertex_count; v++) {
-    if (!s->complex.vertex_alive[v] || s->converged[v] || (s->protecting && qmat_decimation_is_protected(s, v)) ||
+    if (!s->complex.vertex_alive[v] || s->converged[v] || qmat_decimation_is_protected(s, v) ||
         qmat_crease_guard_is_feature(&s->creases, v))
       continue;
     s->converged[v] = 1;
@@ -162,7 +155,7 @@ static qmat_status refit(qmat_decimation *s, size_t most, size_t *moved) {
       status = qmat_sphere_fit_run(s->context, &s->fit, &s->surface_tracker, &s->complex, &s->collapse, INFINITY,
                                    sphere, &before, &after);
     if (status != QMAT_OK) return status;
-    if (!(after <= (1 - qmat_least_gain) * before)) continue;
+    if (!(before > 0 && after <= (1 - qmat_least_gain) * before)) continue;
     qmat_collapse_outcome result;
     double needed;
     status = qmat_decimation_test_sphere(s, sphere, QMAT_NONE, &result, &needed);

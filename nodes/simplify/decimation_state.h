@@ -41,6 +41,7 @@ typedef struct qmat_decimation_rules {
   qmat_exceed_rule on_exceed;
   qmat_topology_policy topology;
   qmat_protection protect;
+  size_t late_spheres;        /* with QMAT_PROTECT_LATE, protection starts at this number of spheres */
   qmat_feature_rule features; /* whether spheres of radius zero stay on their creases; never auto */
   double crease_share; /* of the threshold: the largest distance of a crease from its remaining points; above 0 */
   uint64_t seed;       /* of the factors of the costs; 0: none */
@@ -92,7 +93,7 @@ typedef struct qmat_decimation {
   double *fitted_errors;   /* per edge: the error of its newest fitted sphere */
   uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
   const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
-  bool protecting, fitting;
+  bool fitting;
   int refusal;                       /* why the newest test of a sphere failed */
   uint32_t tested_first;             /* the constraint point that it tested first, or QMAT_NONE */
   struct qmat_copy *copy;            /* NULL: the decimation is alone */

@@ -1,13 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/simplify/edge_heap.h"
 
-/* Whether edge `a` comes before edge `b` of the same cost. */
+/* Whether edge `a` comes before edge `b` of the same cost. A collapse renames the ends of edges in the heap, but never
+ * an edge. */
 static bool decide_tie(const qmat_edge_heap *h, uint32_t a, uint32_t b) {
-  if (h->errors[a] != h->errors[b]) return h->errors[a] < h->errors[b];
-  const uint32_t *p = &h->complex->edges[2 * (size_t)a], *q = &h->complex->edges[2 * (size_t)b];
-  const uint32_t low_p = p[0] < p[1] ? p[0] : p[1], low_q = q[0] < q[1] ? q[0] : q[1];
-  if (low_p != low_q) return low_p < low_q;
-  return (p[0] < p[1] ? p[1] : p[0]) < (q[0] < q[1] ? q[1] : q[0]);
+  return h->errors[a] != h->errors[b] ? h->errors[a] < h->errors[b] : a < b;
 }
 
 static inline bool comes_first(const qmat_edge_heap *h, const qmat_heap_entry *a, const qmat_heap_entry *b) {

@@ -5,8 +5,8 @@
 #include "core/geometry/medial_complex.h"
 
 /* A heap of the edges of a medial complex, cheapest first. Edges of equal cost are ordered by error (eq. 6 gives every
- * spike the cost 0), then by the ids of their ends, so that the order is deterministic. The arrays live in the arena of
- * the context that qmat_edge_heap_init gets. */
+ * spike the cost 0), then by their numbers, so that the first one depends on nothing but the edges in the heap. The
+ * arrays live in the arena of the context that qmat_edge_heap_init gets. */
 typedef struct qmat_edge_heap {
   const qmat_complex *complex;
   double *costs, *errors;          /* per edge: set before the edge is inserted; update the edge after a change */

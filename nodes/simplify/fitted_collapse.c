@@ -155,7 +155,7 @@ static qmat_status start_fit(qmat_decimation *s, const double sphere[4], bool al
   size_t count = 0;
   for (size_t n = 0; !alone && n < c->neighbour_count && count < QMAT_NEIGHBOURHOOD_SPHERES; n++)
     if (!qmat_crease_guard_is_feature(&s->creases, c->neighbours[n]) &&
-        !(s->protecting && qmat_decimation_is_protected(s, c->neighbours[n])))
+        !qmat_decimation_is_protected(s, c->neighbours[n]))
       others[count++] = c->neighbours[n];
   s->neighbourhood.keeps_radii = qmat_decimation_is_of_sheet(s, c->kept);
   return qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, sphere,

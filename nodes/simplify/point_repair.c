@@ -62,7 +62,7 @@ static qmat_status repair_point(qmat_decimation *s, size_t point) {
   for (int i = 0; i < 6; i++) {
     const uint32_t vertex = vertices[i % 3];
     if (vertex == QMAT_NONE || qmat_crease_guard_is_feature(&s->creases, vertex) ||
-        (s->protecting && qmat_decimation_is_protected(s, vertex)))
+        qmat_decimation_is_protected(s, vertex))
       continue;
     qmat_collapse_outcome result;
     status = qmat_decimation_try_move(s, vertex, point, i < 3, &result);

@@ -181,12 +181,16 @@ static qmat_status judge_round(qmat_simplification *s, qmat_simplified *a, qmat_
   qmat_medial_errors after = *found;
   size_t filled = 0;
   if (status == QMAT_OK) status = fill_cavities(s, found, a->medial, &after, &filled);
+  if (status != QMAT_OK) {
+    if (after.uncovered != found->uncovered) qmat_medial_errors_uninit(&after);
+    return status;
+  }
   qmat_simplify_figures_of(&s->rounds[s->newest], &a->figures);
   a->figures.filled += filled;
   a->figures.surface_to_envelope = after.surface_to_envelope;
   a->figures.envelope_to_surface = after.envelope_to_surface;
   a->fault = fmax(fmax(after.surface_to_envelope, after.boundary_to_surface), epsilon);
-  a->within_epsilon = status == QMAT_OK && a->fault == epsilon;
+  a->within_epsilon = a->fault == epsilon;
   if (after.uncovered != found->uncovered) { /* the points that are undecided now become constraints too */
     double *const undecided = found->undecided;
     found->undecided = after.undecided;
@@ -194,10 +198,7 @@ static qmat_status judge_round(qmat_simplification *s, qmat_simplified *a, qmat_
     after.undecided = undecided;
     qmat_medial_errors_uninit(&after);
   }
-  bool right = true;
-  if (status == QMAT_OK) status = judge_topology(s, a->medial, &right);
-  a->has_right_topology = right;
-  return status;
+  return judge_topology(s, a->medial, &a->has_right_topology);
 }
 
 /* ---- the passes ---- */

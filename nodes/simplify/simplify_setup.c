@@ -83,8 +83,13 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   qmat_thickness_of_samples(mesh, thickness, samples, values);
   const double theta = qmat_thickness_threshold(mesh, thickness, params->theta);
   for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
-  *initial = (qmat_initial_medial){spheres, depths, thin};
+  *initial = (qmat_initial_medial){medial->sphere_count, spheres, depths, thin};
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
+}
+
+/* Late protection starts at this number of spheres (section 3.4, "a later stage"). */
+static size_t late_stage(size_t initial) {
+  return initial / QMAT_LATE_DIVISOR > QMAT_LATE_SPHERES ? initial / QMAT_LATE_DIVISOR : QMAT_LATE_SPHERES;
 }
 
 qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const qmat_initial_medial *initial,
@@ -103,6 +108,7 @@ qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *p, const q
       .on_exceed = (qmat_exceed_rule)p->on_exceed,
       .topology = (qmat_topology_policy)p->topology,
       .protect = (qmat_protection)p->protect,
+      .late_spheres = late_stage(initial->count),
       .features = p->features == QMAT_FEATURES_NONE ? QMAT_FEATURES_NONE : QMAT_FEATURES_SHARP,
       .crease_share = p->crease,
       .seed = seed,

@@ -68,6 +68,7 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
 
 /* The initial medial mesh in the unit frame, in the context's arena. */
 typedef struct qmat_initial_medial {
+  size_t count;    /* of spheres */
   double *spheres; /* 4 per sphere */
   double *depths;  /* per sphere: of its centre, negative outside */
   uint8_t *thin;   /* per sample: whether it lies on a thin feature */

@@ -74,7 +74,6 @@ qmat_status qmat_simplification_run_to_count(const qmat_simplification *s, qmat_
     const qmat_status status = run_at(s, tried, 0, &result);
     const bool few = status == QMAT_OK && result.medial->sphere_count <= wanted;
     const bool enough = few && result.within_epsilon;
-    if (status == QMAT_OK && !enough) at_low = result.medial->sphere_count;
     if (few && !enough && !again) { /* few spheres just beyond epsilon: not yet too small */
       qmat_simplified_uninit(&result);
       tried *= precision;
@@ -83,6 +82,7 @@ qmat_status qmat_simplification_run_to_count(const qmat_simplification *s, qmat_
     }
     again = false;
     *(enough ? &high : &low) = tried;
+    if (status == QMAT_OK && !enough) at_low = result.medial->sphere_count;
     if (status == QMAT_OK && (enough || high == INFINITY)) {
       qmat_simplified_uninit(best);
       *best = result;

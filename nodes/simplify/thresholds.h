@@ -93,6 +93,9 @@ static const double qmat_least_gain = 0.02;
 enum { QMAT_MOST_PIECE_VERTICES = 1 << 14 };
 static const double qmat_piece_share = 0.06;
 
+/* The later stage of protection: one sphere in so many initial ones is left, or this number. */
+enum { QMAT_LATE_DIVISOR = 50, QMAT_LATE_SPHERES = 100 };
+
 /* Thresholds that rise double every so many levels: steps of 6 %. */
 enum { QMAT_LEVELS_TO_A_DOUBLING = 12 };
 

@@ -172,15 +172,35 @@ static qmat_status fill_loop(const qmat_simplification *s, const qmat_topology *
   return status;
 }
 
+/* Whether the responsible regions of both ends are all thin. */
+static bool has_thin_regions(const qmat_simplification *s, const qmat_medial *unit, const uint32_t *edge) {
+  bool any = false;
+  for (int k = 0; k < 2; k++)
+    for (uint32_t i = unit->region_offsets[edge[k]]; i < unit->region_offsets[edge[k] + 1]; i++) {
+      if (!s->state.thin[unit->region_samples[i]]) return false;
+      any = true;
+    }
+  return any;
+}
+
+/* Whether the parameters keep an edge: it is a cone along a crease, or with protection a tubular feature. */
+static bool is_kept(const qmat_simplification *s, const qmat_medial *unit, const uint32_t *edge) {
+  const double *const radii = unit->spheres + 3;
+  const bool on_crease = s->params.features == QMAT_FEATURES_SHARP && edge[0] >= unit->sheet_sphere_count &&
+                         radii[4 * (size_t)edge[0]] == 0 && radii[4 * (size_t)edge[1]] == 0;
+  return on_crease || (s->params.protect != QMAT_PROTECT_OFF && has_thin_regions(s, unit, edge));
+}
+
 /* Removes an edge without a slab that is part of a loop, or a part of it at either end: then a new sphere is the end of
- * the other part. The shortest edges are tried. */
+ * the other part. The shortest edges that need not stay are tried. */
 static qmat_status cut_loop(const qmat_simplification *s, const qmat_topology *before, qmat_simplified *result,
                             bool *closed) {
   const qmat_medial *unit = result->medial;
   uint32_t *edges;
-  size_t count;
-  qmat_status status = qmat_topology_find_loop_edges(s->context, unit, &edges, &count);
-  if (count > QMAT_MOST_WALLS) count = QMAT_MOST_WALLS;
+  size_t found, count = 0;
+  qmat_status status = qmat_topology_find_loop_edges(s->context, unit, &edges, &found);
+  for (size_t i = 0; i < found && count < QMAT_MOST_WALLS && status == QMAT_OK; i++)
+    if (!is_kept(s, unit, &unit->edges[2 * (size_t)edges[i]])) edges[count++] = edges[i];
   for (size_t n = 0; n < SHARES && allows(s, result, shares[n]); n++) {
     const size_t ends = shares[n] > 0 ? 2 : 1;
     for (size_t i = 0; i < ends * count && status == QMAT_OK && !*closed; i++) {

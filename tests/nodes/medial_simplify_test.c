@@ -1015,6 +1015,34 @@ static void test_progress_function_cancels(void **state) {
   }
 }
 
+/* Refuses to go on where the points of the first repair are made. */
+typedef struct {
+  qmat_context *context;
+  bool has_measured, has_refused;
+} refusal;
+
+static bool refuse_at_repair(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                             const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total;
+  refusal *r = user;
+  r->context->progress_time = 0;
+  r->has_measured |= strcmp(unit, "facets measured") == 0;
+  r->has_refused = r->has_measured && strcmp(unit, "constraint points") == 0;
+  return !r->has_refused;
+}
+
+static void test_a_cancel_where_a_repair_starts_is_one(void **state) {
+  (void)state;
+  qmat_context context = {.progress = refuse_at_repair};
+  refusal user = {.context = &context};
+  context.progress_user = &user;
+  result r;
+  const pipeline *p = model(BOX);
+  assert_int_equal(try_simplify(&context, p, p->medial, "epsilon=1%", &r), QMAT_CANCELLED);
+  assert_true(user.has_refused);
+  qmat_context_uninit(&context);
+}
+
 /* How often a run asks whether it may go on when no time is too short, by what it is at. */
 typedef struct {
   qmat_context *context;
@@ -1140,6 +1168,7 @@ int main(void) {
       cmocka_unit_test(test_an_edge_that_is_not_needed_opens_a_loop),
       cmocka_unit_test(test_inputs_of_another_mesh_are_named),
       cmocka_unit_test(test_progress_function_cancels),
+      cmocka_unit_test(test_a_cancel_where_a_repair_starts_is_one),
       cmocka_unit_test(test_it_asks_whether_to_go_on_at_every_few_points_and_collapses),
       cmocka_unit_test(test_moving_scaling_and_shuffling_change_little),
       cmocka_unit_test(test_threads_do_not_change_a_byte),

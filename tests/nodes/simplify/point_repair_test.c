@@ -218,12 +218,43 @@ static void test_places_within_epsilon_move_nothing(void **state) {
   free_bar(&b);
 }
 
+/* Both cones are tubular features: their spheres stay, from the start or from the later stage on. */
+static void test_protected_spheres_stay(void **state) {
+  (void)state;
+  static const struct {
+    qmat_protection protect;
+    size_t late_spheres;
+    bool stays;
+  } cases[] = {{QMAT_PROTECT_ALWAYS, 0, true},
+               {QMAT_PROTECT_LATE, SPHERES, true},
+               {QMAT_PROTECT_LATE, SPHERES - 1, false},
+               {QMAT_PROTECT_OFF, SPHERES, false}};
+  uint8_t thin[POINTS];
+  memset(thin, 1, sizeof thin);
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    bar b;
+    make_bar(&b, above, low);
+    b.constraints.sample_point_count = POINTS;
+    b.run.rules.thin = thin;
+    b.run.rules.protect = cases[i].protect;
+    b.run.rules.late_spheres = cases[i].late_spheres;
+    if (cases[i].stays) {
+      check_nothing_moves(&b);
+    } else {
+      assert_int_equal(qmat_decimation_repair(&b.run), QMAT_OK);
+      assert_true(b.run.moves > 0);
+    }
+    free_bar(&b);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_sphere_moves_until_the_place_is_within_epsilon),
       cmocka_unit_test(test_a_place_out_of_reach_moves_nothing_and_is_given_up),
       cmocka_unit_test(test_a_place_near_failed_ones_is_passed_over),
       cmocka_unit_test(test_places_within_epsilon_move_nothing),
+      cmocka_unit_test(test_protected_spheres_stay),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
