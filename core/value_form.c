@@ -350,14 +350,26 @@ static qmat_status read_items(qmat_context *context, reader *from, qmat_value *v
   return QMAT_OK;
 }
 
+/* The number of texts up to the end; the last one may be cut short. */
+static size_t count_texts(reader from) {
+  size_t count = 0;
+  for (uint64_t size; take_number(&from, 4, &size); count++) take(&from, size);
+  return count;
+}
+
 static qmat_status read_names(qmat_context *context, reader *from, qmat_value *value, const qmat_value_row *row) {
-  const size_t count = qmat_row_count(value, row);
+  const size_t count = count_texts(*from);
+  size_t *shared = mutable_slot(value, row->count_offset);
+  if (shares_count(qmat_value_rows(value), row) && *shared != count)
+    return fail_form(context, from, "there are not as many names as items");
+  if (count == 0) return QMAT_OK;
   char **names = qmat_calloc(count, sizeof *names);
   if (!names) return qmat_fail_memory(context, "the names of a list");
   set_pointer(value, row, names);
+  *shared = count;
   for (size_t i = 0; i < count; i++) {
     uint64_t size;
-    if (!take_number(from, 4, &size)) return fail_form(context, from, "there are fewer names than items");
+    if (!take_number(from, 4, &size)) return fail_form(context, from, "a name is cut short");
     const qmat_status status = take_string(context, from, size, &names[i]);
     if (status != QMAT_OK) return status;
   }

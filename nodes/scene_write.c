@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/geometry/joint_weights.h"
+#include "core/json_text.h"
 #include "core/node.h"
 #include "core/text.h"
 #include "io/gltf/gltf_colliders.h"
@@ -138,6 +139,10 @@ static qmat_gltf_addition addition_of(qmat_context *context, const scene_write_p
 
 static bool is_usd(const scene_write_params *params) {
   return params->format >= FORMAT_USDA && params->format <= FORMAT_USDZ;
+}
+
+static bool holds_no_scene(const scene_write_params *params) {
+  return params->format >= FORMAT_URDF || params->format == FORMAT_MA || params->format == FORMAT_PLY;
 }
 
 /* Whether the scene itself is written, with its own meshes: a glTF scene as glTF, or a USD scene as USD. */
@@ -301,7 +306,7 @@ static qmat_status write_robot(qmat_context *context, const scene_write_params *
                             scene ? scene->name : NULL, scene ? scene->meters_per_unit : 0, file);
   qmat_fail(context, QMAT_ERROR_USAGE, "urdf, xml and yaml hold colliders, and there are none");
   qmat_fail_field(context, "colliders");
-  return qmat_fail_hint(context, "connect medial.colliders, as in colliders.yaml");
+  return qmat_fail_hint(context, "qmat mat: --colliders; in a graph: connect medial.colliders, as in colliders.yaml");
 }
 
 /* Writes what the file states of one medial mesh into a report; nothing where no errors are known. */
@@ -360,9 +365,8 @@ static qmat_status check_counts(qmat_context *context, const void *data, const s
   static const int others[] = {IN_SKIN, IN_REPORT, IN_COLLIDERS};
   static const char *const names[] = {"skin", "report", "colliders"};
   const scene_write_params *params = data;
-  const bool is_scene = params->format < FORMAT_URDF && params->format != FORMAT_MA && params->format != FORMAT_PLY;
   const size_t count = counts[IN_MEDIAL];
-  if (!is_scene && count > 1) return fail_several(context, count);
+  if (holds_no_scene(params) && count > 1) return fail_several(context, count);
   for (size_t i = 0; i < 3; i++) {
     const size_t of_other = counts[others[i]];
     if (of_other == 0 || of_other == count) continue;
@@ -420,6 +424,26 @@ static qmat_status check_certified(qmat_context *context, const qmat_value *give
   return QMAT_OK;
 }
 
+static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc", "usdz", "urdf", "xml", "yaml", NULL};
+
+/* Scales that differ by less come from rounding. */
+static const double same_scale = 1e-6;
+
+/* Warns where a file without a scene has the coordinates of one of its meshes, whose nodes scale it. */
+static qmat_status warn_of_own_units(qmat_context *context, const scene_write_params *params, const qmat_scene *scene,
+                                     const qmat_stated_errors *stated, json_t *report) {
+  const bool is_alone = holds_no_scene(params) || (is_usd(params) && !keeps_scene(params, scene));
+  if (!is_alone || !scene || scene->mesh_count == 0) return QMAT_OK;
+  const double own = stated->meters_per_unit, of_scene = scene->meters_per_unit;
+  if (!(own > 0 && of_scene > 0) || fabs(own / of_scene - 1) <= same_scale) return QMAT_OK;
+  if (qmat_json_add_warning(report,
+                            "the .%s file is in the mesh's own units of %.4g m, not in the scene's of %.4g m: a run "
+                            "that saves no glTF or USD scene, or has model.mesh=merged, uses the scene's",
+                            formats[params->format], own, of_scene))
+    return qmat_fail_memory(context, "the report");
+  return QMAT_OK;
+}
+
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const scene_write_params *params = data;
@@ -457,6 +481,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK && params->require == REQUIRE_CERTIFIED)
     status = check_certified(context, inputs[IN_MEDIAL], stated);
   if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
+  if (status == QMAT_OK)
+    status = warn_of_own_units(context, params, (const qmat_scene *)inputs[IN_SCENE], stated, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(stated);
   if (status == QMAT_OK) {
@@ -468,8 +494,6 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_value_release(report ? &report->base : NULL);
   return status;
 }
-
-static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc", "usdz", "urdf", "xml", "yaml", NULL};
 
 static const char *const requirements[] = {[REQUIRE_NOTHING] = "none", [REQUIRE_CERTIFIED] = "certified", NULL};
 
@@ -552,7 +576,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 15,
+    .version = 16,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

@@ -138,6 +138,12 @@ static bool is_missing(const char *path) {
 
 /* Several models, or one whose results go to a folder. */
 static qmat_status run_many(qmat_context *context, qmat_invocation *invocation) {
+  static const char *const of_one_model[] = {"report", "dry-run", "depfile"};
+  for (size_t i = 0; i < sizeof of_one_model / sizeof *of_one_model; i++)
+    if (qmat_invocation_value(invocation, of_one_model[i])) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' is for one model whose result is a file", of_one_model[i]);
+      return qmat_fail_hint(context, "-o FILE, and one model");
+    }
   const char *results = qmat_invocation_value(invocation, "output");
   size_t outputs = 0;
   for (size_t i = 0; i < invocation->given_count; i++) outputs += !strcmp(invocation->given[i].name, "output");

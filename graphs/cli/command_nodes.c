@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <stdio.h>
+#include <string.h>
 
 #include "graphs/cli/command.h"
 #include "graphs/node_json.h"
@@ -9,12 +10,20 @@ static void print_ports(const qmat_port *ports, size_t count) {
   if (count == 0) printf("nothing");
 }
 
+static int widest_name(const qmat_registry *registry) {
+  size_t width = 0, length;
+  for (size_t i = 0; i < registry->count; i++)
+    if ((length = strlen(registry->nodes[i]->name)) > width) width = length;
+  return (int)width;
+}
+
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const qmat_registry *registry = &invocation->registry;
   if (qmat_invocation_value(invocation, "json")) return qmat_print_json(context, qmat_registry_json(registry));
+  const int width = widest_name(registry);
   for (size_t i = 0; i < registry->count; i++) {
     const qmat_node *type = registry->nodes[i];
-    printf("%-18s%s\n%18s", type->name, type->summary, "");
+    printf("%-*s  %s\n%*s", width, type->name, type->summary, width + 2, "");
     print_ports(type->inputs, qmat_input_count(type));
     printf(" -> ");
     print_ports(type->outputs, qmat_output_count(type));

@@ -251,13 +251,52 @@ static void detach(json_t *root, json_t *body, size_t given) {
   if (children && json_array_size(children) == 0) json_object_del(body, "children");
 }
 
-/* What a body that moves has, in both forms. */
-static json_t *motion_of(const qmat_gltf_colliders *added, const double shift[3]) {
+static double number_at(const json_t *numbers, size_t i) {
+  return json_number_value(json_array_get(numbers, i));
+}
+
+/* How much a node's transform lengthens what is in it, on the average of all directions. */
+static double scale_of(const json_t *node) {
+  const json_t *m = json_object_get(node, "matrix"), *scale = json_object_get(node, "scale");
+  if (scale) return cbrt(fabs(number_at(scale, 0) * number_at(scale, 1) * number_at(scale, 2)));
+  if (!m) return 1;
+  double columns[3][3], normal[3];
+  for (size_t c = 0; c < 3; c++)
+    for (size_t r = 0; r < 3; r++) columns[c][r] = number_at(m, 4 * c + r);
+  qmat_cross(columns[1], columns[2], normal);
+  return cbrt(fabs(qmat_dot(columns[0], normal)));
+}
+
+static bool is_child(const json_t *node, size_t number) {
+  const json_t *children = json_object_get(node, "children");
+  for (size_t i = 0; i < json_array_size(children); i++)
+    if ((size_t)number_at(children, i) == number) return true;
+  return false;
+}
+
+/* Metres per unit of a node's space: by its own transform and those of the nodes above it. */
+static double meters_at(const json_t *root, size_t number) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  const size_t count = json_array_size(nodes);
+  double meters = scale_of(json_array_get(nodes, number));
+  for (size_t level = 0; level < count; level++) {
+    size_t parent = 0;
+    while (parent < count && !is_child(json_array_get(nodes, parent), number)) parent++;
+    if (parent == count) break;
+    meters *= scale_of(json_array_get(nodes, parent));
+    number = parent;
+  }
+  return meters;
+}
+
+/* What a body that moves has, in both forms. The centre is in the node's space, the moments are in kg m^2. */
+static json_t *motion_of(const qmat_gltf_colliders *added, const double shift[3], double meters) {
   const qmat_colliders *c = added->colliders;
   json_t *motion = json_object();
   if (c->body_count == 0 || !motion) return motion;
   double moments[3], q[4];
   qmat_principal_inertia(c->body, moments, q);
+  for (int k = 0; k < 3; k++) moments[k] *= meters * meters;
   const bool done =
       qmat_gltf_set(motion, "mass", json_real(c->body[0])) &&
       qmat_gltf_set(motion, "centerOfMass",
@@ -276,7 +315,7 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
   if (done) detach(root, body, added->nodes_given);
   for (int form = 0; form < 2 && done && added->dynamic; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
-    json_t *motion = motion_of(added, shift);
+    json_t *motion = motion_of(added, shift, meters_at(root, (size_t)node));
     done = motion && (form == 0 || qmat_gltf_set(motion, "type", json_string("dynamic")));
     if (done) {
       done = set_extension(body, body_extensions[form], json_pack("{s:o}", "motion", motion));

@@ -65,7 +65,7 @@ typedef struct qmat_extra_points {
 /* Makes constraint points of `extra`, each with its nearest primitive of `complex` as the witness. Points inside the
  * solid that the envelope does not contain are dropped; the others need half of their present depth, at most
  * `required_depth`. Strict ones are all kept, and need all of it. The order is that of qmat_constraint_points, without
- * samples. QMAT_ERROR_MEMORY. All threads. */
+ * samples. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_extra_points_make(qmat_context *context, const qmat_complex *complex, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints);
 

@@ -126,7 +126,10 @@ qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surfac
   if (count) qsort(cavities, count, sizeof *cavities, compare_depths);
   for (size_t i = 0; i < count; i++) {
     const qmat_status status = qmat_progress(context, i, count, "cavities");
-    if (status != QMAT_OK) return status;
+    if (status != QMAT_OK) {
+      *added = 0;
+      return status;
+    }
     const double *place = &places[3 * cavities[i].place];
     double *sphere = &spheres[4 * (before + *added)];
     if (!(cavities[i].depth > 0) || is_covered(&spheres[4 * before], *added, place)) continue;

@@ -24,8 +24,8 @@ typedef struct qmat_crease_guard {
   uint32_t *next, *previous;    /* per place: that of the next remaining feature, QMAT_NONE at an end */
 } qmat_crease_guard;
 
-/* Guards the spheres of radius zero of a complex without collapses, and the edges between two of them.
- * QMAT_ERROR_MEMORY. Cost: linear. */
+/* Guards the spheres of radius zero of a complex without collapses, and the edges between two of them. The vertices
+ * before `first` are those of sheets, and no features. QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_crease_guard_init(qmat_context *context, const qmat_complex *complex, size_t first,
                                    qmat_crease_guard *guard);
 

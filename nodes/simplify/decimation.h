@@ -4,10 +4,12 @@
 
 #include "nodes/simplify/decimation_state.h"
 
-/* Sets up the quadrics, the heap and both error trackers of a complex. The caller has made `complex` (unit frame) and
- * given context, rules and surface. The caller keeps `constraints`. A surface point whose initial distance exceeds
- * the limit has this distance as its limit. `depths`: per vertex. All memory is in the context's arena, except what
- * qmat_decimation_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
+/* Sets up the quadrics, the crease guard, the heap and both error trackers of a complex. The caller has made `complex`
+ * (unit frame) and given context, rules, surface and `sheet_vertices`; `locked` is NULL or given. Where `quadrics` are
+ * given, they and the crease guard stay as they are. The caller keeps `constraints`. A surface point whose initial
+ * distance exceeds the limit has this distance as its limit. `depths`: per vertex. All memory is in the context's
+ * arena, except what qmat_decimation_uninit frees, also after a failure. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
+ * threads. */
 qmat_status qmat_decimation_init(qmat_decimation *decimation, const qmat_constraint_points *constraints,
                                  const double *depths);
 void qmat_decimation_uninit(qmat_decimation *decimation);

@@ -10,8 +10,8 @@
 double qmat_stability_ratio(const double a[4], const double b[4]);
 
 /* Adds to the quadric of each vertex (`quadrics`, one per vertex of the complex) its medial slabs (eq. 2), the cones of
- * its edges without slabs, and its boundary: planes that keep rims and tips in place, each added once, with a hundredth
- * of a slab's weight (section 3.1.2, boundary preservation). Cost: linear. */
+ * its edges without slabs, and its boundary: planes that keep rims and tips in place, each added once, with a small
+ * part of a slab's weight (section 3.1.2, boundary preservation). Cost: linear. */
 void qmat_medial_quadrics_add(const qmat_complex *complex, qmat_quadric *quadrics);
 
 /* The same for compat=qmat, as in the public Q-MAT code: the same slabs, and its fourth method of boundary

@@ -42,8 +42,8 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
 /* Moves and resizes the spheres so that the largest error over the targets becomes small: least squares with weights
  * that rise with the error from step to step. `again` starts with the high weights of the end of the last run. `*error`
  * is the largest error, no more than before; above `threshold` where a target's condition fails, INFINITY where the
- * collapse leaves a sphere alone. Ends early where the error stays large. One thread. Cost: nine passes over the
- * targets and their primitives, and as many linear systems in all coordinates. */
+ * collapse leaves a sphere alone. Ends early where the error stays large. One thread. Cost: at most QMAT_FIT_STEPS
+ * linear systems in all coordinates, and one pass more over the targets and their primitives. */
 void qmat_neighbourhood_fit_run(qmat_neighbourhood_fit *fit, const qmat_complex *complex, bool again, double *error);
 
 #endif

@@ -305,7 +305,7 @@ static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *
   qmat_status status = QMAT_OK;
   if (best->figures.filled > 0) status = append_inner(s->context, found->uncovered, found->uncovered_count, &extra);
   bool ended = false, is_taken = false;
-  for (int i = 0; i < QMAT_MOST_JOINT_REFITS && status == QMAT_OK && !ended && !is_taken; i++) {
+  for (int i = 0; i < QMAT_MOST_REFIT_TRIES && status == QMAT_OK && !ended && !is_taken; i++) {
     qmat_simplified a = {.figures = best->figures, .fault = INFINITY};
     qmat_medial_errors errors = {.surface_to_envelope = 0};
     s->newest = base;
@@ -333,8 +333,7 @@ static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *
 static qmat_status refit_jointly(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best) {
   qmat_status status = QMAT_OK;
   bool fewer = true;
-  for (int i = 0; i < QMAT_MOST_REFIT_REPEATS && fewer && status == QMAT_OK; i++)
-    status = refit_once(s, found, best, &fewer);
+  for (int i = 0; i < QMAT_MOST_REFITS && fewer && status == QMAT_OK; i++) status = refit_once(s, found, best, &fewer);
   return status;
 }
 

@@ -22,11 +22,11 @@ typedef struct qmat_simplification {
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
   qmat_decimation dense;              /* the start of each round */
-  /* Of the newest round, of the round that it continues, and of a repair. */
+  /* Three places: for the newest round or its newest repair, for what that round continues, and a free one. */
   qmat_constraint_points round_constraints[3];
   qmat_decimation rounds[3];
   qmat_arena round_memory[3];
-  int newest, base;        /* numbers of the first two */
+  int newest, base;        /* the places of the first two */
   double share;            /* of the error: what rounds use */
   qmat_copy_depths depths; /* of the copies of rounds */
 } qmat_simplification;

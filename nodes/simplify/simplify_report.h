@@ -11,7 +11,7 @@ typedef struct qmat_simplify_figures {
   size_t features;       /* sharp ones that are left */
   size_t wanted_spheres; /* 0: no such number */
   double crease_error, surface_to_envelope, envelope_to_surface;
-  bool in_order;    /* then only the next member applies, else only those after it */
+  bool in_order;    /* then `threshold` applies, else rounds, filled, moves and divided */
   double threshold; /* of the last collapse */
   size_t rounds, filled, moves;
   size_t divided; /* spheres that divide walls and edges, so that part of them could be removed */

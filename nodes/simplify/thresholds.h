@@ -2,8 +2,10 @@
 #ifndef QMAT_NODES_SIMPLIFY_THRESHOLDS_H
 #define QMAT_NODES_SIMPLIFY_THRESHOLDS_H
 
-/* The thresholds of medial.simplify, in one table. "Derived" ones follow from another number; the others were measured
- * on the models of the ablation table (README.md). Steps within a solver are constants of its file. */
+/* The thresholds of medial.simplify that several files or passes share, in one table. "Derived" ones follow from
+ * another number; the others were measured on the models of the ablation table (README.md). Steps within a solver, a
+ * search or a repair are constants of its file. Chains and nodes share qmat_constraint_share (collapse_chain.h): the
+ * share of epsilon that constraint points may use. */
 
 /* ---- shares of epsilon ---- */
 
@@ -27,7 +29,8 @@ static const double qmat_late_round_share = 0.9;
  * this share of the error. */
 static const double qmat_hovering_share = 0.99;
 
-/* Found points inside the solid must be as deep in the envelope as this share. */
+/* Found points inside the solid need half of their present depth in the envelope, at most this share. Those that a
+ * repair has to reach need all of it. */
 static const double qmat_required_depth_share = 0.05;
 
 /* ---- repetitions: but for damaged models no limit was reached on a model that ended within epsilon ---- */
@@ -36,8 +39,8 @@ enum {
   QMAT_MOST_ROUNDS = 8,        /* of collapses, each with the points found in the one before */
   QMAT_DENSE_AGAIN_ROUND = 3,  /* the first round before which the dense collapse starts over */
   QMAT_MOST_REPAIRS = 4,       /* of a round, each with the points found after the one before */
-  QMAT_MOST_JOINT_REFITS = 6,  /* the same for joint refits */
-  QMAT_MOST_REFIT_REPEATS = 4, /* of joint refits that succeed */
+  QMAT_MOST_REFIT_TRIES = 6,   /* of one joint refit, each with the points found in the one before */
+  QMAT_MOST_REFITS = 4,        /* joint refits after each other, while each removes spheres */
   QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
   QMAT_MOST_WALLS = 12,        /* tried per void; of edges, per loop */
   QMAT_MOST_FITS = 6,          /* of a neighbourhood, each with the newest failure as a target */

@@ -32,6 +32,33 @@ static qmat_scene *scene_example(void) {
   return scene;
 }
 
+static char **names_of(size_t count, const char *const *texts) {
+  char **names = qmat_calloc(count, sizeof *names);
+  assert_non_null(names);
+  for (size_t i = 0; i < count; i++) names[i] = qmat_strdup(texts[i]);
+  return names;
+}
+
+/* A skeleton of two joints, to which a placed mesh is bound. */
+static qmat_scene *rigged_scene_example(void) {
+  qmat_scene *scene = scene_example();
+  scene->mesh_count = scene->placement_count = 1;
+  ASSIGN(scene->meshes, (uint32_t[]){0});
+  ASSIGN(scene->placed, (uint32_t[]){0});
+  ASSIGN(scene->placements, (double[]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1});
+  scene->placement_paths = names_of(1, (const char *const[]){"/Root/Mesh"});
+  qmat_rig *rig = &scene->rig;
+  rig->skeleton_count = 1;
+  rig->skeleton_paths = names_of(1, (const char *const[]){"/Root/Skeleton"});
+  ASSIGN(rig->skeleton_placements, (double[]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+  rig->joint_count = 2;
+  ASSIGN(rig->joint_skeletons, (uint32_t[]){0, 0});
+  ASSIGN(rig->joint_parents, (uint32_t[]){UINT32_MAX, 0});
+  rig->joint_names = names_of(2, (const char *const[]){"hip", ""});
+  ASSIGN(rig->joint_poses, (double[]){0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 2, 0, 0, 0, 0, 1, 1, 1, 1});
+  return scene;
+}
+
 /* A tetrahedron. */
 static qmat_mesh *mesh_example(void) {
   qmat_mesh *mesh = qmat_mesh_new();
@@ -352,6 +379,35 @@ static void test_every_type_is_read_back_to_the_same_bytes_and_digest(void **sta
     qmat_value_release(value);
     qmat_value_release(again);
   }
+}
+
+static void test_a_rig_comes_back_with_all_names(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_scene *scene = rigged_scene_example();
+  uint8_t *bytes;
+  size_t size;
+  qmat_value *value;
+  assert_sealed(&context, &scene->base);
+  assert_int_equal(qmat_value_serialize(&context, &scene->base, &bytes, &size), QMAT_OK);
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &value), QMAT_OK);
+  const qmat_scene *again = (const qmat_scene *)value;
+  assert_memory_equal(&value->digest, &scene->base.digest, sizeof value->digest);
+  assert_string_equal(again->placement_paths[0], "/Root/Mesh");
+  assert_int_equal(again->rig.skeleton_count, 1);
+  assert_string_equal(again->rig.skeleton_paths[0], "/Root/Skeleton");
+  assert_int_equal(again->rig.joint_count, 2);
+  assert_string_equal(again->rig.joint_names[0], "hip");
+  assert_string_equal(again->rig.joint_names[1], "");
+  qmat_value_release(value);
+  /* Names that are not as many as what they name. */
+  for (size_t i = 0; i + 3 < size; i++)
+    if (memcmp(&bytes[i], "hip", 3) == 0) bytes[i - 4] = 7; /* reaches to the end */
+  assert_int_equal(qmat_value_deserialize(&context, bytes, size, &known_items, &value), QMAT_ERROR_FORMAT);
+  assert_string_equal(context.error.message, "this is not a serialised value: there are not as many names as items");
+  qmat_free(bytes);
+  qmat_value_release(&scene->base);
+  qmat_context_uninit(&context);
 }
 
 static void test_the_content_comes_back_field_by_field(void **state) {
@@ -1234,6 +1290,7 @@ int main(void) {
       cmocka_unit_test(test_half_filled_values_are_released_whole),
       cmocka_unit_test(test_bytes_count_what_the_arrays_hold),
       cmocka_unit_test(test_every_type_is_read_back_to_the_same_bytes_and_digest),
+      cmocka_unit_test(test_a_rig_comes_back_with_all_names),
       cmocka_unit_test(test_the_content_comes_back_field_by_field),
       cmocka_unit_test(test_the_serialised_form_is_as_described),
       cmocka_unit_test(test_long_arrays_come_back_whole),

@@ -55,7 +55,9 @@ typedef struct wiring {
   const qmat_report *report;
 } wiring;
 
-static qmat_file *must_write(const qmat_medial *medial, wiring with, const char *const settings[][2]) {
+/* `report`: gets the report, which the caller releases; NULL: nobody wants it. */
+static qmat_file *must_write_with_report(const qmat_medial *medial, wiring with, const char *const settings[][2],
+                                         qmat_report **report) {
   const qmat_node *node = qmat_node_find("scene.write");
   assert_non_null(node);
   const qmat_value *inputs[5] = {NULL};
@@ -71,10 +73,17 @@ static qmat_file *must_write(const qmat_medial *medial, wiring with, const char 
   assert_int_equal(outputs[0]->type, QMAT_FILE);
   assert_true(outputs[0]->sealed);
   assert_int_equal(outputs[1]->type, QMAT_REPORT);
-  qmat_value_release(outputs[1]);
+  if (report)
+    *report = (qmat_report *)outputs[1];
+  else
+    qmat_value_release(outputs[1]);
   free(params);
   qmat_context_uninit(&context);
   return (qmat_file *)outputs[0];
+}
+
+static qmat_file *must_write(const qmat_medial *medial, wiring with, const char *const settings[][2]) {
+  return must_write_with_report(medial, with, settings, NULL);
 }
 
 /* The JSON of a .glb. */
@@ -354,6 +363,40 @@ static void test_ma_keeps_every_number(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* A centimetre mesh of a metre scene that was read mesh by mesh. */
+static void test_a_file_in_the_units_of_a_mesh_says_so(void **state) {
+  (void)state;
+  static const struct {
+    const char *format;
+    size_t mesh_count;
+    double meters_per_unit;
+    bool warns;
+  } cases[] = {{"ma", 1, 0.01, true},   {"ply", 1, 0.01, true}, {"usda", 1, 0.01, true},
+               {"glb", 1, 0.01, false}, {"ma", 0, 0.01, false}, {"ma", 1, 1, false}};
+  qmat_medial *medial = make_medial();
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    qmat_context context = {0};
+    qmat_scene *scene = qmat_scene_new();
+    assert_non_null(scene);
+    scene->name = qmat_strdup("duck");
+    scene->format = qmat_strdup("glb");
+    scene->meters_per_unit = 1;
+    scene->mesh_count = cases[i].mesh_count;
+    if (scene->mesh_count > 0) scene->meshes = qmat_calloc(1, sizeof *scene->meshes);
+    assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
+    qmat_report *given = make_report(json_pack("{s:f}", "meters_per_unit", cases[i].meters_per_unit)), *report;
+    const char *const settings[][2] = {{"format", cases[i].format}, {NULL, NULL}};
+    qmat_file *file = must_write_with_report(medial, (wiring){.scene = scene, .report = given}, settings, &report);
+    assert_int_equal(json_array_size(json_object_get(report->root, "warnings")), cases[i].warns);
+    qmat_value_release(&file->base);
+    qmat_value_release(&report->base);
+    qmat_value_release(&given->base);
+    qmat_value_release(&scene->base);
+    qmat_context_uninit(&context);
+  }
+  qmat_value_release(&medial->base);
+}
+
 /* `mat -o x.glb -o x.ma --set asset.draco=true` makes both files with the same parameters. */
 static void test_compression_does_not_apply_to_formats_that_have_none(void **state) {
   (void)state;
@@ -456,6 +499,7 @@ int main(void) {
       cmocka_unit_test(test_a_skins_vertices_have_the_colour_of_their_kind),
       cmocka_unit_test(test_each_format_is_made),
       cmocka_unit_test(test_ma_keeps_every_number),
+      cmocka_unit_test(test_a_file_in_the_units_of_a_mesh_says_so),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
       cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),
       cmocka_unit_test(test_what_is_not_certified_fails_where_that_is_required),

@@ -168,6 +168,35 @@ static void test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_n
   qmat_writer_uninit(&data);
 }
 
+/* The moments are in kg m^2, whatever scales the node. */
+static void test_moments_follow_the_scales_above_a_body(void **state) {
+  (void)state;
+  static const char *const extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+  double moments[2][2];
+  for (int scaled = 0; scaled < 2; scaled++) {
+    qmat_writer data = {0};
+    json_t *given =
+        json_loads(scaled ? "{\"nodes\": [{\"scale\": [3, 3, 3]}, {\"children\": [0], \"scale\": [1, 1, -0.125]},"
+                            " {\"children\": [1], \"matrix\": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]}]}"
+                          : "{\"nodes\": [{}]}",
+                   0, NULL);
+    json_t *root = write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, given, &data);
+    for (int form = 0; form < 2; form++) {
+      const json_t *motion = json_object_get(
+          json_object_get(json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions"),
+                          extensions[form]),
+          "motion");
+      assert_near(at(motion, "mass"), 2, 0);
+      moments[scaled][form] = json_number_value(json_array_get(json_object_get(motion, "inertiaDiagonal"), 0));
+    }
+    json_decref(root);
+    qmat_writer_uninit(&data);
+  }
+  for (int form = 0; form < 2; form++) /* 3 * 0.5 * 2 = 3 */
+    assert_near(moments[1][form], 9 * moments[0][form], 1e-12 * moments[1][form]);
+  assert_true(moments[0][0] > 0);
+}
+
 static void test_omi_has_convex_meshes_where_radii_differ(void **state) {
   (void)state;
   qmat_writer data = {0};
@@ -263,6 +292,7 @@ int main(void) {
       cmocka_unit_test(test_a_capsules_frame_turns_y_to_its_axis),
       cmocka_unit_test(test_principal_moments_and_axes_make_the_tensor),
       cmocka_unit_test(test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_nodes),
+      cmocka_unit_test(test_moments_follow_the_scales_above_a_body),
       cmocka_unit_test(test_omi_has_convex_meshes_where_radii_differ),
       cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),
       cmocka_unit_test(test_robot_files_have_shapes_in_metres_and_mass),
