@@ -148,7 +148,7 @@ const qmat_node qmat_node_medial_erosion_thickness = {
         "it is seen from its tip, and a sheet of the shape as much as it is wider than thick.\n\n"
         "What encloses a void or a loop never burns; it has the diagonal, or the largest thickness if that is larger. "
         "Pruning removes the thinnest parts first and keeps components, loops and voids. Sheets of the model stay. "
-        "Samples of removed spheres are nobody's.",
+        "Samples of removed spheres then belong to no sphere.",
     .citation = "Yan, Sykes, Chambers, Letscher, Ju: Erosion thickness on medial axes of 3D shapes, 2016 (section 2)",
     .params_size = sizeof(medial_erosion_thickness_params),
     .params = params,

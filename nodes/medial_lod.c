@@ -45,7 +45,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
 
 static const qmat_param params[] = {
     QMAT_INT(medial_lod_params, vertices, "spheres", 0, 0, 4294967294.0,
-             "The least number of medial spheres; 0: any number"),
+             "Collapses stop at this number of medial spheres; 0: never"),
     QMAT_LENGTH(medial_lod_params, epsilon, 0.01, 0, 1,
                 "The largest distance between surface and envelope; 0: no bound"),
     {0},

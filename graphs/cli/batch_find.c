@@ -21,6 +21,7 @@ typedef struct finder {
   const char *results; /* the folder of the results, in which no model is looked for */
   char root[4096];     /* the deepest folder that all arguments share: "" or ends in '/' */
   bool rooted;
+  size_t found; /* models, those that are found again too */
 } finder;
 
 static const char *without_dots(const char *path) {
@@ -44,6 +45,7 @@ static void share_root(finder *f, const char *path, size_t length) {
 
 static qmat_status add_model(finder *f, const char *path) {
   qmat_batch *batch = f->batch;
+  f->found++;
   for (size_t i = 0; i < batch->count; i++)
     if (strcmp(batch->assets[i].input, path) == 0) return QMAT_OK;
   char *input = qmat_strdup(path);
@@ -111,7 +113,7 @@ static qmat_status add_matches(finder *f, const char *folder, const char *rest, 
 /* Adds what an argument names: the matches of a pattern, the models in a folder, or a file. */
 static qmat_status add_argument(finder *f, const char *argument) {
   struct stat about;
-  const size_t before = f->batch->count;
+  const size_t before = f->found;
   char folder[4096];
   if (stat(argument, &about) != 0 && strpbrk(argument, "*?[")) {
     size_t length = strcspn(argument, "*?[");
@@ -120,7 +122,7 @@ static qmat_status add_argument(finder *f, const char *argument) {
     snprintf(folder, sizeof folder, "%.*s", (int)length, argument);
     share_root(f, folder, length);
     const qmat_status status = add_matches(f, folder, argument + length, 0);
-    if (status != QMAT_OK || f->batch->count > before) return status;
+    if (status != QMAT_OK || f->found > before) return status;
     return qmat_fail(f->context, QMAT_ERROR_USAGE, "no file matches '%s'", argument);
   }
   if (stat(argument, &about) != 0 || !S_ISDIR(about.st_mode)) {
@@ -133,7 +135,7 @@ static qmat_status add_argument(finder *f, const char *argument) {
   if (strcmp(without_dots(folder), "") == 0) folder[0] = 0;
   share_root(f, folder, strlen(folder));
   const qmat_status status = add_matches(f, folder, NULL, 0);
-  if (status != QMAT_OK || f->batch->count > before) return status;
+  if (status != QMAT_OK || f->found > before) return status;
   qmat_fail(f->context, QMAT_ERROR_USAGE, "there are no models in this folder");
   return qmat_fail_at(f->context, argument, 0, 0);
 }

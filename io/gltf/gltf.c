@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf/gltf.h"
 
+#include <string.h>
+
 #include "core/arena.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_check.h"
@@ -32,13 +34,24 @@ static qmat_status add_to_soup(void *user, size_t which, const double *positions
   return status;
 }
 
-/* Adds the warnings of the document to those of the report. */
-static bool add_warnings(const qmat_gltf_counts *counts, json_t *warnings, json_t *report) {
+static bool ignores(const qmat_gltf_document *document, const char *extension) {
+  for (size_t i = 0; i < json_array_size(document->extensions_ignored); i++)
+    if (strcmp(json_string_value(json_array_get(document->extensions_ignored, i)), extension) == 0) return true;
+  return false;
+}
+
+/* Adds the warnings of the document to those of the report. `placed`: the meshes are where their nodes place them. */
+static bool add_warnings(const qmat_gltf_counts *counts, bool placed, const qmat_gltf_document *document,
+                         json_t *report) {
+  json_t *warnings = document->warnings;
   bool done = true;
+  if (placed && ignores(document, "EXT_mesh_gpu_instancing"))
+    done = json_array_append_new(
+               warnings, json_string("EXT_mesh_gpu_instancing is not read: each of its meshes is in one place")) == 0;
   if (counts->primitives_skipped > 0) {
     json_t *text = json_sprintf("%zu of %zu primitives are passed over: points, lines, or without positions",
                                 counts->primitives_skipped, counts->primitives_skipped + counts->primitives_read);
-    done = json_array_append_new(warnings, text) == 0;
+    done = json_array_append_new(warnings, text) == 0 && done;
   }
   if (!done || json_array_size(warnings) == 0) return done;
   json_t *all = json_object_get(report, "warnings");
@@ -48,7 +61,7 @@ static bool add_warnings(const qmat_gltf_counts *counts, json_t *warnings, json_
 static qmat_status add_report(qmat_context *context, const qmat_gltf_counts *counts, bool placed,
                               const qmat_gltf_document *document, json_t *report) {
   if (!report) return QMAT_OK;
-  if (!add_warnings(counts, document->warnings, report)) return qmat_fail_memory(context, "a report");
+  if (!add_warnings(counts, placed, document, report)) return qmat_fail_memory(context, "a report");
   if (json_object_set_new(report, "primitives_read", json_integer((json_int_t)counts->primitives_read)) != 0 ||
       json_object_set_new(report, "primitives_skipped", json_integer((json_int_t)counts->primitives_skipped)) != 0 ||
       json_object_set(report, "extensions_ignored", document->extensions_ignored) != 0) {

@@ -623,6 +623,10 @@ static void test_unknown_extensions_that_are_not_required_are_reported(void **st
   json_t *ignored = json_object_get(r.report, "extensions_ignored");
   assert_int_equal(json_array_size(ignored), 1);
   assert_string_equal(json_string_value(json_array_get(ignored, 0)), "EXT_mesh_gpu_instancing");
+  const json_t *warnings = json_object_get(r.report, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_string_equal(json_string_value(json_array_get(warnings, 0)),
+                      "EXT_mesh_gpu_instancing is not read: each of its meshes is in one place");
   done(&r);
   free(json);
 }
