@@ -951,6 +951,11 @@ static void test_an_edge_that_is_not_needed_opens_a_loop(void **state) {
   assert_int_equal(guarded.medial->edge_count, 3);
   assert_int_equal(pipeline_count(guarded.report, "loops"), 0);
   check_errors(p, &guarded, 0.08, true);
+  /* Not where all of them are tubular features that have to stay. */
+  result kept = simplify_medial(p, ring, "epsilon=8% vertices=4 protect=always theta=10");
+  assert_int_equal(kept.medial->edge_count, 4);
+  assert_int_equal(pipeline_count(kept.report, "loops"), 1);
+  release(&kept);
   release(&any);
   release(&guarded);
   qmat_value_release(&ring->base);
