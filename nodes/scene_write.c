@@ -444,6 +444,19 @@ static qmat_status warn_of_own_units(qmat_context *context, const scene_write_pa
   return QMAT_OK;
 }
 
+/* Warns where a layer over a USD scene leaves colliders out. */
+static qmat_status warn_of_lost_colliders(qmat_context *context, const scene_write_params *params,
+                                          const qmat_value *const inputs[], json_t *report) {
+  if (!inputs[IN_COLLIDERS] || !is_usd(params) || !keeps_scene(params, (const qmat_scene *)inputs[IN_SCENE]))
+    return QMAT_OK;
+  if (qmat_json_add_warning(report,
+                            "the .%s file, a layer over the scene, holds no colliders: save them as glTF, or use "
+                            "model.mesh=merged",
+                            formats[params->format]))
+    return qmat_fail_memory(context, "the report");
+  return QMAT_OK;
+}
+
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const scene_write_params *params = data;
@@ -483,6 +496,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
   if (status == QMAT_OK)
     status = warn_of_own_units(context, params, (const qmat_scene *)inputs[IN_SCENE], stated, report->root);
+  if (status == QMAT_OK) status = warn_of_lost_colliders(context, params, inputs, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(stated);
   if (status == QMAT_OK) {
@@ -576,7 +590,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 16,
+    .version = 17,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

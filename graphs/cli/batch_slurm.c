@@ -127,6 +127,10 @@ static bool collect(qmat_asset *asset, size_t index, const char *folder) {
   return true;
 }
 
+/* The job has ended when squeue has not named it so many times in turn. On a shared folder, files may appear after the
+ * job has ended, and a busy controller may not answer. */
+enum { PATIENCE = 10 };
+
 qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int jobs, int threads, const char *folder,
                                  bool (*stop)(void), qmat_batch_observer *observer, void *user) {
   char job[64], path[4200];
@@ -136,8 +140,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     status = qmat_fail_hint(context, "without --engine slurm the batch runs on this machine");
   }
   size_t left = status == QMAT_OK ? batch->count : 0;
-  /* On a shared folder, files may appear after the job has ended. */
-  for (int patience = 10; left > 0 && patience > 0;) {
+  for (int patience = PATIENCE; left > 0 && patience > 0;) {
     if (stop()) {
       cancel(job);
       status = qmat_fail(context, QMAT_CANCELLED, "cancelled");
@@ -151,7 +154,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
       left--;
       observer(user, batch, asset);
     }
-    if (!alive) patience--;
+    patience = alive ? PATIENCE : patience - 1;
   }
   for (size_t i = 0; i < batch->count && status == QMAT_OK; i++) {
     qmat_asset *asset = &batch->assets[i];

@@ -43,14 +43,26 @@ qmat_status qmat_json_to_file(qmat_context *context, const json_t *json, size_t 
   return qmat_writer_to_file(context, &writer, "json", file);
 }
 
+/* Refuses an output that would overwrite a file that the run has read, such as a texture or a layer of the model. Only
+ * the run has found these. */
+static qmat_status check_not_read(qmat_context *context, const qmat_run *run, const char *path) {
+  for (size_t i = 0; i < run->hashed_count; i++)
+    if (run->hashed[i].readable && qmat_same_file(path, run->hashed[i].path))
+      return qmat_fail(context, QMAT_ERROR_USAGE, "the output '%s' would overwrite a file that the model refers to",
+                       path);
+  return QMAT_OK;
+}
+
 /* Makes the file of an output. Names its side files, and refuses those that would replace a file of something else. */
 static qmat_status make_file(qmat_context *context, const qmat_run *run, qmat_run_file *file) {
   const qmat_value *value = run->slots[file->slot].value;
+  qmat_status status = check_not_read(context, run, file->path);
+  if (status != QMAT_OK) return status;
   if (file->written) qmat_value_release(&file->written->base);
   file->written = NULL;
   if (qmat_value_item_type(value) == QMAT_REPORT) {
     json_t *root = qmat_report_json(value);
-    qmat_status status = qmat_json_to_file(context, root, JSON_INDENT(2) | JSON_SORT_KEYS, &file->written);
+    status = qmat_json_to_file(context, root, JSON_INDENT(2) | JSON_SORT_KEYS, &file->written);
     json_decref(root);
     return status;
   }
@@ -58,7 +70,7 @@ static qmat_status make_file(qmat_context *context, const qmat_run *run, qmat_ru
     return qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' has %zu files, one per mesh, but a single path",
                      run->graph->outputs[file->output].name, qmat_value_count(value));
   }
-  qmat_status status = qmat_file_name_sides(context, (const qmat_file *)value, file->path, &file->written);
+  status = qmat_file_name_sides(context, (const qmat_file *)value, file->path, &file->written);
   for (size_t i = 1; status == QMAT_OK && i < file->written->part_count; i++)
     status = check_side_part(context, run, file->path, file->written->parts[i].name);
   return status == QMAT_OK ? qmat_file_check_sides(context, file->written, file->path) : status;

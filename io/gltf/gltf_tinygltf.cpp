@@ -464,7 +464,7 @@ class Reader {
     for (size_t v = 0; v < vertices; v++) {
       for (size_t i = 0; i < joints.size(); i++) {
         const size_t from = 4 * (i / 4 * vertices + v) + i % 4;
-        const bool exists = shape.joints[from] < static_cast<double>(joint_count);
+        const bool exists = shape.joints[from] >= 0 && shape.joints[from] < static_cast<double>(joint_count);
         joints[i] = exists ? static_cast<uint32_t>(shape.joints[from]) : 0;
         weights[i] = exists ? shape.weights[from] : 0;
       }
@@ -480,7 +480,7 @@ class Reader {
       for (size_t s = 0; s < shape.sets; s++) {
         for (size_t k = 4 * (s * vertices + i); k < 4 * (s * vertices + i) + 4; k++) {
           if (shape.weights[k] == 0) continue;
-          if (shape.joints[k] >= static_cast<double>(matrices.size())) {
+          if (!(shape.joints[k] >= 0 && shape.joints[k] < static_cast<double>(matrices.size()))) {
             qmat_fail(context_, QMAT_ERROR_FORMAT, "vertex %zu of the mesh uses joint %.0f, but the joint count is %zu",
                       i, shape.joints[k], matrices.size());
             fail("skin", skin_id);

@@ -51,7 +51,9 @@ qmat_status qmat_boundary_features_init(qmat_context *context, const qmat_medial
   for (size_t t = 0; t < f->triangle_count; t++) {
     const uint32_t *row = &f->triangles[3 * t];
     for (size_t k = 0; k < 3; k++) { /* side k lies opposite to corner k; corners are in rising order */
-      sides[3 * t + k] = find_edge(f, row[k == 0], row[k == 2 ? 1 : 2]);
+      const size_t side = sides[3 * t + k] = find_edge(f, row[k == 0], row[k == 2 ? 1 : 2]);
+      if (side == f->edge_count || f->edges[2 * side] != row[k == 0] || f->edges[2 * side + 1] != row[k == 2 ? 1 : 2])
+        return qmat_fail(context, QMAT_ERROR_INTERNAL, "a side of medial slab %zu is no edge", t);
       f->apex_offsets[sides[3 * t + k] + 2]++;
     }
   }

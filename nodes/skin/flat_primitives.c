@@ -27,27 +27,32 @@ static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
   return low;
 }
 
+/* The slabs that an edge is a side of. */
+enum { FLAT_SLAB = 1, SOLID_SLAB = 2 };
+
 qmat_status qmat_flat_primitives_separate(qmat_context *context, const qmat_medial *medial, qmat_medial *solid,
                                           qmat_medial *flat) {
   qmat_arena *arena = &context->arena;
-  uint8_t *has_slab = qmat_arena_calloc(arena, medial->edge_count, 1);
+  uint8_t *slabs = qmat_arena_calloc(arena, medial->edge_count, 1);
   qmat_medial *const parts[2] = {solid, flat};
   for (int i = 0; i < 2; i++) {
     *parts[i] = (qmat_medial){.sphere_count = medial->sphere_count, .spheres = medial->spheres};
     parts[i]->edges = qmat_arena_alloc(arena, medial->edge_count, 2 * sizeof(uint32_t));
     parts[i]->triangles = qmat_arena_alloc(arena, medial->triangle_count, 3 * sizeof(uint32_t));
-    if (!has_slab || !parts[i]->edges || !parts[i]->triangles) return qmat_fail_memory(context, "medial slabs");
+    if (!slabs || !parts[i]->edges || !parts[i]->triangles) return qmat_fail_memory(context, "medial slabs");
   }
   for (size_t t = 0; t < medial->triangle_count; t++) {
     const uint32_t *row = &medial->triangles[3 * t];
-    qmat_medial *part = parts[is_flat(medial, row, 3)];
+    const bool is_thin = is_flat(medial, row, 3);
+    qmat_medial *part = parts[is_thin];
     memcpy(&part->triangles[3 * part->triangle_count++], row, 3 * sizeof *row);
-    for (size_t k = 0; k < 3; k++) has_slab[find_edge(medial, row[k == 2], row[k == 0 ? 1 : 2])] = 1;
+    for (size_t k = 0; k < 3; k++)
+      slabs[find_edge(medial, row[k == 2], row[k == 0 ? 1 : 2])] |= is_thin ? FLAT_SLAB : SOLID_SLAB;
   }
   for (size_t e = 0; e < medial->edge_count; e++) {
     const uint32_t *row = &medial->edges[2 * e];
-    const bool is_line = is_flat(medial, row, 2);
-    if (is_line && has_slab[e]) continue;
+    const bool is_line = is_flat(medial, row, 2) && !(slabs[e] & SOLID_SLAB);
+    if (is_line && slabs[e]) continue;
     memcpy(&parts[is_line]->edges[2 * parts[is_line]->edge_count++], row, 2 * sizeof *row);
   }
   return QMAT_OK;

@@ -12,6 +12,8 @@
 #include "core/geometry/surface.h"
 #include "core/hash.h"
 #include "core/node.h"
+#include "nodes/measure/boundary_features.h"
+#include "nodes/skin/flat_primitives.h"
 #include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
@@ -727,6 +729,29 @@ static void test_errors_name_the_input_or_the_parameter(void **unused) {
                "resolution");
 }
 
+/* Two corners of a slab have no radius, as on creases: the line between them is a side of a slab with volume, and of no
+ * flat one. */
+static void test_all_sides_of_slabs_with_volume_stay_with_them(void **unused) {
+  (void)unused;
+  const double spheres[] = {0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0.5, 0, 0, 5, 0.5, -3, 0, 0, 0};
+  const uint32_t cones[] = {0, 2}, slabs[] = {0, 1, 3, 0, 1, 4};
+  qmat_medial *medial = sealed_medial_mesh(spheres, 5, cones, 1, slabs, 2);
+  qmat_context context = {0};
+  qmat_medial solid, flat;
+  assert_int_equal(qmat_flat_primitives_separate(&context, medial, &solid, &flat), QMAT_OK);
+  static const uint32_t expected[] = {0, 1, 0, 2, 0, 3, 1, 3};
+  assert_int_equal(solid.triangle_count, 1);
+  assert_int_equal(solid.edge_count, 4);
+  assert_memory_equal(solid.edges, expected, sizeof expected);
+  assert_int_equal(flat.triangle_count, 1);
+  assert_int_equal(flat.edge_count, 0); /* its slab has its sides */
+  qmat_boundary_features features;
+  assert_int_equal(qmat_boundary_features_init(&context, &solid, &features), QMAT_OK);
+  assert_int_equal(qmat_boundary_features_init(&context, &flat, &features), QMAT_ERROR_INTERNAL);
+  qmat_context_uninit(&context);
+  qmat_value_release(&medial->base);
+}
+
 static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unused) {
   (void)unused;
   const double spheres[] = {0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 4, 5, 0, 9, 9, 9, 1};
@@ -785,6 +810,7 @@ int main(void) {
       cmocka_unit_test(test_a_ring_of_cones_is_a_torus),
       cmocka_unit_test(test_separate_spheres_are_separate_components),
       cmocka_unit_test(test_every_soup_of_primitives_is_a_closed_manifold),
+      cmocka_unit_test(test_all_sides_of_slabs_with_volume_stay_with_them),
       cmocka_unit_test(test_flat_slabs_have_two_sides_and_flat_cones_are_prisms),
       cmocka_unit_test(test_thin_parts_stay_connected),
       cmocka_unit_test(test_cells_are_finer_where_radii_are_small),

@@ -104,6 +104,18 @@ expect 2 "would overwrite" "$qmat" mat box.off -o box.glb --report box.off
 holds "the model is untouched" cmp -s box.off box.ma
 rm box.ma
 
+# Only reading the model finds the layers that it refers to.
+printf '#usda 1.0\ndef Cube "Cube"\n{\n}\n' >layer.usda
+cp layer.usda kept.usda
+printf '#usda 1.0\n(\n    subLayers = [@layer.usda@]\n)\n' >scene.usda
+for cached in "" --no-cache; do
+  expect 2 "would overwrite a file that the model refers to" "$qmat" mat scene.usda -o layer.usda --epsilon 5% $coarse \
+    $cached
+done
+holds "the layer is untouched" cmp -s layer.usda kept.usda
+expect 0 "holds no colliders" "$qmat" mat scene.usda -o over.usda --colliders --epsilon 5% $coarse
+rm layer.usda kept.usda scene.usda over*
+
 expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.gltf -o box.ma --epsilon 5% $coarse --report report.json \
   --threads 1
 holds "all files" test -s box.glb -a -s box.gltf -a -s box.ma
