@@ -100,7 +100,7 @@ static qmat_status read_triangles(qmat_context *context, const qmat_gltf_documen
 qmat_status qmat_gltf_parse(qmat_context *context, const uint8_t *bytes, size_t size, const char *path, qmat_soup *soup,
                             json_t *report) {
   qmat_gltf_document document;
-  qmat_status status = qmat_gltf_document_read(context, bytes, size, path, &document);
+  qmat_status status = qmat_gltf_document_read(context, bytes, size, path, true, &document);
   if (status == QMAT_OK) {
     status = read_triangles(context, &document, NULL, 0, soup, report);
     if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
@@ -130,7 +130,7 @@ qmat_status qmat_gltf_parse_meshes(qmat_context *context, const uint8_t *bytes, 
                                    const json_t *root, const char *choice, qmat_gltf_meshes *meshes, json_t *report) {
   qmat_gltf_document document;
   *meshes = (qmat_gltf_meshes){0};
-  qmat_status status = qmat_gltf_document_read(context, bytes, size, path, &document);
+  qmat_status status = qmat_gltf_document_read(context, bytes, size, path, false, &document);
   if (status == QMAT_OK) status = qmat_gltf_choose_meshes(context, root, path, choice, &meshes->ids, &meshes->count);
   if (status == QMAT_OK) {
     meshes->soups = qmat_calloc(meshes->count, sizeof *meshes->soups);

@@ -106,8 +106,25 @@ static qmat_status write_reduced(const qmat_gltf_checker *check) {
   return QMAT_OK;
 }
 
+/* Takes the meshes that qmat has added off their nodes, unless there are no others. */
+static void leave_skins(json_t *root) {
+  json_t *nodes = json_object_get(root, "nodes");
+  bool has_others = false;
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const int64_t mesh = qmat_gltf_mesh_of(json_array_get(nodes, i));
+    has_others = has_others || (mesh >= 0 && !qmat_gltf_is_skin(root, (size_t)mesh));
+  }
+  for (size_t i = 0; has_others && i < json_array_size(nodes); i++) {
+    json_t *node = json_array_get(nodes, i);
+    const int64_t mesh = qmat_gltf_mesh_of(node);
+    if (mesh < 0 || !qmat_gltf_is_skin(root, (size_t)mesh)) continue;
+    json_object_del(node, "mesh");
+    json_object_del(node, "skin");
+  }
+}
+
 qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
-                                    qmat_gltf_document *document) {
+                                    bool leaves_skins, qmat_gltf_document *document) {
   static const char *const arrays[][2] = {{"buffers", "buffer"},     {"bufferViews", "bufferView"},
                                           {"accessors", "accessor"}, {"meshes", "mesh"},
                                           {"nodes", "node"},         {"skins", "skin"},
@@ -122,6 +139,7 @@ qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes,
   if (status == QMAT_OK) status = check_asset(&check);
   for (size_t i = 0; i < sizeof arrays / sizeof *arrays && status == QMAT_OK; i++)
     status = check_root_array(&check, arrays[i][0], arrays[i][1]);
+  if (status == QMAT_OK && leaves_skins) leave_skins(check.root);
   if (status == QMAT_OK) status = qmat_gltf_check_data(&check);
   if (status == QMAT_OK) status = qmat_gltf_check_meshes(&check);
   if (status == QMAT_OK) status = qmat_gltf_check_skins(&check);

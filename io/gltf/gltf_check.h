@@ -13,11 +13,12 @@
  *    morph targets; primitives without POSITION, points and lines have an empty attributes object;
  *  - KHR_draco_mesh_compression is the only extension; its primitives have no indices key;
  *  - nodes have finite transforms, at most one parent and no cycle; meshes, skins, joints and children exist;
- *  - there is exactly one scene: the scene to read.
+ *  - there is exactly one scene: the scene to read;
+ *  - with `leaves_skins`, no node has a mesh that qmat has added to others, a skin or a hull.
  * `bytes` must outlive the document. Free it with qmat_gltf_document_uninit, also after a failure.
  * QMAT_ERROR_FORMAT with the element, QMAT_ERROR_IO for external files, QMAT_ERROR_MEMORY. */
 qmat_status qmat_gltf_document_read(qmat_context *context, const uint8_t *bytes, size_t size, const char *path,
-                                    qmat_gltf_document *document);
+                                    bool leaves_skins, qmat_gltf_document *document);
 
 void qmat_gltf_document_uninit(qmat_gltf_document *document);
 

@@ -275,6 +275,19 @@ static void test_what_comes_out_only_has_more_in_it(void **state) {
   }
 }
 
+static qmat_digest merged_digest(fixture *f, const char *path) {
+  const qmat_read_options options = {0};
+  qmat_scene *scene;
+  qmat_value *mesh;
+  qmat_report *report;
+  assert_int_equal(qmat_model_read_meshes(&f->context, path, &options, "merged", &scene, &mesh, &report), QMAT_OK);
+  const qmat_digest digest = mesh->digest;
+  qmat_value_release(&scene->base);
+  qmat_value_release(mesh);
+  qmat_value_release(&report->base);
+  return digest;
+}
+
 /* Saves the file and its parts in a folder of its own, and reads all of it again. */
 static void test_what_comes_out_is_read_again_with_the_same_meshes(void **state) {
   (void)state;
@@ -295,6 +308,8 @@ static void test_what_comes_out_is_read_again_with_the_same_meshes(void **state)
     if (qmat_model_read_meshes(&f.context, path, &options, "all", &scene, &mesh, &report) != QMAT_OK)
       fail_msg("%s", f.context.error.message);
     assert_memory_equal(&mesh->digest, &f.mesh->digest, sizeof mesh->digest); /* the skins are not taken for models */
+    const qmat_digest merged[] = {merged_digest(&f, f.path), merged_digest(&f, path)};
+    assert_memory_equal(&merged[0], &merged[1], sizeof merged[0]); /* nor where all meshes are merged */
     qmat_medial *medial;
     assert_int_equal(qmat_medial_extract(&f.context, path, "A", &medial, NULL), QMAT_OK);
     assert_int_equal(medial->sphere_count, 3);
