@@ -145,10 +145,16 @@ static qmat_status count_spheres_outside(evaluation *e) {
   uint8_t *inside = qmat_arena_alloc(&e->context->arena, count, sizeof *inside);
   if (!centres || !inside) return qmat_fail_memory(e->context, "medial spheres");
   for (size_t i = 0; i < count; i++) memcpy(&centres[3 * i], &e->unit.spheres[4 * i], 3 * sizeof *centres);
-  qmat_surface_inside_many(e->surface, centres, count, inside, qmat_threads(e->context));
-  for (size_t i = e->unit.sheet_sphere_count; i < count; i++)
-    if (!inside[i] && !isfinite(qmat_surface_distance(e->surface, &centres[3 * i], beside_surface, NULL, NULL)))
-      e->spheres_outside++;
+  const size_t slice = 512; /* winding numbers of open surfaces are slow */
+  for (size_t first = e->unit.sheet_sphere_count; first < count; first += slice) {
+    const qmat_status status = qmat_progress(e->context, first, count, "spheres tested");
+    if (status != QMAT_OK) return status;
+    const size_t tested = count - first < slice ? count - first : slice;
+    qmat_surface_inside_many(e->surface, &centres[3 * first], tested, &inside[first], qmat_threads(e->context));
+    for (size_t i = first; i < first + tested; i++)
+      if (!inside[i] && !isfinite(qmat_surface_distance(e->surface, &centres[3 * i], beside_surface, NULL, NULL)))
+        e->spheres_outside++;
+  }
   return QMAT_OK;
 }
 

@@ -281,14 +281,17 @@ static qmat_status make_contour(skin *s, int detail, size_t most_cells, qmat_ski
                                grid);
 }
 
+/* So many points are measured between two questions whether to go on. */
+static const size_t MEASURED_SLICE = 1 << 15;
+
 /* The largest |F| at the vertices and at the centroids of the triangles: the error of the mesh there. */
 static qmat_status measure(skin *s, double *at_vertices, double *at_centroids) {
   const qmat_skin_triangles *surface = &s->surface;
   const int threads = qmat_threads(s->context);
-  const size_t slice = 1 << 15, total = surface->vertex_count + surface->triangle_count;
+  const size_t total = surface->vertex_count + surface->triangle_count;
   double vertices = 0, centroids = 0;
-  for (size_t begin = 0; begin < total; begin += slice) {
-    const size_t end = total - begin < slice ? total : begin + slice;
+  for (size_t begin = 0; begin < total; begin += MEASURED_SLICE) {
+    const size_t end = total - begin < MEASURED_SLICE ? total : begin + MEASURED_SLICE;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : vertices, centroids)
     for (size_t i = begin; i < end; i++) {
       if (i < surface->vertex_count) {
@@ -327,12 +330,16 @@ static qmat_status mark_far_triangles(skin *s, int level, size_t *far) {
   const int threads = qmat_threads(s->context);
   *far = 0;
   if (!distances) return qmat_fail_memory(s->context, "places far from the skin");
+  qmat_status status = QMAT_OK;
+  for (size_t begin = 0; begin < count && status == QMAT_OK; begin += MEASURED_SLICE) {
+    const size_t end = count - begin < MEASURED_SLICE ? count : begin + MEASURED_SLICE;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) private(centroid)
-  for (size_t t = 0; t < count; t++) {
-    centroid_of(surface, t, centroid);
-    distances[t] = fabs(qmat_envelope_distance(s->envelope, centroid, NULL));
+    for (size_t t = begin; t < end; t++) {
+      centroid_of(surface, t, centroid);
+      distances[t] = fabs(qmat_envelope_distance(s->envelope, centroid, NULL));
+    }
+    status = qmat_progress(s->context, end, count, "measured points");
   }
-  qmat_status status = qmat_progress(s->context, 0, 0, "measured points");
   for (size_t t = 0; t < count && status == QMAT_OK; t++) {
     if (!(distances[t] > CONTOUR_SHARE * s->params->error)) continue;
     centroid_of(surface, t, centroid);

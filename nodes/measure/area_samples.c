@@ -7,7 +7,7 @@
 #include "core/hash.h"
 
 /* Sums are taken over blocks of samples and then in the order of the blocks, so that they do not depend on threads. */
-enum { BLOCK_SAMPLES = 512, SLICE_BLOCKS = 256 };
+enum { BLOCK_SAMPLES = 512, SLICE_BLOCKS = 16 };
 
 void qmat_running_areas(const double *positions, const uint32_t *triangles, size_t count, double *areas) {
   double area = 0, normal[3];
