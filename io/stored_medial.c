@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/arena.h"
+#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
 
 static double raise_error(double error, double by) {
@@ -58,22 +59,6 @@ void qmat_storage_origin(const qmat_medial *medial, const qmat_mesh *skin, doubl
 
 /* ---- simplices ---- */
 
-/* The index of edge (a, b), a < b, in the sorted edges; edge_count if it is missing. */
-static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
-  size_t low = 0, high = medial->edge_count;
-  while (low < high) {
-    size_t middle = low + (high - low) / 2;
-    const uint32_t *edge = medial->edges + 2 * middle;
-    if (edge[0] < a || (edge[0] == a && edge[1] < b)) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  if (low < medial->edge_count && medial->edges[2 * low] == a && medial->edges[2 * low + 1] == b) return low;
-  return medial->edge_count;
-}
-
 static void set_face(uint32_t *faces, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
   faces[3 * *count] = a;
   faces[3 * *count + 1] = b;
@@ -89,8 +74,8 @@ static qmat_status fill_faces(qmat_context *context, const qmat_medial *medial, 
     const uint32_t *id = medial->triangles + 3 * t;
     const uint32_t sides[3][2] = {{id[0], id[1]}, {id[0], id[2]}, {id[1], id[2]}};
     for (int k = 0; k < 3; k++) {
-      size_t edge = find_edge(medial, sides[k][0], sides[k][1]);
-      if (edge == medial->edge_count) {
+      const size_t edge = qmat_simplex_find(medial->edges, medial->edge_count, 2, sides[k]);
+      if (edge == SIZE_MAX) {
         qmat_fail(context, QMAT_ERROR_GEOMETRY, "side (%u, %u) is missing from the edges", sides[k][0], sides[k][1]);
         return qmat_fail_element(context, "triangle", (int64_t)t);
       }

@@ -429,32 +429,30 @@ static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc"
 /* Scales that differ by less come from rounding. */
 static const double same_scale = 1e-6;
 
-/* Warns where a file without a scene has the coordinates of one of its meshes, whose nodes scale it. */
-static qmat_status warn_of_own_units(qmat_context *context, const scene_write_params *params, const qmat_scene *scene,
-                                     const qmat_stated_errors *stated, json_t *report) {
+/* Whether a file without a scene has the coordinates of one of its meshes, whose nodes scale it. */
+static bool has_own_units(const scene_write_params *params, const qmat_scene *scene, double own) {
   const bool is_alone = holds_no_scene(params) || (is_usd(params) && !keeps_scene(params, scene));
-  if (!is_alone || !scene || scene->mesh_count == 0) return QMAT_OK;
-  const double own = stated->meters_per_unit, of_scene = scene->meters_per_unit;
-  if (!(own > 0 && of_scene > 0) || fabs(own / of_scene - 1) <= same_scale) return QMAT_OK;
-  if (qmat_json_add_warning(report,
-                            "the .%s file is in the mesh's own units of %.4g m, not in the scene's of %.4g m: a run "
-                            "that saves no glTF or USD scene, or has model.mesh=merged, uses the scene's",
-                            formats[params->format], own, of_scene))
-    return qmat_fail_memory(context, "the report");
-  return QMAT_OK;
+  return is_alone && scene && scene->mesh_count > 0 && own > 0 && scene->meters_per_unit > 0 &&
+         fabs(own / scene->meters_per_unit - 1) > same_scale;
 }
 
-/* Warns where a layer over a USD scene leaves colliders out. */
-static qmat_status warn_of_lost_colliders(qmat_context *context, const scene_write_params *params,
-                                          const qmat_value *const inputs[], json_t *report) {
-  if (!inputs[IN_COLLIDERS] || !is_usd(params) || !keeps_scene(params, (const qmat_scene *)inputs[IN_SCENE]))
-    return QMAT_OK;
-  if (qmat_json_add_warning(report,
-                            "the .%s file, a layer over the scene, holds no colliders: save them as glTF, or use "
-                            "model.mesh=merged",
-                            formats[params->format]))
-    return qmat_fail_memory(context, "the report");
-  return QMAT_OK;
+/* Warns of units that are not the scene's, and of colliders that a layer over a USD scene leaves out. */
+static qmat_status add_warnings(qmat_context *context, const scene_write_params *params,
+                                const qmat_value *const inputs[], double own, json_t *report) {
+  const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  const char *format = formats[params->format];
+  int bad = 0;
+  if (has_own_units(params, scene, own))
+    bad |= qmat_json_add_warning(report,
+                                 "the .%s file is in the mesh's own units of %.4g m, not in the scene's of %.4g m: a "
+                                 "run that saves no glTF or USD scene, or has model.mesh=merged, uses the scene's",
+                                 format, own, scene->meters_per_unit);
+  if (inputs[IN_COLLIDERS] && is_usd(params) && keeps_scene(params, scene))
+    bad |= qmat_json_add_warning(report,
+                                 "the .%s file, a layer over the scene, holds no colliders: save them as glTF, or use "
+                                 "model.mesh=merged",
+                                 format);
+  return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
 static qmat_status run(qmat_context *context, const void *data, const qmat_value *const inputs[],
@@ -494,9 +492,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   if (status == QMAT_OK && params->require == REQUIRE_CERTIFIED)
     status = check_certified(context, inputs[IN_MEDIAL], stated);
   if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
-  if (status == QMAT_OK)
-    status = warn_of_own_units(context, params, (const qmat_scene *)inputs[IN_SCENE], stated, report->root);
-  if (status == QMAT_OK) status = warn_of_lost_colliders(context, params, inputs, report->root);
+  if (status == QMAT_OK) status = add_warnings(context, params, inputs, stated->meters_per_unit, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
   qmat_free(stated);
   if (status == QMAT_OK) {

@@ -233,6 +233,16 @@ static bool find_mesh(const json_t *meshes, const char *choice, size_t *mesh, si
   return *mesh < count;
 }
 
+size_t qmat_gltf_parent_of(const json_t *root, size_t node) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *children = json_object_get(json_array_get(nodes, i), "children");
+    for (size_t k = 0; k < json_array_size(children); k++)
+      if (json_number_value(json_array_get(children, k)) == (double)node) return i;
+  }
+  return SIZE_MAX;
+}
+
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh) {
   const json_t *object = json_array_get(json_object_get(root, "meshes"), mesh);
   return json_is_true(json_object_get(json_object_get(object, "extras"), QMAT_GLTF_SKIN_MARK));

@@ -68,6 +68,9 @@ bool qmat_gltf_require_extension(json_t *root, const char *name);
 /* The number of the mesh that a node references, also if written as 3.0; -1: none. */
 int64_t qmat_gltf_mesh_of(const json_t *node);
 
+/* The node that a node is a child of; SIZE_MAX: it is a root. Linear in all children. */
+size_t qmat_gltf_parent_of(const json_t *root, size_t node);
+
 /* Whether a mesh is a skin that qmat added to the asset. */
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh);
 

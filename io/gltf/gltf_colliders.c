@@ -267,25 +267,12 @@ static double scale_of(const json_t *node) {
   return cbrt(fabs(qmat_dot(columns[0], normal)));
 }
 
-static bool is_child(const json_t *node, size_t number) {
-  const json_t *children = json_object_get(node, "children");
-  for (size_t i = 0; i < json_array_size(children); i++)
-    if ((size_t)number_at(children, i) == number) return true;
-  return false;
-}
-
-/* Metres per unit of a node's space: by its own transform and those of the nodes above it. */
-static double meters_at(const json_t *root, size_t number) {
+/* Metres per unit of a node's space: by its own transform and those of the nodes above it. Checked nodes form trees. */
+static double meters_at(const json_t *root, size_t node) {
   const json_t *nodes = json_object_get(root, "nodes");
-  const size_t count = json_array_size(nodes);
-  double meters = scale_of(json_array_get(nodes, number));
-  for (size_t level = 0; level < count; level++) {
-    size_t parent = 0;
-    while (parent < count && !is_child(json_array_get(nodes, parent), number)) parent++;
-    if (parent == count) break;
-    meters *= scale_of(json_array_get(nodes, parent));
-    number = parent;
-  }
+  double meters = 1;
+  for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at))
+    meters *= scale_of(json_array_get(nodes, at));
   return meters;
 }
 

@@ -471,15 +471,11 @@ static qmat_gltf_options options_after(const qmat_gltf_options *options, double 
 }
 
 /* The node with the skin of a node: itself, or its parent where a skinned mesh is above. SIZE_MAX: there is none. */
-static size_t skinned_node(const json_t *nodes, size_t id) {
+static size_t skinned_node(const json_t *root, size_t id) {
+  const json_t *nodes = json_object_get(root, "nodes");
   if (json_object_get(json_array_get(nodes, id), "skin")) return id;
-  for (size_t i = 0; i < json_array_size(nodes); i++) {
-    const json_t *node = json_array_get(nodes, i), *children = json_object_get(node, "children");
-    for (size_t k = 0; k < json_array_size(children); k++)
-      if (json_number_value(json_array_get(children, k)) == (double)id)
-        return json_object_get(node, "skin") ? i : SIZE_MAX;
-  }
-  return SIZE_MAX;
+  const size_t parent = qmat_gltf_parent_of(root, id);
+  return json_object_get(json_array_get(nodes, parent), "skin") ? parent : SIZE_MAX;
 }
 
 /* Adds colliders to a node with the mesh, or to the joints of its skin. */
@@ -487,7 +483,7 @@ static qmat_status attach_colliders(qmat_context *context, const qmat_scene *sce
                                     document *document, const qmat_gltf_colliders *added, size_t id,
                                     const double shift[3]) {
   const json_t *nodes = json_object_get(document->root, "nodes");
-  const size_t carrier = medial->skinned_count > 0 ? skinned_node(nodes, id) : SIZE_MAX;
+  const size_t carrier = medial->skinned_count > 0 ? skinned_node(document->root, id) : SIZE_MAX;
   const double *bound = NULL;
   double *matrices = NULL;
   bool done = true;

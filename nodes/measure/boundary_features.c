@@ -3,26 +3,13 @@
 
 #include <math.h>
 
+#include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "nodes/measure/area_samples.h"
 
 static const double pi = 3.14159265358979323846;
-
-/* The row of the edge a < b; the rows are sorted and hold every side of a triangle. */
-static size_t find_edge(const qmat_boundary_features *f, uint32_t a, uint32_t b) {
-  size_t low = 0, high = f->edge_count;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    const uint32_t *row = &f->edges[2 * middle];
-    if (row[0] < a || (row[0] == a && row[1] < b))
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
-}
 
 /* Turns counts at [row + 2] into the places where rows are filled. Filling them makes the places offsets. */
 static void sum_counts(size_t *offsets, size_t rows) {
@@ -51,8 +38,9 @@ qmat_status qmat_boundary_features_init(qmat_context *context, const qmat_medial
   for (size_t t = 0; t < f->triangle_count; t++) {
     const uint32_t *row = &f->triangles[3 * t];
     for (size_t k = 0; k < 3; k++) { /* side k lies opposite to corner k; corners are in rising order */
-      const size_t side = sides[3 * t + k] = find_edge(f, row[k == 0], row[k == 2 ? 1 : 2]);
-      if (side == f->edge_count || f->edges[2 * side] != row[k == 0] || f->edges[2 * side + 1] != row[k == 2 ? 1 : 2])
+      const uint32_t side[2] = {row[k == 0], row[k == 2 ? 1 : 2]};
+      sides[3 * t + k] = qmat_simplex_find(f->edges, f->edge_count, 2, side);
+      if (sides[3 * t + k] == SIZE_MAX)
         return qmat_fail(context, QMAT_ERROR_INTERNAL, "a side of medial slab %zu is no edge", t);
       f->apex_offsets[sides[3 * t + k] + 2]++;
     }

@@ -225,11 +225,6 @@ static size_t first_row(const uint32_t *rows, size_t count, size_t length, const
   return first;
 }
 
-static bool has_row(const uint32_t *rows, size_t count, size_t length, const uint32_t *row) {
-  const size_t at = first_row(rows, count, length, row);
-  return at < count && compare_rows(&rows[length * at], row, length) == 0;
-}
-
 qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat_medial *medial, uint32_t **corners,
                                                size_t *count) {
   const uint32_t *edges = medial->edges;
@@ -241,8 +236,8 @@ qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat
            next < medial->edge_count && edges[2 * next] == lowest[0]; next++) {
         const uint32_t triangle[3] = {edges[2 * e], lowest[0], edges[2 * next + 1]};
         const uint32_t third[2] = {triangle[0], triangle[2]};
-        if (!has_row(edges, medial->edge_count, 2, third) ||
-            has_row(medial->triangles, medial->triangle_count, 3, triangle))
+        if (qmat_simplex_find(edges, medial->edge_count, 2, third) == SIZE_MAX ||
+            qmat_simplex_find(medial->triangles, medial->triangle_count, 3, triangle) != SIZE_MAX)
           continue;
         if (pass == 1) memcpy(&(*corners)[3 * *count], triangle, sizeof triangle);
         ++*count;

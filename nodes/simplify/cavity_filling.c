@@ -124,20 +124,16 @@ qmat_status qmat_cavities_fill(qmat_context *context, const qmat_surface *surfac
   if (before) memcpy(spheres, medial->spheres, 4 * before * sizeof *spheres);
   for (size_t i = 0; i < count; i++) cavities[i] = (cavity){-qmat_surface_signed_distance(surface, &places[3 * i]), i};
   if (count) qsort(cavities, count, sizeof *cavities, compare_depths);
-  for (size_t i = 0; i < count; i++) {
-    const qmat_status status = qmat_progress(context, i, count, "cavities");
-    if (status != QMAT_OK) {
-      *added = 0;
-      return status;
-    }
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    status = qmat_progress(context, i, count, "cavities");
     const double *place = &places[3 * cavities[i].place];
     double *sphere = &spheres[4 * (before + *added)];
     if (!(cavities[i].depth > 0) || is_covered(&spheres[4 * before], *added, place)) continue;
     if (fit_sphere(surface, spheres, before + *added, place, cavities[i].depth, epsilon, sphere, &neighbours[*added]))
       ++*added;
   }
-  if (*added == 0) return QMAT_OK;
-  const qmat_status status = extend(context, medial, spheres, neighbours, *added);
+  if (status == QMAT_OK && *added > 0) status = extend(context, medial, spheres, neighbours, *added);
   if (status != QMAT_OK) *added = 0;
   return status;
 }

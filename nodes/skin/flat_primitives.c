@@ -5,26 +5,13 @@
 #include <string.h>
 
 #include "core/arena.h"
+#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
 
 static bool is_flat(const qmat_medial *medial, const uint32_t *row, size_t size) {
   for (size_t k = 0; k < size; k++)
     if (medial->spheres[4 * (size_t)row[k] + 3] > 0) return false;
   return true;
-}
-
-/* The row of the edge a < b; the rows are sorted. */
-static size_t find_edge(const qmat_medial *medial, uint32_t a, uint32_t b) {
-  size_t low = 0, high = medial->edge_count;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    const uint32_t *row = &medial->edges[2 * middle];
-    if (row[0] < a || (row[0] == a && row[1] < b))
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
 }
 
 /* The slabs that an edge is a side of. */
@@ -46,8 +33,10 @@ qmat_status qmat_flat_primitives_separate(qmat_context *context, const qmat_medi
     const bool is_thin = is_flat(medial, row, 3);
     qmat_medial *part = parts[is_thin];
     memcpy(&part->triangles[3 * part->triangle_count++], row, 3 * sizeof *row);
-    for (size_t k = 0; k < 3; k++)
-      slabs[find_edge(medial, row[k == 2], row[k == 0 ? 1 : 2])] |= is_thin ? FLAT_SLAB : SOLID_SLAB;
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t side[2] = {row[k == 2], row[k == 0 ? 1 : 2]};
+      slabs[qmat_simplex_find(medial->edges, medial->edge_count, 2, side)] |= is_thin ? FLAT_SLAB : SOLID_SLAB;
+    }
   }
   for (size_t e = 0; e < medial->edge_count; e++) {
     const uint32_t *row = &medial->edges[2 * e];
