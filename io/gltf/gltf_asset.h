@@ -23,6 +23,8 @@ enum {
 
 /* This key in a mesh's extras marks the skin of a medial mesh, as opposed to a model. */
 #define QMAT_GLTF_SKIN_MARK "qmat_skin"
+/* The extras of a node with a collider that qmat added have this. */
+#define QMAT_GLTF_COLLIDER_MARK "qmat_collider"
 
 /* The JSON and chunks of a .glb or .gltf. Only the container is checked. A zeroed one is empty and valid. */
 typedef struct qmat_gltf_asset {
@@ -70,6 +72,11 @@ int64_t qmat_gltf_mesh_of(const json_t *node);
 
 /* The node that a node is a child of; SIZE_MAX: it is a root. Linear in all children. */
 size_t qmat_gltf_parent_of(const json_t *root, size_t node);
+
+/* Takes those children off a node that are among the first `given` nodes and for which is_dropped(root, child) holds.
+ * Each stays in the asset as an empty node without a parent, so that the others keep their numbers. */
+void qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
+                             bool (*is_dropped)(const json_t *root, const json_t *child));
 
 /* Whether a mesh is a skin that qmat added to the asset. */
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh);

@@ -9,18 +9,15 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_skin.h"
 
-/* A node that an earlier run added has this in its extras. */
-#define MARK "qmat_collider"
-
 enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
 
 static const char *const shape_extensions[] = {"KHR_implicit_shapes", "OMI_physics_shape"};
 static const char *const body_extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
 
-/* object[key], an object that is created where it is missing; NULL when out of memory. */
+/* object[key], an object that is created where there is none; NULL when out of memory. */
 static json_t *member(json_t *object, const char *key) {
   json_t *value = json_object_get(object, key);
-  if (value) return value;
+  if (json_is_object(value)) return value;
   return qmat_gltf_set(object, key, json_object()) ? json_object_get(object, key) : NULL;
 }
 
@@ -118,8 +115,9 @@ static bool add_shapes(json_t *root, qmat_gltf_colliders *added, size_t shape) {
       made = json_pack("{s:s, s:{s:f, s:f, s:f}}", "type", "capsule", "capsule", "height", qmat_point_distance(a, b),
                        "radiusBottom", a[3], "radiusTop", b[3]);
     } else { /* KHR: the hull of a node's mesh */
-      done = qmat_gltf_add(root, "nodes", json_pack("{s:I, s:{s:b}}", "mesh", added->hulls[shape], "extras", MARK, 1),
-                           &added->nodes[shape]);
+      done = qmat_gltf_add(
+          root, "nodes", json_pack("{s:I, s:{s:b}}", "mesh", added->hulls[shape], "extras", QMAT_GLTF_COLLIDER_MARK, 1),
+          &added->nodes[shape]);
       continue;
     }
     done = add_shape(root, shape_extensions[form], made, &added->shapes[2 * shape + (size_t)form]);
@@ -167,7 +165,7 @@ void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added) {
 /* Adds a child with an extension object (may be NULL: none) in its `extensions`. */
 static bool add_child(json_t *root, json_t *body, json_t *child) {
   json_int_t number;
-  return child && qmat_gltf_set(child, "extras", json_pack("{s:b}", MARK, 1)) &&
+  return child && qmat_gltf_set(child, "extras", json_pack("{s:b}", QMAT_GLTF_COLLIDER_MARK, 1)) &&
          qmat_gltf_add(root, "nodes", json_incref(child), &number) &&
          qmat_gltf_add(body, "children", json_integer(number), NULL);
 }
@@ -239,16 +237,25 @@ static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders 
   return done;
 }
 
-/* Takes the colliders of an earlier run, which are among the `given` first nodes, off the node. They stay in the asset
- * without a parent. */
-static void detach(json_t *root, json_t *body, size_t given) {
-  json_t *children = json_object_get(body, "children"), *nodes = json_object_get(root, "nodes");
-  for (size_t i = json_array_size(children); i-- > 0;) {
-    const size_t id = (size_t)json_number_value(json_array_get(children, i));
-    const json_t *child = id < given ? json_array_get(nodes, id) : NULL;
-    if (json_object_get(json_object_get(child, "extras"), MARK)) json_array_remove(children, i);
+static bool is_earlier_collider(const json_t *root, const json_t *child) {
+  (void)root;
+  return json_object_get(json_object_get(child, "extras"), QMAT_GLTF_COLLIDER_MARK) != NULL;
+}
+
+/* Removes the colliders of an earlier run and how it lets the body move. */
+static void remove_earlier(json_t *root, json_t *body, size_t given) {
+  json_t *extensions = json_object_get(body, "extensions"), *nodes = json_object_get(root, "nodes");
+  const json_t *children = json_object_get(body, "children");
+  bool is_ours = false;
+  for (size_t i = 0; i < json_array_size(children) && !is_ours; i++)
+    is_ours = is_earlier_collider(root, json_array_get(nodes, (size_t)json_number_value(json_array_get(children, i))));
+  for (int form = 0; form < 2 && is_ours; form++) {
+    json_t *physics = json_object_get(extensions, body_extensions[form]);
+    json_object_del(physics, "motion");
+    if (physics && json_object_size(physics) == 0) json_object_del(extensions, body_extensions[form]);
   }
-  if (children && json_array_size(children) == 0) json_object_del(body, "children");
+  if (extensions && json_object_size(extensions) == 0) json_object_del(body, "extensions");
+  qmat_gltf_drop_children(root, body, given, is_earlier_collider);
 }
 
 static double number_at(const json_t *numbers, size_t i) {
@@ -299,15 +306,18 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
                                 const double shift[3]) {
   json_t *body = json_array_get(json_object_get(root, "nodes"), (size_t)node);
   bool done = body != NULL;
-  if (done) detach(root, body, added->nodes_given);
+  if (done) remove_earlier(root, body, added->nodes_given);
   for (int form = 0; form < 2 && done && added->dynamic; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
     json_t *motion = motion_of(added, shift, meters_at(root, (size_t)node));
     done = motion && (form == 0 || qmat_gltf_set(motion, "type", json_string("dynamic")));
-    if (done) {
-      done = set_extension(body, body_extensions[form], json_pack("{s:o}", "motion", motion));
+    json_t *extensions = done ? member(body, "extensions") : NULL;
+    json_t *physics = extensions ? member(extensions, body_extensions[form]) : NULL;
+    if (physics) {
+      done = qmat_gltf_set(physics, "motion", motion); /* what else the asset says of the body stays */
     } else {
       json_decref(motion);
+      done = false;
     }
   }
   for (size_t i = 0; i < added->colliders->shape_count && done; i++) done = add_colliders(root, body, added, i, shift);
@@ -372,9 +382,9 @@ bool qmat_gltf_colliders_attach_to_joints(json_t *root, json_int_t node, const q
   const size_t count = json_array_size(ids);
   json_t **bound = qmat_calloc(count, sizeof(json_t *));
   bool done = bound && count > 0;
-  if (done) detach(root, body, added->nodes_given);
+  if (done) remove_earlier(root, body, added->nodes_given);
   for (size_t i = 0; i < count && done; i++)
-    detach(root, json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, i))), added->nodes_given);
+    remove_earlier(root, json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, i))), added->nodes_given);
   for (size_t i = 0; i < added->colliders->shape_count && done; i++) {
     const uint32_t named = joint_of(added, i, medial), joint = named < count ? named : 0;
     json_t *owner = json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, joint)));

@@ -314,8 +314,12 @@ static qmat_status describe(compressor *c, const packing *p, const uint8_t *byte
     for (size_t k = 0; k < sizeof gone / sizeof *gone; k++) json_object_del(accessor, gone[k]);
     done =
         json_object_set_new(accessor, "count", json_integer((json_int_t)(is_index ? 3 * faces : points))) == 0 && done;
-    if (is_index && points > 65535)
-      done = json_object_set_new(accessor, "componentType", json_integer(QMAT_GLTF_UNSIGNED_INT)) == 0 && done;
+    const json_int_t held = (json_int_t)json_number_value(json_object_get(accessor, "componentType"));
+    const json_int_t needed = points > 65535 ? QMAT_GLTF_UNSIGNED_INT
+                              : points > 255 ? QMAT_GLTF_UNSIGNED_SHORT
+                                             : QMAT_GLTF_UNSIGNED_BYTE;
+    if (is_index && held < needed) /* wider types have larger numbers */
+      done = json_object_set_new(accessor, "componentType", json_integer(needed)) == 0 && done;
     if (is_index || i != p->position) continue;
     for (size_t k = 0; k < 3; k++) {
       low[k] = INFINITY;

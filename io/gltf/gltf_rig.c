@@ -207,6 +207,14 @@ static qmat_status put_matrix(qmat_context *context, const double *matrix, qmat_
   return QMAT_OK;
 }
 
+/* Adds a child that moves with a node, for a skin that lists the node twice: the joints of a glTF skin are different
+ * nodes. */
+static bool add_stand_in(json_t *root, json_int_t *node) {
+  json_t *parent = json_array_get(json_object_get(root, "nodes"), (size_t)*node);
+  return qmat_gltf_add(root, "nodes", json_object(), node) &&
+         qmat_gltf_add(parent, "children", json_integer(*node), NULL);
+}
+
 qmat_status qmat_gltf_rig_skin(qmat_context *context, json_t *root, qmat_gltf_rig *added, uint32_t skin,
                                json_int_t buffer, size_t offset, qmat_writer *data, json_int_t *number) {
   const qmat_rig *rig = added->rig;
@@ -218,8 +226,11 @@ qmat_status qmat_gltf_rig_skin(qmat_context *context, json_t *root, qmat_gltf_ri
   qmat_status status = joints ? QMAT_OK : fail_shortage(context);
   for (size_t i = first; i < end && status == QMAT_OK; i++) {
     const uint32_t joint = rig->bound_joints[i];
-    const json_int_t node = joint == UINT32_MAX ? added->skeletons[rig->skin_skeletons[skin]] : added->joints[joint];
-    status = put_matrix(context, rig->bound_matrices + 16 * i, data);
+    json_int_t node = joint == UINT32_MAX ? added->skeletons[rig->skin_skeletons[skin]] : added->joints[joint];
+    bool is_repeated = false;
+    for (size_t k = first; k < i && !is_repeated; k++) is_repeated = rig->bound_joints[k] == joint;
+    if (is_repeated && !add_stand_in(root, &node)) status = fail_shortage(context);
+    if (status == QMAT_OK) status = put_matrix(context, rig->bound_matrices + 16 * i, data);
     if (status == QMAT_OK && json_array_append_new(joints, json_integer(node)) != 0) status = fail_shortage(context);
   }
   if (status == QMAT_OK &&

@@ -80,23 +80,38 @@ static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char 
 
 /* ---- edits of lists ---- */
 
-/* A list to which edits are applied. The items point into values. */
+/* An item of a list: a text or a qmat_usd_reference of a value, and the layer that has it. */
+typedef struct list_item {
+  const void *value;
+  const qmat_usd_layer *layer;
+} list_item;
+
+/* A list to which edits are applied. */
 typedef struct edited_list {
   size_t count, capacity;
-  const void **items;
+  list_item *items;
 } edited_list;
 
-static bool same_item(qmat_usd_type type, const void *a, const void *b) {
-  if (type != QMAT_USD_REFERENCE) return strcmp(a, b) == 0;
-  const qmat_usd_reference *x = a, *y = b;
-  return strcmp(x->asset, y->asset) == 0 && strcmp(x->path, y->path) == 0;
+static bool are_in_one_folder(const char *a, const char *b) {
+  const char *name_of_a = strrchr(a, '/'), *name_of_b = strrchr(b, '/');
+  if (!name_of_a || !name_of_b) return !name_of_a && !name_of_b;
+  return name_of_a - a == name_of_b - b && strncmp(a, b, (size_t)(name_of_a - a)) == 0;
 }
 
-static const void *item_at(const qmat_usd_value *list, size_t i) {
-  return list->type == QMAT_USD_REFERENCE ? (const void *)&list->references[i] : (const void *)list->texts[i];
+/* Whether two items are the same text or refer to the same prim. An asset is relative to the folder of its layer. */
+static bool same_item(qmat_usd_type type, list_item a, list_item b) {
+  if (type != QMAT_USD_REFERENCE) return strcmp(a.value, b.value) == 0;
+  const qmat_usd_reference *x = a.value, *y = b.value;
+  return strcmp(x->asset, y->asset) == 0 && strcmp(x->path, y->path) == 0 &&
+         (!x->asset[0] || are_in_one_folder(a.layer->path, b.layer->path));
 }
 
-static void remove_item(edited_list *list, qmat_usd_type type, const void *item) {
+static list_item item_at(const qmat_usd_value *list, size_t i, const qmat_usd_layer *layer) {
+  const void *value = list->type == QMAT_USD_REFERENCE ? (const void *)&list->references[i] : list->texts[i];
+  return (list_item){.value = value, .layer = layer};
+}
+
+static void remove_item(edited_list *list, qmat_usd_type type, list_item item) {
   size_t kept = 0;
   for (size_t i = 0; i < list->count; i++) {
     if (!same_item(type, list->items[i], item)) list->items[kept++] = list->items[i];
@@ -104,15 +119,17 @@ static void remove_item(edited_list *list, qmat_usd_type type, const void *item)
   list->count = kept;
 }
 
-/* Inserts items at the front or the end of a list. Items that it already has move, or stay with `only_new`. */
-static bool insert_items(edited_list *list, const qmat_usd_value *items, bool at_front, bool only_new) {
+/* Inserts the items of a layer at the front or the end of a list. Items that it already has move, or stay with
+ * `only_new`. */
+static bool insert_items(edited_list *list, const qmat_usd_value *items, const qmat_usd_layer *layer, bool at_front,
+                         bool only_new) {
   if (qmat_grow((void **)&list->items, &list->capacity, list->count + items->count, sizeof *list->items) != 0)
     return false;
-  for (size_t i = 0; i < items->count && !only_new; i++) remove_item(list, items->type, item_at(items, i));
+  for (size_t i = 0; i < items->count && !only_new; i++) remove_item(list, items->type, item_at(items, i, layer));
   size_t at = at_front ? 0 : list->count;
   memmove(list->items + at + items->count, list->items + at, (list->count - at) * sizeof *list->items);
   for (size_t i = 0; i < items->count; i++) {
-    const void *item = item_at(items, i);
+    const list_item item = item_at(items, i, layer);
     bool known = false;
     for (size_t k = 0; k < at && only_new; k++) known = known || same_item(items->type, list->items[k], item);
     if (known) continue;
@@ -127,6 +144,7 @@ static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const c
                              edited_list *list) {
   *list = (edited_list){0};
   for (size_t i = at->spec_count; i-- > 0;) {
+    const qmat_usd_layer *layer = at->layers[i];
     const qmat_usd_value *value = qmat_usd_field_value(at->specs[i], field);
     if (!value || value->type != QMAT_USD_LIST_OP) continue;
     const qmat_usd_list_op *op = value->list_op;
@@ -143,13 +161,13 @@ static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const c
       return qmat_usd_prim_fail(c->prim, "%s has more than %d items", field, MOST_ARCS_OF_PRIM);
     if (op->is_explicit) {
       list->count = 0;
-      good = insert_items(list, &op->lists[QMAT_USD_EXPLICIT], false, false);
+      good = insert_items(list, &op->lists[QMAT_USD_EXPLICIT], layer, false, false);
     } else {
       for (size_t k = 0; k < op->lists[QMAT_USD_DELETED].count; k++)
-        remove_item(list, wanted, item_at(&op->lists[QMAT_USD_DELETED], k));
-      good = insert_items(list, &op->lists[QMAT_USD_ADDED], false, true) &&
-             insert_items(list, &op->lists[QMAT_USD_PREPENDED], true, false) &&
-             insert_items(list, &op->lists[QMAT_USD_APPENDED], false, false);
+        remove_item(list, wanted, item_at(&op->lists[QMAT_USD_DELETED], k, layer));
+      good = insert_items(list, &op->lists[QMAT_USD_ADDED], layer, false, true) &&
+             insert_items(list, &op->lists[QMAT_USD_PREPENDED], layer, true, false) &&
+             insert_items(list, &op->lists[QMAT_USD_APPENDED], layer, false, false);
     }
     if (!good) return qmat_usd_fail_prim_memory(c->prim);
   }
@@ -193,27 +211,18 @@ static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, 
   return qmat_usd_add_arcs(c, made);
 }
 
-/* The layer of the strongest of the node's specs with this field. */
-static const qmat_usd_layer *layer_with(const qmat_usd_composer *c, const node *at, const char *field) {
-  for (size_t i = 0; i < at->spec_count; i++) {
-    if (qmat_usd_field_value(at->specs[i], field)) return at->layers[i];
-  }
-  return c->files->stacks[at->stack].layers[0];
-}
-
-static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
-                                 const qmat_usd_reference *reference, const char *what) {
+static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, list_item item, const char *what) {
+  const qmat_usd_reference *reference = item.value;
   size_t stack = at->stack;
-  const qmat_usd_layer *from = layer_with(c, at, field);
   if (reference->asset[0]) {
-    qmat_status status = qmat_usd_files_find(c->files, c->prim, from, reference->asset, what, &stack);
+    qmat_status status = qmat_usd_files_find(c->files, c->prim, item.layer, reference->asset, what, &stack);
     if (status != QMAT_OK || stack == SIZE_MAX) return status;
   }
   char path[256];
   const qmat_usd_layer *layer = c->files->stacks[stack].layers[0];
   const qmat_usd_time time = {
       .offset = reference->offset,
-      .scale = reference->scale * qmat_usd_codes_per_second(from) / qmat_usd_codes_per_second(layer)};
+      .scale = reference->scale * qmat_usd_codes_per_second(item.layer) / qmat_usd_codes_per_second(layer)};
   if (reference->path[0]) return add_target(c, at, arc, stack, reference->path, &time, what);
   const char *name = qmat_usd_text(qmat_usd_field_value(layer->root, "defaultPrim"));
   if (!name || !*name || strlen(name) > 254) {
@@ -228,8 +237,7 @@ static qmat_status add_references(qmat_usd_composer *c, node *at, qmat_usd_arc a
                                   const char *what) {
   edited_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_REFERENCE, &list);
-  for (size_t i = 0; i < list.count && status == QMAT_OK; i++)
-    status = add_reference(c, at, arc, field, list.items[i], what);
+  for (size_t i = 0; i < list.count && status == QMAT_OK; i++) status = add_reference(c, at, arc, list.items[i], what);
   qmat_free(list.items);
   return status;
 }
@@ -253,8 +261,8 @@ static qmat_status add_classes(qmat_usd_composer *c, node *at, qmat_usd_arc arc,
   edited_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_PATH, &list);
   for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
-    status = add_target(c, at, arc, at->stack, list.items[i], NULL, what);
-    if (status == QMAT_OK) status = warn_of_class(c, at, list.items[i]);
+    status = add_target(c, at, arc, at->stack, list.items[i].value, NULL, what);
+    if (status == QMAT_OK) status = warn_of_class(c, at, list.items[i].value);
   }
   qmat_free(list.items);
   return status;
@@ -339,7 +347,7 @@ qmat_status qmat_usd_add_variants(qmat_usd_composer *c) {
     at->has_variants_done = true;
     edited_list sets;
     qmat_status status = edit_list(c, at, "variantSetNames", QMAT_USD_STRING, &sets);
-    for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, at, sets.items[i]);
+    for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, at, sets.items[i].value);
     qmat_free(sets.items);
     if (status != QMAT_OK) return status;
   }

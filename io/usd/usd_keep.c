@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_keep.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "io/gltf/gltf_keep.h"
@@ -9,9 +10,14 @@
 
 enum { MOST_KEPT = 4096 };
 
+/* In the path of a texture: the number of a tile. USD looks for these numbers. */
+#define UDIM "<UDIM>"
+enum { FIRST_UDIM_TILE = 1001, LAST_UDIM_TILE = 1100 };
+
 /* Paths of the files to keep, the root layer first. */
 typedef struct keeper {
   qmat_context *context;
+  const qmat_usd_stage *stage;
   size_t count, capacity;
   char **paths;
 } keeper;
@@ -36,17 +42,49 @@ static qmat_status add_path(keeper *k, char *path) {
   return QMAT_OK;
 }
 
-/* Whether a file is an image. One that cannot be read is none. */
-static qmat_status is_image(const keeper *k, const char *path, bool *image) {
+/* Adds a warning, which it takes over, unless it is there already. */
+static qmat_status warn(const keeper *k, json_t *text) {
+  json_t *warnings = qmat_usd_stage_warnings(k->stage), *other;
+  size_t i;
+  json_array_foreach(warnings, i, other) {
+    if (!text || !json_equal(text, other)) continue;
+    json_decref(text);
+    return QMAT_OK;
+  }
+  return json_array_append_new(warnings, text) == 0 ? QMAT_OK : fail_shortage(k);
+}
+
+/* Adds the path of an image, which it takes over; NULL is none. A file that cannot be read is passed over; one that is
+ * not an image is not kept, with a warning. */
+static qmat_status add_image(keeper *k, char *path) {
+  if (!path) return fail_shortage(k);
   qmat_bytes bytes = {0};
   const qmat_error before = k->context->error;
-  const qmat_status status = qmat_bytes_read_file(k->context, path, &bytes);
-  *image = status == QMAT_OK && (qmat_gltf_image_type(bytes.data, bytes.size) ||
-                                 (bytes.size > 4 && memcmp(bytes.data, "v/1\1", 4) == 0)); /* OpenEXR */
+  qmat_status status = qmat_bytes_read_file(k->context, path, &bytes);
+  const bool is_read = status == QMAT_OK;
+  const bool is_image = is_read && (qmat_gltf_image_type(bytes.data, bytes.size) ||
+                                    (bytes.size > 4 && memcmp(bytes.data, "v/1\1", 4) == 0)); /* OpenEXR */
   qmat_bytes_uninit(&bytes);
-  if (status != QMAT_ERROR_IO && status != QMAT_ERROR_FORMAT) return status;
-  k->context->error = before;
-  return QMAT_OK;
+  if (is_image) return add_path(k, path);
+  if (status == QMAT_ERROR_IO || status == QMAT_ERROR_FORMAT) {
+    k->context->error = before;
+    status = QMAT_OK;
+  }
+  if (is_read)
+    status = warn(k, json_sprintf("'%s' is not kept for an output as USD: it is not an image", qmat_usd_shown(path)));
+  qmat_free(path);
+  return status;
+}
+
+/* Adds the images of a path with <UDIM> in it, a number for each tile. */
+static qmat_status add_tiles(keeper *k, const char *path, const char *place) {
+  qmat_status status = QMAT_OK;
+  for (int tile = FIRST_UDIM_TILE; tile <= LAST_UDIM_TILE && status == QMAT_OK; tile++) {
+    char *image = qmat_alloc(strlen(path) + 1, 1);
+    if (image) snprintf(image, strlen(path) + 1, "%.*s%d%s", (int)(place - path), path, tile, place + strlen(UDIM));
+    status = add_image(k, image);
+  }
+  return status;
 }
 
 static qmat_status add_assets(keeper *k, const char *from, const qmat_usd_value *value) {
@@ -54,13 +92,12 @@ static qmat_status add_assets(keeper *k, const char *from, const qmat_usd_value 
   if (!value || value->type != QMAT_USD_ASSET) return QMAT_OK;
   for (size_t i = 0; i < value->count && status == QMAT_OK; i++) {
     char *path = value->texts[i][0] ? qmat_usd_beside(from, value->texts[i]) : NULL;
-    bool image = false;
-    if (path) status = is_image(k, path, &image);
-    if (image) {
-      const qmat_status added = add_path(k, path);
-      if (added != QMAT_OK) return added;
-    } else {
+    const char *place = path ? strstr(path, UDIM) : NULL;
+    if (place) {
+      status = add_tiles(k, path, place);
       qmat_free(path);
+    } else if (path) {
+      status = add_image(k, path);
     }
   }
   return status;
@@ -103,14 +140,9 @@ static qmat_status pack(const keeper *k, size_t folder, const qmat_bytes *root, 
   return status;
 }
 
-static qmat_status warn_not_kept(const keeper *k, const qmat_usd_stage *stage, const char *why) {
-  json_t *text = json_sprintf("the scene is not kept for an output as USD: %s", why);
-  return json_array_append_new(qmat_usd_stage_warnings(stage), text) == 0 ? QMAT_OK : fail_shortage(k);
-}
-
 /* Lists the files to keep; `*why` says why that is impossible. */
-static qmat_status list_files(keeper *k, const qmat_usd_stage *stage, bool is_package, const char **why) {
-  const qmat_usd_files *files = qmat_usd_stage_files(stage);
+static qmat_status list_files(keeper *k, bool is_package, const char **why) {
+  const qmat_usd_files *files = qmat_usd_stage_files(k->stage);
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < files->file_count && status == QMAT_OK && !*why && !is_package; i++) {
     const char *path;
@@ -128,17 +160,17 @@ static qmat_status list_files(keeper *k, const qmat_usd_stage *stage, bool is_pa
 
 qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, const qmat_bytes *bytes,
                           qmat_scene *scene) {
-  keeper k = {.context = context};
+  keeper k = {.context = context, .stage = stage};
   const char *why = NULL;
   const bool is_package = bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
   qmat_writer out = {0};
-  qmat_status status = list_files(&k, stage, is_package, &why);
+  qmat_status status = list_files(&k, is_package, &why);
   const size_t folder = k.count > 1 ? common_folder(&k) : 0;
   for (size_t i = 0; i < k.count && k.count > 1; i++)
     if (!qmat_is_part_name(k.paths[i] + folder) || !qmat_is_utf8(k.paths[i] + folder))
       why = "a file is in a folder above that of the first one";
   if (status == QMAT_OK && why) {
-    status = warn_not_kept(&k, stage, why);
+    status = warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", why));
   } else if (status == QMAT_OK) {
     if (k.count > 1)
       status = pack(&k, folder, bytes, &out);

@@ -231,6 +231,24 @@ static void test_names_of_hulls_and_a_second_run_replaces_the_first(void **state
   qmat_writer_uninit(&data);
 }
 
+/* What the asset says of its body stays; how an earlier run let it move goes with the next one that does not. */
+static void test_the_motion_of_a_body_is_that_of_the_last_run(void **state) {
+  (void)state;
+  static const char *const keys[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+  qmat_writer data = {0};
+  json_t *root = json_pack("{s:[{s:{s:{s:{}}}}]}", "nodes", "extensions", keys[0], "trigger");
+  for (int run = 0; run < 3; run++) {
+    const bool moves = run != 1;
+    write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, moves, root, &data);
+    const json_t *own = json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions");
+    assert_non_null(json_object_get(json_object_get(own, keys[0]), "trigger"));
+    for (int form = 0; form < 2; form++)
+      assert_true(moves == (json_object_get(json_object_get(own, keys[form]), "motion") != NULL));
+  }
+  json_decref(root);
+  qmat_writer_uninit(&data);
+}
+
 static bool says(const qmat_file *file, const char *text) {
   return memmem(file->parts[0].bytes, file->parts[0].size, text, strlen(text)) != NULL;
 }
@@ -295,6 +313,7 @@ int main(void) {
       cmocka_unit_test(test_moments_follow_the_scales_above_a_body),
       cmocka_unit_test(test_omi_has_convex_meshes_where_radii_differ),
       cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),
+      cmocka_unit_test(test_the_motion_of_a_body_is_that_of_the_last_run),
       cmocka_unit_test(test_robot_files_have_shapes_in_metres_and_mass),
       cmocka_unit_test(test_usd_has_a_capsule_of_two_radii_and_convex_hulls),
   };

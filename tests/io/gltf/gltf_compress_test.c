@@ -11,6 +11,7 @@
 
 #include "core/json_text.h"
 #include "io/draco_draco.h"
+#include "io/gltf/gltf_asset.h"
 #include "tests/io/gltf/gltf_assets.h"
 
 /* Two meshes of one box with numbers for its corners, a third of a longer box with a morph target, and a picture behind
@@ -245,6 +246,37 @@ static void test_what_was_compressed_before_keeps_its_data_and_all_that_it_says(
   uninit(&o);
 }
 
+/* 127 triangles that share one of 255 corners: Draco splits it, and then there are too many points for bytes. */
+static void test_indices_get_wider_where_corners_are_split(void **state) {
+  (void)state;
+  enum { TRIANGLES = 127, CORNERS = 2 * TRIANGLES + 1 };
+  static const char text[] =
+      "{'asset':{'version':'2.0'},'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+      "'accessors':[{'bufferView':0,'componentType':5126,'count':255,'type':'VEC3','min':[0,0,0],'max':[1,1,1]},"
+      "{'bufferView':1,'componentType':5121,'count':381,'type':'SCALAR'}],"
+      "'bufferViews':[{'buffer':0,'byteLength':3060},{'buffer':0,'byteOffset':3060,'byteLength':381}],"
+      "'buffers':[{'byteLength':3441}]}";
+  char *json = asset_json(text);
+  outcome o = {.root = json_loads(json, 0, NULL), .notes = json_array()};
+  for (int i = 0; i < CORNERS; i++) {
+    qmat_put_f32(&o.data, (float)cos(i));
+    qmat_put_f32(&o.data, (float)sin(i));
+    qmat_put_f32(&o.data, (float)i / CORNERS);
+  }
+  for (int i = 0; i < TRIANGLES; i++) {
+    const uint8_t triangle[] = {0, (uint8_t)(2 * i + 1), (uint8_t)(2 * i + 2)};
+    qmat_put_bytes(&o.data, triangle, sizeof triangle);
+  }
+  assert_int_equal(qmat_gltf_compress(&o.context, o.root, o.data.bytes, o.data.size, 1e-3, o.notes, &o.compressed),
+                   QMAT_OK);
+  assert_int_equal(o.compressed.primitives, 1);
+  assert_true(number(at(o.root, "accessors", 0), "count") > 255);
+  assert_int_equal(number(at(o.root, "accessors", 1), "componentType"), QMAT_GLTF_UNSIGNED_SHORT);
+  assert_int_equal(number(at(o.root, "accessors", 1), "count"), 3 * TRIANGLES);
+  free(json);
+  uninit(&o);
+}
+
 static void test_the_same_asset_gives_the_same_bytes(void **state) {
   (void)state;
   outcome first, second;
@@ -264,6 +296,7 @@ int main(void) {
       cmocka_unit_test(test_the_readers_find_the_same_meshes),
       cmocka_unit_test(test_what_cannot_be_taken_stays_as_it_is),
       cmocka_unit_test(test_what_was_compressed_before_keeps_its_data_and_all_that_it_says),
+      cmocka_unit_test(test_indices_get_wider_where_corners_are_split),
       cmocka_unit_test(test_the_same_asset_gives_the_same_bytes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

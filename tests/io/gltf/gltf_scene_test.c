@@ -13,6 +13,7 @@
 #include "io/save.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/io/medial_examples.h"
+#include "tests/shapes.h"
 
 /* Two boxes: `near` is on two nodes, of which the second has extras that are a text; `far` is on one, below a camera's
  * parent. A third mesh has points only, a fourth is on no node. */
@@ -333,24 +334,30 @@ static void test_what_comes_out_is_read_again_with_the_same_meshes(void **state)
   }
 }
 
+/* What was written, as a scene of which mesh 1 is to get a medial mesh. */
+static qmat_scene *scene_again(qmat_context *context, const qmat_file *file) {
+  qmat_scene *scene = qmat_scene_new();
+  scene->name = qmat_strdup("again");
+  scene->format = qmat_strdup("glb");
+  scene->parts = qmat_calloc(1, sizeof *scene->parts);
+  scene->part_count = 1;
+  scene->parts[0].name = qmat_strdup("");
+  scene->parts[0].bytes = qmat_alloc(file->parts[0].size, 1);
+  scene->parts[0].size = file->parts[0].size;
+  memcpy(scene->parts[0].bytes, file->parts[0].bytes, file->parts[0].size);
+  scene->mesh_count = 1;
+  scene->meshes = qmat_calloc(1, sizeof *scene->meshes);
+  scene->meshes[0] = 1;
+  assert_int_equal(qmat_value_seal(context, &scene->base), QMAT_OK);
+  return scene;
+}
+
 static void test_a_second_time_replaces_what_the_first_left(void **state) {
   (void)state;
   fixture f, again = {0};
   assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
   qmat_file *first = enrich(&f, 1, true, NULL, false);
-  again.scene = qmat_scene_new();
-  again.scene->name = qmat_strdup("again");
-  again.scene->format = qmat_strdup("glb");
-  again.scene->parts = qmat_calloc(1, sizeof *again.scene->parts);
-  again.scene->part_count = 1;
-  again.scene->parts[0].name = qmat_strdup("");
-  again.scene->parts[0].bytes = qmat_alloc(first->parts[0].size, 1);
-  again.scene->parts[0].size = first->parts[0].size;
-  memcpy(again.scene->parts[0].bytes, first->parts[0].bytes, first->parts[0].size);
-  again.scene->mesh_count = 1;
-  again.scene->meshes = qmat_calloc(1, sizeof *again.scene->meshes);
-  again.scene->meshes[0] = 1;
-  assert_int_equal(qmat_value_seal(&again.context, &again.scene->base), QMAT_OK);
+  again.scene = scene_again(&again.context, first);
   qmat_file *second = enrich(&again, 1, true, NULL, false);
   assert_int_equal(second->parts[0].size, first->parts[0].size);
   assert_memory_equal(second->parts[0].bytes, first->parts[0].bytes, first->parts[0].size);
@@ -537,6 +544,42 @@ static void test_a_mesh_far_from_zero_has_its_medial_mesh_on_a_translated_child(
   release(&f);
 }
 
+/* The first run adds a child with a medial mesh far from zero and one with a skin, the second run only extras. */
+static void test_a_second_time_takes_away_children_of_the_first(void **state) {
+  (void)state;
+  fixture f, again = {0};
+  assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
+  qmat_medial *medial = example_build((const double[]){4e5 + 0.1, 0, 5e6 + 0.3, 1, 4e5 + 1.3, 0, 5e6, 0.5}, 2,
+                                      (const uint32_t[]){0, 1}, 1, NULL, 0);
+  qmat_mesh *skin = shape_box(1, 1, 1);
+  for (size_t i = 0; i < skin->vertex_count; i++) {
+    skin->positions[3 * i] += 4e5;
+    skin->positions[3 * i + 2] += 5e6;
+  }
+  shape_seal(skin);
+  const qmat_gltf_addition addition = {
+      .medial = medial, .skin = skin, .options = {.binary = true, .quantisation = 1e-4}};
+  qmat_file *first;
+  assert_int_equal(qmat_gltf_enrich(&f.context, f.scene, &addition, 1, false, NULL, &first), QMAT_OK);
+  qmat_gltf_asset before = open_part(&first->parts[0]);
+  assert_int_equal(json_array_size(json_object_get(node_of(&before, 2), "children")), 4);
+  qmat_gltf_asset_uninit(&before);
+  again.scene = scene_again(&again.context, first);
+  qmat_file *second = enrich(&again, 1, true, NULL, false);
+  qmat_gltf_asset after = open_part(&second->parts[0]);
+  assert_non_null(data_of(node_of(&after, 2)));
+  assert_int_equal(json_array_size(json_object_get(node_of(&after, 2), "children")), 2); /* its own */
+  for (size_t i = 6; i < json_array_size(json_object_get(after.root, "nodes")); i++)
+    assert_int_equal(json_object_size(node_of(&after, i)), 0);
+  qmat_gltf_asset_uninit(&after);
+  qmat_value_release(&again.scene->base);
+  qmat_value_release(&first->base);
+  qmat_value_release(&second->base);
+  qmat_value_release(&skin->base);
+  qmat_value_release(&medial->base);
+  release(&f);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_meshes_are_read_once_each_in_their_own_space),
@@ -544,6 +587,7 @@ int main(void) {
       cmocka_unit_test(test_what_comes_out_only_has_more_in_it),
       cmocka_unit_test(test_what_comes_out_is_read_again_with_the_same_meshes),
       cmocka_unit_test(test_a_second_time_replaces_what_the_first_left),
+      cmocka_unit_test(test_a_second_time_takes_away_children_of_the_first),
       cmocka_unit_test(test_one_of_all_meshes_gets_a_node_of_the_scene),
       cmocka_unit_test(test_a_glb_takes_in_buffers_and_images_and_renumbers_them),
       cmocka_unit_test(test_a_mesh_far_from_zero_has_its_medial_mesh_on_a_translated_child),

@@ -8,6 +8,7 @@
 #include "io/placement.h"
 #include "io/usd/usd_medial.h"
 #include "io/usd/usd_write.h"
+#include "io/usd/usdz.h"
 #include "tests/io/files.h"
 #include "tests/io/medial_examples.h"
 #include "tests/shapes.h"
@@ -25,16 +26,20 @@ typedef struct reading {
   qmat_status status;
 } reading;
 
-static reading read_choice(const char *text, const char *choice) {
+static reading read_at(const char *path, const char *text, const char *choice) {
   reading r = {.scene = qmat_scene_new(), .report = json_object()};
   assert_true(r.scene && r.report);
   qmat_bytes bytes = memory_file(text, strlen(text));
   r.scene->name = qmat_strdup("thing");
   r.scene->format = qmat_strdup("usd");
-  r.status = qmat_usd_read_meshes(&r.context, &bytes, "file.usda", choice, 16, r.scene, &r.meshes, r.report);
+  r.status = qmat_usd_read_meshes(&r.context, &bytes, path, choice, 16, r.scene, &r.meshes, r.report);
   free(bytes.data);
   if (r.status == QMAT_OK) assert_int_equal(qmat_value_seal(&r.context, &r.scene->base), QMAT_OK);
   return r;
+}
+
+static reading read_choice(const char *text, const char *choice) {
+  return read_at("file.usda", text, choice);
 }
 
 static reading read_all(const char *text) {
@@ -368,6 +373,41 @@ static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
   release(&before);
 }
 
+/* All tiles of a texture are kept with the scene; a file that is not an image is named once. */
+static void test_tiles_are_kept_and_other_files_are_named(void **state) {
+  (void)state;
+  static const char *const names[] = {"t.1001.png", "t.1100.png", "t.1101.png", "look.mdl"};
+  static const uint8_t png[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  char folder[64], path[4][256], scene[256], warning[512];
+  make_folder(folder);
+  for (int i = 0; i < 4; i++) {
+    snprintf(path[i], sizeof path[i], "%s/%s", folder, names[i]);
+    write_file(path[i], i < 3 ? (const char *)png : "mdl 1.0;", sizeof png);
+  }
+  snprintf(scene, sizeof scene, "%s/scene.usda", folder);
+  reading r = read_at(scene,
+                      "#usda 1.0\n" CUBE("a", "") "def Shader \"s\" { asset inputs:file = @./t.<UDIM>.png@\n"
+                                                 "asset info:mdl:sourceAsset = @./look.mdl@\n"
+                                                 "asset other = @look.mdl@\nasset gone = @none.png@ }\n",
+                      "all");
+  assert_int_equal(r.status, QMAT_OK);
+  snprintf(warning, sizeof warning, "'%s' is not kept for an output as USD: it is not an image", path[3]);
+  assert_string_equal(warning_of(&r, 0), warning);
+  assert_string_equal(warning_of(&r, 1), "");
+  assert_int_equal(r.scene->part_count, 1);
+  const qmat_bytes bytes = {.data = r.scene->parts[0].bytes, .size = r.scene->parts[0].size};
+  qmat_usdz archive;
+  assert_int_equal(qmat_usdz_open(&r.context, &bytes, "kept", &archive), QMAT_OK);
+  assert_int_equal(archive.member_count, 3);
+  assert_string_equal(archive.members[0].name, "scene.usda");
+  assert_string_equal(archive.members[1].name, names[0]);
+  assert_string_equal(archive.members[2].name, names[1]);
+  qmat_usdz_uninit(&archive);
+  release(&r);
+  for (int i = 0; i < 4; i++) unlink(path[i]);
+  assert_int_equal(rmdir(folder), 0);
+}
+
 /* The overs of a path that begins with another path are below its prim, and each prim is opened once. */
 static void test_the_prims_of_a_layer_are_opened_once(void **state) {
   (void)state;
@@ -402,6 +442,7 @@ int main(void) {
       cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
       cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),
       cmocka_unit_test(test_a_layer_adds_medial_meshes_and_takes_nothing),
+      cmocka_unit_test(test_tiles_are_kept_and_other_files_are_named),
       cmocka_unit_test(test_the_prims_of_a_layer_are_opened_once),
       cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
   };

@@ -416,6 +416,34 @@ static void test_gltf_has_the_skeleton_its_skin_and_its_motion(void **state) {
   release(&r);
 }
 
+/* A mesh may list a joint twice and joints that the skeleton has not; the joints of a glTF skin are different nodes. */
+static void test_a_joint_that_a_mesh_lists_twice_has_a_stand_in(void **state) {
+  (void)state;
+  reading r = read_text(ROOT(SKELETON(JOINTS BINDS RESTS)
+                                 MESH(BINDING "uniform token[] skel:joints = [\"hip\", \"hip/knee\", \"hip\"]\n")));
+  qmat_medial *ball = sealed_medial_mesh((const double[]){0, 0, 0, 1}, 1, NULL, 0, NULL, 0);
+  const qmat_gltf_addition addition = {.medial = ball, .options = {.binary = true, .quantisation = 0.001}};
+  qmat_file *file;
+  qmat_gltf_asset asset;
+  assert_int_equal(qmat_gltf_write_places(&r.context, r.scene, &addition, 1, &file), QMAT_OK);
+  assert_int_equal(qmat_gltf_asset_init(&r.context, file->parts[0].bytes, file->parts[0].size, "file.glb", &asset),
+                   QMAT_OK);
+  const json_t *joints = json_object_get(json_array_get(json_object_get(asset.root, "skins"), 0), "joints");
+  assert_int_equal(json_array_size(joints), 3);
+  const json_int_t hip = json_integer_value(json_array_get(joints, 0)),
+                   stand_in = json_integer_value(json_array_get(joints, 2));
+  assert_true(stand_in != hip && stand_in != json_integer_value(json_array_get(joints, 1)));
+  const json_t *nodes = json_object_get(asset.root, "nodes"),
+               *children = json_object_get(json_array_get(nodes, (size_t)hip), "children");
+  assert_int_equal(json_array_size(children), 2);
+  assert_int_equal(json_integer_value(json_array_get(children, 1)), stand_in);
+  assert_int_equal(json_object_size(json_array_get(nodes, (size_t)stand_in)), 0);
+  qmat_gltf_asset_uninit(&asset);
+  qmat_value_release(&file->base);
+  qmat_value_release(&ball->base);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_skeleton_its_skin_and_its_rest_are_those_of_the_file),
@@ -427,6 +455,7 @@ int main(void) {
       cmocka_unit_test(test_what_cannot_be_used_is_left_out_with_one_warning),
       cmocka_unit_test(test_a_rig_that_does_not_fit_together_is_refused),
       cmocka_unit_test(test_gltf_has_the_skeleton_its_skin_and_its_motion),
+      cmocka_unit_test(test_a_joint_that_a_mesh_lists_twice_has_a_stand_in),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

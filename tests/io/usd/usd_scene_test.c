@@ -455,6 +455,35 @@ static void test_a_variant_that_is_not_selected_is_left_out_aloud(void **state) 
   json_decref(report);
 }
 
+/* The layer and its sublayer, in two folders, each refer to their own asset.usda; the prim gets both meshes. */
+static void test_references_are_beside_the_layer_of_the_stack_that_has_them(void **state) {
+  (void)state;
+  char sub[256], sublayer[256], its_asset[256], asset[256];
+  snprintf(sub, sizeof sub, "%s", in_folder("sub"));
+  snprintf(sublayer, sizeof sublayer, "%s", in_folder("sub/below.usda"));
+  snprintf(its_asset, sizeof its_asset, "%s", in_folder("sub/asset.usda"));
+  snprintf(asset, sizeof asset, "%s", in_folder("asset.usda"));
+  assert_int_equal(mkdir(sub, 0777), 0);
+  static const char below[] = "#usda 1.0\ndef \"x\" ( prepend references = @./asset.usda@ ) {}\n";
+  static const char one[] = "#usda 1.0\n( defaultPrim = \"A\" )\ndef \"A\" {\n" MESH("a", "") "}";
+  static const char other[] = "#usda 1.0\n( defaultPrim = \"B\" )\ndef \"B\" {\n" MESH("b", "") "}";
+  write_file(sublayer, below, strlen(below));
+  write_file(asset, one, strlen(one));
+  write_file(its_asset, other, strlen(other));
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n( subLayers = [@sub/below.usda@] )\ndef \"x\" ( prepend references = @./asset.usda@ ) {}\n", &report);
+  assert_int_equal(count_of(report, "meshes_placed"), 2);
+  assert_int_equal(count_of(report, "layers_read"), 4);
+  assert_string_equal(warning_of(report, 0), "");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  unlink(asset);
+  unlink(its_asset);
+  unlink(sublayer);
+  rmdir(sub);
+}
+
 static void test_files_are_found_beside_the_layer_that_names_them(void **state) {
   (void)state;
   char sub[256], asset[256], sublayer[256];
@@ -690,6 +719,7 @@ int main(void) {
       cmocka_unit_test(test_members_of_a_package_that_overlap_are_refused),
       cmocka_unit_test(test_children_come_through_variants_nested_variants_and_references),
       cmocka_unit_test(test_a_variant_that_is_not_selected_is_left_out_aloud),
+      cmocka_unit_test(test_references_are_beside_the_layer_of_the_stack_that_has_them),
       cmocka_unit_test(test_files_are_found_beside_the_layer_that_names_them),
       cmocka_unit_test(test_samples_over_time_give_the_first_with_a_warning),
       cmocka_unit_test(test_broken_meshes_are_errors_that_name_the_prim),
