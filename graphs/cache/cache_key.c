@@ -82,6 +82,7 @@ json_t *qmat_key_items(const qmat_node *type, const void *params, const qmat_dig
   char number[24];
   snprintf(number, sizeof number, "%d", QMAT_KEY_FORMAT);
   bool done = items && add_item(items, "key", "format", number);
+  done = done && add_item(items, "program", "version", QMAT_VERSION);
   if (*qmat_source_digest) done = done && add_item(items, "program", "sources", qmat_source_digest);
   snprintf(number, sizeof number, "%u", (unsigned)type->version);
   done = done && add_item(items, "node", type->name, number);

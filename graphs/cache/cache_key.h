@@ -8,6 +8,7 @@
  * node's descriptor alone determines the items. Each is a JSON array of three texts, tag, name and value:
  *
  *     key      format          "2"
+ *     program  version         of qmat: files that it writes name it
  *     program  sources         digest of the sources of core/, io/ and nodes/ (QMAT_KEY_SOURCES)
  *     node     medial.simplify its version
  *     library  Embree          its version and instruction set

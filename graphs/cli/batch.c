@@ -32,16 +32,22 @@ void qmat_batch_uninit(qmat_batch *batch) {
 static bool start(qmat_asset *asset) {
   extern char **environ;
   posix_spawn_file_actions_t actions;
-  if (posix_spawn_file_actions_init(&actions) != 0) return false;
-  /* Messages go to the report. */
-  int result = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  if (result == 0) result = posix_spawn(&asset->process, asset->words[0], &actions, NULL, asset->words, environ);
-  posix_spawn_file_actions_destroy(&actions);
+  int result = posix_spawn_file_actions_init(&actions);
+  if (result == 0) {
+    /* Messages go to the report. */
+    result = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    if (result == 0) result = posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    if (result == 0) result = posix_spawn(&asset->process, asset->words[0], &actions, NULL, asset->words, environ);
+    posix_spawn_file_actions_destroy(&actions);
+  }
   asset->started = qmat_clock_seconds();
   asset->state = result == 0 ? QMAT_ASSET_RUNNING : QMAT_ASSET_FAILED;
-  return result == 0;
+  if (result == 0) return true;
+  asset->exit_code = -1;
+  asset->result =
+      json_pack("{s:{s:o}}", "error", "text", json_sprintf("cannot start '%s': %s", asset->words[0], strerror(result)));
+  return false;
 }
 
 static void end(qmat_asset *asset, int status) {

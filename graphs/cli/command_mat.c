@@ -138,7 +138,7 @@ static bool is_missing(const char *path) {
 
 /* Several models, or one whose results go to a folder. */
 static qmat_status run_many(qmat_context *context, qmat_invocation *invocation) {
-  static const char *const of_one_model[] = {"report", "dry-run", "depfile"};
+  static const char *const of_one_model[] = {"report", "dry-run", "depfile", "progress"};
   for (size_t i = 0; i < sizeof of_one_model / sizeof *of_one_model; i++)
     if (qmat_invocation_value(invocation, of_one_model[i])) {
       qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' is for one model whose result is a file", of_one_model[i]);
@@ -156,6 +156,18 @@ static qmat_status run_many(qmat_context *context, qmat_invocation *invocation) 
   return qmat_run_batch(context, invocation, NULL, invocation->arguments, invocation->argument_count, results);
 }
 
+/* One model, whose results are files or the standard output. */
+static qmat_status run_one(qmat_context *context, qmat_invocation *invocation) {
+  bool streams = false;
+  for (size_t i = 0; i < invocation->given_count; i++)
+    streams = streams || (!strcmp(invocation->given[i].name, "output") && qmat_is_stream(invocation->given[i].value));
+  if (qmat_invocation_value(invocation, "format") && !streams) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "option '--format' is for results in a folder or on the standard output");
+    return qmat_fail_hint(context, "the ending of the output's path chooses its format");
+  }
+  return qmat_execute(context, invocation, set_inputs, NULL, NULL);
+}
+
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const char *first = invocation->arguments[0], *output = qmat_invocation_value(invocation, "output");
   if (!output) {
@@ -167,7 +179,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const bool pattern = strpbrk(first, "*?[") && is_missing(first);
   if (invocation->argument_count > 1 || is_folder(first) || is_folder(output) || pattern)
     return run_many(context, invocation);
-  return qmat_execute(context, invocation, set_inputs, NULL, NULL);
+  return run_one(context, invocation);
 }
 
 static const qmat_option options[] = {

@@ -131,6 +131,8 @@ static json_t *describe_difference(const qmat_run *run, const qmat_run_step *ste
   for (size_t i = 0; i < sizeof simple / sizeof *simple; i++)
     if (strcmp(tag, simple[i].tag) == 0)
       return sentence("%s %s is %s, was %s", simple[i].subject, name, shown_value(now), shown_value(before));
+  if (strcmp(tag, "program") == 0 && strcmp(name, "version") == 0)
+    return sentence("the version of qmat is %s, was %s", shown_value(now), shown_value(before));
   if (strcmp(tag, "program") == 0) return sentence("the program was built from other sources");
   if (strcmp(tag, "file") == 0) {
     const json_t *like = now ? json_pack("[s, s, s]", "name", name, "") : NULL;

@@ -53,6 +53,16 @@ holds "a line of JSON each" test "$(grep -c '"result":"ok"' out.txt)" -eq 9
 holds "what was done before comes from the cache" test "$(grep -c '"hits":4' out.txt)" -eq 9
 holds "the other format" test -s results/box1.ma
 
+# Paths that go down and up again: results stay in their folder.
+mkdir -p models/sub below
+cp models/box2.off over.off
+printf 'models/box1.off\nmodels/sub/../../over.off\nmodels/sub/.././box3.off\n' >list.txt
+batch --inputs list.txt --out below/results
+holds "all are made, not $code" test $code -eq 0
+holds "results are below the folder" test "$(cd below && find . -name '*.glb' | sort | tr '\n' ' ')" = \
+  "./results/box1.glb ./results/box3.glb ./results/over.glb "
+rm -r below models/sub over.off list.txt
+
 # Pages: one of each model, and one of all, with failures first. Names may need escapes.
 cat >pages.yaml <<'END'
 qmat: 1

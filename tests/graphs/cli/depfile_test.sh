@@ -37,4 +37,10 @@ for tool in make ninja; do
   made no "after an edited side file"
 done
 
+# Results with the same bytes as before are as new as the run: of two, both.
+"$qmat" mat roof.gltf -o two.ma -o two.ply --quiet --epsilon 10% --set samples.spacing=10%
+touch -d 2001-01-01 two.ma two.ply
+"$qmat" mat roof.gltf -o two.ma -o two.ply --quiet --epsilon 10% --set samples.spacing=10%
+holds "both results are new" test two.ma -nt roof.gltf -a two.ply -nt roof.gltf
+
 finish

@@ -58,11 +58,12 @@ holds "two files, two formats" test "$(made two)" = "a/spot.ma a/spot.ply b/spot
 expect 0 "2 done" "$qmat" mat models/a models/b/spot.off models/a/spot.off -o twice $coarse
 holds "a model that is named twice is taken once" test "$(made twice)" = "a/spot.glb b/spot.glb"
 expect 0 "1 done" "$qmat" mat models/a models/a 'models/a/*.off' -o thrice $coarse
-for option in --dry-run "--report all.json" "--depfile all.d"; do
+for option in --dry-run "--report all.json" "--depfile all.d" "--progress json"; do
   expect 2 "is for one model" "$qmat" mat models -o unmade $option $coarse
   expect 2 "is for one model" "$qmat" mat box.off -o unmade/ $option $coarse
 done
-holds "a refused option makes no folder" test ! -e unmade
+expect 2 "option '--format' is for results in a folder" "$qmat" mat box.off -o unmade.glb -f ma $coarse
+holds "a refused option makes nothing" test ! -e unmade -a ! -e unmade.glb
 expect 0 "1 done" "$qmat" mat box.off -o into/ $coarse
 holds "one model into a folder" cmp right.glb into/box.glb
 cp -r models within
