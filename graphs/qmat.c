@@ -43,7 +43,8 @@ struct qmat_job {
   qmat_run_given *given;
   size_t given_count, given_capacity;
   char *cache_folder; /* NULL: none */
-  qmat_cache cache;   /* open during a run, and as long as its report may be requested */
+  qmat_cache cache;   /* open during a run */
+  char *run_report;   /* of the last run, as JSON; NULL: there is none */
   qmat_job_progress progress;
   void *progress_user;
   qmat_job_problem problem;
@@ -140,13 +141,18 @@ qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size
                                                text, size, &(*job)->graph));
 }
 
+void qmat_job_forget(qmat_job *job) {
+  for (size_t i = 0; i < job->save_count; i++) qmat_free(job->saves[i].path);
+  for (size_t i = 0; i < job->given_count; i++) qmat_value_release(job->given[i].value);
+  job->save_count = job->want_count = job->given_count = 0;
+}
+
 void qmat_job_free(qmat_job *job) {
   if (!job) return;
   qmat_run_uninit(&job->run);
-  qmat_cache_close(&job->cache);
   qmat_free(job->cache_folder);
-  for (size_t i = 0; i < job->save_count; i++) qmat_free(job->saves[i].path);
-  for (size_t i = 0; i < job->given_count; i++) qmat_value_release(job->given[i].value);
+  qmat_free(job->run_report);
+  qmat_job_forget(job);
   qmat_free(job->saves);
   qmat_free(job->wants);
   qmat_free(job->given);
@@ -164,7 +170,7 @@ qmat_result qmat_job_set(qmat_job *job, const char *assignment) {
 
 static qmat_status make_mesh(qmat_context *context, const char *name, const double *positions, size_t vertex_count,
                              const uint32_t *triangles, size_t triangle_count, qmat_mesh **mesh) {
-  const qmat_read_options options = {.defects = QMAT_DEFECTS_REFUSE};
+  const qmat_read_options options = {.defects = QMAT_DEFECTS_DROP};
   qmat_soup soup = {0};
   *mesh = NULL;
   qmat_status status = QMAT_OK;
@@ -356,6 +362,11 @@ qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
   qmat_status status = output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output)
                               : only_file(job, path, &save.output);
   if (status == QMAT_OK) status = qmat_graph_output_format(&job->context, &job->graph, save.output, path, &choice);
+  for (size_t i = 0; i < job->save_count && status == QMAT_OK; i++) {
+    if (strcmp(job->saves[i].path, path) != 0) continue;
+    job->saves[i].output = save.output;
+    return QMAT_RESULT_OK;
+  }
   if (status == QMAT_OK) {
     save.path = qmat_strdup(path);
     if (!save.path ||
@@ -417,7 +428,8 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   if (!job->loaded) return job->problem.result;
   qmat_context *context = &job->context;
   qmat_run_uninit(&job->run);
-  qmat_cache_close(&job->cache);
+  qmat_free(job->run_report);
+  job->run_report = NULL;
   job->ran = false;
   if (threads < 0 || threads > 1024)
     return finish(
@@ -446,7 +458,13 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   if (status == QMAT_OK) status = qmat_run_plan(context, &job->graph, &options, &job->run);
   if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
   if (status == QMAT_OK) status = qmat_run_write(context, &job->run);
+  if (status == QMAT_OK) { /* now, since it has texts of the graph, which may change */
+    json_t *report = qmat_run_report(context, &job->run);
+    status = dump(context, report, &job->run_report);
+    json_decref(report);
+  }
   context->progress = NULL;
+  qmat_cache_close(&job->cache);
   qmat_free(saves);
   job->ran = status == QMAT_OK;
   if (status != QMAT_OK) qmat_run_uninit(&job->run);
@@ -573,8 +591,6 @@ qmat_result qmat_job_run_report(qmat_job *job, char **json) {
   *json = NULL;
   if (!job->loaded) return job->problem.result;
   if (!job->ran) return finish(job, qmat_fail(&job->context, QMAT_ERROR_USAGE, "the job has no results: run it first"));
-  json_t *report = qmat_run_report(&job->context, &job->run);
-  qmat_status status = dump(&job->context, report, json);
-  json_decref(report);
-  return finish(job, status);
+  *json = qmat_strdup(job->run_report);
+  return finish(job, *json ? QMAT_OK : qmat_fail_memory(&job->context, "report"));
 }

@@ -55,9 +55,9 @@ QMAT_API void qmat_text_free(char *text);
 /* ---- making a job ---- */
 
 /* A job with the built-in graph, graphs/qmat_plus.yaml: nodes model, surface, solid, thickness, samples, initial,
- * refined, features, simple, errors, skin, asset, chain, page, picture; inputs model, epsilon, vertices, features;
- * outputs asset, page, picture. `*job` is NULL only when memory is short; after any other failure it has the error.
- * Free it with qmat_job_free. */
+ * refined, features, simple, errors, skin, asset, chain, page, picture; inputs model, epsilon, vertices, features,
+ * effort, require; outputs asset, page, picture. `*job` is NULL only when memory is short; after any other failure it
+ * has the error. Free it with qmat_job_free. */
 QMAT_API qmat_result qmat_job_new(qmat_job **job);
 /* The same with a graph file, or where there is none of that name a built-in graph: "qmat_plus", "colliders", "lod".
  * Relative paths of a file are relative to its folder. */
@@ -76,7 +76,8 @@ QMAT_API qmat_result qmat_job_set(qmat_job *job, const char *assignment);
 /* Sets an output port ("model.mesh") to a triangle mesh. Its node then does not run; the node's output of type scene
  * gets the name `name` (NULL: "mesh"). `positions` has 3 * vertex_count doubles x y z, `triangles` 3 * triangle_count
  * indices below vertex_count, counter-clockwise from outside; both are copied. As for a file, vertices at the same
- * position are welded and the orientation is made consistent. Cost: linear. */
+ * position are welded, the orientation is made consistent, and triangles are left out that have fewer than three
+ * different vertices, or the same ones as an earlier triangle. Cost: linear. */
 QMAT_API qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
                                         size_t vertex_count, const uint32_t *triangles, size_t triangle_count);
 
@@ -102,8 +103,13 @@ QMAT_API qmat_result qmat_job_graph(qmat_job *job, char **json);
 
 /* Saves an output of the graph ("asset"; NULL: the one that alone has the ending of `path`, else the only one that
  * every run makes) as `path` after a successful run. The path's ending chooses the format. An output may be saved
- * several times under different paths. */
+ * several times under different paths. They hold for every later run. A path that is given again replaces the earlier
+ * one. */
 QMAT_API qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
+
+/* Forgets what was given, requested and saved, for a run with other models or paths. Parameters and the cache stay, and
+ * so do the results of the last run. */
+QMAT_API void qmat_job_forget(qmat_job *job);
 
 /* Sets the folder of the cache, which is made if it is missing; NULL, the default: no cache. A cached result is used
  * instead of running its node; a mesh in memory counts by its content. Any number of jobs, threads and processes may

@@ -261,6 +261,11 @@ def _table(array, columns, kind, what):
     return np.ascontiguousarray(given, kind)
 
 
+def _own_table(array, columns, kind, what):
+    """The same, but never the caller's array, which may change before a later run."""
+    return _table(array, columns, kind, what).copy()
+
+
 def _pointer(array):
     kind = "double *" if array.dtype == np.float64 else "uint32_t *"
     return _ffi.cast(kind, array.ctypes.data)
@@ -407,7 +412,7 @@ def _assignment(name, value):
         value = "true" if value else "false"
     elif isinstance(value, (float, np.floating)):
         value = repr(float(value))
-    return f"{name}={os.fspath(value) if isinstance(value, os.PathLike) else value}".encode()
+    return os.fsencode(f"{name}=") + os.fsencode(value if isinstance(value, (str, bytes, os.PathLike)) else str(value))
 
 
 class Graph:
@@ -428,7 +433,7 @@ class Graph:
             self._make = (_lib.qmat_job_new_from_text, text.encode(), len(text.encode()))
         else:
             self._make = (_lib.qmat_job_new,)
-        self._calls = []  # (function, arguments, what has to stay alive)
+        self._calls = {}  # by what each one sets: function, arguments, what has to stay alive
         self._job = _Job(*self._make)
         described = self._job.json(_lib.qmat_job_graph)
         self.inputs = described["inputs"]
@@ -438,51 +443,52 @@ class Graph:
                       for port, kind in node["outputs"].items()}
         if cache is True:
             folder = _lib.qmat_cache_folder()
-            cache = _text(folder) if folder else None
+            cache = _ffi.string(folder) if folder else None
             _lib.qmat_text_free(folder)
         if cache:
-            self._call(_lib.qmat_job_cache, os.fsencode(cache))
+            self._call("cache", _lib.qmat_job_cache, os.fsencode(cache))
 
     def _current(self):
         """The job of the next run."""
         if not self._job:
             self._job = _Job(*self._make)
-            for function, arguments, _ in self._calls:
+            for function, arguments, _ in self._calls.values():
                 self._job.call(function, *arguments)
         return self._job
 
-    def _call(self, function, *arguments, alive=None):
-        """Calls the library, and again for each later run."""
+    def _call(self, what, function, *arguments, alive=None):
+        """Calls the library, and again for each later run, until another call sets the same."""
         self._current().call(function, *arguments)
-        self._calls.append((function, arguments, alive))
+        self._calls.pop(what, None)  # calls have an order: an input may set what a parameter sets, too
+        self._calls[what] = (function, arguments, alive)
 
     def set(self, settings=(), **inputs):
         """Sets parameters: g.set({"simple.protect": "late"}, epsilon=.01, model="octopus.off"). Returns the graph."""
         for name, value in {**dict(settings), **inputs}.items():
-            self._call(_lib.qmat_job_set, _assignment(name, value))
+            self._call(("set", name), _lib.qmat_job_set, _assignment(name, value))
         return self
 
     def give(self, port, value, *more, name=None):
         """Gives the value of an output port, whose node then does not run: a result of any run, or arrays V, F of a
         mesh, or spheres, cones, slabs of a medial mesh. `name` is that of the mesh. Returns the graph."""
-        place = port.encode()
+        place, what = port.encode(), ("give", port)
         if isinstance(value, (Value, Report)):
-            self._call(_lib.qmat_job_give_result, place, value._job.job, value._port.encode(), alive=value)
+            self._call(what, _lib.qmat_job_give_result, place, value._job.job, value._port.encode(), alive=value)
         elif port not in self.ports:
             self._current().call(_lib.qmat_job_want, place)  # says which port is meant
         elif self.ports[port] == "medial":
-            spheres = _table(value, 4, np.float64, "spheres")
-            cones, slabs = [_table(more[i] if len(more) > i else [], 2 + i, np.uint32, ("cones", "slabs")[i])
+            spheres = _own_table(value, 4, np.float64, "spheres")
+            cones, slabs = [_own_table(more[i] if len(more) > i else [], 2 + i, np.uint32, ("cones", "slabs")[i])
                             for i in range(2)]
-            self._call(_lib.qmat_job_give_medial, place, _pointer(spheres), len(spheres), _pointer(cones), len(cones),
+            self._call(what, _lib.qmat_job_give_medial, place, _pointer(spheres), len(spheres), _pointer(cones), len(cones),
                        _pointer(slabs), len(slabs), alive=(spheres, cones, slabs))
         else:
             if len(more) != 1:
                 raise TypeError(f"{port}: a mesh is given as two arrays, V and F")
-            positions = _table(value, 3, np.float64, "V")
-            triangles = _table(more[0], 3, np.uint32, "F")
+            positions = _own_table(value, 3, np.float64, "V")
+            triangles = _own_table(more[0], 3, np.uint32, "F")
             title = name.encode() if name else _ffi.NULL
-            self._call(_lib.qmat_job_give_mesh, place, title, _pointer(positions), len(positions), _pointer(triangles),
+            self._call(what, _lib.qmat_job_give_mesh, place, title, _pointer(positions), len(positions), _pointer(triangles),
                        len(triangles), alive=(positions, triangles, title))
         return self
 
@@ -593,4 +599,7 @@ def mat(V, F=None, *, epsilon=None, vertices=None, features=None, set=(), name=N
         raise TypeError("a model is a path, or two arrays V and F")
     results = graph.run("simple.medial", "errors.report", "solid.mesh", "model.scene", threads=threads,
                         progress=progress)
+    if isinstance(results["simple.medial"], list):
+        # The library says how many there are, and how to choose one.
+        results._job.call(_lib.qmat_job_medial, b"simple.medial", _ffi.new("qmat_medial_view *"))
     return MedialMesh(results, settings, cache)

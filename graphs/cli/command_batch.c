@@ -95,44 +95,60 @@ static bool is_shared(const batch_call *call, const char *name) {
   return shared;
 }
 
-static bool output_has_format(const qmat_graph *graph, size_t output, const char *ending) {
+/* The format of an output that an ending means, with or without its dot; NULL: none. */
+static const char *output_format(const qmat_graph *graph, size_t output, const char *ending) {
   const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[output].node].type);
+  if (qmat_graph_output_type(graph, output) != QMAT_FILE) return NULL;
   for (int k = 0; format && format->choices[k]; k++)
-    if (strcmp(format->choices[k], ending) == 0) return true;
+    if (strcasecmp(format->choices[k], ending + (*ending == '.')) == 0) return format->choices[k];
+  return NULL;
+}
+
+static bool gives_format(const qmat_invocation *invocation, size_t output, const char *wanted) {
+  for (size_t i = 0; i < invocation->given_count; i++) {
+    if (strcmp(invocation->given[i].name, "format") != 0) continue;
+    const char *format = output_format(&invocation->graph, output, invocation->given[i].value);
+    if (format && strcmp(format, wanted) == 0) return true;
+  }
   return false;
 }
 
-static bool gives_format(const qmat_invocation *invocation, const char *ending) {
-  for (size_t i = 0; i < invocation->given_count; i++)
-    if (strcmp(invocation->given[i].name, "format") == 0 && strcmp(invocation->given[i].value, ending) == 0)
-      return true;
-  return false;
+static void add_output(const batch_call *call, word_list *list, const qmat_asset *asset, size_t output,
+                       const char *ending) {
+  const qmat_graph *graph = &call->invocation->graph;
+  const char *name = graph->outputs[output].name;
+  size_t last;
+  const bool several = qmat_graph_file_count(graph, &last) > 1; /* they differ by their names */
+  add_word(list, "--output=%s=%s/%s%s%s.%s", name, call->folder, asset->stem, several ? "-" : "", several ? name : "",
+           ending);
 }
 
 /* Adds the paths of an asset's results: in each --format, or in the graph's. */
 static void add_outputs(const batch_call *call, word_list *list, const qmat_asset *asset) {
   const qmat_invocation *invocation = call->invocation;
   const qmat_graph *graph = &invocation->graph;
-  size_t last;
-  const bool several = qmat_graph_file_count(graph, &last) > 1;
+  const bool chosen = qmat_invocation_value(invocation, "format") != NULL;
   for (size_t i = 0; i < graph->output_count; i++) {
-    const qmat_graph_output *output = &graph->outputs[i];
-    const qmat_node *type = graph->nodes[output->node].type;
-    const qmat_param *format = qmat_output_format_param(type);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !format) continue;
+    const qmat_graph_node *node = &graph->nodes[graph->outputs[i].node];
+    const qmat_param *param = qmat_output_format_param(node->type);
+    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !param) continue;
     char ending[64];
-    qmat_param_format(format, graph->nodes[output->node].params, ending, sizeof ending);
-    const bool chosen = qmat_invocation_value(invocation, "format") != NULL;
-    /* Several outputs differ by their names. */
-    for (size_t k = 0; k < invocation->given_count; k++)
-      if (strcmp(invocation->given[k].name, "format") == 0 && output_has_format(graph, i, invocation->given[k].value))
-        add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
-                 several ? output->name : "", invocation->given[k].value);
+    qmat_param_format(param, node->params, ending, sizeof ending);
+    for (int k = 0; param->choices[k]; k++)
+      if (gives_format(invocation, i, param->choices[k])) add_output(call, list, asset, i, param->choices[k]);
     const bool on_request = qmat_graph_on_request(graph, i);
-    if (on_request ? call->pages && !gives_format(invocation, ending) : !chosen)
-      add_word(list, "--output=%s=%s/%s%s%s.%s", output->name, call->folder, asset->stem, several ? "-" : "",
-               several ? output->name : "", ending);
+    if (on_request ? call->pages && !gives_format(invocation, i, ending) : !chosen)
+      add_output(call, list, asset, i, ending);
   }
+}
+
+/* Adds an option as it was given: with its value, also an empty one, where it takes one. */
+static void add_option(const qmat_invocation *invocation, word_list *list, const qmat_given_option *given) {
+  const char *value = NULL;
+  for (size_t i = 0; i < invocation->option_count && !value; i++)
+    if (strcmp(invocation->options[i].name, given->name) == 0) value = invocation->options[i].value;
+  const bool is_optional = value && *value == '[';
+  add_word(list, value && !(is_optional && !*given->value) ? "--%s=%s" : "--%s", given->name, given->value);
 }
 
 static qmat_status make_command(const batch_call *call, size_t index, qmat_asset *asset) {
@@ -145,7 +161,7 @@ static qmat_status make_command(const batch_call *call, size_t index, qmat_asset
   add_word(&list, "--report=%s/%zu.json", call->reports, index);
   for (size_t i = 0; i < invocation->given_count; i++) {
     const qmat_given_option *given = &invocation->given[i];
-    if (is_shared(call, given->name)) add_word(&list, *given->value ? "--%s=%s" : "--%s", given->name, given->value);
+    if (is_shared(call, given->name)) add_option(invocation, &list, given);
   }
   if (call->graph) add_word(&list, "--set=%s=%s", call->input, asset->input);
   add_outputs(call, &list, asset);
@@ -329,13 +345,14 @@ static qmat_status check_formats(const batch_call *call) {
   for (size_t k = 0; k < call->invocation->given_count; k++) {
     const qmat_given_option *given = &call->invocation->given[k];
     bool known = strcmp(given->name, "format") != 0;
-    for (size_t i = 0; !known && i < graph->output_count; i++) known = output_has_format(graph, i, given->value);
+    for (size_t i = 0; !known && i < graph->output_count; i++) known = output_format(graph, i, given->value) != NULL;
     for (size_t i = 0; !known && i < graph->output_count; i++) {
       char path[64];
       int format;
-      snprintf(path, sizeof path, "asset.%.48s", given->value);
+      snprintf(path, sizeof path, "asset.%.48s", given->value + (*given->value == '.'));
       if (qmat_graph_output_type(graph, i) != QMAT_FILE || qmat_graph_on_request(graph, i)) continue;
-      qmat_graph_output_format(call->context, graph, i, path, &format);
+      if (qmat_graph_output_format(call->context, graph, i, path, &format) == QMAT_OK) /* by the last of several dots */
+        qmat_fail(call->context, QMAT_ERROR_USAGE, "'%s' is not an ending", qmat_show(given->value).text);
       return qmat_fail_field(call->context, "--format");
     }
   }

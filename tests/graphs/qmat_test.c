@@ -187,6 +187,35 @@ static void test_the_progress_function_cancels_and_the_job_runs_again(void **sta
   rmdir(folder);
 }
 
+/* A job makes one file after the other; a report of a run stays what it was when parameters change. */
+static void test_a_job_forgets_models_and_paths(void **state) {
+  (void)state;
+  static const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  static const uint32_t sides[] = {0, 2, 1, 0, 1, 3, 1, 2, 3,
+                                   0, 3, 2, 0, 2, 1, 3, 3, 0}; /* one twice, one without area */
+  char folder[] = "/tmp/qmat-job-XXXXXX", first[64], second[64], *report;
+  assert_non_null(mkdtemp(folder));
+  snprintf(first, sizeof first, "%s/first.ma", folder);
+  snprintf(second, sizeof second, "%s/second.ma", folder);
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_save(job, "asset", first));
+  ok(job, qmat_job_save(job, "asset", first));
+  ok(job, qmat_job_run(job, 0, NULL, NULL));
+  ok(job, qmat_job_set(job, "model=elsewhere.off"));
+  ok(job, qmat_job_run_report(job, &report));
+  assert_null(strstr(report, "elsewhere.off"));
+  assert_non_null(strstr(report, "first.ma"));
+  qmat_text_free(report);
+  assert_int_equal(unlink(first), 0);
+  qmat_job_forget(job);
+  ok(job, qmat_job_give_mesh(job, "model.mesh", "tetrahedron", tetrahedron, 4, sides, 6));
+  ok(job, qmat_job_save(job, "asset", second));
+  ok(job, qmat_job_run(job, 0, NULL, NULL));
+  assert_int_equal(unlink(second), 0);
+  assert_int_equal(rmdir(folder), 0); /* the first is not written again */
+  qmat_job_free(job);
+}
+
 /* Values of any type pass from job to job without a file. */
 static void test_values_are_given_read_and_passed_on(void **state) {
   (void)state;
@@ -355,6 +384,7 @@ int main(void) {
       cmocka_unit_test(test_a_mesh_in_memory_becomes_spheres_inside_it),
       cmocka_unit_test(test_the_saved_file_is_the_file_in_memory),
       cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
+      cmocka_unit_test(test_a_job_forgets_models_and_paths),
       cmocka_unit_test(test_values_are_given_read_and_passed_on),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),

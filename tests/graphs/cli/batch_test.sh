@@ -53,6 +53,19 @@ holds "a line of JSON each" test "$(grep -c '"result":"ok"' out.txt)" -eq 9
 holds "what was done before comes from the cache" test "$(grep -c '"hits":4' out.txt)" -eq 9
 holds "the other format" test -s results/box1.ma
 
+# Endings with a dot or in capitals; values that are empty.
+batch --inputs 'models/*1.off' --out dotted -f .ma -f PLY
+holds "endings are those of the graph" test "$(cd dotted && echo *)" = "box1.ma box1.ply"
+batch --inputs 'models/*1.off' --out dotted -f .doc
+holds "an unknown ending is refused" sh -c "[ $code -eq 2 ] && grep -q 'format' err.txt"
+batch --inputs 'models/*1.off' --out dotted -f tar.ma
+holds "so is one with two dots" sh -c "[ $code -eq 2 ] && grep -q \"'tar.ma' is not an ending\" err.txt"
+batch --inputs 'models/*1.off' --out dotted --remote-cache ''
+holds "an empty value stays a value" test -s dotted/box1.glb
+batch --inputs 'models/*1.off' --out dotted --cache ''
+holds "an empty folder of the cache is an error" sh -c "[ $code -ne 0 ] && grep -q 'cache is empty' out.txt err.txt"
+rm -r dotted
+
 # Paths that go down and up again: results stay in their folder.
 mkdir -p models/sub below
 cp models/box2.off over.off
