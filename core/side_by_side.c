@@ -1,70 +1,90 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/side_by_side.h"
 
-typedef struct shared_progress {
+#include <time.h>
+
+/* The main thread, when it has no item left, asks so often whether to go on: nanoseconds. */
+enum { WAIT = 1000000 };
+
+typedef struct shared_items {
   qmat_context *context;
   const _Atomic size_t *done;
   size_t total;
   const char *unit;
-  _Atomic bool ended; /* the run was cancelled, or an item has failed */
-} shared_progress;
+  _Atomic size_t next, ended; /* the next item to start; how many have ended or are left out */
+  _Atomic size_t failed;      /* the first item that has failed; SIZE_MAX: none */
+  _Atomic bool cancelled;
+  qmat_error error; /* of the item that failed */
+} shared_items;
 
-/* Only the thread that runs the node may call the progress function of the run. */
-typedef struct progress_caller {
-  shared_progress *shared;
+/* A thread and its item. Only the thread that runs the node may call the progress function of the run. */
+typedef struct item_thread {
+  shared_items *shared;
   bool is_main_thread;
-} progress_caller;
+  size_t item;
+} item_thread;
 
-static bool forward_progress(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                             const char *unit) {
+static void ask_outer(shared_items *s) {
+  if (qmat_progress(s->context, atomic_load(s->done), s->total, s->unit) != QMAT_OK) atomic_store(&s->cancelled, true);
+}
+
+static bool is_needed(const shared_items *s, size_t item) {
+  return !atomic_load(&s->cancelled) && item < atomic_load(&s->failed);
+}
+
+static bool item_may_continue(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                              const char *unit) {
   (void)node_id;
   (void)node_type;
   (void)done;
   (void)total;
   (void)unit;
-  const progress_caller *here = user;
-  shared_progress *s = here->shared;
-  if (here->is_main_thread && qmat_progress(s->context, atomic_load(s->done), s->total, s->unit) != QMAT_OK)
-    atomic_store(&s->ended, true);
-  return !atomic_load(&s->ended);
+  const item_thread *here = user;
+  if (here->is_main_thread) ask_outer(here->shared);
+  return is_needed(here->shared, here->item);
+}
+
+static void note_failure(shared_items *s, size_t item, const qmat_error *error, qmat_status status) {
+#pragma omp critical(qmat_side_by_side)
+  if (is_needed(s, item)) { /* one that was stopped comes after one that failed, or all were cancelled */
+    s->error = *error;
+    s->error.status = status;
+    atomic_store(&s->failed, item);
+  }
 }
 
 qmat_status qmat_run_side_by_side(qmat_context *context, size_t count, qmat_item_fn *run, void *user,
                                   const _Atomic size_t *done, size_t total, const char *unit) {
-  shared_progress shared = {.context = context, .done = done, .total = total, .unit = unit};
+  shared_items shared = {.context = context, .done = done, .total = total, .unit = unit, .failed = SIZE_MAX};
   const int threads = qmat_threads(context);
   const qmat_status status = qmat_progress(context, 0, 0, unit);
   if (status != QMAT_OK) return status;
-  size_t failed = SIZE_MAX;
-  qmat_error error = {.status = QMAT_OK};
 #pragma omp parallel num_threads(threads)
   {
-    progress_caller here = {.shared = &shared, .is_main_thread = false};
-    qmat_context own = {.progress = forward_progress,
+    item_thread here = {.shared = &shared, .is_main_thread = false};
+    qmat_context own = {.progress = item_may_continue,
                         .progress_user = &here,
                         .threads = 1,
                         .node_id = context->node_id,
                         .node_type = context->node_type};
 #pragma omp master
     here.is_main_thread = true;
-#pragma omp for schedule(dynamic, 1)
-    for (size_t item = 0; item < count; item++) {
-      if (atomic_load(&shared.ended)) continue;
-      const qmat_status result = run(user, &own, item);
-      qmat_arena_uninit(&own.arena);
-      if (result == QMAT_OK || result == QMAT_CANCELLED) continue;
-      atomic_store(&shared.ended, true);
-#pragma omp critical(qmat_side_by_side)
-      if (item < failed) {
-        failed = item;
-        error = own.error;
+    while ((here.item = atomic_fetch_add(&shared.next, 1)) < count) {
+      if (is_needed(&shared, here.item)) {
+        const qmat_status result = run(user, &own, here.item);
+        if (result != QMAT_OK) note_failure(&shared, here.item, &own.error, result);
+        qmat_arena_uninit(&own.arena);
       }
+      atomic_fetch_add(&shared.ended, 1);
+    }
+    while (here.is_main_thread && atomic_load(&shared.ended) < count) {
+      ask_outer(&shared);
+      nanosleep(&(struct timespec){.tv_nsec = WAIT}, NULL);
     }
     qmat_context_uninit(&own);
   }
-  if (failed < SIZE_MAX) {
-    context->error = error;
-    return error.status;
-  }
-  return atomic_load(&shared.ended) ? QMAT_CANCELLED : QMAT_OK;
+  if (atomic_load(&shared.cancelled)) return QMAT_CANCELLED;
+  if (atomic_load(&shared.failed) == SIZE_MAX) return QMAT_OK;
+  context->error = shared.error;
+  return shared.error.status;
 }

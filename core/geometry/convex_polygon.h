@@ -4,9 +4,10 @@
 
 #include <string.h>
 
-/* Cuts a convex polygon by a plane (Sutherland and Hodgman 1974). `heights` (one per corner) are those of the corners
- * above it; what is not above goes to `kept`, which has room for count + 1 corners and is not `polygon`. Returns the
- * number of corners kept, 0 for a polygon of none. */
+/* Cuts a convex polygon by a plane (Sutherland and Hodgman 1974). heights[i] is the signed height of corner i above the
+ * plane; what is not above goes to `kept`, which is not `polygon`. Returns the number of corners kept, 0 for a polygon
+ * of none. It is at most count + 1 where heights have no rounding errors. Those of corners on the plane may alternate,
+ * so `kept` needs room for 3 * count / 2 corners. */
 static inline int qmat_convex_polygon_cut(double (*polygon)[3], const double *heights, int count, double (*kept)[3]) {
   int corners = 0;
   for (int i = 0; i < count; i++) {

@@ -40,7 +40,8 @@ double qmat_depth_lattice_exact_near(qmat_depth_lattice *lattice, const double p
 double qmat_depth_lattice_exact_up_to(qmat_depth_lattice *lattice, const double point[3], double near, double distance,
                                       double depth) {
   const double gap = distance * (1 + 1e-9) + side_margin;
-  if (!(near > gap && depth < near + gap)) return qmat_depth_lattice_exact_near(lattice, point, near, distance);
+  const bool is_inside = near > gap && qmat_surface_is_closed(lattice->surface);
+  if (!is_inside || depth >= near + gap) return qmat_depth_lattice_exact_near(lattice, point, near, distance);
   lattice->queries++;
   return qmat_surface_depth_up_to(lattice->surface, point, depth);
 }

@@ -6,8 +6,8 @@
 #include "core/key_table.h"
 
 /* A cache of depths at the nodes of a cubic lattice. Depth is the distance to the surface, negative outside. Each node
- * is computed when it is first needed. Depth is 1-Lipschitz, so a node bounds it everywhere nearby. Results depend on
- * the point alone, not on earlier queries. One thread at a time. */
+ * is computed when it is first needed. The depth of a closed surface is 1-Lipschitz, so a node bounds it everywhere
+ * nearby. Results depend on the point alone, not on earlier queries. One thread at a time. */
 typedef struct qmat_depth_lattice {
   const qmat_surface *surface;
   double spacing;

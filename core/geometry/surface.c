@@ -303,10 +303,16 @@ double qmat_surface_signed_distance(const qmat_surface *surface, const double po
   return qmat_surface_signed_distance_within(surface, point, INFINITY);
 }
 
+bool qmat_surface_is_closed(const qmat_surface *surface) {
+  return surface->leaf_count == 0;
+}
+
 double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap) {
   const double limit = fabs(near) + gap;
   double distance;
-  if (near > gap)
+  if (!qmat_surface_is_closed(surface))
+    distance = qmat_surface_signed_distance_within(surface, point, limit);
+  else if (near > gap)
     distance = qmat_surface_distance(surface, point, limit, NULL, NULL);
   else if (near < -gap && (!surface->sheet_blocks || surface->half_thickness == 0))
     distance = -solid_distance(surface, point, limit, NULL, NULL);
@@ -322,7 +328,7 @@ double qmat_surface_depth_up_to(const qmat_surface *surface, const double point[
 }
 
 bool qmat_surface_is_watertight(const qmat_surface *surface) {
-  return surface->blocks && surface->leaf_count == 0 && qmat_surface_half_thickness(surface) == 0;
+  return surface->blocks && qmat_surface_is_closed(surface) && qmat_surface_half_thickness(surface) == 0;
 }
 
 /* The excess over the triangle of a sheet that is nearest to the centre: convex, so largest at a corner. */
@@ -419,21 +425,28 @@ static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t be
   node->radius = farthest_corner(surface, begin, end, node->centre);
 }
 
-static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
-  const size_t n = surface->solid_count;
-  size_t leaf_count = 1;
-  while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
-  sort_item *items = qmat_alloc(n, sizeof *items);
-  double *areas = qmat_alloc(2 * leaf_count, sizeof *areas);
-  surface->order = qmat_alloc(n, sizeof *surface->order);
-  surface->nodes = qmat_alloc(2 * leaf_count, sizeof *surface->nodes);
-  qmat_status status = QMAT_OK;
-  if (!items || !areas || !surface->order || !surface->nodes) {
-    status = qmat_fail_memory(context, "the winding number tree");
-    goto done;
+/* An inner node of the tree, from its two children. */
+static void fill_inner(const qmat_surface *surface, size_t index, double *areas) {
+  const winding_node *left = surface->nodes + 2 * index, *right = left + 1;
+  winding_node *node = surface->nodes + index;
+  const double left_area = areas[2 * index], right_area = areas[2 * index + 1], area = left_area + right_area;
+  areas[index] = area;
+  const double share = area > 0 ? left_area / area : 0.5;
+  for (int k = 0; k < 3; k++) {
+    node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
+    node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
   }
-  surface->leaf_count = leaf_count;
-  for (size_t i = 0; i < n; i++) {
+  /* Computed from the corners: from the children's balls, radii near the root would be twice too large. */
+  size_t first = index, last = index + 1, begin, end, unused;
+  while (first < surface->leaf_count) first *= 2, last *= 2;
+  leaf_range(surface, first - surface->leaf_count, &begin, &unused);
+  leaf_range(surface, last - 1 - surface->leaf_count, &unused, &end);
+  node->radius = farthest_corner(surface, begin, end, node->centre);
+}
+
+/* Sorts the triangles along a curve that fills the box. */
+static void sort_along_curve(qmat_surface *surface, sort_item *items) {
+  for (size_t i = 0; i < surface->solid_count; i++) {
     double vector[3], centroid[3];
     area_and_centroid(surface, (uint32_t)i, vector, centroid);
     uint64_t code = 0;
@@ -443,33 +456,40 @@ static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surfa
     }
     items[i] = (sort_item){code, (uint32_t)i};
   }
-  qsort(items, n, sizeof *items, compare_items);
-  for (size_t i = 0; i < n; i++) surface->order[i] = items[i].triangle;
+  qsort(items, surface->solid_count, sizeof *items, compare_items);
+  for (size_t i = 0; i < surface->solid_count; i++) surface->order[i] = items[i].triangle;
+}
 
-  memset(surface->nodes, 0, sizeof *surface->nodes); /* node 0 is not used */
-  for (size_t leaf = 0; leaf < leaf_count; leaf++) {
-    size_t begin, end;
-    leaf_range(surface, leaf, &begin, &end);
-    fill_leaf(surface, surface->nodes + leaf_count + leaf, begin, end, areas + leaf_count + leaf);
+static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
+  const size_t n = surface->solid_count;
+  const int threads = qmat_threads(context);
+  size_t leaf_count = 1;
+  while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
+  sort_item *items = qmat_alloc(n, sizeof *items);
+  double *areas = qmat_alloc(2 * leaf_count, sizeof *areas);
+  surface->order = qmat_alloc(n, sizeof *surface->order);
+  surface->nodes = qmat_calloc(2 * leaf_count, sizeof *surface->nodes); /* node 0 is not used */
+  qmat_status status = QMAT_OK;
+  if (!items || !areas || !surface->order || !surface->nodes) {
+    status = qmat_fail_memory(context, "the winding number tree");
+  } else {
+    surface->leaf_count = leaf_count;
+    sort_along_curve(surface, items);
+    status = qmat_progress(context, 0, 0, "surface");
   }
-  for (size_t index = leaf_count - 1; index > 0; index--) {
-    const winding_node *left = surface->nodes + 2 * index, *right = left + 1;
-    winding_node *node = surface->nodes + index;
-    const double left_area = areas[2 * index], right_area = areas[2 * index + 1], area = left_area + right_area;
-    areas[index] = area;
-    const double share = area > 0 ? left_area / area : 0.5;
-    for (int k = 0; k < 3; k++) {
-      node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
-      node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
+  for (size_t level = leaf_count; level > 0 && status == QMAT_OK; level /= 2) {
+#pragma omp parallel for num_threads(threads) schedule(guided)
+    for (size_t index = level; index < 2 * level; index++) {
+      if (level == leaf_count) {
+        size_t begin, end;
+        leaf_range(surface, index - leaf_count, &begin, &end);
+        fill_leaf(surface, surface->nodes + index, begin, end, areas + index);
+      } else {
+        fill_inner(surface, index, areas);
+      }
     }
-    /* Computed from the corners: from the children's balls, radii near the root would be twice too large. */
-    size_t first = index, last = index + 1, begin, end, unused;
-    while (first < leaf_count) first *= 2, last *= 2;
-    leaf_range(surface, first - leaf_count, &begin, &unused);
-    leaf_range(surface, last - 1 - leaf_count, &unused, &end);
-    node->radius = farthest_corner(surface, begin, end, node->centre);
+    status = qmat_progress(context, 0, 0, "surface");
   }
-done:
   qmat_free(items);
   qmat_free(areas);
   return status;

@@ -54,14 +54,19 @@ double qmat_surface_distance(const qmat_surface *surface, const double point[3],
 double qmat_surface_distance_to_triangle(const qmat_surface *surface, const double point[3], uint32_t triangle);
 
 /* The same distance without limit, negative inside the solid (see qmat_surface_inside). With sheets it is the smaller
- * of that for the solids and the distance to a sheet less half the thickness, and changes by at most the distance
- * between two points. */
+ * of that for the solids and the distance to a sheet less half the thickness. Between two points it changes by at most
+ * their distance, if the surface is closed (qmat_surface_is_closed). */
 double qmat_surface_signed_distance(const qmat_surface *surface, const double point[3]);
 
 /* The same where its size is at most `limit` (>= 0); else it may be infinite, of either sign, which takes less time. */
 double qmat_surface_signed_distance_within(const qmat_surface *surface, const double point[3], double limit);
 
-/* The same, faster where it is known that the signed distance differs from `near` by at most `gap`. */
+/* Whether the surface is closed and oriented, sheets aside. Around any other surface, the side that a point is on
+ * changes also where there is no triangle. */
+bool qmat_surface_is_closed(const qmat_surface *surface);
+
+/* The same, faster where it is known that the signed distance (of a surface that is not closed: its size) differs from
+ * `near` by at most `gap`. */
 double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap);
 
 /* The depth of a point whose signed distance is known to be negative; INFINITY where it exceeds `limit`. */

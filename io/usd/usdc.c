@@ -61,6 +61,7 @@ static qmat_status read_fields(qmat_usdc_values *v, uint32_t set, qmat_usd_spec 
   while (c->field_sets[set + count] != QMAT_USDC_NONE) {
     if (++count > QMAT_USD_MOST_FIELDS) return fail(c, "a spec has too many fields");
   }
+  if (spec->fields) return fail(c, "two specs have the same path"); /* a set of variants may have two elements */
   spec->fields = qmat_usd_alloc(c->layer, count, sizeof *spec->fields);
   if (!spec->fields) return qmat_usd_layer_error(c->layer);
   spec->field_capacity = count;

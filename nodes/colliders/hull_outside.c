@@ -8,7 +8,7 @@
 #include "core/geometry/vector.h"
 
 /* Facets between two looks whether the run is cancelled; corners of a triangle that is cut by three planes, at most. */
-enum { SLICE = 4096, MOST_CORNERS = 6 };
+enum { SLICE = 4096, MOST_CORNERS = 9 /* of a triangle after three qmat_convex_polygon_cut */ };
 
 /* A point is over a triangle where it is inside of the planes through its sides by more than this. */
 static const double rounding = 1e-9;

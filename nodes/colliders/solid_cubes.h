@@ -7,9 +7,9 @@
 
 /* A search of a solid by cubes that are divided into eight. All is in the unit frame. */
 
-/* The corners of a triangle that is clipped to a cube, at most; cubes of this depth are not divided. The unit frame's
- * box is cut into so many regions, which are searched independently. */
-enum { QMAT_CUBE_MOST_CORNERS = 9, QMAT_CUBE_DEEPEST = 16, QMAT_CUBE_REGIONS = 4096 };
+/* The corners of a triangle that is clipped to a cube, at most (six qmat_convex_polygon_cut); cubes of this depth are
+ * not divided. The unit frame's box is cut into so many regions, which are searched independently. */
+enum { QMAT_CUBE_MOST_CORNERS = 28, QMAT_CUBE_DEEPEST = 16, QMAT_CUBE_REGIONS = 4096 };
 
 /* A cube that meets the solid, and what of the shapes and of the surface matters in it. */
 typedef struct qmat_solid_cube {

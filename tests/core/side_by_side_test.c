@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -46,6 +47,34 @@ static void test_a_failure_ends_it_with_its_error(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* Item 9 fails at once, item 5 late. */
+static qmat_status fail_late(void *user, qmat_context *own, size_t item) {
+  items *all = user;
+  all->ran[item]++;
+  if (item == 5)
+    for (int i = 0; i < 5000 && atomic_load(&all->done) == 0; i++)
+      nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+  if (item == 9) atomic_store(&all->done, 1);
+  return item == 5 || item == 9 ? qmat_fail(own, QMAT_ERROR_GEOMETRY, "item %zu", item) : QMAT_OK;
+}
+
+static void test_the_first_failing_item_gives_the_error(void **state) {
+  (void)state;
+  qmat_context context = {.threads = 2};
+  items all = {.first_failure = 64, .last_failure = 64};
+  assert_int_equal(qmat_run_side_by_side(&context, 64, fail_late, &all, &all.done, 64, "items"), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.message, "item 5");
+  assert_int_equal(all.ran[63], 0);
+  qmat_context_uninit(&context);
+}
+
+/* Runs until it is cancelled, in any thread. */
+static qmat_status run_on(void *user, qmat_context *own, size_t item) {
+  (void)user, (void)item;
+  while (qmat_progress(own, 0, 0, "") == QMAT_OK) nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+  return QMAT_CANCELLED;
+}
+
 static bool refuse_later(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
                          const char *unit) {
   (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
@@ -65,11 +94,25 @@ static void test_it_can_be_cancelled(void **state) {
   }
 }
 
+/* One item for eight threads: the main thread hears of a cancel while another has the item. */
+static void test_it_can_be_cancelled_while_the_main_thread_waits(void **state) {
+  (void)state;
+  for (int round = 0; round < 20; round++) {
+    int left = 10;
+    qmat_context context = {.threads = 8, .progress = refuse_later, .progress_user = &left};
+    items all = {.first_failure = 64, .last_failure = 64};
+    assert_int_equal(qmat_run_side_by_side(&context, 1, run_on, &all, &all.done, 1, "items"), QMAT_CANCELLED);
+    qmat_context_uninit(&context);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_item_runs_once),
       cmocka_unit_test(test_a_failure_ends_it_with_its_error),
+      cmocka_unit_test(test_the_first_failing_item_gives_the_error),
       cmocka_unit_test(test_it_can_be_cancelled),
+      cmocka_unit_test(test_it_can_be_cancelled_while_the_main_thread_waits),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

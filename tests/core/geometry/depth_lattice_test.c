@@ -128,6 +128,55 @@ static void test_depths_do_not_depend_on_earlier_queries(void **state) {
   free(distances);
 }
 
+/* A torus of which a piece is missing: sides change at its ends, where no triangle is near. */
+static void test_depths_of_an_open_surface_do_not_depend_on_earlier_queries(void **state) {
+  (void)state;
+  enum { POINTS = 4000, FACETS = 120 };
+  qmat_context context = {0};
+  qmat_mesh *mesh = shape_torus(2, 0.7, 40, 20);
+  mesh->triangle_count -= FACETS;
+  shape_seal(mesh);
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  assert_false(qmat_surface_is_closed(surface));
+  qmat_depth_lattice forward, backward;
+  assert_int_equal(qmat_depth_lattice_init(&context, &forward, surface, 0.01), QMAT_OK);
+  assert_int_equal(qmat_depth_lattice_init(&context, &backward, surface, 0.01), QMAT_OK);
+  double(*points)[3] = calloc(POINTS, sizeof *points), *depths = calloc(POINTS, sizeof *depths);
+  assert_true(points && depths);
+  /* Along the middle of the tube, out of one end and into the other. */
+  const double middle = 2 / qmat_surface_frame(surface)->diagonal;
+  for (size_t i = 0; i < POINTS; i++) {
+    const double angle = 0.005 * (double)i;
+    points[i][0] = middle * cos(angle);
+    points[i][1] = middle * sin(angle);
+    points[i][2] = 0.02 * sin(7 * angle);
+  }
+  for (size_t i = 0; i < POINTS; i++) {
+    double gap;
+    const double near = qmat_depth_lattice_near(&forward, points[i], &gap);
+    depths[i] = qmat_depth_lattice_exact_up_to(&forward, points[i], near, gap, 0.02);
+  }
+  for (size_t i = POINTS; i-- > 0;) {
+    double gap;
+    const double near = qmat_depth_lattice_near(&backward, points[i], &gap);
+    const double depth = qmat_depth_lattice_exact_up_to(&backward, points[i], near, gap, 0.02);
+    assert_memory_equal(&depth, &depths[i], sizeof depth);
+    const double exact = qmat_depth_lattice_exact(&backward, points[i]);
+    if (depth < INFINITY)
+      assert_near(depth, exact, 1e-12);
+    else
+      assert_true(exact > 0.02);
+  }
+  qmat_depth_lattice_uninit(&forward);
+  qmat_depth_lattice_uninit(&backward);
+  qmat_surface_free(surface);
+  qmat_value_release(&mesh->base);
+  qmat_context_uninit(&context);
+  free(points);
+  free(depths);
+}
+
 static void test_points_beyond_the_lattice_get_the_exact_depth(void **state) {
   qmat_depth_lattice lattice;
   make_lattice(&lattice, state, 0.01);
@@ -212,6 +261,7 @@ int main(void) {
       cmocka_unit_test(test_near_depth_differs_by_at_most_the_distance_to_the_node),
       cmocka_unit_test(test_nodes_are_exact),
       cmocka_unit_test(test_depths_do_not_depend_on_earlier_queries),
+      cmocka_unit_test(test_depths_of_an_open_surface_do_not_depend_on_earlier_queries),
       cmocka_unit_test(test_points_beyond_the_lattice_get_the_exact_depth),
       cmocka_unit_test(test_a_depth_is_exact_up_to_a_limit),
       cmocka_unit_test(test_least_depth_is_below_the_depth_by_at_most_the_second_order),

@@ -250,6 +250,17 @@ static void test_a_list_of_children_that_all_prims_share_takes_linear_time(void 
   assert_int_equal(read_quickly(&crate), COUNT - 1);
 }
 
+/* The path of a set of variants, twice: the fields of the second would not fit into the place of the first's. */
+static void test_a_set_of_variants_has_one_path(void **state) {
+  (void)state;
+  static const uint32_t one_field[] = {0, UINT32_MAX};
+  qmat_writer tokens = {0};
+  qmat_put_bytes(&tokens, "note\0{a=}", 10);
+  qmat_writer crate = write_rows(&tokens, 2, 1, 0, 11, 0, one_field, 2, 3, 0);
+  assert_crate_refused(&crate, crate.size, "two specs have the same path");
+  qmat_writer_uninit(&crate);
+}
+
 static void test_more_fields_than_a_spec_may_have_are_refused(void **state) {
   (void)state;
   static uint32_t fields[QMAT_USD_MOST_FIELDS + 2]; /* of the same field */
@@ -283,6 +294,7 @@ int main(void) {
       cmocka_unit_test(test_wrong_numbers_in_the_tables_are_refused_by_the_table),
       cmocka_unit_test(test_a_million_levels_below_a_target_take_linear_time),
       cmocka_unit_test(test_a_list_of_children_that_all_prims_share_takes_linear_time),
+      cmocka_unit_test(test_a_set_of_variants_has_one_path),
       cmocka_unit_test(test_more_fields_than_a_spec_may_have_are_refused),
       cmocka_unit_test(test_a_variant_that_is_there_twice_is_refused),
       cmocka_unit_test(test_crates_of_real_assets_say_what_their_texts_say),
