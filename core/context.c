@@ -87,8 +87,9 @@ qmat_status qmat_fail_hint(qmat_context *context, const char *format, ...) {
 }
 
 qmat_status qmat_fail_within(qmat_context *context, const char *what) {
-  char text[sizeof context->error.message + 256];
-  snprintf(text, sizeof text, "%.200s: %s", what, context->error.message);
+  char name[201], text[sizeof context->error.message + 256];
+  copy_text(name, sizeof name, what);
+  snprintf(text, sizeof text, "%s: %s", name, context->error.message);
   copy_text(context->error.message, sizeof context->error.message, text);
   return context->error.status;
 }

@@ -213,9 +213,7 @@ static qmat_status parse_text(qmat_context *context, const qmat_param *param, co
   return QMAT_OK;
 }
 
-qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
-                             void *params) {
-  (void)node;
+qmat_status qmat_param_parse(qmat_context *context, const qmat_param *param, const char *text, void *params) {
   void *place = slot(param, params);
   switch (param->type) {
     case QMAT_PARAM_BOOL:
@@ -290,7 +288,7 @@ static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node,
     if (param->type != QMAT_PARAM_FLOAT || !is_in_meters(param, *value)) continue;
     char text[48];
     qmat_param_format(param, params, text, sizeof text);
-    if (!(diagonal > 0)) return fail_unit(context, param, text);
+    if (!(diagonal > 0 && isfinite(diagonal))) return fail_unit(context, param, text);
     *value = -*value / diagonal;
     if (float_in_range(param, *value)) continue;
     char length[48], given[160];

@@ -158,8 +158,7 @@ void qmat_params_default(const qmat_node *node, void *params);
 
 /* Parses `text` into the parameter and checks type, range and choice; independent of the locale. Texts are not copied:
  * `text` must outlive `params`. QMAT_ERROR_USAGE names the parameter, the range, and the nearest choice. */
-qmat_status qmat_param_parse(qmat_context *context, const qmat_node *node, const qmat_param *param, const char *text,
-                             void *params);
+qmat_status qmat_param_parse(qmat_context *context, const qmat_param *param, const char *text, void *params);
 
 /* Ends `run` of a node. Seals `values` (`count`, in the order of its outputs) that are not sealed yet, and hands them
  * over as `outputs`. Where `status` is an error, or sealing fails, it releases them instead (NULL: none) and sets no

@@ -203,9 +203,9 @@ void qmat_format_length(double meters, char *text) {
   static const struct {
     const char *unit;
     double scale, below;
-  } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, INFINITY}};
+  } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, 0}};
   size_t i = 0;
-  while (meters >= units[i].below) i++;
+  while (i < 2 && meters >= units[i].below) i++;
   double value = meters * units[i].scale;
   char number[40] = "0";
   if (value > 0) {

@@ -43,7 +43,8 @@ const char *qmat_value_failure(const qmat_value *value);
 /* "mesh", "medial", ...; "unknown" for a number that is no type. */
 const char *qmat_value_type_name(qmat_value_type type);
 
-/* The bytes that the value's arrays, texts and files occupy; a list's are those of its items. */
+/* The bytes that the value's arrays, texts and files occupy, without lists of names; a list's are those of its items.
+ */
 size_t qmat_value_bytes(const qmat_value *value);
 
 /* One table of numbers in a value: rows * columns doubles or ids, row by row; the other pointer is NULL. */

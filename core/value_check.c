@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/medial_build.h"
 #include "core/text.h"
 
 qmat_status qmat_check_finite(qmat_context *context, const double *numbers, size_t count, size_t components,
@@ -141,30 +142,14 @@ qmat_status qmat_check_simplices(qmat_context *context, const uint32_t *simplice
   return QMAT_OK;
 }
 
-static bool has_edge(const uint32_t *edges, size_t edge_count, uint32_t low, uint32_t high) {
-  const uint32_t wanted[2] = {low, high};
-  size_t first = 0, last = edge_count;
-  while (first < last) {
-    const size_t middle = first + (last - first) / 2;
-    const int order = compare_ids(edges + 2 * middle, wanted, 2);
-    if (order == 0) return true;
-    if (order < 0) {
-      first = middle + 1;
-    } else {
-      last = middle;
-    }
-  }
-  return false;
-}
-
 qmat_status qmat_check_sides(qmat_context *context, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
                              size_t triangle_count) {
   static const int sides[3][2] = {{0, 1}, {0, 2}, {1, 2}};
   for (size_t i = 0; i < triangle_count; i++) {
     for (int k = 0; k < 3; k++) {
-      const uint32_t low = triangles[3 * i + (size_t)sides[k][0]], high = triangles[3 * i + (size_t)sides[k][1]];
-      if (has_edge(edges, edge_count, low, high)) continue;
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "its side (%u, %u) is not among the edges", low, high);
+      const uint32_t side[2] = {triangles[3 * i + (size_t)sides[k][0]], triangles[3 * i + (size_t)sides[k][1]]};
+      if (qmat_simplex_find(edges, edge_count, 2, side) != SIZE_MAX) continue;
+      qmat_fail(context, QMAT_ERROR_GEOMETRY, "its side (%u, %u) is not among the edges", side[0], side[1]);
       return qmat_fail_element(context, "triangle", (int64_t)i);
     }
   }

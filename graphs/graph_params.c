@@ -95,7 +95,7 @@ qmat_status qmat_graph_set(qmat_context *context, qmat_graph *graph, size_t inde
     copy = param->type == QMAT_PARAM_PATH ? qmat_resolve_path(folder, text) : qmat_strdup(text);
     if (!copy) status = qmat_fail_memory(context, "graph");
   }
-  if (status == QMAT_OK) status = qmat_param_parse(context, node->type, param, copy, node->params);
+  if (status == QMAT_OK) status = qmat_param_parse(context, param, copy, node->params);
   if (status == QMAT_OK) {
     qmat_free(node->texts[row]);
     node->texts[row] = copy;
@@ -116,7 +116,7 @@ static qmat_status try_param(qmat_context *context, const qmat_graph *graph, qma
   if (!params) return qmat_fail_memory(context, "graph");
   context->node_id = node->id;
   context->node_type = node->type->name;
-  const qmat_status status = qmat_param_parse(context, node->type, &node->type->params[at.param], text, params);
+  const qmat_status status = qmat_param_parse(context, &node->type->params[at.param], text, params);
   context->node_id = outer_id;
   context->node_type = outer_type;
   qmat_free(params);

@@ -6,7 +6,6 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
-#include "core/geometry/medial_primitive.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/value.h"
@@ -241,35 +240,31 @@ qmat_status qmat_skin_spheres(qmat_context *context, const qmat_mesh *mesh, qmat
 /* The joints of the primitive nearest to a point, blended by the weights of its spheres at the foot. */
 static void blend_joints(const qmat_envelope *envelope, const qmat_medial *medial, const double *point,
                          uint32_t strongest[4], double strengths[4]) {
-  size_t primitive;
-  uint32_t ids[3], joints[12];
-  double feet[3] = {1, 0, 0}, weights[12];
-  qmat_envelope_distance(envelope, point, &primitive);
-  const int count = qmat_envelope_primitive(envelope, primitive, ids);
-  if (count > 1) {
-    const double *spheres[3];
-    for (int k = 0; k < count; k++) spheres[k] = medial->spheres + 4 * (size_t)ids[k];
-    qmat_primitive prepared;
-    qmat_primitive_ball ball;
-    qmat_primitive_prepare(spheres, count, &prepared, &ball);
-    qmat_primitive_foot(&prepared, point, feet);
-  }
-  for (size_t k = 0; k < 4 * (size_t)count; k++) {
-    joints[k] = medial->joints[4 * (size_t)ids[k / 4] + k % 4];
-    weights[k] = feet[k / 4] * medial->weights[4 * (size_t)ids[k / 4] + k % 4];
-  }
-  qmat_strongest_joints(joints, weights, 4 * (size_t)count, strongest, strengths);
+  uint32_t ids[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX}, joints[12];
+  double feet[3], weights[12];
+  size_t count = 0;
+  (void)qmat_envelope_foot_within(envelope, point, INFINITY, ids, feet);
+  for (size_t i = 0; i < 3 && ids[i] != UINT32_MAX; i++)
+    for (size_t k = 0; k < 4; k++, count++) {
+      joints[count] = medial->joints[4 * (size_t)ids[i] + k];
+      weights[count] = feet[i] * medial->weights[4 * (size_t)ids[i] + k];
+    }
+  qmat_strongest_joints(joints, weights, count, strongest, strengths);
 }
 
 qmat_status qmat_skin_envelope(qmat_context *context, const qmat_medial *medial, const qmat_mesh *mesh,
                                uint32_t *joints, double *weights) {
+  enum { SLICE = 16384 }; /* vertices between two calls of the progress function */
   qmat_envelope *envelope;
-  const qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);
-  if (status != QMAT_OK) return status;
+  qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);
   const int threads = qmat_threads(context);
+  for (size_t first = 0; first < mesh->vertex_count && status == QMAT_OK; first += SLICE) {
+    const size_t end = first + SLICE < mesh->vertex_count ? first + SLICE : mesh->vertex_count;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t v = 0; v < mesh->vertex_count; v++)
-    blend_joints(envelope, medial, mesh->positions + 3 * v, joints + 4 * v, weights + 4 * v);
+    for (size_t v = first; v < end; v++)
+      blend_joints(envelope, medial, mesh->positions + 3 * v, joints + 4 * v, weights + 4 * v);
+    status = qmat_progress(context, end, mesh->vertex_count, "vertices");
+  }
   qmat_envelope_free(envelope);
-  return qmat_progress(context, 0, 0, "joints");
+  return status;
 }

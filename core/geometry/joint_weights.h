@@ -25,15 +25,15 @@ void qmat_strongest_joints(const uint32_t *joints, const double *weights, size_t
 /* Gives each sphere of an unsealed medial mesh, in the units of `mesh`, the mean joints and weights of the surface that
  * it answers for: the points that are nearer to it than to the other spheres of the primitive nearest to them. A sphere
  * that answers for no point takes those of the vertex nearest to it. Nothing is done for a mesh without a skin.
- * Triangles are divided, so that points are a fiftieth of the diagonal apart, up to a few million. QMAT_ERROR_MEMORY,
- * QMAT_ERROR_GEOMETRY for a medial mesh with ids out of range, QMAT_CANCELLED. Threads are the context's; the result
- * does not depend on them. Cost: a query of the envelope for each point. */
+ * Triangles are divided, so that points are a fiftieth of the diagonal apart, but at most 16 on a side.
+ * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY for a medial mesh with ids out of range, QMAT_CANCELLED. Threads are the
+ * context's; the result does not depend on them. Cost: a query of the envelope for each point. */
 qmat_status qmat_skin_spheres(qmat_context *context, const struct qmat_mesh *mesh, struct qmat_medial *medial);
 
-/* Gives the vertices of a mesh that shows a medial mesh with joints those of the spheres nearest to them: `joints` and
- * `weights` get 4 for each. The spheres of the primitive nearest to a vertex count by their weights at its foot, which
- * vary evenly along cones and slabs. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY, QMAT_CANCELLED. Threads are the
- * context's; the result does not depend on them. Cost: a query of the envelope for each vertex. */
+/* Gives each vertex of an envelope's mesh the joints and weights of the spheres nearest to it: `joints` and `weights`
+ * get 4 for each. The spheres of the primitive nearest to a vertex count by their weights at its foot, which vary
+ * evenly along cones and slabs. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY, QMAT_CANCELLED. Threads are the context's; the
+ * result does not depend on them. Cost: a query of the envelope for each vertex. */
 qmat_status qmat_skin_envelope(qmat_context *context, const struct qmat_medial *medial, const struct qmat_mesh *mesh,
                                uint32_t *joints, double *weights);
 

@@ -76,7 +76,7 @@ double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3])
 /* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point that attains it. */
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]);
 /* The same where the distance is at most `best`; else some distance that is more, and no weights. Points that are
- * far from the slab's tangent planes are decided by these. */
+ * far from the slab's tangent planes are decided by these. In the unit frame. */
 double qmat_slab_foot_below(const qmat_slab *slab, const double point[3], double best, double weights[3]);
 
 #endif

@@ -18,7 +18,7 @@ static qmat_status scale_box(qmat_context *context, double length, const char *f
   double params[8];
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
-  assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "factor"), factor, params), QMAT_OK);
+  assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "factor"), factor, params), QMAT_OK);
   qmat_mesh *box = shape_seal(shape_box(length, 1, 1));
   const qmat_value *inputs[] = {&box->base};
   *scaled = NULL;
@@ -59,7 +59,7 @@ static void test_a_factor_of_zero_is_out_of_range(void **state) {
   const qmat_node *node = &qmat_node_mesh_scale;
   double params[8];
   qmat_params_default(node, params);
-  assert_int_equal(qmat_param_parse(&context, node, qmat_param_find(node, "factor"), "0", params), QMAT_ERROR_USAGE);
+  assert_int_equal(qmat_param_parse(&context, qmat_param_find(node, "factor"), "0", params), QMAT_ERROR_USAGE);
   qmat_context_uninit(&context);
 }
 

@@ -191,8 +191,8 @@ static qmat_mesh *skin(qmat_context *context, const qmat_medial *medial, double 
   qmat_value *outputs[4] = {NULL};
   snprintf(text, sizeof text, "%.0f", fmin(fmax(resolution, 16), 1024));
   qmat_params_default(node, params);
-  if (qmat_param_parse(context, node, qmat_param_find(node, "resolution"), text, params) != QMAT_OK ||
-      qmat_param_parse(context, node, qmat_param_find(node, "error"), "0", params) != QMAT_OK ||
+  if (qmat_param_parse(context, qmat_param_find(node, "resolution"), text, params) != QMAT_OK ||
+      qmat_param_parse(context, qmat_param_find(node, "error"), "0", params) != QMAT_OK ||
       qmat_node_run(context, node, params, (const qmat_value *[]){&medial->base}, outputs) != QMAT_OK)
     return NULL;
   qmat_value_release(outputs[1]);

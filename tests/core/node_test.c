@@ -93,7 +93,7 @@ static const qmat_node bare = {.name = "test.bare", .outputs = example_outputs};
 static qmat_status parse(qmat_context *context, const char *name, const char *text, example_params *params) {
   const qmat_param *param = qmat_param_find(&example, name);
   assert_non_null(param);
-  return qmat_param_parse(context, &example, param, text, params);
+  return qmat_param_parse(context, param, text, params);
 }
 
 /* The parameter refuses the text with this line, and keeps its value. */
@@ -366,7 +366,7 @@ static void test_formatted_values_read_back_to_themselves(void **state) {
     char texts[9][64];
     for (size_t i = 0; i < 9; i++) {
       qmat_param_format(&example_rows[i], &params, texts[i], sizeof texts[i]);
-      assert_int_equal(qmat_param_parse(&context, &example, &example_rows[i], texts[i], &again), QMAT_OK);
+      assert_int_equal(qmat_param_parse(&context, &example_rows[i], texts[i], &again), QMAT_OK);
     }
     assert_int_equal(again.caps, params.caps);
     assert_true(again.rays == params.rays && again.seed == params.seed);

@@ -135,7 +135,7 @@ static subject subject_of(const qmat_node *node) {
     if (!(param->flags & QMAT_PARAM_REQUIRED)) continue;
     qmat_status status = QMAT_ERROR_USAGE;
     for (size_t i = 0; i < 2 && status != QMAT_OK; i++) {
-      status = qmat_param_parse(&context, node, param, made.files[i], run.params);
+      status = qmat_param_parse(&context, param, made.files[i], run.params);
       if (param->flags & QMAT_PARAM_INPUT_FILE) {
         status = qmat_node_run(&context, node, run.params, run.inputs, run.outputs);
         release_outputs(&run);
@@ -154,8 +154,7 @@ static qmat_value *make(const char *name, const char *port, world in, const char
   qmat_context context = {0};
   subject run = {.node = node, .params = qmat_calloc(1, node->params_size)};
   qmat_params_default(node, run.params);
-  if (param)
-    assert_int_equal(qmat_param_parse(&context, node, qmat_param_find(node, param), text, run.params), QMAT_OK);
+  if (param) assert_int_equal(qmat_param_parse(&context, qmat_param_find(node, param), text, run.params), QMAT_OK);
   use_world(&run, in);
   if (qmat_node_run(&context, node, run.params, run.inputs, run.outputs) != QMAT_OK)
     fail_msg("%s: %s", name, context.error.message);
@@ -679,11 +678,11 @@ static bool is_named(const qmat_node *node, const qmat_error *error) {
 static void try_param(const qmat_node *node, const qmat_param *param, const char *text) {
   subject run = subject_of(node);
   qmat_context context = {.threads = 2};
-  qmat_status status = qmat_param_parse(&context, node, param, text, run.params);
+  qmat_status status = qmat_param_parse(&context, param, text, run.params);
   if (status != QMAT_OK) fail_msg("%s: %s=%s: %s", node->name, param->name, text, context.error.message);
   char written[64];
   qmat_param_format(param, run.params, written, sizeof written);
-  assert_int_equal(qmat_param_parse(&context, node, param, text, run.params), QMAT_OK);
+  assert_int_equal(qmat_param_parse(&context, param, text, run.params), QMAT_OK);
   status = qmat_params_check(&context, node, run.params);
   const double start = now();
   if (status == QMAT_OK && !execute_patiently(&context, &run, &status))
@@ -744,7 +743,7 @@ static void test_every_length_may_have_a_unit_and_needs_a_model_with_one(void **
       if (!(param->flags & QMAT_PARAM_RELATIVE)) continue;
       subject run = subject_of(node);
       qmat_context context = {0};
-      assert_int_equal(qmat_param_parse(&context, node, param, "5mm", run.params), QMAT_OK);
+      assert_int_equal(qmat_param_parse(&context, param, "5mm", run.params), QMAT_OK);
       assert_int_equal(qmat_params_check(&context, node, run.params), QMAT_OK);
       assert_int_equal(execute(&context, &run), QMAT_ERROR_USAGE);
       assert_string_equal(context.error.field, param->name);
@@ -759,7 +758,7 @@ static void check_refused(const qmat_node *node, const qmat_param *param, const 
   qmat_context context = {0};
   void *params = qmat_calloc(1, node->params_size);
   qmat_params_default(node, params);
-  if (qmat_param_parse(&context, node, param, text, params) != QMAT_ERROR_USAGE)
+  if (qmat_param_parse(&context, param, text, params) != QMAT_ERROR_USAGE)
     fail_msg("%s: %s=%s is taken", node->name, param->name, text);
   assert_string_equal(context.error.field, param->name);
   qmat_free(params);

@@ -15,7 +15,7 @@ static qmat_status run(qmat_context *context, const char *content, qmat_value **
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
   assert_int_equal(qmat_params_check(context, node, params), QMAT_ERROR_USAGE);
-  assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "path"), path, params), QMAT_OK);
+  assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "path"), path, params), QMAT_OK);
   *output = NULL;
   const qmat_status status = node->run(context, params, NULL, output);
   unlink(path);

@@ -42,7 +42,7 @@ static qmat_status try_skin(qmat_context *context, qmat_medial *medial, const ch
     *value++ = 0;
     const qmat_param *param = qmat_param_find(node, word);
     assert_non_null(param);
-    assert_int_equal(qmat_param_parse(context, node, param, value, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, param, value, params), QMAT_OK);
   }
   const qmat_value *inputs[1] = {&medial->base};
   qmat_value *outputs[2] = {NULL, NULL};

@@ -25,7 +25,7 @@ typedef struct result {
 static void set_params(qmat_context *context, const char *text, void *params) {
   const qmat_node *node = &qmat_node_mesh_sample;
   qmat_params_default(node, params);
-  assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "spacing"), "0", params), QMAT_OK);
+  assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "spacing"), "0", params), QMAT_OK);
   char copy[256];
   assert_true(strlen(text) < sizeof copy);
   memcpy(copy, text, strlen(text) + 1);
@@ -35,7 +35,7 @@ static void set_params(qmat_context *context, const char *text, void *params) {
     *value++ = '\0';
     const qmat_param *param = qmat_param_find(node, word);
     assert_non_null(param);
-    if (qmat_param_parse(context, node, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
+    if (qmat_param_parse(context, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
   }
 }
 

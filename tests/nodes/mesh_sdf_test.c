@@ -21,13 +21,13 @@ static qmat_status try_spaced_sdf(qmat_context *context, qmat_mesh *mesh, const 
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
   if (cone_angle) {
-    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "cone_angle"), cone_angle, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "cone_angle"), cone_angle, params), QMAT_OK);
   }
   if (rays) {
-    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "rays"), rays, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "rays"), rays, params), QMAT_OK);
   }
   if (spacing) {
-    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "spacing"), spacing, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "spacing"), spacing, params), QMAT_OK);
   }
   const qmat_value *inputs[1] = {&mesh->base};
   qmat_value *outputs[1] = {NULL};

@@ -139,8 +139,7 @@ static result run_on(qmat_mesh *mesh, const char *const *settings, int threads) 
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
   for (; *settings; settings += 2)
-    assert_int_equal(qmat_param_parse(&context, node, qmat_param_find(node, settings[0]), settings[1], params),
-                     QMAT_OK);
+    assert_int_equal(qmat_param_parse(&context, qmat_param_find(node, settings[0]), settings[1], params), QMAT_OK);
   const qmat_value *inputs[] = {&mesh->base};
   qmat_value *outputs[2] = {NULL, NULL};
   result r = {.status = qmat_node_run(&context, node, params, inputs, outputs)};

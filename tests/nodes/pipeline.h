@@ -32,7 +32,7 @@ static inline qmat_status pipeline_run(qmat_context *context, const char *name, 
     *value++ = '\0';
     const qmat_param *param = qmat_param_find(node, word);
     if (!param) fail_msg("%s has no parameter %s", name, word);
-    if (qmat_param_parse(context, node, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
+    if (qmat_param_parse(context, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
   }
   if (qmat_params_check(context, node, params) != QMAT_OK) fail_msg("%s", context->error.message);
   const qmat_status status = qmat_node_run(context, node, params, inputs, outputs);

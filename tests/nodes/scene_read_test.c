@@ -27,12 +27,12 @@ static qmat_status run(qmat_context *context, const char *content, const char *d
   assert_true(node->params_size <= sizeof params);
   qmat_params_default(node, params);
   assert_int_equal(qmat_params_check(context, node, params), QMAT_ERROR_USAGE); /* the path is required */
-  assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "path"), path, params), QMAT_OK);
+  assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "path"), path, params), QMAT_OK);
   if (defects) {
-    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "defects"), defects, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "defects"), defects, params), QMAT_OK);
   }
   if (given_unit)
-    assert_int_equal(qmat_param_parse(context, node, qmat_param_find(node, "unit"), given_unit, params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "unit"), given_unit, params), QMAT_OK);
   assert_int_equal(qmat_params_check(context, node, params), QMAT_OK);
   if (content) write_file(path, content, strlen(content));
   for (int i = 0; i < 3; i++) outputs[i] = NULL;
@@ -142,8 +142,7 @@ static void test_an_unknown_choice_is_refused(void **state) {
   uint64_t params[8];
   const qmat_node *node = &qmat_node_scene_read;
   qmat_params_default(node, params);
-  assert_int_equal(qmat_param_parse(&context, node, qmat_param_find(node, "defects"), "dropp", params),
-                   QMAT_ERROR_USAGE);
+  assert_int_equal(qmat_param_parse(&context, qmat_param_find(node, "defects"), "dropp", params), QMAT_ERROR_USAGE);
 }
 
 int main(void) {

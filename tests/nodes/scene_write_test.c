@@ -26,7 +26,7 @@ static void *make_params(const qmat_node *node, const char *const settings[][2])
   for (size_t i = 0; settings && settings[i][0]; i++) {
     const qmat_param *param = qmat_param_find(node, settings[i][0]);
     assert_non_null(param);
-    assert_int_equal(qmat_param_parse(&context, node, param, settings[i][1], params), QMAT_OK);
+    assert_int_equal(qmat_param_parse(&context, param, settings[i][1], params), QMAT_OK);
   }
   qmat_context_uninit(&context);
   return params;
