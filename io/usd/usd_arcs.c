@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* A scene may be composed of this many nodes, and more for each spec of its layers. */
-#define FREE_NODES ((size_t)1 << 18)
+#define FREE_NODES ((size_t)1 << 22)
 #define NODES_PER_SPEC 64
 
 enum { MOST_ARCS_OF_PRIM = 4096 };
@@ -76,6 +76,47 @@ static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char 
     path += length;
   }
   return spec;
+}
+
+/* ---- trees of children ---- */
+
+qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *parent, const char *name, node **made) {
+  qmat_status status = qmat_usd_new_node(c, parent, from->arc, from->stack, from->spec_count, made);
+  if (status != QMAT_OK) return status;
+  (*made)->introduced = from->introduced;
+  (*made)->time = from->time;
+  for (size_t i = 0; i < from->spec_count; i++) {
+    const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
+    if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
+  }
+  node **end = &(*made)->first_child;
+  for (const node *child = from->first_child; child; child = child->next) {
+    node *copy;
+    status = qmat_usd_copy_tree(c, child, *made, name, &copy);
+    if (status != QMAT_OK) return status;
+    if (!copy) continue;
+    *end = copy;
+    end = &copy->next;
+  }
+  if ((*made)->spec_count == 0 && !(*made)->first_child) {
+    *made = NULL;
+    --*c->nodes_made;
+    c->node_count--;
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_usd_add_arcs_of_copies(qmat_usd_composer *c, node *at) {
+  /* New arcs are inserted between the copies: these are listed first. */
+  size_t count = 0;
+  for (const node *child = at->first_child; child; child = child->next) count++;
+  node **copies = qmat_arena_alloc(&c->prim->arena, count, sizeof *copies);
+  if (!copies) return qmat_usd_fail_prim_memory(c->prim);
+  count = 0;
+  for (node *child = at->first_child; child; child = child->next) copies[count++] = child;
+  qmat_status status = qmat_usd_add_arcs(c, at);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = qmat_usd_add_arcs_of_copies(c, copies[i]);
+  return status;
 }
 
 /* ---- edits of lists ---- */
@@ -188,27 +229,96 @@ static bool is_on_the_way(const node *at, const qmat_usd_spec *spec) {
   return false;
 }
 
-/* Adds the prim at `path` in a layer stack as a child of `at`, with its own arcs. `time` turns its times into those of
- * `at`; NULL: they are the same. */
+static qmat_status add_variants(qmat_usd_composer *c, node *tree);
+
+/* Whether a prim above the one at a path has arcs or variants, which may bring opinions about it. */
+static bool has_arcs_above(const qmat_usd_stack *layers, const char *path) {
+  static const char *const fields[] = {"inheritPaths", "references", "payload", "specializes", "variantSetNames"};
+  for (size_t i = 0; i < layers->count; i++) {
+    const qmat_usd_spec *spec = layers->layers[i]->root;
+    for (const char *part = path; spec && strchr(part + 1, '/'); part = strchr(part + 1, '/')) {
+      const size_t length = strcspn(part + 1, "/");
+      char name[256];
+      if (length >= sizeof name) return false;
+      snprintf(name, sizeof name, "%.*s", (int)length, part + 1);
+      spec = qmat_usd_child(layers->layers[i], spec, QMAT_USD_PRIM, name);
+      for (size_t k = 0; spec && k < sizeof fields / sizeof *fields; k++)
+        if (qmat_usd_field_value(spec, fields[k])) return true;
+    }
+  }
+  return false;
+}
+
+/* All nodes of a tree came with an arc of the prim of this depth. */
+static void set_introduced(node *at, int depth) {
+  at->introduced = depth;
+  for (node *child = at->first_child; child; child = child->next) set_introduced(child, depth);
+}
+
+/* Composes the prim at a path from the root of its layer stack on, since prims above it have arcs; all but its own arcs
+ * and variants. `*made` is NULL when there is no such prim. */
+static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, size_t stack, const char *path,
+                                  qmat_usd_time time, node **made) {
+  const qmat_usd_stack *layers = &c->files->stacks[stack];
+  const int depth = c->prim->depth;
+  int levels = 0;
+  for (const char *slash = path; slash; slash = strchr(slash + 1, '/')) levels++;
+  qmat_status status = QMAT_OK;
+  node *above = NULL;
+  *made = NULL;
+  for (const char *part = path; part && status == QMAT_OK; part = strchr(part + 1, '/')) {
+    char name[256];
+    const size_t length = strcspn(part + 1, "/");
+    snprintf(name, sizeof name, "%.*s", length < sizeof name ? (int)length : 0, part + 1);
+    c->prim->depth = depth - --levels; /* arcs of prims above are weaker */
+    if (!above) {
+      status = qmat_usd_new_node(c, at, arc, stack, layers->count, made);
+      if (status == QMAT_OK) (*made)->time = time;
+      for (size_t i = 0; i < layers->count && status == QMAT_OK; i++) {
+        const qmat_usd_spec *spec = qmat_usd_child(layers->layers[i], layers->layers[i]->root, QMAT_USD_PRIM, name);
+        if (spec) qmat_usd_add_spec(*made, layers->layers[i], spec);
+      }
+    } else {
+      status = qmat_usd_copy_tree(c, above, at, name, made);
+    }
+    if (status != QMAT_OK || !*made || levels == 0) break;
+    above = *made;
+    status = qmat_usd_add_arcs_of_copies(c, above);
+    if (status == QMAT_OK) status = add_variants(c, above);
+  }
+  c->prim->depth = depth;
+  if (status == QMAT_OK && *made) set_introduced(*made, depth);
+  return status;
+}
+
+/* Adds the prim at `path` in a layer stack as a child of `at`, with its own arcs and what prims above it bring. `time`
+ * turns its times into those of `at`; NULL: they are the same. */
 static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, size_t stack, const char *path,
                               const qmat_usd_time *time, const char *what) {
   const qmat_usd_stack *layers = &c->files->stacks[stack];
+  qmat_usd_time own = at->time;
+  if (time) own = (qmat_usd_time){.offset = own.offset + own.scale * time->offset, .scale = own.scale * time->scale};
+  if (at->arcs_deep >= QMAT_USD_DEEPEST_ARCS)
+    return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: it leads back to itself", what, qmat_usd_shown(path));
   node *made;
-  qmat_status status = qmat_usd_new_node(c, at, arc, stack, layers->count, &made);
-  if (status != QMAT_OK) return status;
-  if (time)
-    made->time = (qmat_usd_time){.offset = at->time.offset + at->time.scale * time->offset,
-                                 .scale = at->time.scale * time->scale};
-  for (size_t i = 0; i < layers->count; i++) {
-    const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
-    if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
+  qmat_status status;
+  if (has_arcs_above(layers, path)) {
+    status = compose_target(c, at, arc, stack, path, own, &made);
+  } else {
+    status = qmat_usd_new_node(c, at, arc, stack, layers->count, &made);
+    if (status == QMAT_OK) made->time = own;
+    for (size_t i = 0; i < layers->count && status == QMAT_OK; i++) {
+      const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
+      if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
+    }
   }
-  if (made->spec_count == 0)
+  if (status != QMAT_OK) return status;
+  if (!made || (made->spec_count == 0 && !made->first_child))
     return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: there is no such prim", what, qmat_usd_shown(path));
-  if (made->arcs_deep > QMAT_USD_DEEPEST_ARCS || is_on_the_way(at, made->specs[0]))
+  if (made->spec_count > 0 && is_on_the_way(at, made->specs[0]))
     return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: it leads back to itself", what, qmat_usd_shown(path));
   link_node(at, made);
-  return qmat_usd_add_arcs(c, made);
+  return qmat_usd_add_arcs_of_copies(c, made);
 }
 
 static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, list_item item, const char *what) {
@@ -308,12 +418,12 @@ static bool has_variant(const node *at, const char *set, const char *name) {
   return false;
 }
 
-static qmat_status add_variant(qmat_usd_composer *c, node *at, const char *set) {
+static qmat_status add_variant(qmat_usd_composer *c, node *tree, node *at, const char *set) {
   bool is_there = false;
   for (size_t i = 0; i < at->spec_count; i++)
     is_there = is_there || qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
   if (!is_there) return QMAT_OK;
-  const char *selection = find_selection(c->prim->tree, set);
+  const char *selection = find_selection(tree, set);
   if (!selection) return qmat_usd_warn(c->prim, "no variant of '%s' is selected: all are skipped", qmat_usd_shown(set));
   node *made;
   qmat_status status = qmat_usd_new_node(c, at, QMAT_USD_ARC_VARIANT, at->stack, at->spec_count, &made);
@@ -324,7 +434,7 @@ static qmat_status add_variant(qmat_usd_composer *c, node *at, const char *set) 
     if (spec) qmat_usd_add_spec(made, at->layers[i], spec);
   }
   if (made->spec_count == 0) {
-    if (has_variant(c->prim->tree, set, selection)) return QMAT_OK;
+    if (has_variant(tree, set, selection)) return QMAT_OK;
     return qmat_usd_warn(c->prim, "there is no variant '%s' of '%s'", qmat_usd_shown(selection), qmat_usd_shown(set));
   }
   link_node(at, made);
@@ -341,15 +451,20 @@ static node *find_undone(node *at) {
   return NULL;
 }
 
-qmat_status qmat_usd_add_variants(qmat_usd_composer *c) {
+/* Adds the selected variants of all nodes of a tree, and their arcs. */
+static qmat_status add_variants(qmat_usd_composer *c, node *tree) {
   node *at;
-  while ((at = find_undone(c->prim->tree)) != NULL) {
+  while ((at = find_undone(tree)) != NULL) {
     at->has_variants_done = true;
     edited_list sets;
     qmat_status status = edit_list(c, at, "variantSetNames", QMAT_USD_STRING, &sets);
-    for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, at, sets.items[i].value);
+    for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, tree, at, sets.items[i].value);
     qmat_free(sets.items);
     if (status != QMAT_OK) return status;
   }
   return QMAT_OK;
+}
+
+qmat_status qmat_usd_add_variants(qmat_usd_composer *c) {
+  return add_variants(c, c->prim->tree);
 }

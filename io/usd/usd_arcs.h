@@ -49,6 +49,14 @@ void qmat_usd_add_spec(qmat_usd_node *to, const qmat_usd_layer *layer, const qma
 /* Adds the arcs of a node's specs, and their arcs, except variants. */
 qmat_status qmat_usd_add_arcs(qmat_usd_composer *c, qmat_usd_node *at);
 
+/* Makes the part of the tree of the child `name` that comes from the arcs of its parent's tree, `from`; NULL when there
+ * is none. `parent`: as in qmat_usd_new_node. */
+qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const qmat_usd_node *from, qmat_usd_node *parent, const char *name,
+                               qmat_usd_node **made);
+
+/* Adds the arcs of the child itself to all nodes that qmat_usd_copy_tree made. */
+qmat_status qmat_usd_add_arcs_of_copies(qmat_usd_composer *c, qmat_usd_node *at);
+
 /* Adds the selected variants of all nodes of the prim's tree, and their arcs. Selections may come from any node, so
  * that the other arcs have to be there. */
 qmat_status qmat_usd_add_variants(qmat_usd_composer *c);

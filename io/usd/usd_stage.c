@@ -70,47 +70,6 @@ void qmat_usd_stage_forget_warnings(qmat_usd_stage *stage) {
 
 /* ---- prims ---- */
 
-/* The part of the tree of the child `name` that comes from the arcs of its parent's tree; NULL when there is none. */
-static qmat_status copy_tree(composer *c, const node *from, node *parent, const char *name, node **made) {
-  qmat_status status = qmat_usd_new_node(c, parent, from->arc, from->stack, from->spec_count, made);
-  if (status != QMAT_OK) return status;
-  (*made)->introduced = from->introduced;
-  (*made)->time = from->time;
-  for (size_t i = 0; i < from->spec_count; i++) {
-    const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
-    if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
-  }
-  node **end = &(*made)->first_child;
-  for (const node *child = from->first_child; child; child = child->next) {
-    node *copy;
-    status = copy_tree(c, child, *made, name, &copy);
-    if (status != QMAT_OK) return status;
-    if (!copy) continue;
-    *end = copy;
-    end = &copy->next;
-  }
-  if ((*made)->spec_count == 0 && !(*made)->first_child) {
-    *made = NULL;
-    --*c->nodes_made;
-    c->node_count--;
-  }
-  return QMAT_OK;
-}
-
-/* Adds the arcs of the child itself to all nodes that copy_tree made. */
-static qmat_status add_arcs_of_copies(composer *c, node *at) {
-  /* New arcs are inserted between the copies: these are listed first. */
-  size_t count = 0;
-  for (const node *child = at->first_child; child; child = child->next) count++;
-  node **copies = qmat_arena_alloc(&c->prim->arena, count, sizeof *copies);
-  if (!copies) return qmat_usd_fail_prim_memory(c->prim);
-  count = 0;
-  for (node *child = at->first_child; child; child = child->next) copies[count++] = child;
-  qmat_status status = qmat_usd_add_arcs(c, at);
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) status = add_arcs_of_copies(c, copies[i]);
-  return status;
-}
-
 static size_t count_specs(const node *at) {
   size_t count = at->spec_count;
   for (const node *child = at->first_child; child; child = child->next) count += count_specs(child);
@@ -160,10 +119,10 @@ qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *pare
   composer c = {.files = &stage->files, .prim = child, .nodes_made = &stage->nodes_made};
   if (child->depth > QMAT_USD_DEEPEST)
     return qmat_usd_prim_fail(child, "prims are nested more than %d deep", QMAT_USD_DEEPEST);
-  qmat_status status = copy_tree(&c, parent->tree, NULL, name, &child->tree);
+  qmat_status status = qmat_usd_copy_tree(&c, parent->tree, NULL, name, &child->tree);
   if (status == QMAT_OK && !child->tree)
     return qmat_fail(stage->log.context, QMAT_ERROR_INTERNAL, "a prim of USD has no opinions");
-  if (status == QMAT_OK) status = add_arcs_of_copies(&c, child->tree);
+  if (status == QMAT_OK) status = qmat_usd_add_arcs_of_copies(&c, child->tree);
   if (status == QMAT_OK) status = qmat_usd_add_variants(&c);
   return status == QMAT_OK ? finish_prim(&c) : status;
 }

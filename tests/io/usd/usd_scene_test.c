@@ -484,6 +484,48 @@ static void test_references_are_beside_the_layer_of_the_stack_that_has_them(void
   rmdir(sub);
 }
 
+/* A reference to a prim below others brings what their payloads and variants say of it, weaker than its own layer. */
+static void test_a_reference_brings_what_prims_above_its_target_bring(void **state) {
+  (void)state;
+  static const char asset[] =
+      "#usda 1.0\ndef Xform \"A\" ( payload = @payload.usda@</P>\n"
+      "  variants = { string v = \"one\" }\n  prepend variantSets = \"v\" ) {\n"
+      "  over \"G\" { double3 xformOp:translate = (1, 0, 0) }\n"
+      "  variantSet \"v\" = { \"one\" { over \"G\" { def \"in\" { " MESH("v", "") "} } } }\n}\n";
+  static const char payload[] =
+      "#usda 1.0\ndef \"P\" { def Xform \"G\" { double3 xformOp:translate = (5, 0, 0)\n"
+      "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n" MESH("p", "") "} }\n";
+  write_file(in_folder("asset.usda"), asset, strlen(asset));
+  write_file(in_folder("payload.usda"), payload, strlen(payload));
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\ndef \"x\" ( references = @asset.usda@</A/G> ) {}\n"
+      "def \"y\" ( references = @asset.usda@</A/G/in> ) {}\n"
+      "def \"z\" ( references = @asset.usda@</A/none> ) {}\n",
+      &report);
+  assert_int_equal(count_of(report, "meshes_placed"), 3); /* x/p, x/in/v, y/v */
+  assert_string_equal(warning_of(report, 0), "/z: the reference of </A/none> is skipped: there is no such prim");
+  assert_string_equal(warning_of(report, 1), "");
+  assert_true(soup.positions[0] == 1); /* the layer's own opinion, not the payload's */
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  unlink(in_folder("asset.usda"));
+  unlink(in_folder("payload.usda"));
+}
+
+/* Two prims that refer to what is below each other. */
+static void test_references_through_prims_above_end(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\ndef \"A\" ( references = </B/c> ) { def \"d\" {} }\n"
+      "def \"B\" ( references = </A/d> ) { def \"c\" {" MESH("m", "") "} }\n",
+      &report);
+  assert_true(count_of(report, "meshes_placed") >= 2);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
 static void test_files_are_found_beside_the_layer_that_names_them(void **state) {
   (void)state;
   char sub[256], asset[256], sublayer[256];
@@ -720,6 +762,8 @@ int main(void) {
       cmocka_unit_test(test_children_come_through_variants_nested_variants_and_references),
       cmocka_unit_test(test_a_variant_that_is_not_selected_is_left_out_aloud),
       cmocka_unit_test(test_references_are_beside_the_layer_of_the_stack_that_has_them),
+      cmocka_unit_test(test_a_reference_brings_what_prims_above_its_target_bring),
+      cmocka_unit_test(test_references_through_prims_above_end),
       cmocka_unit_test(test_files_are_found_beside_the_layer_that_names_them),
       cmocka_unit_test(test_samples_over_time_give_the_first_with_a_warning),
       cmocka_unit_test(test_broken_meshes_are_errors_that_name_the_prim),
