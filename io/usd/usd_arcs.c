@@ -330,9 +330,11 @@ static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc ar
   }
   char path[256];
   const qmat_usd_layer *layer = c->files->stacks[stack].layers[0];
-  const qmat_usd_time time = {
+  const qmat_usd_time through = {
       .offset = reference->offset,
       .scale = reference->scale * qmat_usd_codes_per_second(item.layer) / qmat_usd_codes_per_second(layer)};
+  const qmat_usd_time time =
+      qmat_usd_time_through(qmat_usd_stack_time(&c->files->stacks[at->stack], item.layer), through);
   if (reference->path[0]) return add_target(c, at, arc, stack, reference->path, &time, what);
   const char *name = qmat_usd_text(qmat_usd_field_value(layer->root, "defaultPrim"));
   if (!name || !*name || strlen(name) > 254) {

@@ -160,7 +160,8 @@ static qmat_status open_member(qmat_usd_files *files, const qmat_usd_prim *prim,
   if (!added) return fail_memory(prim);
   added->is_missing = !member || is_package(member->bytes, member->size);
   if (added->is_missing)
-    return qmat_usd_warn(prim, "the %s @%s@ is skipped: it is not in the package", what, qmat_usd_shown(asset));
+    return qmat_usd_warn(prim, "the %s @%s@ is skipped: %s", what, qmat_usd_shown(asset),
+                         member ? "packages in packages are not read" : "it is not in the package");
   *opened = added;
   return read_member(files, prim, from, member, added);
 }
@@ -227,29 +228,41 @@ static qmat_status find_asset(qmat_usd_files *files, const qmat_usd_prim *prim, 
 
 /* Adds a layer and its sublayers. A layer that is already in the stack is not added again. */
 static qmat_status add_to_stack(qmat_usd_files *files, const qmat_usd_prim *prim, qmat_usd_stack *stack,
-                                const qmat_usd_layer *layer, int depth) {
+                                const qmat_usd_layer *layer, qmat_usd_time time, int depth) {
   for (size_t i = 0; i < stack->count; i++) {
     if (stack->layers[i] == layer) return QMAT_OK;
   }
   if (depth > QMAT_USD_DEEPEST_ARCS)
     return qmat_usd_prim_fail(prim, "sublayers are nested more than %d deep", QMAT_USD_DEEPEST_ARCS);
-  if (qmat_grow((void **)&stack->layers, &stack->capacity, stack->count + 1, sizeof *stack->layers) != 0)
+  if (qmat_grow((void **)&stack->layers, &stack->capacity, stack->count + 1, sizeof *stack->layers) != 0 ||
+      qmat_grow((void **)&stack->times, &stack->time_capacity, stack->count + 1, sizeof *stack->times) != 0)
     return fail_memory(prim);
+  stack->times[stack->count] = time;
   stack->layers[stack->count++] = layer;
+  qmat_status status = QMAT_OK;
+  if (qmat_usd_field_value(layer->root, "layerRelocates") || qmat_usd_field_value(layer->root, "relocates"))
+    status = qmat_usd_warn(prim, "the relocates of a layer are skipped");
   const qmat_usd_value *names = qmat_usd_field_value(layer->root, "subLayers");
   const qmat_usd_value *times = qmat_usd_field_value(layer->root, "subLayerOffsets");
-  if (!names || !names->is_array || !qmat_usd_is_text(names->type)) return QMAT_OK;
+  if (!names || !names->is_array || !qmat_usd_is_text(names->type)) return status;
   if (times && (!times->is_array || times->components != 2 || !qmat_usd_is_number(times->type))) times = NULL;
-  qmat_status status = QMAT_OK;
   for (size_t i = 0; i < names->count && status == QMAT_OK; i++) {
     file *sublayer;
-    const double *time = times && i < times->count ? times->numbers + 2 * i : NULL;
     status = find_asset(files, prim, layer, names->texts[i], "sublayer", &sublayer);
-    if (status == QMAT_OK && time && (time[0] != 0 || time[1] != 1))
-      status = qmat_usd_warn(prim, "the time offset of the sublayer @%s@ is ignored", qmat_usd_shown(names->texts[i]));
-    if (status == QMAT_OK && sublayer) status = add_to_stack(files, prim, stack, &sublayer->layer, depth + 1);
+    if (status != QMAT_OK || !sublayer) continue;
+    qmat_usd_time own = {.scale = 1};
+    if (times && i < times->count)
+      own = (qmat_usd_time){.offset = times->numbers[2 * i], .scale = times->numbers[2 * i + 1]};
+    own.scale *= qmat_usd_codes_per_second(layer) / qmat_usd_codes_per_second(&sublayer->layer);
+    status = add_to_stack(files, prim, stack, &sublayer->layer, qmat_usd_time_through(time, own), depth + 1);
   }
   return status;
+}
+
+qmat_usd_time qmat_usd_stack_time(const qmat_usd_stack *stack, const qmat_usd_layer *layer) {
+  for (size_t i = 0; i < stack->count; i++)
+    if (stack->layers[i] == layer) return stack->times[i];
+  return (qmat_usd_time){.scale = 1};
 }
 
 /* Finds the stack whose strongest layer is `layer`, or makes it. */
@@ -262,7 +275,7 @@ static qmat_status find_stack(qmat_usd_files *files, const qmat_usd_prim *prim, 
     return fail_memory(prim);
   qmat_usd_stack *stack = &files->stacks[files->stack_count++];
   *stack = (qmat_usd_stack){0};
-  return add_to_stack(files, prim, stack, layer, 0);
+  return add_to_stack(files, prim, stack, layer, (qmat_usd_time){.scale = 1}, 0);
 }
 
 /* ---- opening and closing ---- */
@@ -314,7 +327,10 @@ void qmat_usd_files_uninit(qmat_usd_files *files) {
     qmat_bytes_uninit(&files->packages[i].file);
     qmat_free(files->packages[i].path);
   }
-  for (size_t i = 0; i < files->stack_count; i++) qmat_free(files->stacks[i].layers);
+  for (size_t i = 0; i < files->stack_count; i++) {
+    qmat_free(files->stacks[i].layers);
+    qmat_free(files->stacks[i].times);
+  }
   qmat_free(files->files);
   qmat_free(files->packages);
   qmat_free(files->stacks);

@@ -13,8 +13,9 @@ enum { QMAT_USD_DEEPEST_ARCS = 64 }; /* nesting of references and of sublayers *
 
 /* A layer with all its sublayers, strongest first. */
 typedef struct qmat_usd_stack {
-  size_t count, capacity;
+  size_t count, capacity, time_capacity;
   const qmat_usd_layer **layers;
+  qmat_usd_time *times; /* how the times of each layer become those of the first */
 } qmat_usd_stack;
 
 /* Zeroed it is empty and valid. */
@@ -36,6 +37,9 @@ qmat_status qmat_usd_files_open(qmat_usd_files *files, const qmat_usd_prim *root
  * `files`. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY. */
 qmat_status qmat_usd_files_find(qmat_usd_files *files, const qmat_usd_prim *prim, const qmat_usd_layer *from,
                                 const char *asset, const char *what, size_t *found);
+
+/* How the times of a layer of a stack become those of the stack's first layer. */
+qmat_usd_time qmat_usd_stack_time(const qmat_usd_stack *stack, const qmat_usd_layer *layer);
 
 /* One of the files that were read, numbered from 0. `*path` and `*layer` are NULL for a file that is missing or is
  * itself a package; `*is_member`: it is in a package. */

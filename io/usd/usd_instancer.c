@@ -36,33 +36,55 @@ static qmat_status read_arrays(const qmat_usd_prim *prim, arrays *a) {
   return status;
 }
 
+typedef struct id_list {
+  size_t count, capacity;
+  int64_t *ids;
+} id_list;
+
 static int compare_ids(const void *a, const void *b) {
   const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
   return x < y ? -1 : x > y;
 }
 
-/* The sorted ids of the instances that are left out. */
-static qmat_status read_masked(const qmat_usd_prim *prim, qmat_arena *arena, int64_t **masked, size_t *count) {
-  const qmat_usd_value *invisible, *inactive = qmat_usd_prim_field(prim, "inactiveIds");
+/* Adds integers to the ids, or takes them out. */
+static bool edit_ids(id_list *list, const qmat_usd_value *by, bool adds) {
+  if (!by->is_array || !qmat_usd_is_integer(by->type)) return true;
+  if (adds) {
+    if (qmat_grow((void **)&list->ids, &list->capacity, list->count + by->count, sizeof *list->ids) != 0) return false;
+    for (size_t i = 0; i < by->count; i++) list->ids[list->count++] = by->integers[i];
+    return true;
+  }
+  int64_t *gone = qmat_alloc(by->count, sizeof *gone);
+  if (!gone) return false;
+  memcpy(gone, by->integers, by->count * sizeof *gone);
+  qsort(gone, by->count, sizeof *gone, compare_ids);
+  size_t kept = 0;
+  for (size_t i = 0; i < list->count; i++)
+    if (!bsearch(&list->ids[i], gone, by->count, sizeof *gone, compare_ids)) list->ids[kept++] = list->ids[i];
+  list->count = kept;
+  qmat_free(gone);
+  return true;
+}
+
+/* The sorted ids of the instances that are left out: inactiveIds, whose opinions edit the weaker ones, and
+ * invisibleIds. The caller frees them. */
+static qmat_status read_masked(const qmat_usd_prim *prim, id_list *masked) {
+  const qmat_usd_value *invisible;
   const qmat_status status = read_array(prim, "invisibleIds", false, 1, SIZE_MAX, &invisible);
   if (status != QMAT_OK) return status;
-  const qmat_usd_list_op *op = inactive && inactive->type == QMAT_USD_LIST_OP ? inactive->list_op : NULL;
-  size_t most = invisible ? invisible->count : 0;
-  const bool is_plain = inactive && inactive->is_array && qmat_usd_is_integer(inactive->type);
-  if (is_plain) most += inactive->count;
-  for (int edit = 0; op && edit < QMAT_USD_EDIT_COUNT; edit++) most += op->lists[edit].count;
-  *masked = qmat_arena_alloc(arena, most, sizeof **masked);
-  if (!*masked) return qmat_usd_fail_prim_memory(prim);
-  *count = 0;
-  for (size_t i = 0; invisible && i < invisible->count; i++) (*masked)[(*count)++] = invisible->integers[i];
-  for (size_t i = 0; is_plain && i < inactive->count; i++) (*masked)[(*count)++] = inactive->integers[i];
-  for (int edit = 0; op && edit < QMAT_USD_EDIT_COUNT; edit++) {
-    const qmat_usd_value *list = &op->lists[edit];
-    if (edit == QMAT_USD_DELETED || edit == QMAT_USD_ORDERED || !qmat_usd_is_integer(list->type)) continue;
-    for (size_t i = 0; i < list->count; i++) (*masked)[(*count)++] = list->integers[i];
+  bool done = true;
+  for (size_t i = prim->opinion_count; i-- > 0 && done;) {
+    const qmat_usd_value *value = qmat_usd_field_value(prim->opinions[i].spec, "inactiveIds");
+    const qmat_usd_list_op *op = value && value->type == QMAT_USD_LIST_OP ? value->list_op : NULL;
+    if (value && (!op || op->is_explicit)) masked->count = 0;
+    if (value && !op) done = edit_ids(masked, value, true);
+    if (op && done) done = edit_ids(masked, &op->lists[QMAT_USD_DELETED], false);
+    for (int edit = 0; op && edit < QMAT_USD_EDIT_COUNT && done; edit++)
+      if (edit != QMAT_USD_ORDERED && edit != QMAT_USD_DELETED) done = edit_ids(masked, &op->lists[edit], true);
   }
-  qsort(*masked, *count, sizeof **masked, compare_ids);
-  return QMAT_OK;
+  done = done && (!invisible || edit_ids(masked, invisible, true));
+  if (masked->count > 0) qsort(masked->ids, masked->count, sizeof *masked->ids, compare_ids);
+  return done ? QMAT_OK : qmat_usd_fail_prim_memory(prim);
 }
 
 /* Scale, then orientation, then position. */
@@ -77,15 +99,10 @@ static qmat_usd_transform place(const arrays *a, size_t i) {
   return result;
 }
 
-qmat_status qmat_usd_instancer_read(const qmat_usd_prim *prim, qmat_arena *arena, qmat_usd_instancer *instancer) {
+static qmat_status read_instances(const qmat_usd_prim *prim, qmat_arena *arena, const id_list *masked,
+                                  qmat_usd_instancer *instancer) {
   arrays a;
-  int64_t *masked = NULL;
-  size_t masked_count = 0;
-  *instancer = (qmat_usd_instancer){0};
-  qmat_status status =
-      qmat_usd_prim_targets(prim, "prototypes", arena, &instancer->prototypes, &instancer->prototype_count);
-  if (status == QMAT_OK) status = read_arrays(prim, &a);
-  if (status == QMAT_OK) status = read_masked(prim, arena, &masked, &masked_count);
+  qmat_status status = read_arrays(prim, &a);
   if (status != QMAT_OK || !a.indices) return status;
   instancer->of = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->of);
   instancer->placements = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->placements);
@@ -95,9 +112,20 @@ qmat_status qmat_usd_instancer_read(const qmat_usd_prim *prim, qmat_arena *arena
     if (of < 0 || (uint64_t)of >= instancer->prototype_count)
       return qmat_usd_prim_fail(prim, "instance %zu has prototype %lld, but there are %zu", i, (long long)of,
                                 instancer->prototype_count);
-    if (bsearch(&id, masked, masked_count, sizeof *masked, compare_ids)) continue;
+    if (masked->count > 0 && bsearch(&id, masked->ids, masked->count, sizeof id, compare_ids)) continue;
     instancer->of[instancer->instance_count] = (uint32_t)of;
     instancer->placements[instancer->instance_count++] = place(&a, i);
   }
   return QMAT_OK;
+}
+
+qmat_status qmat_usd_instancer_read(const qmat_usd_prim *prim, qmat_arena *arena, qmat_usd_instancer *instancer) {
+  id_list masked = {0};
+  *instancer = (qmat_usd_instancer){0};
+  qmat_status status =
+      qmat_usd_prim_targets(prim, "prototypes", arena, &instancer->prototypes, &instancer->prototype_count);
+  if (status == QMAT_OK) status = read_masked(prim, &masked);
+  if (status == QMAT_OK) status = read_instances(prim, arena, &masked, instancer);
+  qmat_free(masked.ids);
+  return status;
 }

@@ -8,72 +8,85 @@
 #include "io/usd/usd_files.h"
 #include "io/usd/usdz.h"
 
-enum { MOST_KEPT = 4096 };
+enum { MOST_FILES = 4096, LONGEST_NAME = 255 /* in a package */ };
 
 /* In the path of a texture: the number of a tile. USD looks for these numbers. */
 #define UDIM "<UDIM>"
 enum { FIRST_UDIM_TILE = 1001, LAST_UDIM_TILE = 1100 };
 
-/* Paths of the files to keep, the root layer first. */
+/* Paths of files, each once. */
+typedef struct path_list {
+  size_t count, capacity;
+  char **paths;
+} path_list;
+
 typedef struct keeper {
   qmat_context *context;
   const qmat_usd_stage *stage;
-  size_t count, capacity;
-  char **paths;
+  path_list kept;   /* the files to keep, the root layer first */
+  path_list others; /* assets that are no images or cannot be read */
+  const char *why;  /* nothing can be kept; NULL: it can */
 } keeper;
 
 static qmat_status fail_shortage(const keeper *k) {
   return qmat_fail_memory(k->context, "the files of a USD scene");
 }
 
-/* Adds a path, which it takes over; NULL is none. */
-static qmat_status add_path(keeper *k, char *path) {
-  for (size_t i = 0; i < k->count && path; i++) {
-    if (strcmp(k->paths[i], path) != 0) continue;
+static void list_uninit(path_list *list) {
+  for (size_t i = 0; i < list->count; i++) qmat_free(list->paths[i]);
+  qmat_free(list->paths);
+}
+
+static bool has_path(const path_list *list, const char *path) {
+  for (size_t i = 0; i < list->count; i++)
+    if (strcmp(list->paths[i], path) == 0) return true;
+  return false;
+}
+
+/* Adds a path, which it takes over, to one of the keeper's lists. */
+static qmat_status add_path(keeper *k, path_list *list, char *path) {
+  if (list->count >= MOST_FILES) k->why = "it refers to too many files";
+  if (k->why || has_path(list, path)) {
     qmat_free(path);
     return QMAT_OK;
   }
-  if (!path) return QMAT_OK;
-  if (k->count >= MOST_KEPT || qmat_grow((void **)&k->paths, &k->capacity, k->count + 1, sizeof *k->paths) != 0) {
+  if (qmat_grow((void **)&list->paths, &list->capacity, list->count + 1, sizeof *list->paths) != 0) {
     qmat_free(path);
     return fail_shortage(k);
   }
-  k->paths[k->count++] = path;
+  list->paths[list->count++] = path;
   return QMAT_OK;
 }
 
-/* Adds a warning, which it takes over, unless it is there already. */
+/* Adds a warning, which it takes over. */
 static qmat_status warn(const keeper *k, json_t *text) {
-  json_t *warnings = qmat_usd_stage_warnings(k->stage), *other;
-  size_t i;
-  json_array_foreach(warnings, i, other) {
-    if (!text || !json_equal(text, other)) continue;
-    json_decref(text);
-    return QMAT_OK;
-  }
-  return json_array_append_new(warnings, text) == 0 ? QMAT_OK : fail_shortage(k);
+  return json_array_append_new(qmat_usd_stage_warnings(k->stage), text) == 0 ? QMAT_OK : fail_shortage(k);
 }
 
-/* Adds the path of an image, which it takes over; NULL is none. A file that cannot be read is passed over; one that is
- * not an image is not kept, with a warning. */
+/* Adds the path of an image, which it takes over; NULL is a shortage. A file that cannot be read is passed over; one
+ * that is not an image is not kept, with a warning. */
 static qmat_status add_image(keeper *k, char *path) {
   if (!path) return fail_shortage(k);
+  qmat_status status = qmat_progress(k->context, 0, 0, "files");
+  if (status != QMAT_OK || has_path(&k->kept, path) || has_path(&k->others, path)) {
+    qmat_free(path);
+    return status;
+  }
   qmat_bytes bytes = {0};
   const qmat_error before = k->context->error;
-  qmat_status status = qmat_bytes_read_file(k->context, path, &bytes);
+  status = qmat_bytes_read_file(k->context, path, &bytes);
   const bool is_read = status == QMAT_OK;
   const bool is_image = is_read && (qmat_gltf_image_type(bytes.data, bytes.size) ||
                                     (bytes.size > 4 && memcmp(bytes.data, "v/1\1", 4) == 0)); /* OpenEXR */
   qmat_bytes_uninit(&bytes);
-  if (is_image) return add_path(k, path);
   if (status == QMAT_ERROR_IO || status == QMAT_ERROR_FORMAT) {
     k->context->error = before;
     status = QMAT_OK;
   }
-  if (is_read)
+  if (is_read && !is_image)
     status = warn(k, json_sprintf("'%s' is not kept for an output as USD: it is not an image", qmat_usd_shown(path)));
-  qmat_free(path);
-  return status;
+  const qmat_status added = add_path(k, is_image ? &k->kept : &k->others, path);
+  return status == QMAT_OK ? added : status;
 }
 
 /* Adds the images of a path with <UDIM> in it, a number for each tile. */
@@ -114,45 +127,46 @@ static qmat_status add_images(keeper *k, const char *from, const qmat_usd_spec *
 
 /* The length of the folder that all paths are in. */
 static size_t common_folder(const keeper *k) {
-  const char *first = k->paths[0];
+  const char *first = k->kept.paths[0];
   size_t length = 0;
   for (size_t end = 1; first[end - 1]; end++) {
     if (first[end - 1] != '/') continue;
-    for (size_t i = 1; i < k->count; i++)
-      if (strncmp(k->paths[i], first, end) != 0) return length;
+    for (size_t i = 1; i < k->kept.count; i++)
+      if (strncmp(k->kept.paths[i], first, end) != 0) return length;
     length = end;
   }
   return length;
 }
 
-static qmat_status pack(const keeper *k, size_t folder, const qmat_bytes *root, qmat_writer *out) {
+static qmat_status pack(keeper *k, size_t folder, const qmat_bytes *root, qmat_writer *out) {
   qmat_usdz_writer archive = {.out = out};
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < k->count && status == QMAT_OK; i++) {
+  for (size_t i = 0; i < k->kept.count && status == QMAT_OK && !k->why; i++) {
     qmat_bytes bytes = {0};
-    if (i > 0) status = qmat_bytes_read_file(k->context, k->paths[i], &bytes);
+    if (i > 0) status = qmat_bytes_read_file(k->context, k->kept.paths[i], &bytes);
     const qmat_bytes *from = i > 0 ? &bytes : root;
-    if (status == QMAT_OK) qmat_usdz_add(&archive, k->paths[i] + folder, from->data, from->size);
+    if (from->size > UINT32_MAX - out->size) k->why = "its files have more than 4 GiB";
+    if (status == QMAT_OK && !k->why) qmat_usdz_add(&archive, k->kept.paths[i] + folder, from->data, from->size);
     qmat_bytes_uninit(&bytes);
   }
   qmat_usdz_finish(&archive);
-  if (status == QMAT_OK && out->failed) status = fail_shortage(k);
+  if (status == QMAT_OK && !k->why && out->failed) status = fail_shortage(k);
   return status;
 }
 
-/* Lists the files to keep; `*why` says why that is impossible. */
-static qmat_status list_files(keeper *k, bool is_package, const char **why) {
+/* Lists the files to keep. */
+static qmat_status list_files(keeper *k, bool is_package) {
   const qmat_usd_files *files = qmat_usd_stage_files(k->stage);
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < files->file_count && status == QMAT_OK && !*why && !is_package; i++) {
+  for (size_t i = 0; i < files->file_count && status == QMAT_OK && !k->why && !is_package; i++) {
     const char *path;
     const qmat_usd_layer *layer;
     bool is_member;
     qmat_usd_files_at(files, i, &path, &layer, &is_member);
-    if (is_member) *why = "it refers to packages";
+    if (is_member) k->why = "it refers to packages";
     if (is_member || !path) continue;
     char *copy = qmat_strdup(path);
-    status = copy ? add_path(k, copy) : fail_shortage(k);
+    status = copy ? add_path(k, &k->kept, copy) : fail_shortage(k);
     if (status == QMAT_OK) status = add_images(k, path, layer->root);
   }
   return status;
@@ -161,21 +175,22 @@ static qmat_status list_files(keeper *k, bool is_package, const char **why) {
 qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, const qmat_bytes *bytes,
                           qmat_scene *scene) {
   keeper k = {.context = context, .stage = stage};
-  const char *why = NULL;
   const bool is_package = bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
   qmat_writer out = {0};
-  qmat_status status = list_files(&k, is_package, &why);
-  const size_t folder = k.count > 1 ? common_folder(&k) : 0;
-  for (size_t i = 0; i < k.count && k.count > 1; i++)
-    if (!qmat_is_part_name(k.paths[i] + folder) || !qmat_is_utf8(k.paths[i] + folder))
-      why = "a file is in a folder above that of the first one";
-  if (status == QMAT_OK && why) {
-    status = warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", why));
+  qmat_status status = list_files(&k, is_package);
+  const size_t folder = k.kept.count > 1 ? common_folder(&k) : 0;
+  for (size_t i = 0; i < k.kept.count && k.kept.count > 1; i++)
+    if (!qmat_is_part_name(k.kept.paths[i] + folder) || !qmat_is_utf8(k.kept.paths[i] + folder))
+      k.why = "a file is in a folder above that of the first one";
+    else if (strlen(k.kept.paths[i] + folder) > LONGEST_NAME)
+      k.why = "the name of a file is too long";
+  if (status == QMAT_OK && !k.why && k.kept.count > 1)
+    status = pack(&k, folder, bytes, &out);
+  else
+    qmat_put_bytes(&out, bytes->data, bytes->size);
+  if (status == QMAT_OK && k.why) {
+    status = warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", k.why));
   } else if (status == QMAT_OK) {
-    if (k.count > 1)
-      status = pack(&k, folder, bytes, &out);
-    else
-      qmat_put_bytes(&out, bytes->data, bytes->size);
     scene->parts = qmat_calloc(1, sizeof *scene->parts);
     if (status == QMAT_OK && (!scene->parts || out.failed)) status = fail_shortage(&k);
     if (status == QMAT_OK) {
@@ -190,7 +205,7 @@ qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, co
     }
   }
   qmat_writer_uninit(&out);
-  for (size_t i = 0; i < k.count; i++) qmat_free(k.paths[i]);
-  qmat_free(k.paths);
+  list_uninit(&k.kept);
+  list_uninit(&k.others);
   return status;
 }

@@ -13,6 +13,11 @@ typedef struct qmat_usd_time {
   double offset, scale;
 } qmat_usd_time;
 
+/* Times that pass through `inner` first, then through `outer`. */
+static inline qmat_usd_time qmat_usd_time_through(qmat_usd_time outer, qmat_usd_time inner) {
+  return (qmat_usd_time){.offset = outer.offset + outer.scale * inner.offset, .scale = outer.scale * inner.scale};
+}
+
 /* A spec with opinions about a prim, and its layer. */
 typedef struct qmat_usd_opinion {
   const qmat_usd_layer *layer;

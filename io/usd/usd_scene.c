@@ -236,15 +236,14 @@ static qmat_status place_instances(const reader *r, const qmat_usd_prim *prim, c
   scene->placement_count = first;
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < instancer->instance_count && status == QMAT_OK; i++) {
-    if (instancer->of[i] != prototype) continue;
+    if (i % 65536 == 0) status = qmat_progress(r->context, i, instancer->instance_count, "instances");
+    if (instancer->of[i] != prototype || status != QMAT_OK) continue;
     const qmat_usd_transform world = qmat_usd_product(&instancer->placements[i], &state->world);
     for (size_t k = 0; k < count && status == QMAT_OK; k++) {
       qmat_usd_placement placed = own[k];
       placed.world = qmat_usd_product(&own[k].world, &world);
       if (keeps_volume(&placed.world)) status = add_placement(r, prim, &placed);
     }
-    if (status == QMAT_OK && i % 4096 == 0)
-      status = qmat_progress(r->context, i, instancer->instance_count, "instances");
   }
   qmat_free(own);
   return status;
@@ -257,9 +256,11 @@ static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherite
   qmat_status status = qmat_usd_instancer_read(prim, &prim->arena, &instancer);
   if (status != QMAT_OK) return status;
   r->scene->point_instances += instancer.instance_count;
-  /* Prototypes inherit neither the instancer's purpose nor, twice, its place. */
-  const inherited own = {
-      .world = qmat_usd_identity(), .purpose = "default", .instancers = state->instancers + 1, .is_prototype = true};
+  /* Prototypes do not inherit the instancer's place twice. */
+  const inherited own = {.world = qmat_usd_identity(),
+                         .purpose = state->purpose,
+                         .instancers = state->instancers + 1,
+                         .is_prototype = true};
   prototype p = {.r = r, .state = &own};
   for (size_t i = 0; i < instancer.prototype_count && status == QMAT_OK; i++) {
     const size_t first = r->scene->placement_count;

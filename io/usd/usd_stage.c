@@ -77,19 +77,20 @@ static size_t count_specs(const node *at) {
 }
 
 /* Lists the opinions of a tree from strong to weak: with `wanted` those through a specialize arc, else the others. */
-static void list_opinions(const node *at, bool inherited, bool specialized, bool wanted, int introduced,
-                          qmat_usd_opinion *opinions, size_t *count) {
+static void list_opinions(const qmat_usd_files *files, const node *at, bool inherited, bool specialized, bool wanted,
+                          int introduced, qmat_usd_opinion *opinions, size_t *count) {
   inherited = inherited || at->arc == QMAT_USD_ARC_INHERIT || at->arc == QMAT_USD_ARC_SPECIALIZE;
   specialized = specialized || at->arc == QMAT_USD_ARC_SPECIALIZE;
   if (at->arc != QMAT_USD_ARC_VARIANT) introduced = at->introduced; /* variants have the paths of their prim */
   for (size_t i = 0; i < at->spec_count && specialized == wanted; i++)
-    opinions[(*count)++] = (qmat_usd_opinion){.layer = at->layers[i],
-                                              .spec = at->specs[i],
-                                              .is_inherited = inherited,
-                                              .introduced = introduced,
-                                              .time = at->time};
+    opinions[(*count)++] = (qmat_usd_opinion){
+        .layer = at->layers[i],
+        .spec = at->specs[i],
+        .is_inherited = inherited,
+        .introduced = introduced,
+        .time = qmat_usd_time_through(at->time, qmat_usd_stack_time(&files->stacks[at->stack], at->layers[i]))};
   for (const node *child = at->first_child; child; child = child->next)
-    list_opinions(child, inherited, specialized, wanted, introduced, opinions, count);
+    list_opinions(files, child, inherited, specialized, wanted, introduced, opinions, count);
 }
 
 static qmat_status finish_prim(composer *c) {
@@ -97,8 +98,8 @@ static qmat_status finish_prim(composer *c) {
   qmat_usd_opinion *opinions = qmat_arena_alloc(&prim->arena, count_specs(prim->tree), sizeof *opinions);
   if (!opinions) return qmat_usd_fail_prim_memory(c->prim);
   /* Opinions through specialize arcs are the weakest of all. */
-  list_opinions(prim->tree, false, false, false, 0, opinions, &prim->opinion_count);
-  list_opinions(prim->tree, false, false, true, 0, opinions, &prim->opinion_count);
+  list_opinions(c->files, prim->tree, false, false, false, 0, opinions, &prim->opinion_count);
+  list_opinions(c->files, prim->tree, false, false, true, 0, opinions, &prim->opinion_count);
   prim->opinions = opinions;
   return QMAT_OK;
 }

@@ -156,8 +156,8 @@ static bool is_plain(const char *text) {
 }
 
 static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, bool is_z_up, const char *sublayer) {
-  static const char *const numbers[] = {"endTimeCode", "framesPerSecond", "metersPerUnit", "startTimeCode",
-                                        "timeCodesPerSecond"};
+  static const char *const numbers[] = {"endTimeCode",   "framesPerSecond", "kilogramsPerUnit",
+                                        "metersPerUnit", "startTimeCode",   "timeCodesPerSecond"};
   const char *prim = qmat_usd_text(qmat_usd_field_value(root, "defaultPrim"));
   qmat_put_text(writer, "#usda 1.0\n(\n");
   if (is_plain(sublayer)) { /* by this a later run knows that the side file is this layer's */

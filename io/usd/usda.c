@@ -64,6 +64,7 @@ static const struct {
     {"payload", "payload", QMAT_USD_REFERENCE},       {"inherits", "inheritPaths", QMAT_USD_PATH},
     {"specializes", "specializes", QMAT_USD_PATH},    {"variantSets", "variantSetNames", QMAT_USD_STRING},
     {"variants", "variantSelection", QMAT_USD_BLOCK}, {"apiSchemas", "apiSchemas", QMAT_USD_TOKEN},
+    {"inactiveIds", "inactiveIds", QMAT_USD_INT64},
 };
 
 static qmat_status take_field(qmat_usda *p, qmat_usd_spec *spec) {
@@ -88,7 +89,8 @@ static qmat_status take_field(qmat_usda *p, qmat_usd_spec *spec) {
   if (spec->kind == QMAT_USD_ROOT && strcmp(name, "subLayers") == 0) {
     status = qmat_usda_take_sublayers(p, &value, &offsets);
     if (status == QMAT_OK) status = qmat_usd_set_field(p->layer, spec, "subLayerOffsets", &offsets);
-  } else if (strcmp(name, "relocates") == 0) {
+  } else if (strcmp(name, "relocates") == 0 || strcmp(name, "prefixSubstitutions") == 0 ||
+             strcmp(name, "suffixSubstitutions") == 0) {
     status = qmat_usda_skip(p, name, &value);
   } else {
     status = qmat_usda_take_any(p, &value);

@@ -394,6 +394,8 @@ qmat_status qmat_usda_take_list(qmat_usda *p, qmat_usd_type type, qmat_usd_value
     qmat_free(references.items);
     return status;
   }
+  if (type == QMAT_USD_INT64)
+    return qmat_usda_take_typed(p, &(qmat_usda_type){.type = type, .components = 1, .is_array = true}, value);
   status = type == QMAT_USD_BLOCK ? qmat_usda_take_any(p, value) : take_texts(p, type, is_array, value);
   value->is_array = true;
   return status;

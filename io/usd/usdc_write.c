@@ -557,7 +557,7 @@ static void crate_uninit(crate *c) {
   qmat_key_table_uninit(&c->path_numbers);
   integers *const lists[] = {&c->strings,    &c->field_names, &c->field_sets,
                              &c->spec_paths, &c->spec_sets,   &c->spec_types};
-  for (size_t i = 0; i < QMAT_USD_EDIT_COUNT; i++) qmat_free(lists[i]->items);
+  for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) qmat_free(lists[i]->items);
   qmat_free(c->tokens);
   qmat_free(c->field_reps);
   qmat_free(c->paths);

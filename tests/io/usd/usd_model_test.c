@@ -170,6 +170,34 @@ static void test_an_instancer_places_its_prototypes(void **state) {
   release(&r);
 }
 
+/* Lists of ids edit those of weaker layers; the purpose of an instancer is that of what it places. */
+static void test_inactive_instances_and_those_of_proxies_are_left_out(void **state) {
+  (void)state;
+  char folder[64], weak[256], scene[256];
+  make_folder(folder);
+  snprintf(weak, sizeof weak, "%s/weak.usda", folder);
+  snprintf(scene, sizeof scene, "%s/scene.usda", folder);
+  static const char below[] =
+      "#usda 1.0\ndef PointInstancer \"many\" ( prepend inactiveIds = [1, 2] ) {\n"
+      "rel prototypes = </many/one>\nint[] protoIndices = [0, 0, 0, 0]\n"
+      "point3f[] positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)]\n" CUBE("one", "") "}\n";
+  write_file(weak, below, strlen(below));
+  reading r = read_at(scene,
+                      "#usda 1.0\n( subLayers = [@./weak.usda@] )\n"
+                      "over \"many\" ( delete inactiveIds = [1]\n append inactiveIds = [3] ) {}\n"
+                      "def PointInstancer \"rough\" { uniform token purpose = \"proxy\"\n"
+                      "rel prototypes = </rough/one>\nint[] protoIndices = [0]\n"
+                      "point3f[] positions = [(9, 0, 0)]\n" CUBE("one", "") "}\n",
+                      "all");
+  assert_int_equal(r.status, QMAT_OK);
+  assert_int_equal(r.scene->placement_count, 2);
+  assert_place(&r, 0, 0, "/many/one", 0, 0, 0);
+  assert_place(&r, 1, 0, "/many/one", 1, 0, 0);
+  release(&r);
+  unlink(weak);
+  rmdir(folder);
+}
+
 static void test_prototypes_are_found_through_references_and_instancers_nest(void **state) {
   (void)state;
   reading r = read_all(
@@ -438,6 +466,7 @@ int main(void) {
       cmocka_unit_test(test_equal_meshes_are_one_mesh_in_several_places),
       cmocka_unit_test(test_a_mesh_is_chosen_by_path_end_or_number),
       cmocka_unit_test(test_an_instancer_places_its_prototypes),
+      cmocka_unit_test(test_inactive_instances_and_those_of_proxies_are_left_out),
       cmocka_unit_test(test_prototypes_are_found_through_references_and_instancers_nest),
       cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
       cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),

@@ -218,6 +218,31 @@ static void test_times_go_through_references_and_start_at_the_scenes_start(void 
   rmdir(folder);
 }
 
+static void test_times_go_through_sublayers(void **state) {
+  (void)state;
+  char folder[64], path[96], name[96];
+  make_folder(folder);
+  snprintf(name, sizeof name, "%s/walk.usda", folder);
+  snprintf(path, sizeof path, "%s/file.usda", folder);
+  const char walk[] =
+      "#usda 1.0\n(timeCodesPerSecond = 12)\nover \"r\" { def SkelAnimation \"walk\" {\n"
+      "uniform token[] joints = [\"hip\"]\n"
+      "float3[] translations.timeSamples = {0: [(0,0,0)], 12: [(0,0,1)]}\n} }\n";
+  write_file(name, walk, sizeof walk - 1);
+  reading r = read_file(
+      "#usda 1.0\n(timeCodesPerSecond = 60\nstartTimeCode = 30\n"
+      "subLayers = [@./walk.usda@ (offset = 60; scale = 2)])\ndef SkelRoot \"r\" {\n"
+      "rel skel:skeleton = </r/s>\nrel skel:animationSource = </r/walk>\n" SKELETON(JOINTS BINDS RESTS)
+          MESH(BINDING) "}\n",
+      path);
+  assert_no_warning(&r);
+  assert_int_equal(r.scene->rig.key_count, 2);
+  assert_numbers(r.scene->rig.key_times, (const double[]){0.5, 2.5}, 2);
+  release(&r);
+  unlink(name);
+  rmdir(folder);
+}
+
 static void test_what_cannot_be_used_is_left_out_with_one_warning(void **state) {
   (void)state;
   static const struct {
@@ -422,7 +447,14 @@ static void test_a_joint_that_a_mesh_lists_twice_has_a_stand_in(void **state) {
   reading r = read_text(ROOT(SKELETON(JOINTS BINDS RESTS)
                                  MESH(BINDING "uniform token[] skel:joints = [\"hip\", \"hip/knee\", \"hip\"]\n")));
   qmat_medial *ball = sealed_medial_mesh((const double[]){0, 0, 0, 1}, 1, NULL, 0, NULL, 0);
-  const qmat_gltf_addition addition = {.medial = ball, .options = {.binary = true, .quantisation = 0.001}};
+  qmat_mesh *skin = shape_seal(shape_box(1, 1, 1));
+  const uint32_t numbers[4 * 8] = {0, 1, 2, 0};
+  double weights[4 * 8] = {0.5, 0.25, 0.25, 0};
+  for (size_t v = 1; v < 8; v++) weights[4 * v] = 1;
+  const qmat_gltf_addition addition = {.medial = ball,
+                                       .skin = skin,
+                                       .vertices = {.joints = numbers, .weights = weights},
+                                       .options = {.binary = true, .quantisation = 0.001}};
   qmat_file *file;
   qmat_gltf_asset asset;
   assert_int_equal(qmat_gltf_write_places(&r.context, r.scene, &addition, 1, &file), QMAT_OK);
@@ -441,6 +473,7 @@ static void test_a_joint_that_a_mesh_lists_twice_has_a_stand_in(void **state) {
   qmat_gltf_asset_uninit(&asset);
   qmat_value_release(&file->base);
   qmat_value_release(&ball->base);
+  qmat_value_release(&skin->base);
   release(&r);
 }
 
@@ -452,6 +485,7 @@ int main(void) {
       cmocka_unit_test(test_skins_number_joints_as_the_mesh_does_and_equal_ones_are_one),
       cmocka_unit_test(test_motion_has_the_times_and_parts_of_the_animation),
       cmocka_unit_test(test_times_go_through_references_and_start_at_the_scenes_start),
+      cmocka_unit_test(test_times_go_through_sublayers),
       cmocka_unit_test(test_what_cannot_be_used_is_left_out_with_one_warning),
       cmocka_unit_test(test_a_rig_that_does_not_fit_together_is_refused),
       cmocka_unit_test(test_gltf_has_the_skeleton_its_skin_and_its_motion),
