@@ -154,17 +154,18 @@ static qmat_status pack(keeper *k, size_t folder, const qmat_bytes *root, qmat_w
   return status;
 }
 
-/* Lists the files to keep. */
-static qmat_status list_files(keeper *k, bool is_package) {
+/* Lists the files to keep, without the root layer where that is one of qmat's. */
+static qmat_status list_files(keeper *k, bool without_root) {
   const qmat_usd_files *files = qmat_usd_stage_files(k->stage);
+  const qmat_usd_layer *root = qmat_usd_stage_root_layer(k->stage);
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < files->file_count && status == QMAT_OK && !k->why && !is_package; i++) {
+  for (size_t i = 0; i < files->file_count && status == QMAT_OK && !k->why; i++) {
     const char *path;
     const qmat_usd_layer *layer;
     bool is_member;
     qmat_usd_files_at(files, i, &path, &layer, &is_member);
     if (is_member) k->why = "it refers to packages";
-    if (is_member || !path) continue;
+    if (is_member || !path || (without_root && layer == root)) continue;
     char *copy = qmat_strdup(path);
     status = copy ? add_path(k, &k->kept, copy) : fail_shortage(k);
     if (status == QMAT_OK) status = add_images(k, path, layer->root);
@@ -172,39 +173,91 @@ static qmat_status list_files(keeper *k, bool is_package) {
   return status;
 }
 
+/* Appends what is kept of a scene with the root layer in `bytes`. */
+static qmat_status put_layers(keeper *k, const qmat_bytes *bytes, bool without_root, qmat_writer *out) {
+  qmat_status status = list_files(k, without_root);
+  if (status != QMAT_OK || k->why) return status;
+  const size_t folder = k->kept.count > 1 ? common_folder(k) : 0;
+  for (size_t i = 0; i < k->kept.count && k->kept.count > 1; i++)
+    if (!qmat_is_part_name(k->kept.paths[i] + folder) || !qmat_is_utf8(k->kept.paths[i] + folder))
+      k->why = "a file is in a folder above that of the first one";
+    else if (strlen(k->kept.paths[i] + folder) > LONGEST_NAME)
+      k->why = "the name of a file is too long";
+  if (k->why) return QMAT_OK;
+  if (k->kept.count > 1) return pack(k, folder, bytes, out);
+  qmat_put_bytes(out, bytes->data, bytes->size);
+  return QMAT_OK;
+}
+
+/* Appends a package, without the layer of qmat that it may start with: then what is below the folder of the original.
+ */
+static qmat_status put_package(const keeper *k, const qmat_bytes *bytes, const char *original, qmat_writer *out) {
+  qmat_usdz package;
+  const qmat_status status = qmat_usdz_open(k->context, bytes, "the scene", &package);
+  const qmat_usdz_member *first = status == QMAT_OK && original ? qmat_usdz_find(&package, original) : NULL;
+  const char *slash = first ? strchr(original, '/') : NULL;
+  const size_t folder = slash ? (size_t)(slash - original) + 1 : 0;
+  bool is_ours = folder > 0;
+  for (size_t i = 1; i < package.member_count && is_ours; i++)
+    is_ours = strncmp(package.members[i].name, original, folder) == 0;
+  if (status == QMAT_OK && is_ours && package.member_count == 2) {
+    qmat_put_bytes(out, first->bytes, first->size);
+  } else if (status == QMAT_OK && is_ours) {
+    qmat_usdz_writer archive = {.out = out};
+    qmat_usdz_add(&archive, first->name + folder, first->bytes, first->size);
+    for (size_t i = 1; i < package.member_count; i++)
+      if (&package.members[i] != first)
+        qmat_usdz_add(&archive, package.members[i].name + folder, package.members[i].bytes, package.members[i].size);
+    qmat_usdz_finish(&archive);
+  } else if (status == QMAT_OK) {
+    qmat_put_bytes(out, bytes->data, bytes->size);
+  }
+  qmat_usdz_uninit(&package);
+  return status;
+}
+
+static bool is_package(const qmat_bytes *bytes) {
+  return bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
+}
+
+/* Makes what was kept the only part of a scene. */
+static qmat_status store(const keeper *k, const qmat_writer *out, qmat_scene *scene) {
+  scene->parts = qmat_calloc(1, sizeof *scene->parts);
+  if (!scene->parts || out->failed) return fail_shortage(k);
+  scene->part_count = 1;
+  scene->parts[0].name = qmat_strdup("");
+  scene->parts[0].bytes = qmat_alloc(out->size, 1);
+  if (!scene->parts[0].name || !scene->parts[0].bytes) return fail_shortage(k);
+  memcpy(scene->parts[0].bytes, out->bytes, out->size);
+  scene->parts[0].size = out->size;
+  return QMAT_OK;
+}
+
 qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, const qmat_bytes *bytes,
                           qmat_scene *scene) {
   keeper k = {.context = context, .stage = stage};
-  const bool is_package = bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
+  const char *original = qmat_usd_original_of(qmat_usd_stage_root_layer(stage)), *path;
+  const qmat_usd_layer *layer;
+  bool is_member;
+  qmat_bytes below = {0};
   qmat_writer out = {0};
-  qmat_status status = list_files(&k, is_package);
-  const size_t folder = k.kept.count > 1 ? common_folder(&k) : 0;
-  for (size_t i = 0; i < k.kept.count && k.kept.count > 1; i++)
-    if (!qmat_is_part_name(k.kept.paths[i] + folder) || !qmat_is_utf8(k.kept.paths[i] + folder))
-      k.why = "a file is in a folder above that of the first one";
-    else if (strlen(k.kept.paths[i] + folder) > LONGEST_NAME)
-      k.why = "the name of a file is too long";
-  if (status == QMAT_OK && !k.why && k.kept.count > 1)
-    status = pack(&k, folder, bytes, &out);
-  else
-    qmat_put_bytes(&out, bytes->data, bytes->size);
-  if (status == QMAT_OK && k.why) {
-    status = warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", k.why));
-  } else if (status == QMAT_OK) {
-    scene->parts = qmat_calloc(1, sizeof *scene->parts);
-    if (status == QMAT_OK && (!scene->parts || out.failed)) status = fail_shortage(&k);
-    if (status == QMAT_OK) {
-      scene->part_count = 1;
-      scene->parts[0].name = qmat_strdup("");
-      scene->parts[0].bytes = qmat_alloc(out.size, 1);
-      if (!scene->parts[0].name || !scene->parts[0].bytes) status = fail_shortage(&k);
-    }
-    if (status == QMAT_OK) {
-      memcpy(scene->parts[0].bytes, out.bytes, out.size);
-      scene->parts[0].size = out.size;
-    }
-  }
+  qmat_status status = QMAT_OK;
+  qmat_usd_files_at(qmat_usd_stage_files(stage), 0, &path, &layer, &is_member);
+  char *beside = original && path && !is_package(bytes) ? qmat_usd_beside(path, original) : NULL;
+  if (beside) status = qmat_bytes_read_file(context, beside, &below);
+  if (status == QMAT_OK && original)
+    status = warn(&k, json_sprintf("what an earlier run has added is left out: an output as USD is a layer over '%s'",
+                                   qmat_usd_shown(original)));
+  const qmat_bytes *root = beside ? &below : bytes;
+  if (status == QMAT_OK)
+    status = is_package(root) ? put_package(&k, root, beside ? NULL : original, &out)
+                              : put_layers(&k, root, beside != NULL, &out);
+  if (status == QMAT_OK)
+    status = k.why ? warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", k.why))
+                   : store(&k, &out, scene);
   qmat_writer_uninit(&out);
+  qmat_bytes_uninit(&below);
+  qmat_free(beside);
   list_uninit(&k.kept);
   list_uninit(&k.others);
   return status;

@@ -200,6 +200,10 @@ bool qmat_usd_is_text(qmat_usd_type type) {
   return type >= QMAT_USD_STRING && type <= QMAT_USD_PATH;
 }
 
+const char *qmat_usd_original_of(const qmat_usd_layer *layer) {
+  return qmat_usd_text(qmat_usd_entry(qmat_usd_field_value(layer->root, "customLayerData"), "qmat_original"));
+}
+
 double qmat_usd_codes_per_second(const qmat_usd_layer *layer) {
   const double frames = qmat_usd_number(qmat_usd_field_value(layer->root, "framesPerSecond"), 24),
                codes = qmat_usd_number(qmat_usd_field_value(layer->root, "timeCodesPerSecond"), frames);

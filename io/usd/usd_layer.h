@@ -141,6 +141,9 @@ double qmat_usd_number(const qmat_usd_value *value, double otherwise);
 /* Whether the value is `true` or a number other than 0; `otherwise` for other values and for NULL. */
 bool qmat_usd_truth(const qmat_usd_value *value, bool otherwise);
 
+/* The name of the layer that qmat has written this one over, by its customLayerData; NULL: it is no such layer. */
+const char *qmat_usd_original_of(const qmat_usd_layer *layer);
+
 /* The time codes of a second, as the layer states them; 24 where it does not. */
 double qmat_usd_codes_per_second(const qmat_usd_layer *layer);
 

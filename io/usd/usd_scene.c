@@ -29,6 +29,7 @@ typedef struct reader {
   size_t segments;
   bool takes_undefined; /* also reads prims that only have an 'over' */
   bool has_undefined;   /* such a prim was found */
+  bool leaves_medials;  /* the root layer is one that qmat has written over another */
 } reader;
 
 /* ---- meshes ---- */
@@ -159,6 +160,8 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
     r->scene->prims_skipped++;
     return QMAT_OK;
   }
+  if (r->leaves_medials && qmat_usd_text(qmat_usd_entry(qmat_usd_prim_field(prim, "customData"), "qmat_version")))
+    return QMAT_OK;
   const char *specifier = qmat_usd_prim_specifier(prim);
   qmat_status status = QMAT_OK;
   if (strcmp(specifier, "class") == 0 && !state->is_prototype) return QMAT_OK;
@@ -322,6 +325,7 @@ qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, 
   if (status != QMAT_OK) return status;
   reader r = {
       .context = context, .scene = scene, .stage = scene->stage, .segments = segments > 0 ? segments : USUAL_SEGMENTS};
+  r.leaves_medials = qmat_usd_original_of(qmat_usd_stage_root_layer(scene->stage)) != NULL;
   const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
   status = qmat_usd_stage_root(r.stage, &root);
   if (status == QMAT_OK) status = read_children(&r, &root, &state);

@@ -35,7 +35,7 @@ bool qmat_usdc_has_original(const char *path, const char *name) {
   bool found = false;
   if (qmat_bytes_read_file(&context, path, &bytes) == QMAT_OK && qmat_usdc_is_crate(&bytes) &&
       qmat_usdc_read(&context, &bytes, path, &layer) == QMAT_OK) {
-    const char *text = qmat_usd_text(qmat_usd_entry(qmat_usd_field_value(layer.root, "customLayerData"), entry));
+    const char *text = qmat_usd_original_of(&layer);
     found = text && strcmp(text, name) == 0;
   }
   qmat_usd_layer_uninit(&layer);

@@ -320,11 +320,12 @@ static void test_a_transform_is_split_into_a_rotation_and_a_plain_one(void **sta
 /* ---- layers over a scene ---- */
 
 /* Adds the same medial mesh to all meshes of a scene. The caller releases the file. */
-static qmat_file *write_layer(reading *r, const qmat_medial *medial, qmat_usd_form form) {
+static qmat_file *write_layer(reading *r, const qmat_medial *medial, const qmat_mesh *skin, qmat_usd_form form) {
   qmat_usd_addition additions[8] = {{0}};
   for (size_t i = 0; i < r->meshes.count; i++)
     additions[i] =
         (qmat_usd_addition){.medial = i == 2 ? NULL : medial,
+                            .skin = skin,
                             .options = {.form = form, .name = "thing", .prim = r->meshes.names[i], .moved = 1e-3}};
   qmat_file *file;
   if (qmat_usd_write_layer(&r->context, r->scene, additions, r->meshes.count, &file) != QMAT_OK)
@@ -346,9 +347,10 @@ static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
   reading before = read_all(LAYERED);
   before.scene->is_z_up = true;
   qmat_medial *medial = example_medial(5);
+  qmat_mesh *skin = shape_seal(shape_box(1, 1, 1));
   static const char *const formats[] = {"usda", "usdc", "usdz"};
   for (qmat_usd_form form = QMAT_USD_TEXT; form <= QMAT_USD_PACKAGE; form++) {
-    qmat_file *file = write_layer(&before, medial, form);
+    qmat_file *file = write_layer(&before, medial, skin, form);
     assert_int_equal(file->part_count, form == QMAT_USD_PACKAGE ? 1 : 2);
     assert_string_equal(file->format, formats[form]);
     if (form != QMAT_USD_PACKAGE) {
@@ -368,7 +370,14 @@ static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
     qmat_usd_meshes meshes;
     json_t *report = json_object(), *names, *facts = json_object();
     assert_int_equal(qmat_usd_read_meshes(&context, &bytes, path, "all", 16, scene, &meshes, report), QMAT_OK);
-    assert_int_equal(json_array_size(json_object_get(report, "warnings")), 0);
+    /* Read as a scene, it is the original: what qmat has added is no part of it. */
+    const json_t *warnings = json_object_get(report, "warnings");
+    assert_int_equal(json_array_size(warnings), 1);
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)),
+                           "what an earlier run has added is left out: an output as USD is a layer over 'original"));
+    assert_int_equal(scene->part_count, 1);
+    assert_int_equal(scene->parts[0].size, strlen(LAYERED));
+    assert_memory_equal(scene->parts[0].bytes, LAYERED, strlen(LAYERED));
     assert_true(json_real_value(json_object_get(report, "meters_per_unit")) == 0.5);
     assert_string_equal(json_string_value(json_object_get(report, "up_axis")), "Z");
     assert_int_equal(json_integer_value(json_object_get(report, "instances")), 0);
@@ -397,6 +406,7 @@ static void test_a_layer_adds_medial_meshes_and_takes_nothing(void **state) {
   snprintf(path, sizeof path, "%s/original.usda", folder);
   unlink(path);
   assert_int_equal(rmdir(folder), 0);
+  qmat_value_release(&skin->base);
   qmat_value_release(&medial->base);
   release(&before);
 }
@@ -442,7 +452,7 @@ static void test_the_prims_of_a_layer_are_opened_once(void **state) {
   reading r =
       read_all("#usda 1.0\n" CUBE("a", CUBE("x", "")) CUBE("a1", "") "def \"b\" { def \"a\" {" CUBE("x", "") "} }\n");
   qmat_medial *medial = example_medial(1);
-  qmat_file *file = write_layer(&r, medial, QMAT_USD_TEXT);
+  qmat_file *file = write_layer(&r, medial, NULL, QMAT_USD_TEXT);
   char *text = qmat_alloc(file->parts[0].size + 1, 1);
   memcpy(text, file->parts[0].bytes, file->parts[0].size);
   text[file->parts[0].size] = '\0';
