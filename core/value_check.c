@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/medial_build.h"
 #include "core/text.h"
 
 qmat_status qmat_check_finite(qmat_context *context, const double *numbers, size_t count, size_t components,
@@ -140,6 +139,22 @@ qmat_status qmat_check_simplices(qmat_context *context, const uint32_t *simplice
     return qmat_fail_element(context, kind, (int64_t)i);
   }
   return QMAT_OK;
+}
+
+size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row) {
+  size_t low = 0, high = count;
+  while (low < high) {
+    const size_t middle = low + (high - low) / 2;
+    const uint32_t *at = &rows[width * middle];
+    size_t k = 0;
+    while (k < width && at[k] == row[k]) k++;
+    if (k == width) return middle;
+    if (at[k] < row[k])
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return SIZE_MAX;
 }
 
 qmat_status qmat_check_sides(qmat_context *context, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,

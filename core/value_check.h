@@ -41,6 +41,10 @@ qmat_status qmat_check_spheres(qmat_context *context, const double *spheres, siz
 qmat_status qmat_check_simplices(qmat_context *context, const uint32_t *simplices, size_t count, size_t width,
                                  size_t sphere_count, const char *kind);
 
+/* The place of `row` (`width` ids, ascending) among `count` sorted rows of simplices; SIZE_MAX where it is not there.
+ * Cost: logarithmic. */
+size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row);
+
 /* The three sides of every triangle are among the sorted edges. O(triangles * log edges). */
 qmat_status qmat_check_sides(qmat_context *context, const uint32_t *edges, size_t edge_count, const uint32_t *triangles,
                              size_t triangle_count);

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/arena.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
+#include "core/value_check.h"
 
 static double raise_error(double error, double by) {
   return nextafter(error + nextafter(by, INFINITY), INFINITY);

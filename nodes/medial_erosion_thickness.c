@@ -7,6 +7,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/json_text.h"
 #include "core/node.h"
+#include "core/value_check.h"
 #include "nodes/initial/erosion.h"
 #include "nodes/initial/free_pairs.h"
 #include "nodes/measure/unit_spheres.h"

@@ -7,6 +7,7 @@
 #include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
 #include "core/json_text.h"
+#include "core/value_check.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/initial/dual_complex.h"
 #include "nodes/initial/free_pairs.h"

@@ -74,7 +74,9 @@ static qmat_status draw(qmat_context *context, const report_picture_params *para
   for (size_t i = 0; i < count && i < rows * columns && status == QMAT_OK; i++) {
     const size_t x = width * (i % columns) / columns, y = height * (i / columns) / rows;
     const size_t cell[4] = {x, y, width * (i % columns + 1) / columns - x, height * (i / columns + 1) / rows - y};
+    const qmat_arena aside = qmat_arena_set_aside(&context->arena); /* each mesh frees its scratch memory */
     status = draw_mesh(context, &options, inputs, i, cell, picture, caption);
+    qmat_arena_put_back(&context->arena, aside);
     if (status != QMAT_OK && count > 1 && inputs[QMAT_SHOWN_MEDIAL]->type == QMAT_LIST)
       qmat_fail_within(context, ((const qmat_list *)inputs[QMAT_SHOWN_MEDIAL])->names[i]);
   }

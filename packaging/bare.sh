@@ -34,9 +34,9 @@ done <commands
 echo '$ python3 notebook.py'
 python3 notebook.py picture.svg
 END
+# Never leaves this machine's /dev in a folder that is to be removed.
+trap 'umount "$folder/proc" "$folder/dev" 2>/dev/null || true' EXIT
+trap 'exit 1' HUP INT TERM
 mount -t proc proc "$folder/proc"
 mount --bind /dev "$folder/dev"
-status=0
-chroot "$folder" sh /root/examples/run.sh || status=$?
-umount "$folder/proc" "$folder/dev"
-exit $status
+chroot "$folder" sh /root/examples/run.sh

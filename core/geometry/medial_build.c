@@ -121,22 +121,6 @@ done:
   return status;
 }
 
-size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row) {
-  size_t low = 0, high = count;
-  while (low < high) {
-    const size_t middle = low + (high - low) / 2;
-    const uint32_t *at = &rows[width * middle];
-    size_t k = 0;
-    while (k < width && at[k] == row[k]) k++;
-    if (k == width) return middle;
-    if (at[k] < row[k])
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return SIZE_MAX;
-}
-
 qmat_medial *qmat_medial_copy(const qmat_medial *medial) {
   qmat_medial *copy = qmat_medial_new();
   if (!copy) return NULL;

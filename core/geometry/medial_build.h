@@ -13,10 +13,6 @@
 qmat_status qmat_medial_set_simplices(qmat_context *context, qmat_medial *medial, const uint32_t *edges,
                                       size_t edge_count, const uint32_t *triangles, size_t triangle_count);
 
-/* The place of `row` (`width` ids, ascending) among `count` sorted rows of simplices; SIZE_MAX where it is not there.
- * Cost: logarithmic. */
-size_t qmat_simplex_find(const uint32_t *rows, size_t count, size_t width, const uint32_t *row);
-
 /* An unsealed copy. NULL when memory is short. */
 qmat_medial *qmat_medial_copy(const qmat_medial *medial);
 

@@ -391,7 +391,10 @@ static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   bool sound = path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
   qmat_free(path);
-  if (!sound) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  if (sound)
+    touch(cache, QMAT_CACHE_BLOB, digest); /* as new as the record that is about to name it */
+  else
+    set_aside(cache, QMAT_CACHE_BLOB, digest);
   return sound;
 }
 
@@ -663,9 +666,17 @@ qmat_cache_sweep qmat_cache_clear(qmat_cache *cache) {
   return sweep;
 }
 
+/* Whether another process has deleted an entry since it was listed. */
+static bool is_gone(const qmat_cache *cache, const qmat_cache_entry *entry) {
+  char *path = path_of(cache, entry->kind, entry->name);
+  const bool gone = path && access(path, F_OK) != 0 && errno == ENOENT;
+  qmat_free(path);
+  return gone;
+}
+
 static qmat_cache_health check_record(qmat_cache *cache, const qmat_cache_entry *entry) {
   json_t *record = qmat_cache_record(cache, &entry->digest);
-  if (!record) return QMAT_CACHE_BROKEN;
+  if (!record) return is_gone(cache, entry) ? QMAT_CACHE_SOUND : QMAT_CACHE_BROKEN;
   const json_t *outputs = json_object_get(record, "outputs");
   qmat_cache_health health = QMAT_CACHE_SOUND;
   for (size_t i = 0; i < json_array_size(outputs); i++)
@@ -681,7 +692,7 @@ qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *en
   char *path = path_of(cache, entry->kind, entry->name);
   bool sound = path && qmat_digest_of_file(path, &digest) == QMAT_OK && qmat_digest_equal(&digest, &entry->digest);
   qmat_free(path);
-  if (sound) return QMAT_CACHE_SOUND;
+  if (sound || is_gone(cache, entry)) return QMAT_CACHE_SOUND;
   set_aside(cache, entry->kind, &entry->digest);
   return QMAT_CACHE_BROKEN;
 }

@@ -46,8 +46,6 @@ static void share_root(finder *f, const char *path, size_t length) {
 static qmat_status add_model(finder *f, const char *path) {
   qmat_batch *batch = f->batch;
   f->found++;
-  for (size_t i = 0; i < batch->count; i++)
-    if (strcmp(batch->assets[i].input, path) == 0) return QMAT_OK;
   char *input = qmat_strdup(path);
   if (!input || qmat_grow((void **)&batch->assets, &batch->capacity, batch->count + 1, sizeof *batch->assets) != 0) {
     qmat_free(input);
@@ -110,6 +108,12 @@ static qmat_status add_matches(finder *f, const char *folder, const char *rest, 
   return status;
 }
 
+static qmat_status fail_results(const finder *f, const char *argument) {
+  qmat_fail(f->context, QMAT_ERROR_USAGE, "'%s' is the folder of the results, where models are not looked for",
+            qmat_show(argument).text);
+  return qmat_fail_hint(f->context, "choose another folder for the results");
+}
+
 /* Adds what an argument names: the matches of a pattern, the models in a folder, or a file. */
 static qmat_status add_argument(finder *f, const char *argument) {
   struct stat about;
@@ -123,6 +127,7 @@ static qmat_status add_argument(finder *f, const char *argument) {
     share_root(f, folder, length);
     const qmat_status status = add_matches(f, folder, argument + length, 0);
     if (status != QMAT_OK || f->found > before) return status;
+    if (f->results && qmat_same_file(*folder ? folder : ".", f->results)) return fail_results(f, argument);
     return qmat_fail(f->context, QMAT_ERROR_USAGE, "no file matches '%s'", argument);
   }
   if (stat(argument, &about) != 0 || !S_ISDIR(about.st_mode)) {
@@ -136,6 +141,7 @@ static qmat_status add_argument(finder *f, const char *argument) {
   share_root(f, folder, strlen(folder));
   const qmat_status status = add_matches(f, folder, NULL, 0);
   if (status != QMAT_OK || f->found > before) return status;
+  if (f->results && qmat_same_file(*folder ? folder : ".", f->results)) return fail_results(f, argument);
   qmat_fail(f->context, QMAT_ERROR_USAGE, "there are no models in this folder");
   return qmat_fail_at(f->context, argument, 0, 0);
 }
@@ -203,6 +209,31 @@ static qmat_status name_results(finder *f, qmat_asset *asset) {
   return asset->stem ? QMAT_OK : qmat_fail_memory(f->context, "assets");
 }
 
+static int by_input(const void *a, const void *b) {
+  const qmat_asset *first = *(const qmat_asset *const *)a, *second = *(const qmat_asset *const *)b;
+  const int order = strcmp(first->input, second->input);
+  return order != 0 ? order : (first > second) - (first < second);
+}
+
+/* Takes out models that were found before. */
+static qmat_status drop_repeated(qmat_context *context, qmat_batch *batch) {
+  qmat_asset **sorted = qmat_alloc(batch->count, sizeof *sorted);
+  if (!sorted) return qmat_fail_memory(context, "assets");
+  for (size_t i = 0; i < batch->count; i++) sorted[i] = &batch->assets[i];
+  if (batch->count > 0) qsort(sorted, batch->count, sizeof *sorted, by_input);
+  for (size_t i = batch->count; i-- > 1;) {
+    if (strcmp(sorted[i - 1]->input, sorted[i]->input) != 0) continue;
+    qmat_free(sorted[i]->input);
+    sorted[i]->input = NULL;
+  }
+  size_t kept = 0;
+  for (size_t i = 0; i < batch->count; i++)
+    if (batch->assets[i].input) batch->assets[kept++] = batch->assets[i];
+  batch->count = kept;
+  qmat_free(sorted);
+  return QMAT_OK;
+}
+
 static int by_stem(const void *a, const void *b) {
   return strcmp((*(const qmat_asset *const *)a)->stem, (*(const qmat_asset *const *)b)->stem);
 }
@@ -229,6 +260,7 @@ qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments,
   const bool is_list = list && !strpbrk(list, "*?[") && !(stat(list, &about) == 0 && S_ISDIR(about.st_mode));
   qmat_status status = is_list ? read_list(&f, list) : list ? add_argument(&f, list) : QMAT_OK;
   for (size_t i = 0; i < count && status == QMAT_OK; i++) status = add_argument(&f, arguments[i]);
+  if (status == QMAT_OK) status = drop_repeated(context, batch);
   for (size_t i = 0; i < batch->count && status == QMAT_OK; i++) status = name_results(&f, &batch->assets[i]);
   return status == QMAT_OK ? check_stems(context, batch) : status;
 }

@@ -9,6 +9,9 @@
 #include "io/bytes.h"
 #include "io/save.h"
 
+/* Of a cluster that does not say another number. */
+enum { USUAL_MOST_TASKS = 1001 };
+
 /* Puts a word in quotes for the shell. */
 static void put_quoted(qmat_writer *writer, const char *word) {
   qmat_put_text(writer, "'");
@@ -28,24 +31,26 @@ static void put_path(qmat_writer *writer, const char *folder, const char *name) 
   put_quoted(writer, path);
 }
 
-/* Writes the script of the job array. Task n runs the command of asset n and writes its exit code to FOLDER/n.exit in
- * one step. A task whose machine dies writes none, and Slurm restarts it. */
-static qmat_status write_script(qmat_context *context, const qmat_batch *batch, const char *folder) {
+/* Writes the script of a job array of `tasks`. Task n runs the commands of assets n, n + tasks, ... and writes each
+ * exit code to FOLDER/NUMBER.exit in one step. A task whose machine dies is started again by Slurm. */
+static qmat_status write_script(qmat_context *context, const qmat_batch *batch, size_t tasks, const char *folder) {
   qmat_writer writer = {0};
   qmat_file *file = NULL;
   char path[4200];
-  qmat_put_text(&writer, "#!/bin/sh\ncase $SLURM_ARRAY_TASK_ID in\n");
+  qmat_put_text(&writer, "#!/bin/sh\nmodel=$SLURM_ARRAY_TASK_ID\nwhile [ \"$model\" -lt ");
+  qmat_put_integer(&writer, (int64_t)batch->count);
+  qmat_put_text(&writer, " ]; do\ncase $model in\n");
   for (size_t i = 0; i < batch->count; i++) {
     qmat_put_integer(&writer, (int64_t)i);
     qmat_put_text(&writer, ") ");
     for (char **word = batch->assets[i].words; *word; word++) put_quoted(&writer, *word);
     qmat_put_text(&writer, ";;\n");
   }
-  qmat_put_text(&writer, "esac\ncode=$?\ncd ");
+  qmat_put_text(&writer, "esac\ncode=$?\n(cd ");
   put_quoted(&writer, folder);
-  qmat_put_text(&writer,
-                "&& echo $code >\"$SLURM_ARRAY_TASK_ID.new\" && mv \"$SLURM_ARRAY_TASK_ID.new\" "
-                "\"$SLURM_ARRAY_TASK_ID.exit\"\n");
+  qmat_put_text(&writer, "&& echo $code >\"$model.new\" && mv \"$model.new\" \"$model.exit\")\nmodel=$((model + ");
+  qmat_put_integer(&writer, (int64_t)tasks);
+  qmat_put_text(&writer, "))\ndone\n");
   snprintf(path, sizeof path, "%s/array.sh", folder);
   qmat_status status = qmat_writer_to_file(context, &writer, "sh", &file);
   if (status == QMAT_OK) status = qmat_file_save(context, file, path);
@@ -66,13 +71,22 @@ static bool ask(qmat_writer *command, char *line, size_t size) {
   return pclose(pipe) == 0;
 }
 
-static bool submit(const qmat_batch *batch, int jobs, int threads, const char *folder, char *job, size_t size) {
+/* The number of tasks that a job array may have. */
+static size_t most_tasks(void) {
+  qmat_writer command = {0};
+  char line[64];
+  qmat_put_text(&command, "scontrol show config | sed -n 's/^MaxArraySize *= *//p'");
+  const long most = ask(&command, line, sizeof line) ? strtol(line, NULL, 10) : 0;
+  return most > 0 ? (size_t)most : USUAL_MOST_TASKS;
+}
+
+static bool submit(size_t tasks, int jobs, int threads, const char *folder, char *job, size_t size) {
   qmat_writer command = {0};
   char options[160];
   snprintf(options, sizeof options,
            "sbatch --parsable --requeue --job-name=qmat --output=/dev/null --nodes=1 --ntasks=1 --cpus-per-task=%d "
            "--array=0-%zu",
-           threads, batch->count - 1);
+           threads, tasks - 1);
   qmat_put_text(&command, options);
   if (jobs > 0) {
     qmat_put_text(&command, "%");
@@ -134,8 +148,9 @@ enum { PATIENCE = 10 };
 qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int jobs, int threads, const char *folder,
                                  bool (*stop)(void), qmat_batch_observer *observer, void *user) {
   char job[64], path[4200];
-  qmat_status status = write_script(context, batch, folder);
-  if (status == QMAT_OK && !submit(batch, jobs, threads, folder, job, sizeof job)) {
+  const size_t most = most_tasks(), tasks = batch->count < most ? batch->count : most;
+  qmat_status status = write_script(context, batch, tasks, folder);
+  if (status == QMAT_OK && !submit(tasks, jobs, threads, folder, job, sizeof job)) {
     qmat_fail(context, QMAT_ERROR_DEPENDENCY, "Slurm does not accept the job: sbatch failed");
     status = qmat_fail_hint(context, "without --engine slurm the batch runs on this machine");
   }

@@ -27,7 +27,7 @@ typedef struct batch_call {
   const char *folder, *input; /* of the results, and the graph's input that takes the model */
   char program[4096], reports[4096];
   int jobs, threads;
-  bool json, quiet, verbose, slurm;
+  bool json, quiet, verbose, slurm, has_told_of_cache;
   bool pages;   /* outputs on request are saved too, and a page of all assets */
   bool redraws; /* stderr is a terminal: its last line says how far the batch is */
   size_t ended;
@@ -238,12 +238,35 @@ static void print_asset_line(const batch_call *call, const qmat_batch *batch, co
   qmat_put_wrapped(stderr, line, 0, 2, width, true);
 }
 
+/* Tells which meshes of a scene have failed, and once what is wrong with the cache. */
+static void print_warnings(batch_call *call, const qmat_asset *asset) {
+  const char *of = json_string_value(json_object_get(json_object_get(asset->result, "summary"), "node"));
+  const json_t *nodes = json_object_get(asset->result, "nodes"), *node, *mesh;
+  size_t i, k;
+  json_array_foreach(nodes, i, node) {
+    const char *id = json_string_value(json_object_get(node, "id"));
+    if (!id || !of || strcmp(id, of) != 0) continue;
+    json_array_foreach(json_object_get(json_object_get(node, "report"), "meshes"), k, mesh) {
+      const char *name = json_string_value(json_object_get(mesh, "name"));
+      const char *failure = json_string_value(json_object_get(mesh, "failure"));
+      if (name && failure)
+        fprintf(stderr, "qmat: warning: %s: mesh '%s' cannot be described: %s\n", qmat_show(asset->input).text,
+                qmat_show(name).text, failure);
+    }
+  }
+  const char *of_cache = json_string_value(json_object_get(json_object_get(asset->result, "cache"), "warning"));
+  if (!of_cache || call->quiet || call->has_told_of_cache) return;
+  fprintf(stderr, "qmat: warning: %s\n", of_cache);
+  call->has_told_of_cache = true;
+}
+
 static void on_asset(void *user, const qmat_batch *batch, const qmat_asset *asset) {
   batch_call *call = user;
   call->ended++;
   if (call->json) print_json_line(asset);
+  if (call->redraws && !call->json && !call->quiet) fputs("\r\x1b[K", stderr);
+  if (!call->json) print_warnings(call, asset);
   if (call->json || call->quiet) return;
-  if (call->redraws) fputs("\r\x1b[K", stderr);
   print_asset_line(call, batch, asset);
   if (!call->redraws || call->ended == batch->count) return;
   char left[32];
@@ -483,8 +506,8 @@ static const qmat_option options[] = {
     {"format", 'f', "ENDING", "Format of the results; default the graph's; may be repeated"},
     {"pages", 0, NULL, "Also save a page and a picture of each model, and DIR/index.html with all of them"},
     {"input", 0, "NAME", "The graph's input that takes the model; default the only one that is a file"},
-    {"jobs", 'j', "N", "How many models at a time; default one per processor"},
-    {"threads", 0, "N", "Threads of each model; default an equal share of the processors"},
+    {"jobs", 'j', "N", "How many models at a time; default one per processor; with Slurm, as many as it starts"},
+    {"threads", 0, "N", "Threads of each model; default an equal share of the processors; with Slurm, one"},
     {"engine", 0, "local|slurm", "Run here, or as a job array on a Slurm cluster that shares folders and cache"},
     {"set", 0, "NAME=VALUE", "Set a parameter for all models; may be repeated"},
     {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},

@@ -15,6 +15,10 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the output path is missing");
     return qmat_fail_hint(context, "-o PATH");
   }
+  if (qmat_is_stream(to)) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "the medial mesh needs the path of a file, not '%s'", qmat_show(to).text);
+    return qmat_fail_hint(context, "-o FILE.ma");
+  }
   const qmat_format format = qmat_format_of_name(to);
   if (format != QMAT_FORMAT_MA && format != QMAT_FORMAT_PLY) {
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has none of the known endings: .ma, .ply", qmat_show(to).text);

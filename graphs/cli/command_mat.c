@@ -145,10 +145,11 @@ static qmat_status run_many(qmat_context *context, qmat_invocation *invocation) 
       return qmat_fail_hint(context, "-o FILE, and one model");
     }
   const char *results = qmat_invocation_value(invocation, "output");
-  size_t outputs = 0;
+  size_t outputs = 0, unused;
   for (size_t i = 0; i < invocation->given_count; i++) outputs += !strcmp(invocation->given[i].name, "output");
   if (outputs > 1 || qmat_is_stream(results) ||
-      (!is_folder(results) && qmat_format_of_name(results) != QMAT_FORMAT_UNKNOWN)) {
+      (!is_folder(results) && (qmat_format_of_name(results) != QMAT_FORMAT_UNKNOWN ||
+                               qmat_graph_output_of_ending(&invocation->graph, results, &unused)))) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the results of several models need a folder, not '%s'",
               qmat_show(results).text);
     return qmat_fail_hint(context, "-o results/ --format glb");

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "graphs/cli/command.h"
@@ -16,6 +17,8 @@ typedef struct watched_file {
   int folder;       /* the watch of its folder; -1: the folder cannot be watched */
   bool readable;
   qmat_digest digest;
+  bool is_link;      /* to a file whose folder is not watched */
+  struct stat about; /* what the system said of it last */
 } watched_file;
 
 typedef struct watcher {
@@ -30,6 +33,29 @@ static void forget_files(watcher *watcher) {
   watcher->count = 0;
 }
 
+/* Looks at what the system says about a file; zeros when there is none. */
+static void look_at(watched_file *file) {
+  struct stat about;
+  file->is_link = lstat(file->path, &about) == 0 && S_ISLNK(about.st_mode);
+  file->about = (struct stat){0};
+  if (stat(file->path, &about) == 0) file->about = about;
+}
+
+/* Whether a file has changed of which the folder tells nothing: a link, or one whose folder is missing. */
+static bool has_changed_elsewhere(watcher *watcher) {
+  bool changed = false;
+  for (size_t i = 0; i < watcher->count; i++) {
+    watched_file *file = &watcher->files[i];
+    const watched_file before = *file;
+    look_at(file);
+    if (file->folder >= 0 && !before.is_link && !file->is_link) continue;
+    changed = changed || file->about.st_ino != before.about.st_ino || file->about.st_size != before.about.st_size ||
+              file->about.st_mtim.tv_sec != before.about.st_mtim.tv_sec ||
+              file->about.st_mtim.tv_nsec != before.about.st_mtim.tv_nsec;
+  }
+  return changed;
+}
+
 static void add_file(watcher *watcher, const char *path, bool readable, const qmat_digest *digest) {
   for (size_t i = 0; i < watcher->count; i++)
     if (strcmp(watcher->files[i].path, path) == 0) return;
@@ -41,6 +67,7 @@ static void add_file(watcher *watcher, const char *path, bool readable, const qm
     return;
   }
   watched_file file = {.path = copy, .name = slash ? slash + 1 : copy, .readable = readable, .digest = *digest};
+  look_at(&file);
   /* Folders are watched, since programs save a file by renaming a new one. */
   const uint32_t events = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVED_FROM | IN_DELETE;
   if (slash == copy) {
@@ -100,12 +127,13 @@ static bool take_events(const watcher *watcher) {
 }
 
 /* Waits until the bytes of a file change. False: the program was interrupted. */
-static bool wait_for_change(const watcher *watcher) {
+static bool wait_for_change(watcher *watcher) {
   struct pollfd waiting = {.fd = watcher->inotify, .events = POLLIN};
   /* A file may have changed during the run. */
   for (bool changed = has_changed(watcher); !changed;) {
     if (qmat_interrupted()) return false;
-    if (poll(&waiting, 1, 500) <= 0 || !take_events(watcher)) continue;
+    const bool told = poll(&waiting, 1, 500) > 0 && take_events(watcher);
+    if (!has_changed_elsewhere(watcher) && !told) continue;
     /* Several files may be saved at once, so this waits until no event has come for a while. */
     while (poll(&waiting, 1, 60) > 0) take_events(watcher);
     changed = has_changed(watcher);

@@ -7,6 +7,7 @@
 #include "graphs/cli/command.h"
 #include "graphs/cli/print_run.h"
 #include "graphs/cli/progress.h"
+#include "graphs/cli/terminal.h"
 #include "graphs/graph_file.h"
 #include "graphs/graph_names.h"
 #include "graphs/graph_params.h"
@@ -210,7 +211,10 @@ static void print_warnings(const qmat_run *run, bool quiet) {
     const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
     for (size_t k = 0; k < json_array_size(warnings) && !quiet; k++) {
       const char *text = json_string_value(json_array_get(warnings, k));
-      if (text) fprintf(stderr, "qmat: warning: node '%s': %s\n", id, text);
+      if (!text) continue;
+      fprintf(stderr, "qmat: warning: node '%s': ", id);
+      qmat_put_shown(stderr, text);
+      fputc('\n', stderr);
     }
     const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
     for (size_t k = 0; k < json_array_size(meshes); k++) {
@@ -241,6 +245,19 @@ static qmat_status finish_stream(qmat_context *context, const qmat_invocation *i
   return qmat_streams_flush(context, &invocation->streams);
 }
 
+/* Refuses the standard output where only a file can be written. */
+static qmat_status check_files(qmat_context *context, const qmat_invocation *invocation) {
+  static const char *const options[] = {"report", "depfile"};
+  for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
+    const char *path = qmat_invocation_value(invocation, options[i]);
+    if (!path || !qmat_is_stream(path)) continue;
+    qmat_fail(context, QMAT_ERROR_USAGE, "option '--%s' needs the path of a file, not '%s'", options[i],
+              qmat_show(path).text);
+    return qmat_fail_hint(context, "--%s FILE", options[i]);
+  }
+  return QMAT_OK;
+}
+
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                          void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
@@ -253,7 +270,9 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   qmat_run_observer observer;
   qmat_planned_run planned = {0};
   qmat_run *run = &planned.run;
-  qmat_status status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
+  qmat_status status = check_files(context, invocation);
+  if (status != QMAT_OK) return status;
+  status = qmat_progress_view_init(context, mode || !quiet ? mode : "off", &view);
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 0, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);

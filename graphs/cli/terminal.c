@@ -48,6 +48,15 @@ static size_t word_length(const char *text, int whole, int *columns) {
   return length;
 }
 
+/* Prints a byte; a terminal would obey control characters. */
+static void put_byte(FILE *out, char byte) {
+  fputc((unsigned char)byte < 0x20 || byte == 0x7f ? '?' : byte, out);
+}
+
+void qmat_put_shown(FILE *out, const char *text) {
+  for (; *text; text++) put_byte(out, *text);
+}
+
 /* Prints a word without its middle, so that it takes `room` columns. */
 static void put_shortened(FILE *out, const char *word, size_t length, int columns, int room) {
   const int head = (room - 3) / 2, tail = room - 3 - head;
@@ -56,7 +65,7 @@ static void put_shortened(FILE *out, const char *word, size_t length, int column
     const bool starts = starts_character(word[i]);
     if (starts && column == head) fputs("...", out);
     column += starts;
-    if (column <= head || column > columns - tail) fputc(word[i], out);
+    if (column <= head || column > columns - tail) put_byte(out, word[i]);
   }
 }
 
@@ -78,7 +87,7 @@ void qmat_put_wrapped(FILE *out, const char *text, int column, int indent, int w
       if (shortens && columns > width - indent && width - indent > 10)
         put_shortened(out, text, length, columns, width - indent);
       else
-        fwrite(text, 1, length, out);
+        for (size_t i = 0; i < length; i++) put_byte(out, text[i]);
       column += columns + blanks;
       first = false;
     }

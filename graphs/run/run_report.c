@@ -152,10 +152,12 @@ qmat_status qmat_save_json(qmat_context *context, const json_t *json, const char
 
 /* ---- depfile ---- */
 
-/* Puts a path, escaped as Make and Ninja read it in a depfile. */
+/* Puts a path, escaped as Make and Ninja read it in a depfile: both take a backslash as it is, except before a blank.
+ */
 static void put_escaped(qmat_writer *writer, const char *path) {
   for (; *path; path++) {
-    if (*path == ' ' || *path == '#' || *path == '\\') qmat_put_text(writer, "\\");
+    const bool is_before_blank = *path == '\\' && path[1 + strspn(path + 1, "\\")] == ' ';
+    if (*path == ' ' || *path == '#' || *path == ':' || is_before_blank) qmat_put_text(writer, "\\");
     if (*path == '$') qmat_put_text(writer, "$");
     qmat_put_bytes(writer, path, 1);
   }

@@ -29,12 +29,19 @@ function percent(x) {
   return `${(Math.ceil(1e4 * x - 1e-6) / 100).toFixed(2).replace(/\.?0+$/, '')} %`;
 }
 
+/** Three digits, rounded up: lengths are upper bounds. */
+function threeDigits(x) {
+  if (!(x > 0)) return 0;
+  const digit = 10 ** (Math.floor(Math.log10(x)) - 2);
+  return Number((Math.ceil(x / digit - 1e-9) * digit).toPrecision(3));
+}
+
 /** A share of the diagonal as a length, where the unit is known, else in the units of the model. */
 function length(mesh, share) {
   const meters = share * mesh.diagonal * mesh.meters_per_unit;
-  if (!(meters > 0)) return `${Number((share * mesh.diagonal).toPrecision(3))} units`;
+  if (!(meters > 0)) return `${threeDigits(share * mesh.diagonal)} units`;
   const [unit, size] = [['km', 1e3], ['m', 1], ['cm', 1e-2], ['mm', 1e-3], ['\u00b5m', 1e-6]].find(([, size]) => meters >= size) ?? ['\u00b5m', 1e-6];
-  return `${Number((meters / size).toPrecision(3))} ${unit}`;
+  return `${threeDigits(meters / size)} ${unit}`;
 }
 
 // ---- data ----

@@ -48,7 +48,7 @@ static int compare_ids(const void *a, const void *b) {
 
 /* Adds integers to the ids, or takes them out. */
 static bool edit_ids(id_list *list, const qmat_usd_value *by, bool adds) {
-  if (!by->is_array || !qmat_usd_is_integer(by->type)) return true;
+  if (by->count == 0 || !by->is_array || !qmat_usd_is_integer(by->type)) return true;
   if (adds) {
     if (qmat_grow((void **)&list->ids, &list->capacity, list->count + by->count, sizeof *list->ids) != 0) return false;
     for (size_t i = 0; i < by->count; i++) list->ids[list->count++] = by->integers[i];

@@ -6,6 +6,7 @@
 
 #include "core/geometry/medial_build.h"
 #include "core/geometry/triangle.h"
+#include "core/value_check.h"
 
 #define NONE UINT32_MAX
 

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
+#include "core/value_check.h"
 #include "nodes/initial/item_queue.h"
 
 static const size_t steps_per_report = 65536;

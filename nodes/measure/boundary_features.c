@@ -3,10 +3,10 @@
 
 #include <math.h>
 
-#include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
+#include "core/value_check.h"
 #include "nodes/measure/area_samples.h"
 
 static const double pi = 3.14159265358979323846;

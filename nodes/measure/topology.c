@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
+#include "core/value_check.h"
 
 /* The limit of the entries that the reduction of the matrix visits. */
 static const size_t most_entries = 100000000;

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/arena.h"
-#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
+#include "core/value_check.h"
 
 static bool is_flat(const qmat_medial *medial, const uint32_t *row, size_t size) {
   for (size_t k = 0; k < size; k++)

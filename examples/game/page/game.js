@@ -45,7 +45,7 @@ for (let i = 0; i < 5; i++) addBox([-1.2 - 0.6 * i, 0.2 * (i + 1), 0], [0.3, 0.2
 
 /** An asset: what is drawn, its first body that moves, and the scale that makes its diagonal 1. */
 async function load(name) {
-  const bytes = await (await fetch(`/assets/${name}`)).arrayBuffer();
+  const bytes = await (await fetch(`/assets/${encodeURIComponent(name)}`)).arrayBuffer();
   const gltf = await new GLTFLoader().parseAsync(bytes, '');
   const body = bodiesOf(openGlb(bytes)).find((one) => one.motion);
   const box = new THREE.Box3().setFromObject(gltf.scene), scale = 1 / box.getSize(new THREE.Vector3()).length();

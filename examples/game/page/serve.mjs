@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 // Serves the page with the assets that the build made: node serve.mjs [FOLDER_OF_ASSETS [PORT]]
-import { createReadStream, existsSync, readdirSync } from 'node:fs';
+import { createReadStream, readdirSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { join, normalize } from 'node:path';
 
@@ -11,7 +11,10 @@ const folders = { '/assets/': assets, '/readers/': join(here, '../../readers'), 
 const types = { html: 'text/html', js: 'text/javascript', mjs: 'text/javascript', wasm: 'application/wasm', json: 'application/json' };
 
 const server = createServer((request, response) => {
-  const path = normalize(new URL(request.url, 'http://localhost').pathname);
+  let path = '/none';
+  try {
+    path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
+  } catch { /* a malformed address */ }
   if (path === '/assets.json') {
     response.setHeader('Content-Type', 'application/json');
     response.end(JSON.stringify(readdirSync(assets).filter((name) => name.endsWith('.glb'))));
@@ -19,7 +22,7 @@ const server = createServer((request, response) => {
   }
   const prefix = Object.keys(folders).find((start) => path.startsWith(start));
   const file = join(folders[prefix], path === '/' ? 'index.html' : path.slice(prefix.length));
-  if (!existsSync(file)) {
+  if (!statSync(file, { throwIfNoEntry: false })?.isFile()) {
     response.statusCode = 404;
     response.end();
     return;

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/hash.h"
+#include "core/value_check.h"
 
 static qmat_medial *spheres(size_t count) {
   qmat_medial *medial = qmat_medial_new();

@@ -66,6 +66,9 @@ batch --inputs 'models/*1.off' --out dotted --cache ''
 holds "an empty folder of the cache is an error" sh -c "[ $code -ne 0 ] && grep -q 'cache is empty' out.txt err.txt"
 rm -r dotted
 
+batch --inputs 'models/*.off' --out models
+holds "models are not looked for in the folder of the results" sh -c "[ $code -eq 2 ] && grep -q 'is the folder of the results' err.txt"
+
 # Paths that go down and up again: results stay in their folder.
 mkdir -p models/sub below
 cp models/box2.off over.off

@@ -6,6 +6,7 @@ source=$2
 . "$(dirname "$0")/../../lib.sh"
 QMAT_CACHE=off
 export QMAT_CACHE
+write_box box.off 1
 
 command="$qmat mat roof.gltf -o roof.ma --quiet --epsilon 10% --set samples.spacing=10% --depfile roof.ma.d"
 printf 'roof.ma:\n\t%s\n-include roof.ma.d\n' "$command" >Makefile
@@ -35,6 +36,27 @@ for tool in make ninja; do
   printf '\000\000\100\100' | dd of=roof.bin bs=1 seek=12 conv=notrunc status=none
   made yes "an edited side file"
   made no "after an edited side file"
+done
+
+# Names with what Make and Ninja read as something else.
+for tool in make ninja; do
+  name='at 12:30 #2.off'
+  sed 's/^8 6 0/8 6 0/' "$work/box.off" >"$name"
+  printf 'all: odd.ma\nodd.ma:\n\t%s mat "at 12:30 #2.off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n-include odd.d\n' \
+    "$qmat" >Makefile
+  printf 'rule mat\n  command = %s mat "at 12:30 #2.off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n  depfile = odd.d\nbuild odd.ma: mat\n' \
+    "$qmat" >build.ninja
+  rm -f odd.ma odd.d
+  touch before
+  sleep 1.1
+  $tool >out.txt 2>err.txt || die "$tool: a name with a colon"
+  $tool >out.txt 2>err.txt || die "$tool: a name with a colon, again"
+  touch again
+  sleep 1.1
+  holds "$tool: nothing to do" test ! odd.ma -nt again
+  sed 's/^1 0 0/1.5 0 0/' "$work/box.off" >"$name"
+  $tool >out.txt 2>err.txt || die "$tool: the model has changed"
+  holds "$tool: a changed model is seen" test odd.ma -nt again
 done
 
 # Results with the same bytes as before are as new as the run: of two, both.

@@ -72,6 +72,7 @@ AccountingStorageType=accounting_storage/none
 MpiDefault=none
 SchedulerParameters=batch_sched_delay=1,sched_interval=2
 SelectType=select/cons_tres
+MaxArraySize=8
 SelectTypeParameters=CR_Core
 SlurmdTimeout=5
 KillWait=2
@@ -131,6 +132,7 @@ done
 
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
+# Ten models in an array of eight: two tasks have two.
 timeout 600 "$qmat" batch graph.yaml --inputs 'models/*.off' --out results --engine slurm >out.txt 2>err.txt &
 batch=$!
 tries=0

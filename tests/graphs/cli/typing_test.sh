@@ -62,8 +62,12 @@ for option in --dry-run "--report all.json" "--depfile all.d" "--progress json";
   expect 2 "is for one model" "$qmat" mat models -o unmade $option $coarse
   expect 2 "is for one model" "$qmat" mat box.off -o unmade/ $option $coarse
 done
+expect 2 "needs the path of a file, not '-'" "$qmat" mat box.off -o unmade.glb --report - $coarse
+expect 2 "needs the path of a file, not '-'" "$qmat" mat box.off -o unmade.glb --depfile - $coarse
+expect 2 "needs the path of a file, not '-.ma'" "$qmat" extract right.glb -o -.ma
+expect 2 "need a folder, not 'unmade.html'" "$qmat" mat box.off models/a/spot.off -o unmade.html $coarse
 expect 2 "option '--format' is for results in a folder" "$qmat" mat box.off -o unmade.glb -f ma $coarse
-holds "a refused option makes nothing" test ! -e unmade -a ! -e unmade.glb
+holds "a refused option makes nothing" test ! -e unmade -a ! -e unmade.glb -a ! -e unmade.html -a ! -e -
 expect 0 "1 done" "$qmat" mat box.off -o into/ $coarse
 holds "one model into a folder" cmp right.glb into/box.glb
 cp -r models within

@@ -62,6 +62,13 @@ runs 5 "the mistake mended"
 was samples hit "the mistake mended"
 rm models/box.off
 runs 6 "a model that is gone"
+mkdir elsewhere
+write_box elsewhere/box.off
+ln -s ../elsewhere/box.off models/box.off
+runs 7 "a link to a model"
+sed 's/^2 1 1$/2 1 1.2/' elsewhere/box.off >new.off
+mv new.off elsewhere/box.off
+runs 8 "a model in another folder, behind the link"
 kill -TERM $watching
 wait $watching
 code=$?
