@@ -33,8 +33,8 @@ static void forget_files(watcher *watcher) {
   watcher->count = 0;
 }
 
-/* Looks at what the system says about a file; zeros when there is none. */
-static void look_at(watched_file *file) {
+/* Updates what the system says of a file: zeros where there is none. */
+static void update_about(watched_file *file) {
   struct stat about;
   file->is_link = lstat(file->path, &about) == 0 && S_ISLNK(about.st_mode);
   file->about = (struct stat){0};
@@ -47,7 +47,7 @@ static bool has_changed_elsewhere(watcher *watcher) {
   for (size_t i = 0; i < watcher->count; i++) {
     watched_file *file = &watcher->files[i];
     const watched_file before = *file;
-    look_at(file);
+    update_about(file);
     if (file->folder >= 0 && !before.is_link && !file->is_link) continue;
     changed = changed || file->about.st_ino != before.about.st_ino || file->about.st_size != before.about.st_size ||
               file->about.st_mtim.tv_sec != before.about.st_mtim.tv_sec ||
@@ -67,7 +67,7 @@ static void add_file(watcher *watcher, const char *path, bool readable, const qm
     return;
   }
   watched_file file = {.path = copy, .name = slash ? slash + 1 : copy, .readable = readable, .digest = *digest};
-  look_at(&file);
+  update_about(&file);
   /* Folders are watched, since programs save a file by renaming a new one. */
   const uint32_t events = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVED_FROM | IN_DELETE;
   if (slash == copy) {

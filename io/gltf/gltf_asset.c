@@ -261,6 +261,20 @@ bool qmat_gltf_is_skin(const json_t *root, size_t mesh) {
   return json_is_true(json_object_get(json_object_get(object, "extras"), QMAT_GLTF_SKIN_MARK));
 }
 
+bool qmat_gltf_is_addition(const json_t *root, const json_t *node) {
+  const int64_t mesh = qmat_gltf_mesh_of(node);
+  const json_t *extras = json_object_get(node, "extras");
+  const char *key;
+  json_t *value;
+  if (json_object_get(extras, QMAT_GLTF_COLLIDER_MARK)) return false;
+  if (mesh >= 0) return qmat_gltf_is_skin(root, (size_t)mesh);
+  if (!json_object_get(extras, "qmat_data") || json_object_get(node, "children")) return false;
+  json_object_foreach((json_t *)(uintptr_t)extras, key, value) {
+    if (strncmp(key, "qmat_", 5) != 0) return false;
+  }
+  return true;
+}
+
 qmat_status qmat_gltf_choose_meshes(qmat_context *context, const json_t *root, const char *path, const char *choice,
                                     uint32_t **meshes, size_t *count) {
   const json_t *nodes = json_object_get(root, "nodes"), *array = json_object_get(root, "meshes");

@@ -81,6 +81,9 @@ void qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
 /* Whether a mesh is a skin that qmat added to the asset. */
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh);
 
+/* Whether a node has a skin that qmat added, or nothing but a medial mesh. Colliders do not count. */
+bool qmat_gltf_is_addition(const json_t *root, const json_t *node);
+
 /* The number of nodes that reference a mesh. */
 size_t qmat_gltf_mesh_carriers(const json_t *root, size_t mesh);
 

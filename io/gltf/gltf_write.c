@@ -241,21 +241,6 @@ static void remove_extras(json_t *own) {
   }
 }
 
-/* Whether a child has a skin, or nothing but a medial mesh: what an earlier run added. */
-static bool is_earlier_addition(const json_t *root, const json_t *child) {
-  const int64_t mesh = qmat_gltf_mesh_of(child);
-  const json_t *extras = json_object_get(child, "extras");
-  const char *key;
-  json_t *value;
-  if (json_object_get(extras, QMAT_GLTF_COLLIDER_MARK)) return false;
-  if (mesh >= 0) return qmat_gltf_is_skin(root, (size_t)mesh);
-  if (!json_object_get(extras, "qmat_data") || json_object_get(child, "children")) return false;
-  json_object_foreach((json_t *)(uintptr_t)extras, key, value) {
-    if (strncmp(key, "qmat_", 5) != 0) return false;
-  }
-  return true;
-}
-
 /* Adds a medial mesh and its skin to every node that references the mesh. The skin is always on a child. The medial
  * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. */
 static bool add_to_carriers(document *document, json_int_t mesh, const json_t *extras, const double *origin,
@@ -267,7 +252,7 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
     json_t *node = json_array_get(nodes, i), *own = json_object_get(node, "extras");
     if (qmat_gltf_mesh_of(node) != mesh) continue;
     remove_extras(own);
-    qmat_gltf_drop_children(document->root, node, document->nodes_given, is_earlier_addition);
+    qmat_gltf_drop_children(document->root, node, document->nodes_given, qmat_gltf_is_addition);
     if (!is_zero(origin) || (own && !json_is_object(own))) {
       done = add_child(document->root, node, json_pack("{s:O}", "extras", extras), origin, "medial mesh");
     } else {
