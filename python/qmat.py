@@ -50,6 +50,7 @@ qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job
 qmat_result qmat_job_want(qmat_job *job, const char *port);
 qmat_result qmat_job_graph(qmat_job *job, char **json);
 qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
+void qmat_job_forget(qmat_job *job);
 qmat_result qmat_job_cache(qmat_job *job, const char *folder);
 char *qmat_cache_folder(void);
 qmat_result qmat_job_hits(qmat_job *job, size_t *hits, size_t *nodes);

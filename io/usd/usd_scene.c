@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/key_table.h"
 #include "io/usd/usd_instancer.h"
 #include "io/usd/usd_shape.h"
 
@@ -30,23 +31,36 @@ typedef struct reader {
   bool takes_undefined; /* also reads prims that only have an 'over' */
   bool has_undefined;   /* such a prim was found */
   bool leaves_medials;  /* the root layer is one that qmat has written over another */
+  qmat_key_table known; /* the numbers of meshes by the first bytes of their digests */
 } reader;
 
 /* ---- meshes ---- */
 
-/* The number of the mesh with this digest; UINT32_MAX: it is new. */
-static uint32_t find_mesh(const qmat_usd_scene *scene, const qmat_digest *digest) {
-  for (size_t i = 0; i < scene->mesh_count; i++)
-    if (qmat_digest_equal(&scene->digests[i], digest)) return (uint32_t)i;
-  return UINT32_MAX;
+static uint64_t key_of(const qmat_digest *digest) {
+  uint64_t key;
+  memcpy(&key, digest->bytes, sizeof key);
+  return key == QMAT_NO_KEY ? 0 : key;
 }
 
-static qmat_status add_mesh(qmat_usd_scene *scene, const qmat_usd_prim *prim, const qmat_usd_mesh *mesh,
+/* The number of the mesh with this digest; UINT32_MAX: it is new. */
+static uint32_t find_mesh(const reader *r, const qmat_digest *digest) {
+  const uint32_t number = qmat_key_table_id(&r->known, key_of(digest));
+  return number != QMAT_NO_ID && qmat_digest_equal(&r->scene->digests[number], digest) ? number : UINT32_MAX;
+}
+
+static qmat_status add_mesh(reader *r, const qmat_usd_prim *prim, const qmat_usd_mesh *mesh,
                             const qmat_digest *digest) {
+  qmat_usd_scene *scene = r->scene;
   const size_t at = scene->mesh_count;
   if (qmat_grow((void **)&scene->meshes, &scene->mesh_capacity, at + 1, sizeof *scene->meshes) != 0 ||
       qmat_grow((void **)&scene->digests, &scene->digest_capacity, at + 1, sizeof *scene->digests) != 0)
     return qmat_usd_fail_prim_memory(prim);
+  const uint64_t key = key_of(digest);
+  if (qmat_key_table_id(&r->known, key) == QMAT_NO_ID) {
+    qmat_key_slot *slot = qmat_key_table_add(&r->known, key);
+    if (!slot) return qmat_usd_fail_prim_memory(prim);
+    slot->id = (uint32_t)at;
+  }
   scene->meshes[at] = *mesh;
   scene->digests[at] = *digest;
   scene->mesh_count++;
@@ -91,7 +105,7 @@ static qmat_status warn_if_flattened(const qmat_usd_prim *prim, const inherited 
   return *flattened ? qmat_usd_warn(prim, "left out: its transform flattens it or is not finite") : QMAT_OK;
 }
 
-static qmat_status read_mesh(const reader *r, const qmat_usd_prim *prim, const inherited *state) {
+static qmat_status read_mesh(reader *r, const qmat_usd_prim *prim, const inherited *state) {
   qmat_usd_mesh mesh = {0};
   qmat_digest digest;
   bool flattened;
@@ -109,15 +123,15 @@ static qmat_status read_mesh(const reader *r, const qmat_usd_prim *prim, const i
   }
   if (status != QMAT_OK) return status;
   if (qmat_usd_mesh_digest(&mesh, &digest) != QMAT_OK) return qmat_usd_fail_prim_memory(prim);
-  uint32_t number = find_mesh(r->scene, &digest);
+  uint32_t number = find_mesh(r, &digest);
   if (number == UINT32_MAX) {
     number = (uint32_t)r->scene->mesh_count;
-    status = add_mesh(r->scene, prim, &mesh, &digest);
+    status = add_mesh(r, prim, &mesh, &digest);
   }
   return status == QMAT_OK ? place_mesh(r, prim, number, skin, state) : status;
 }
 
-static qmat_status read_shape(const reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
+static qmat_status read_shape(reader *r, const qmat_usd_prim *prim, const char *type, const inherited *state) {
   qmat_usd_scene *scene = r->scene;
   qmat_usd_shape shape;
   qmat_usd_mesh mesh;
@@ -129,13 +143,13 @@ static qmat_status read_shape(const reader *r, const qmat_usd_prim *prim, const 
   status = warn_if_flattened(prim, state, &flattened);
   if (status != QMAT_OK || flattened) return status;
   if (qmat_usd_shape_digest(&shape, &digest) != QMAT_OK) return qmat_usd_fail_prim_memory(prim);
-  uint32_t number = find_mesh(scene, &digest);
+  uint32_t number = find_mesh(r, &digest);
   if (number == UINT32_MAX) {
     number = (uint32_t)scene->mesh_count;
     if (!qmat_usd_shape_mesh(&shape, r->segments, &scene->arena, &mesh)) return qmat_usd_fail_prim_memory(prim);
     scene->shape_elements += mesh.points->count + mesh.indices->count;
     if (scene->shape_elements > FREE_ELEMENTS) return fail_too_many(r, prim, "different shapes");
-    status = add_mesh(scene, prim, &mesh, &digest);
+    status = add_mesh(r, prim, &mesh, &digest);
   }
   return status == QMAT_OK ? place_mesh(r, prim, number, UINT32_MAX, state) : status;
 }
@@ -317,6 +331,14 @@ static qmat_status check_any(qmat_context *context, const qmat_usd_scene *scene,
                         first ? "; " : "", first ? first : "");
 }
 
+static qmat_status read_all(reader *r, qmat_usd_prim *root) {
+  const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
+  qmat_status status = qmat_key_table_init(&r->known, 0) == 0 ? read_children(r, root, &state)
+                                                              : qmat_fail_memory(r->context, "a USD scene");
+  qmat_key_table_uninit(&r->known);
+  return status;
+}
+
 qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, const char *path, size_t segments,
                                 qmat_usd_scene *scene) {
   qmat_usd_prim root = {0};
@@ -326,9 +348,8 @@ qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, 
   reader r = {
       .context = context, .scene = scene, .stage = scene->stage, .segments = segments > 0 ? segments : USUAL_SEGMENTS};
   r.leaves_medials = qmat_usd_original_of(qmat_usd_stage_root_layer(scene->stage)) != NULL;
-  const inherited state = {.world = qmat_usd_identity(), .purpose = "default"};
   status = qmat_usd_stage_root(r.stage, &root);
-  if (status == QMAT_OK) status = read_children(&r, &root, &state);
+  if (status == QMAT_OK) status = read_all(&r, &root);
   if (status == QMAT_OK && scene->placement_count == 0 && r.has_undefined) {
     /* The file may be meant as a layer of another one. */
     qmat_usd_stage *stage = scene->stage;
@@ -337,7 +358,7 @@ qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, 
     scene->stage = stage;
     qmat_usd_stage_forget_warnings(stage);
     r.takes_undefined = true;
-    status = read_children(&r, &root, &state);
+    status = read_all(&r, &root);
   }
   qmat_usd_prim_uninit(&root);
   if (status == QMAT_OK) status = check_any(context, scene, path);

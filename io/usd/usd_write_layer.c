@@ -7,8 +7,9 @@
 #include <string.h>
 
 #include "core/node.h"
-#include "io/usd/usd_stage.h"
 #include "io/usd/usd_write.h"
+#include "io/usd/usda.h"
+#include "io/usd/usdc.h"
 #include "io/usd/usdc_write.h"
 #include "io/usd/usdz.h"
 
@@ -215,6 +216,16 @@ static qmat_status open_original(qmat_context *context, const qmat_file_part *pa
   return strcmp(ending, "usdz") == 0 ? qmat_usdz_open(context, &bytes, "the scene", package) : QMAT_OK;
 }
 
+/* Reads the root layer of what was kept. `package` has the members where it is one. */
+static qmat_status read_root_layer(qmat_context *context, const qmat_file_part *part, const qmat_usdz *package,
+                                   qmat_usd_layer *layer) {
+  const qmat_usdz_member *first = package->member_count > 0 ? &package->members[0] : NULL;
+  const qmat_bytes bytes = {.data = first ? (uint8_t *)(uintptr_t)first->bytes : part->bytes,
+                            .size = first ? first->size : part->size};
+  return qmat_usdc_is_crate(&bytes) ? qmat_usdc_read(context, &bytes, "the scene", layer)
+                                    : qmat_usda_read(context, &bytes, "the scene", layer);
+}
+
 static qmat_status make_package(qmat_context *context, const qmat_usdz *original, const qmat_file_part *part,
                                 const char *sublayer, const qmat_writer *text, qmat_file **file) {
   qmat_writer out = {0};
@@ -268,20 +279,19 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
   const char *ending = ending_of(part);
   const qmat_usd_form form = additions[0].options.form;
   const bool in_package = form == QMAT_USD_PACKAGE;
-  const qmat_bytes bytes = {.data = part->bytes, .size = part->size};
   char sublayer[512];
-  qmat_usd_stage *stage = NULL;
+  qmat_usd_layer layer = {0};
   qmat_usdz original = {0};
   qmat_writer text = {0};
   *file = NULL;
   qmat_status status = open_original(context, part, ending, &original);
-  if (status == QMAT_OK) status = qmat_usd_stage_open(context, &bytes, "", &stage);
+  if (status == QMAT_OK) status = read_root_layer(context, part, &original, &layer);
   if (status == QMAT_OK) {
     if (in_package && original.member_count > 0)
       snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
     else
       snprintf(sublayer, sizeof sublayer, in_package ? "original/scene.%s" : "original.%s", ending);
-    status = put_text(context, scene, additions, count, qmat_usd_stage_root_layer(stage)->root, sublayer, &text);
+    status = put_text(context, scene, additions, count, layer.root, sublayer, &text);
   }
   if (status == QMAT_OK && text.failed) status = fail_shortage(context);
   if (status == QMAT_OK && form == QMAT_USD_CRATE) status = qmat_usdc_of_text(context, &text);
@@ -290,6 +300,6 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
                         : make_pair(context, part, sublayer, form == QMAT_USD_CRATE ? "usdc" : "usda", &text, file);
   qmat_writer_uninit(&text);
   qmat_usdz_uninit(&original);
-  qmat_usd_stage_close(stage);
+  qmat_usd_layer_uninit(&layer);
   return status;
 }

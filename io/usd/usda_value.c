@@ -48,12 +48,15 @@ static const qmat_usda_type types[] = {TYPE("bool", BOOL, 1),
 /* Takes one item and appends it to `list`. */
 typedef qmat_status take_item(qmat_usda *p, const void *data, qmat_usda_list *list);
 
+enum { ITEMS_PER_REPORT = 65536 };
+
 /* One item, or with `is_array` any number in []. */
 static qmat_status take_items(qmat_usda *p, bool is_array, take_item *take, const void *data, qmat_usda_list *list) {
   if (!is_array) return take(p, data, list);
   qmat_status status = qmat_usda_expect(p, '[');
-  while (status == QMAT_OK && !qmat_usda_accept(p, ']')) {
+  for (size_t i = 1; status == QMAT_OK && !qmat_usda_accept(p, ']'); i++) {
     status = take(p, data, list);
+    if (status == QMAT_OK && i % ITEMS_PER_REPORT == 0) status = qmat_progress(p->layer->context, 0, 0, "items");
     if (status == QMAT_OK && !qmat_usda_accept(p, ',') && qmat_usda_peek(p) != ']')
       status = qmat_usda_expected(p, "',' or ']'");
   }

@@ -30,11 +30,10 @@ struct CellInfo {
   std::array<bool, 4> is_singular = {false, false, false, false};
 };
 
-using VertexBase =
-    CGAL::Triangulation_vertex_base_with_info_3<SphereId, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>;
-using CellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel, RegularCellBase>;
-using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
-using Cell = Triangulation::Cell_handle;
+using BallCellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel, RegularCellBase>;
+using BallTriangulation =
+    CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<RegularVertexBase, BallCellBase>>;
+using Cell = BallTriangulation::Cell_handle;
 
 constexpr size_t kSimplicesPerReport = 2048;
 
@@ -48,19 +47,16 @@ struct Corner {
   std::array<double, 3> point;
 };
 
-template <size_t N>
-using Simplices = std::vector<std::array<uint32_t, N>>;
-
 }  // namespace
 
 struct qmat_ball_union {
-  Triangulation triangulation;
+  BallTriangulation triangulation;
   size_t count = 0;
 };
 
 namespace {
 
-bool is_small(const Triangulation &t, const Cell &c, int i) {
+bool is_small(const BallTriangulation &t, const Cell &c, int i) {
   const auto compare = t.geom_traits().compare_weighted_squared_radius_3_object();
   const Ball &p = c->vertex((i + 1) & 3)->point(), &q = c->vertex((i + 2) & 3)->point(),
              &r = c->vertex((i + 3) & 3)->point();
@@ -95,7 +91,7 @@ std::array<uint32_t, 3> balls_of(const Cell &cell, int facet) {
   return ids;
 }
 
-qmat_status find_cells(qmat_context *context, Triangulation &t) {
+qmat_status find_cells(qmat_context *context, BallTriangulation &t) {
   const auto compare = t.geom_traits().compare_weighted_squared_radius_3_object();
   size_t done = 0;
   for (auto c = t.finite_cells_begin(); c != t.finite_cells_end(); c++) {
@@ -110,7 +106,7 @@ qmat_status find_cells(qmat_context *context, Triangulation &t) {
 }
 
 /* A facet of the shape that has no tetrahedron of the shape on a side has a corner there. */
-qmat_status find_corners(qmat_context *context, Triangulation &t, std::vector<Corner> &corners,
+qmat_status find_corners(qmat_context *context, BallTriangulation &t, std::vector<Corner> &corners,
                          Simplices<3> &singular) {
   size_t done = 0;
   for (auto f = t.finite_facets_begin(); f != t.finite_facets_end(); f++) {
@@ -135,11 +131,11 @@ qmat_status find_corners(qmat_context *context, Triangulation &t, std::vector<Co
 }
 
 /* Whether a facet at the edge belongs to the shape. */
-bool is_side(const Triangulation &t, const Triangulation::Edge &edge) {
+bool is_side(const BallTriangulation &t, const BallTriangulation::Edge &edge) {
   auto facet = t.incident_facets(edge);
   const auto first = facet;
   do {
-    const Triangulation::Facet side = *facet;
+    const BallTriangulation::Facet side = *facet;
     const Cell cell = side.first;
     if (cell->info().in_shape || cell->neighbor(side.second)->info().in_shape) return true;
     if (cell->info().is_singular[static_cast<size_t>(side.second)]) return true;
@@ -147,7 +143,7 @@ bool is_side(const Triangulation &t, const Triangulation::Edge &edge) {
   return false;
 }
 
-qmat_status find_edges(qmat_context *context, const Triangulation &t, size_t count, Simplices<2> &singular,
+qmat_status find_edges(qmat_context *context, const BallTriangulation &t, size_t count, Simplices<2> &singular,
                        std::vector<uint8_t> &isolated) {
   const auto compare = t.geom_traits().compare_weighted_squared_radius_3_object();
   size_t done = 0;
@@ -218,23 +214,24 @@ qmat_status collect(qmat_context *context, qmat_ball_union &u, qmat_ball_union_p
 }
 
 /* A point on a side that several tetrahedra share is in the shape if one of them is. */
-bool contains(const Triangulation &t, const Point &point, Cell &hint) {
-  Triangulation::Locate_type type;
+bool contains(const BallTriangulation &t, const Point &point, Cell &hint) {
+  BallTriangulation::Locate_type type;
   int i, j;
   const Cell cell = t.locate(Ball(point, 0), type, i, j, hint);
   hint = cell;
-  if (cell == Cell() || type == Triangulation::OUTSIDE_CONVEX_HULL || type == Triangulation::OUTSIDE_AFFINE_HULL)
+  if (cell == Cell() || type == BallTriangulation::OUTSIDE_CONVEX_HULL ||
+      type == BallTriangulation::OUTSIDE_AFFINE_HULL)
     return false;
   if (cell->info().in_shape) return true;
-  if (type == Triangulation::FACET) return cell->neighbor(i)->info().in_shape;
-  if (type == Triangulation::EDGE) {
+  if (type == BallTriangulation::FACET) return cell->neighbor(i)->info().in_shape;
+  if (type == BallTriangulation::EDGE) {
     auto at = t.incident_cells(cell, i, j);
     const auto first = at;
     do {
       if (at->info().in_shape) return true;
     } while (++at != first);
   }
-  if (type == Triangulation::VERTEX) {
+  if (type == BallTriangulation::VERTEX) {
     std::vector<Cell> cells;
     t.incident_cells(cell->vertex(i), std::back_inserter(cells));
     return std::any_of(cells.begin(), cells.end(), [](const Cell &c) { return c->info().in_shape; });

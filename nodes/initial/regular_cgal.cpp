@@ -19,15 +19,10 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Sphere = Kernel::Weighted_point_3;
-using VertexBase =
-    CGAL::Triangulation_vertex_base_with_info_3<SphereId, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>;
-using CellBase = RegularCellBase;
-using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using PowerTriangulation =
+    CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<RegularVertexBase, RegularCellBase>>;
 
-template <size_t N>
-using Simplices = std::vector<std::array<uint32_t, N>>;
-
-constexpr size_t kSimplicesPerReport = 65536;
+constexpr size_t kPowerSimplicesPerReport = 65536;
 
 /* Copies the simplices, whose ids ascend, in lexicographic order. */
 template <size_t N>
@@ -42,20 +37,21 @@ qmat_status copy_sorted(qmat_context *context, Simplices<N> &simplices, size_t c
   return QMAT_OK;
 }
 
-qmat_status collect(qmat_context *context, const Triangulation &triangulation, size_t count,
+qmat_status collect(qmat_context *context, const PowerTriangulation &triangulation, size_t count,
                     qmat_regular_simplices *found) {
   Simplices<2> edges;
   Simplices<3> triangles;
   qmat_status status;
   size_t done = 0;
   for (auto edge = triangulation.finite_edges_begin(); edge != triangulation.finite_edges_end(); edge++) {
-    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "edges")) != QMAT_OK) return status;
+    if (done++ % kPowerSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "edges")) != QMAT_OK)
+      return status;
     const uint32_t a = edge->first->vertex(edge->second)->info().value;
     const uint32_t b = edge->first->vertex(edge->third)->info().value;
     edges.push_back({std::min(a, b), std::max(a, b)});
   }
   for (auto facet = triangulation.finite_facets_begin(); facet != triangulation.finite_facets_end(); facet++) {
-    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "facets")) != QMAT_OK)
+    if (done++ % kPowerSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "facets")) != QMAT_OK)
       return status;
     std::array<uint32_t, 3> ids;
     for (int k = 0, n = 0; k < 4; k++)
@@ -90,7 +86,7 @@ qmat_status qmat_regular_simplices_find(qmat_context *context, const double *sph
       const double *s = spheres + 4 * i;
       sites.emplace_back(Kernel::Point_3(s[0], s[1], s[2]), s[3] * s[3]);
     }
-    Triangulation triangulation;
+    PowerTriangulation triangulation;
     const qmat_status status = insert_spheres(context, sites, triangulation);
     return status == QMAT_OK ? collect(context, triangulation, count, simplices) : status;
   } catch (const std::bad_alloc &) {

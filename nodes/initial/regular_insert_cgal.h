@@ -7,12 +7,15 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Hidden_point_memory_policy.h>
 #include <CGAL/Regular_triangulation_cell_base_3.h>
+#include <CGAL/Regular_triangulation_vertex_base_3.h>
 #include <CGAL/Spatial_sort_traits_adapter_3.h>
 #include <CGAL/Triangulation_cell_base_3.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <CGAL/property_map.h>
 #include <CGAL/spatial_sort.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <vector>
 
@@ -25,10 +28,18 @@ struct SphereId {
   uint32_t value = kNoSphereId;
 };
 
+using RegularVertexBase = CGAL::Triangulation_vertex_base_with_info_3<
+    SphereId, CGAL::Exact_predicates_inexact_constructions_kernel,
+    CGAL::Regular_triangulation_vertex_base_3<CGAL::Exact_predicates_inexact_constructions_kernel>>;
+
 /* The base of cells. Hidden spheres are not kept: only the rest of the triangulation is asked for. */
 using RegularCellBase = CGAL::Regular_triangulation_cell_base_3<
     CGAL::Exact_predicates_inexact_constructions_kernel,
     CGAL::Triangulation_cell_base_3<CGAL::Exact_predicates_inexact_constructions_kernel>, CGAL::Discard_hidden_points>;
+
+/* Simplices of N vertices each. */
+template <size_t N>
+using Simplices = std::vector<std::array<uint32_t, N>>;
 
 /* Inserts the spheres in a spatial order. A vertex gets the smallest id of the spheres that are equal to its own. */
 template <class Triangulation>
