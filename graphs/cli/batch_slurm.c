@@ -48,7 +48,10 @@ static qmat_status write_script(qmat_context *context, const qmat_batch *batch, 
   }
   qmat_put_text(&writer, "esac\ncode=$?\n(cd ");
   put_quoted(&writer, folder);
-  qmat_put_text(&writer, "&& echo $code >\"$model.new\" && mv \"$model.new\" \"$model.exit\")\nmodel=$((model + ");
+  qmat_put_text(&writer,
+                "&& echo $code >\"$model.new\" && mv \"$model.new\" \"$model.exit\")\n"
+                "case $code in 3 | 143) exit ;; esac\n" /* cancelled: the others are not started */
+                "model=$((model + ");
   qmat_put_integer(&writer, (int64_t)tasks);
   qmat_put_text(&writer, "))\ndone\n");
   snprintf(path, sizeof path, "%s/array.sh", folder);
