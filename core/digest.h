@@ -35,6 +35,7 @@ qmat_status qmat_digest_of_file(const char *path, qmat_digest *digest);
 /* Parses exactly 64 lower-case hexadecimal digits. On false, `*digest` is unchanged. */
 bool qmat_digest_parse(const char *text, qmat_digest *digest);
 
+/* Whether two digests are the same. */
 bool qmat_digest_equal(const qmat_digest *a, const qmat_digest *b);
 
 /* Writes the 64 lower-case hexadecimal digits and a terminating zero. */

@@ -5,7 +5,7 @@
 #include <math.h>
 
 /* Finds the eigenvalues of a symmetric matrix, which replace its diagonal, and orthonormal eigenvectors: the columns of
- * v, which are a right-handed frame. By Jacobi rotations. */
+ * v, which are a right-handed frame. They are in no order. By Jacobi rotations. */
 static inline void qmat_symmetric_eigen(double m[3][3], double v[3][3]) {
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) v[i][j] = i == j;

@@ -66,12 +66,14 @@ double qmat_slab_distance(const double a[4], const double b[4], const double c[4
 
 /* Fills `cone` from its two end spheres. */
 void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]);
+/* The signed distance of a point to the cone. */
 double qmat_cone_prepared_distance(const qmat_cone *cone, const double point[3]);
 /* The same distance, and the weights of the two ends (sum 1) at the medial point that attains it. */
 double qmat_cone_foot(const qmat_cone *cone, const double point[3], double weights[2]);
 
 /* Fills `slab` from its three corner spheres. */
 void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], const double c[4]);
+/* The signed distance of a point to the slab. */
 double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3]);
 /* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point that attains it. */
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]);

@@ -29,15 +29,17 @@ bool qmat_quadric_add_slab(qmat_quadric *quadric, const double a[4], const doubl
  * closed form. Adds nothing and returns false when one sphere contains the other. */
 bool qmat_quadric_add_cone(qmat_quadric *quadric, const double a[4], const double b[4], double weight);
 
+/* Adds another quadric: the error becomes the sum of both. */
 void qmat_quadric_add(qmat_quadric *quadric, const qmat_quadric *other);
 
 /* The error of sphere `x`, at least 0. */
 double qmat_quadric_error(const qmat_quadric *quadric, const double x[4]);
 
-/* The sphere of least error. False when A is singular: a pivot of its LDL' factorisation is below 1e-9 of its trace. */
+/* The sphere of least error. False when A is singular: a pivot of its LDL' factorisation is below 1e-9 of its trace;
+ * `x` is then unchanged. */
 bool qmat_quadric_minimise(const qmat_quadric *quadric, double x[4]);
 
-/* The same for the given radius x[3]: only the centre is found. */
+/* The same for the given radius x[3]: only the centre is found, and is unchanged where the result is false. */
 bool qmat_quadric_minimise_centre(const qmat_quadric *quadric, double x[4]);
 
 #endif

@@ -21,12 +21,15 @@ typedef struct qmat_surface qmat_surface;
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface);
 /* The same without the sheets, in the unit frame of the whole mesh; qmat_surface_mesh is then without them too. */
 qmat_status qmat_surface_new_of_solids(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface);
+/* NULL is allowed. */
 void qmat_surface_free(qmat_surface *surface);
 
 /* The unit frame of all points. */
 const qmat_frame *qmat_surface_frame(const qmat_surface *surface);
 /* The mesh's vertices in the unit frame: 3 * vertex_count doubles, owned by the surface. */
 const double *qmat_surface_positions(const qmat_surface *surface);
+/* The mesh that the surface was built from, which the caller owns; of one without sheets, a mesh that borrows its
+ * arrays. */
 const qmat_mesh *qmat_surface_mesh(const qmat_surface *surface);
 /* Half the thickness of the sheets; 0 without sheets. */
 double qmat_surface_half_thickness(const qmat_surface *surface);

@@ -15,11 +15,12 @@ struct RTCDeviceTy;
 typedef struct qmat_triangle_blocks qmat_triangle_blocks;
 
 /* Builds the blocks. `positions` (3 doubles per vertex) and `triangles` (3 * count vertex ids) are borrowed and must
- * outlive them; their bounding box is about 1 wide. Degenerate triangles are allowed. Free with
- * qmat_triangle_blocks_free before the device. QMAT_ERROR_MEMORY; a failure of Embree is in the device's error state.
- * Cost: O(n log n) on all threads, about 60 bytes per triangle. */
+ * outlive them; their bounding box is about 1 wide. Degenerate triangles are allowed. Free
+ * `*blocks` with qmat_triangle_blocks_free before the device, also after a failure. QMAT_ERROR_MEMORY; a failure of
+ * Embree is in the device's error state. Cost: O(n log n) on all threads, about 60 bytes per triangle. */
 qmat_status qmat_triangle_blocks_new(qmat_context *context, struct RTCDeviceTy *device, const double *positions,
                                      const uint32_t *triangles, size_t count, qmat_triangle_blocks **blocks);
+/* NULL is allowed. */
 void qmat_triangle_blocks_free(qmat_triangle_blocks *blocks);
 
 /* The distance to the nearest triangle in double precision. `closest` (3 doubles) receives the closest point and
