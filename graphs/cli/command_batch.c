@@ -382,6 +382,16 @@ static qmat_status check_formats(const batch_call *call) {
   return QMAT_OK;
 }
 
+/* Refuses a model whose page would have the name of the page of all. */
+static qmat_status check_pages(const batch_call *call, const qmat_batch *batch) {
+  for (size_t i = 0; i < batch->count; i++)
+    if (strcasecmp(batch->assets[i].stem, "index") == 0)
+      return qmat_fail(call->context, QMAT_ERROR_USAGE,
+                       "the page of '%s' would have the name of the page of all models",
+                       qmat_show(batch->assets[i].input).text);
+  return QMAT_OK;
+}
+
 /* Makes a folder for the reports of the assets. On a cluster it is inside the results, the one folder that is shared.
  */
 static qmat_status make_report_folder(batch_call *call) {
@@ -447,6 +457,7 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   if (status == QMAT_OK)
     status = qmat_batch_find(context, inputs, count, qmat_invocation_value(invocation, "inputs"), results, &batch);
   if (status == QMAT_OK) status = prepare(&call);
+  if (status == QMAT_OK && call.pages) status = check_pages(&call, &batch);
   for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
   bool started = status == QMAT_OK;
   if (started && call.slurm)

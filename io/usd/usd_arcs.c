@@ -296,8 +296,7 @@ static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc a
 static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, size_t stack, const char *path,
                               const qmat_usd_time *time, const char *what) {
   const qmat_usd_stack *layers = &c->files->stacks[stack];
-  qmat_usd_time own = at->time;
-  if (time) own = (qmat_usd_time){.offset = own.offset + own.scale * time->offset, .scale = own.scale * time->scale};
+  const qmat_usd_time own = time ? qmat_usd_time_through(at->time, *time) : at->time;
   if (at->arcs_deep >= QMAT_USD_DEEPEST_ARCS)
     return qmat_usd_warn(c->prim, "the %s of <%s> is skipped: it leads back to itself", what, qmat_usd_shown(path));
   node *made;

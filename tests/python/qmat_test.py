@@ -220,11 +220,23 @@ class OfFiles(InAFolder):
         skin = qmat.Graph(text=OF_SPHERES).give("given.medial", medials[1]).run()["skin"]
         self.assertAlmostEqual(skin.vertices[:, 0].max(), 8, delta=.5)
 
+        with self.assertRaises(qmat.UsageError) as raised:
+            qmat.mat("scene.gltf", epsilon=.05, set={"model.defects": "drop"})
+        self.assertIn("merged", raised.exception.hint)
+
     def test_a_second_run_is_from_the_cache(self):
         for hits in (False, True):
             m = qmat.mat(BOX_V, BOX_F, epsilon=.05, cache="cache")
             self.assertEqual({node["cache"] == "hit" for node in m.report["nodes"]}, {hits})
         self.assertTrue(os.listdir("cache"))
+
+    def test_a_graph_has_the_mesh_that_was_given_last_as_it_was_then(self):
+        V, graph = BOX_V.copy(), qmat.Graph().set(epsilon=.05)
+        graph.give("model.mesh", V * 3, BOX_F).run("solid.mesh")
+        graph.give("model.mesh", V, BOX_F)
+        V *= 5
+        for _ in range(2):
+            self.assertEqual(graph.run("solid.mesh")["solid.mesh"].vertices.max(), BOX_V.max())
 
 
 class Mistakes(InAFolder):

@@ -79,6 +79,27 @@ holds "results are below the folder" test "$(cd below && find . -name '*.glb' | 
   "./results/box1.glb ./results/box3.glb ./results/over.glb "
 rm -r below models/sub over.off list.txt
 
+# A scene of which one mesh has no area: the others are made, and it is told.
+mkdir scenes
+cat >scenes/two.usda <<'END'
+#usda 1.0
+def Cube "good" {}
+def Mesh "bad" {
+  point3f[] points = [(0, 0, 0), (1, 0, 0)]
+  int[] faceVertexCounts = [3]
+  int[] faceVertexIndices = [0, 0, 1]
+}
+END
+"$qmat" mat scenes -o told --epsilon 20% --set samples.spacing=20% --quiet >out.txt 2>err.txt
+holds "the scene is made, not $?" test -s told/two.glb
+holds "a mesh that cannot be described is told" grep -q "two.usda: mesh .*bad.* cannot be described" err.txt
+rm -r scenes told
+
+cp models/box1.off Index.off
+batch --inputs 'Inde*.off' --out paged --pages
+holds "a model cannot take the name of the page of all" sh -c "[ $code -eq 2 ] && grep -q 'page of all models' err.txt"
+rm Index.off
+
 # Pages: one of each model, and one of all, with failures first. Names may need escapes.
 cat >pages.yaml <<'END'
 qmat: 1
