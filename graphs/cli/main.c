@@ -48,6 +48,7 @@ static void start_with_settings(char **argv) {
   if (getauxval(AT_SECURE)) return; /* the loader would remove the first again, and each start would start another */
   if (set_memory && setenv("GLIBC_TUNABLES", memory_settings, 1) != 0) return;
   if (set_threads && (setenv("OMP_WAIT_POLICY", "passive", 1) != 0 || setenv("GOMP_SPINCOUNT", "3000", 1) != 0)) return;
+  qmat_hold_interrupts(); /* until the next start catches them */
   execv("/proc/self/exe", argv);
 }
 

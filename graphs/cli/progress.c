@@ -23,11 +23,26 @@ static void on_interrupt(int number) {
   interrupted = 1;
 }
 
+static sigset_t interrupts(void) {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  return set;
+}
+
+void qmat_hold_interrupts(void) {
+  const sigset_t set = interrupts();
+  sigprocmask(SIG_BLOCK, &set, NULL);
+}
+
 void qmat_catch_interrupts(void) {
   struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)(SA_RESETHAND | SA_RESTART)};
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
+  const sigset_t set = interrupts();
+  sigprocmask(SIG_UNBLOCK, &set, NULL);
 }
 
 bool qmat_interrupted(void) {
