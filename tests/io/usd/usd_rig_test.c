@@ -192,25 +192,16 @@ static void test_motion_has_the_times_and_parts_of_the_animation(void **state) {
   release(&r);
 }
 
-static void test_times_go_through_references_and_start_at_the_scenes_start(void **state) {
-  (void)state;
+/* A file walk.usda beside a scene of 60 time codes a second that starts at code 30: a second of its animation takes two
+ * in the scene, from code 60 on, which is half a second after the start. */
+static void assert_walk(const char *walk, const char *scene) {
   char folder[64], path[96], name[96];
   make_folder(folder);
   snprintf(name, sizeof name, "%s/walk.usda", folder);
   snprintf(path, sizeof path, "%s/file.usda", folder);
-  const char walk[] =
-      "#usda 1.0\n(timeCodesPerSecond = 12)\ndef SkelAnimation \"walk\" {\n"
-      "uniform token[] joints = [\"hip\"]\n"
-      "float3[] translations.timeSamples = {0: [(0,0,0)], 12: [(0,0,1)]}\n}\n";
-  write_file(name, walk, sizeof walk - 1);
-  reading r = read_file(
-      "#usda 1.0\n(timeCodesPerSecond = 60\nstartTimeCode = 30)\ndef SkelRoot \"r\" {\n"
-      "rel skel:skeleton = </r/s>\nrel skel:animationSource = </r/walk>\n"
-      "def \"walk\" (references = @./walk.usda@</walk> (offset = 60; scale = 2)) {}\n" SKELETON(JOINTS BINDS RESTS)
-          MESH(BINDING) "}\n",
-      path);
+  write_file(name, walk, strlen(walk));
+  reading r = read_file(scene, path);
   assert_no_warning(&r);
-  /* A second of the animation takes two here, from code 60 on, which is half a second after the start. */
   assert_int_equal(r.scene->rig.key_count, 2);
   assert_numbers(r.scene->rig.key_times, (const double[]){0.5, 2.5}, 2);
   release(&r);
@@ -218,29 +209,26 @@ static void test_times_go_through_references_and_start_at_the_scenes_start(void 
   rmdir(folder);
 }
 
+#define WALK                                                           \
+  "def SkelAnimation \"walk\" {\nuniform token[] joints = [\"hip\"]\n" \
+  "float3[] translations.timeSamples = {0: [(0,0,0)], 12: [(0,0,1)]}\n}\n"
+
+static void test_times_go_through_references_and_start_at_the_scenes_start(void **state) {
+  (void)state;
+  assert_walk("#usda 1.0\n(timeCodesPerSecond = 12)\n" WALK,
+              "#usda 1.0\n(timeCodesPerSecond = 60\nstartTimeCode = 30)\ndef SkelRoot \"r\" {\n"
+              "rel skel:skeleton = </r/s>\nrel skel:animationSource = </r/walk>\n"
+              "def \"walk\" (references = @./walk.usda@</walk> (offset = 60; scale = 2)) {}\n" SKELETON(
+                  JOINTS BINDS RESTS) MESH(BINDING) "}\n");
+}
+
 static void test_times_go_through_sublayers(void **state) {
   (void)state;
-  char folder[64], path[96], name[96];
-  make_folder(folder);
-  snprintf(name, sizeof name, "%s/walk.usda", folder);
-  snprintf(path, sizeof path, "%s/file.usda", folder);
-  const char walk[] =
-      "#usda 1.0\n(timeCodesPerSecond = 12)\nover \"r\" { def SkelAnimation \"walk\" {\n"
-      "uniform token[] joints = [\"hip\"]\n"
-      "float3[] translations.timeSamples = {0: [(0,0,0)], 12: [(0,0,1)]}\n} }\n";
-  write_file(name, walk, sizeof walk - 1);
-  reading r = read_file(
-      "#usda 1.0\n(timeCodesPerSecond = 60\nstartTimeCode = 30\n"
-      "subLayers = [@./walk.usda@ (offset = 60; scale = 2)])\ndef SkelRoot \"r\" {\n"
-      "rel skel:skeleton = </r/s>\nrel skel:animationSource = </r/walk>\n" SKELETON(JOINTS BINDS RESTS)
-          MESH(BINDING) "}\n",
-      path);
-  assert_no_warning(&r);
-  assert_int_equal(r.scene->rig.key_count, 2);
-  assert_numbers(r.scene->rig.key_times, (const double[]){0.5, 2.5}, 2);
-  release(&r);
-  unlink(name);
-  rmdir(folder);
+  assert_walk("#usda 1.0\n(timeCodesPerSecond = 12)\nover \"r\" { " WALK "}\n",
+              "#usda 1.0\n(timeCodesPerSecond = 60\nstartTimeCode = 30\n"
+              "subLayers = [@./walk.usda@ (offset = 60; scale = 2)])\ndef SkelRoot \"r\" {\n"
+              "rel skel:skeleton = </r/s>\nrel skel:animationSource = </r/walk>\n" SKELETON(JOINTS BINDS RESTS)
+                  MESH(BINDING) "}\n");
 }
 
 static void test_what_cannot_be_used_is_left_out_with_one_warning(void **state) {
