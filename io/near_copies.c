@@ -14,14 +14,18 @@ static bool are_equal(const void *a, const void *b, size_t bytes) {
   return bytes == 0 || memcmp(a, b, bytes) == 0;
 }
 
-/* Whether two meshes differ at most in their positions. A subdivision surface has a cage with positions of its own. */
-static bool are_alike(const qmat_mesh *a, const qmat_mesh *b) {
+/* Whether two meshes have the same counts and marks. A subdivision surface has a cage with positions of its own. */
+static bool count_alike(const qmat_mesh *a, const qmat_mesh *b) {
   return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
          a->sheet_triangle_count == b->sheet_triangle_count && a->flap_triangle_count == b->flap_triangle_count &&
          a->sheet_thickness == b->sheet_thickness && a->closed == b->closed && a->oriented == b->oriented &&
          a->deviation == b->deviation && a->meters_per_unit == b->meters_per_unit &&
-         a->skinned_count == b->skinned_count && a->cage.face_count == 0 && b->cage.face_count == 0 &&
-         are_equal(a->triangles, b->triangles, 3 * a->triangle_count * sizeof *a->triangles) &&
+         a->skinned_count == b->skinned_count && a->cage.face_count == 0 && b->cage.face_count == 0;
+}
+
+/* Whether two meshes that count alike have the same triangles and skins. */
+static bool are_joined_alike(const qmat_mesh *a, const qmat_mesh *b) {
+  return are_equal(a->triangles, b->triangles, 3 * a->triangle_count * sizeof *a->triangles) &&
          are_equal(a->joints, b->joints, 4 * a->skinned_count * sizeof *a->joints) &&
          are_equal(a->weights, b->weights, 4 * a->skinned_count * sizeof *a->weights);
 }
@@ -89,9 +93,10 @@ static size_t find_originals(const qmat_list *list, original *originals, size_t 
     const qmat_mesh *mesh = (const qmat_mesh *)list->items[i];
     for (size_t k = 0; k < count && of[i] == SIZE_MAX; k++) {
       const qmat_mesh *first = (const qmat_mesh *)list->items[originals[k].item];
-      if (!are_alike(first, mesh)) continue;
+      if (!count_alike(first, mesh)) continue;
+      /* Positions first: those of other meshes mostly differ from the first vertex on. */
       const double move = largest_move(first, mesh, originals[k].nearest);
-      if (!(move <= originals[k].nearest)) continue;
+      if (!(move <= originals[k].nearest) || !are_joined_alike(first, mesh)) continue;
       of[i] = k;
       originals[k].is_varied |= move > 0;
     }

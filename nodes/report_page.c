@@ -212,7 +212,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_report_page = {
     .name = "report.page",
-    .version = 4,
+    .version = 5,
     .summary = "Makes a page that shows a surface and its medial mesh in a browser",
     .doc =
         "One HTML file, which needs no server, no network and no other file. It shows the surface, coloured by its "

@@ -47,7 +47,8 @@ static qmat_status draw_mesh(qmat_context *context, const qmat_picture_options *
   caption->spheres += medial->sphere_count;
   caption->cones += medial->edge_count;
   caption->slabs += medial->triangle_count;
-  caption->range = fmax(caption->range, shown.range);
+  const bool is_first = caption->range == 0, is_alike = fabs(shown.range - caption->range) <= 1e-9 * shown.range;
+  caption->range = is_first || is_alike ? shown.range : (double)NAN;
   /* one mesh without errors leaves all without */
   const double out = qmat_shown_number(report, "surface_to_envelope"),
                in = qmat_shown_number(report, "envelope_to_surface");
@@ -144,7 +145,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, &qmat_libr
 
 const qmat_node qmat_node_report_picture = {
     .name = "report.picture",
-    .version = 2,
+    .version = 3,
     .summary = "Draws a surface and its medial mesh as PNG or SVG",
     .doc =
         "Spheres are orange, cones blue and slabs green, each cut exactly where others cover it. The surface has the "

@@ -296,14 +296,15 @@ static qmat_status write_usd(qmat_context *context, const scene_write_params *pa
                         file);
 }
 
-/* Colliders alone, as robot simulators read them. */
+/* Colliders alone, as robot simulators read them, in metres. `own`: metres of a unit of the mesh, by its report. */
 static qmat_status write_robot(qmat_context *context, const scene_write_params *params,
-                               const qmat_value *const inputs[], qmat_file **file) {
+                               const qmat_value *const inputs[], double own, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
+  const double of_scene = scene ? scene->meters_per_unit : 0;
   if (inputs[IN_COLLIDERS])
     return qmat_robot_write(context, (const qmat_colliders *)inputs[IN_COLLIDERS],
                             (qmat_robot_format)(params->format - FORMAT_URDF + QMAT_ROBOT_URDF),
-                            scene ? scene->name : NULL, scene ? scene->meters_per_unit : 0, file);
+                            scene ? scene->name : NULL, own > 0 ? own : of_scene, file);
   qmat_fail(context, QMAT_ERROR_USAGE, "urdf, xml and yaml hold colliders, and there are none");
   qmat_fail_field(context, "colliders");
   return qmat_fail_hint(context, "qmat mat: --colliders; in a graph: connect medial.colliders, as in colliders.yaml");
@@ -429,9 +430,11 @@ static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc"
 /* Scales that differ by less come from rounding. */
 static const double same_scale = 1e-6;
 
-/* Whether a file without a scene has the coordinates of one of its meshes, whose nodes scale it. */
+/* Whether a file without a scene has the coordinates of one of its meshes, whose nodes scale it. Files for robots are
+ * in metres. */
 static bool has_own_units(const scene_write_params *params, const qmat_scene *scene, double own) {
-  const bool is_alone = holds_no_scene(params) || (is_usd(params) && !keeps_scene(params, scene));
+  const bool is_alone =
+      (holds_no_scene(params) && params->format < FORMAT_URDF) || (is_usd(params) && !keeps_scene(params, scene));
   return is_alone && scene && scene->mesh_count > 0 && own > 0 && scene->meters_per_unit > 0 &&
          fabs(own / scene->meters_per_unit - 1) > same_scale;
 }
@@ -477,7 +480,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
       case FORMAT_XML:
       case FORMAT_YAML:
         stated[0] = errors_of(medial, (const qmat_report *)inputs[IN_REPORT]);
-        status = write_robot(context, params, inputs, &file);
+        status = write_robot(context, params, inputs, stated[0].meters_per_unit, &file);
         break;
       case FORMAT_USDA:
       case FORMAT_USDC:
@@ -586,7 +589,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 18,
+    .version = 19,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

@@ -94,7 +94,7 @@ export function bodiesOf(file) {
 
 // ---- shapes ----
 
-/** Points whose convex hull contains a sphere [x, y, z, radius] and is at most 4 % larger: a cube's face grid, thrown onto
+/** Points whose convex hull contains a sphere [x, y, z, radius] and is at most 4.5 % larger: a cube's face grid, thrown onto
  * the sphere. */
 function around([x, y, z, r]) {
   const points = [], grid = [-1, -0.45, 0, 0.45, 1];
@@ -124,8 +124,9 @@ const grown = (shape, s) => (shape.points ? { points: shape.points.map((p) => p.
   shape.ends ? { ends: shape.ends.map((p) => p.map((v) => s * v)) } :
     { center: shape.center.map((v) => s * v), radius: s * shape.radius });
 
-/** Mass, centre and inertia about it for a body in other units of length. A body whose file states no mass has mass 1 and
- * the inertia of the box around its shapes. */
+/** Mass, centre and inertia about it for a body in other units of length, `s` of them to one of its node. A stated inertia is
+ * in kg m^2, whatever the scale of the node. A body whose file states no mass has mass 1 and the inertia of the box around its
+ * shapes. A body that forces do not move keeps the frame of its node. */
 function motionOf(body, s) {
   const m = body.motion, mass = m?.mass ?? 1, low = [Infinity, Infinity, Infinity], high = low.map((v) => -v);
   const reach = (p, r) => p.forEach((v, k) => { low[k] = Math.min(low[k], v - r); high[k] = Math.max(high[k], v + r); });
@@ -135,7 +136,9 @@ function motionOf(body, s) {
     if (center) reach(center, radius);
   }
   const sides = high.map((v, k) => (v - low[k]) ** 2), total = sides[0] + sides[1] + sides[2];
-  const inertia = (m?.inertiaDiagonal ?? sides.map((v) => (mass * (total - v)) / 12)).map((v) => v * s * s);
+  const meters = size(body.matrix); // of a unit of the node
+  const inertia = (m?.inertiaDiagonal?.map((v) => v / meters ** 2) ?? sides.map((v) => (mass * (total - v)) / 12)).map((v) => v * s * s);
+  if (!isDynamic(body)) return { mass, inertia, centre: [0, 0, 0], frame: [0, 0, 0, 1] };
   const centre = m?.centerOfMass ?? (m?.mass === undefined ? high.map((v, k) => (v + low[k]) / 2) : [0, 0, 0]);
   return { mass, inertia, centre: centre.map((v) => s * v), frame: m?.inertiaOrientation ?? [0, 0, 0, 1] };
 }
@@ -243,6 +246,10 @@ export function addToBullet(Ammo, world, body, { at = [0, 0, 0], rotation = [0, 
     compound, vec(isDynamic(body) ? inertia : [0, 0, 0]));
   info.set_m_friction(friction);
   const made = new Ammo.btRigidBody(info);
+  if (body.motion?.isKinematic) {
+    made.setCollisionFlags(made.getCollisionFlags() | 2); // CF_KINEMATIC_OBJECT
+    made.setActivationState(4); // DISABLE_DEACTIVATION
+  }
   world.addRigidBody(made);
   const pose = () => {
     const of = made.getWorldTransform(), p = of.getOrigin(), q = of.getRotation();

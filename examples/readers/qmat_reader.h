@@ -28,7 +28,7 @@ typedef struct qmr_medial {
   uint32_t *slabs;  /* 3 each: convex hulls of three spheres */
   uint32_t *cones;  /* 2 each: convex hulls of two spheres, those that are no side of a slab */
   uint32_t *points; /* 1 each: spheres on no cone and no slab */
-  double *errors;   /* 1 each sphere: bound of its distance to the surface; NULL: not in the file */
+  double *errors;   /* 1 each sphere: bound of the distance of the surface that it answers for; NULL: not in the file */
   uint16_t *joints; /* 4 each sphere: numbers in the skin's joints; NULL: not in the file */
   double *weights;  /* 4 each sphere, of sum 1; NULL: not in the file */
 } qmr_medial;

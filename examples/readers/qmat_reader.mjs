@@ -170,6 +170,16 @@ export function ray(medial, origin, direction, most = Infinity) {
   return hit;
 }
 
+/** The medial mesh of a node. One that cannot be read is told on the console, and the rest of the model is loaded. */
+function ofNode(extras, name) {
+  try {
+    return ofExtras(extras);
+  } catch (error) {
+    console.warn(`${name}: ${error.message}`);
+    return null;
+  }
+}
+
 // ---- three.js ----
 
 /** A plugin of GLTFLoader: `loader.register(() => new ThreePlugin())`. Objects of nodes that have a medial mesh get it as
@@ -179,7 +189,7 @@ export class ThreePlugin {
   async afterRoot(gltf) {
     for (const scene of gltf.scenes) {
       scene.traverse((object) => {
-        const medial = ofExtras(object.userData);
+        const medial = ofNode(object.userData, object.name);
         if (medial) object.medial = medial;
       });
     }
@@ -222,7 +232,7 @@ export function babylonExtension(loader) {
     dispose() {},
     loadNodeAsync(context, node, assign) {
       return loader.loadNodeAsync(context, node, (transformNode) => {
-        const medial = ofExtras(node.extras);
+        const medial = ofNode(node.extras, node.name);
         if (medial) transformNode.metadata = { ...transformNode.metadata, medial };
         assign(transformNode);
       });

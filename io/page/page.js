@@ -8,7 +8,13 @@ const page = JSON.parse(document.getElementById('data').textContent);
 const $ = (id) => document.getElementById(id);
 const HALF_VIEW = Math.tan(Math.PI / 12);
 const FILLED = 0.92;
-const canRead = 'DecompressionStream' in globalThis; // else the page shows its picture
+const canRead = (() => { // else the page shows its picture
+  try {
+    return Boolean(new DecompressionStream('deflate-raw'));
+  } catch {
+    return false;
+  }
+})();
 const KINDS = ['sphere', 'cone', 'slab'];
 const css = (colour) => `rgb(${colour.map((x) => Math.round(255 * x)).join(' ')})`;
 
@@ -24,24 +30,24 @@ function make(tag, attributes = {}, ...children) {
 const count = (n) => n.toLocaleString('en-US');
 const counted = (n, name) => `${count(n)} ${name}${n === 1 ? '' : 's'}`;
 
-/** An upper bound as a percentage, rounded up as qmat prints it. */
-function percent(x) {
-  return `${(Math.ceil(1e4 * x - 1e-6) / 100).toFixed(2).replace(/\.?0+$/, '')} %`;
+/** A number rounded up to that many digits: what is shown are upper bounds. */
+function roundedUp(x, digits) {
+  if (!(x > 0)) return 0;
+  const decimals = Math.max(digits - 1 - Math.floor(Math.log10(x)), 0);
+  return Number((Math.ceil(x * 10 ** decimals * (1 - 1e-12)) / 10 ** decimals).toFixed(decimals));
 }
 
-/** Three digits, rounded up: lengths are upper bounds. */
-function threeDigits(x) {
-  if (!(x > 0)) return 0;
-  const digit = 10 ** (Math.floor(Math.log10(x)) - 2);
-  return Number((Math.ceil(x / digit - 1e-9) * digit).toPrecision(3));
+/** An upper bound as a percentage, as qmat prints it. */
+function percent(x) {
+  return x > 0 ? `${roundedUp(Math.max(100 * x, 0.001), 2)} %` : '0 %';
 }
 
 /** A share of the diagonal as a length, where the unit is known, else in the units of the model. */
 function length(mesh, share) {
   const meters = share * mesh.diagonal * mesh.meters_per_unit;
-  if (!(meters > 0)) return `${threeDigits(share * mesh.diagonal)} units`;
+  if (!(meters > 0)) return `${roundedUp(share * mesh.diagonal, 3)} units`;
   const [unit, size] = [['km', 1e3], ['m', 1], ['cm', 1e-2], ['mm', 1e-3], ['\u00b5m', 1e-6]].find(([, size]) => meters >= size) ?? ['\u00b5m', 1e-6];
-  return `${threeDigits(meters / size)} ${unit}`;
+  return `${roundedUp(meters / size, 3)} ${unit}`;
 }
 
 // ---- data ----
@@ -92,7 +98,7 @@ function reduced(spheres, edges, slabs, idOf) {
   return { spheres, edges: keptEdges, slabs: keptSlabs };
 }
 
-/** All levels of detail: level n is the medial mesh after n collapses, as medial.lod extracts it. */
+/** All levels of detail, each named by its number of spheres: the medial meshes that medial.lod extracts. */
 class Chain {
   static async read(json) {
     const chain = new Chain();
@@ -149,6 +155,7 @@ class Mesh {
     mesh.normals = await arrayOf(s.normals, Int8Array, 3);
     mesh.errors = await arrayOf(s.errors, Int16Array, 1);
     mesh.corners = await arrayOf(s.corners, Uint32Array, 1);
+    mesh.reach = reachOf(mesh);
     return mesh;
   }
 }
@@ -183,6 +190,14 @@ function axesOf({ turn, tilt }) {
   return { right: [ca, 0, -sa], up: [-sa * sb, cb, -ca * sb], towards: [sa * cb, sb, ca * cb] };
 }
 
+/** How far from the origin anything of a mesh is; levels of detail stick out a little more. */
+function reachOf({ positions, result: { spheres } }) {
+  let reach = 0;
+  for (let i = 0; i < positions.length; i += 3) reach = Math.max(reach, Math.hypot(positions[i], positions[i + 1], positions[i + 2]) / 32767);
+  for (let i = 0; i < spheres.length; i += 4) reach = Math.max(reach, Math.hypot(spheres[i], spheres[i + 1], spheres[i + 2]) + spheres[i + 3]);
+  return reach + 0.1;
+}
+
 /** How far away the camera has to be for all of the model to be in view. */
 function fittingDistance(mesh, axes, aspect) {
   const tall = HALF_VIEW * FILLED, wide = tall * aspect;
@@ -203,14 +218,14 @@ const COMMON = `#version 300 es
 precision highp float;
 precision highp int;
 uniform vec3 right, up, towards, target;
-uniform float away, aspect;
+uniform float away, aspect, reach; // nothing is farther from the target than the last
 const float HALF = ${HALF_VIEW};
 `;
 
 const PROJECT = `
 vec4 project(vec3 p) {
   vec3 d = p - target;
-  float w = away - dot(d, towards), near = max(1e-3, away - 4.0), far = away + 4.0;
+  float w = away - dot(d, towards), near = max(1e-3, away - reach), far = away + reach;
   return vec4(dot(d, right) / (HALF * aspect), dot(d, up) / HALF, (w * (far + near) - 2.0 * far * near) / (far - near), w);
 }
 `;
@@ -316,6 +331,7 @@ void main() {
   float t = approach(s.xyz, near), square = s.w * s.w - dot(near, near);
   if (square <= 0.0) discard;
   float depth = sqrt(square);
+  if (t - depth <= 0.0) discard; // behind the eye
   finish(t - depth, near - depth * ray);
 }`];
 
@@ -428,6 +444,7 @@ class Drawing {
     for (const name of ['right', 'up', 'towards', 'target']) gl.uniform3fv(uniforms[name], camera[name]);
     gl.uniform1f(uniforms.away, camera.away);
     gl.uniform1f(uniforms.aspect, aspect);
+    gl.uniform1f(uniforms.reach, camera.reach);
     return uniforms;
   }
   drawMedial(camera, aspect, hidden) {
@@ -501,7 +518,7 @@ const fits = new Map();
 function cameraOf(aspect) {
   const key = `${meshes.indexOf(state.mesh)} ${aspect.toFixed(4)}`;
   if (!fits.has(key)) fits.set(key, fittingDistance(state.mesh, axesOf(page.camera), aspect));
-  return { ...axesOf(state), target: state.pan, away: fits.get(key) * state.zoom };
+  return { ...axesOf(state), target: state.pan, away: fits.get(key) * state.zoom, reach: state.mesh.reach + Math.hypot(...state.pan) };
 }
 
 /** Where a place is seen, in pixels from the top left of a stage of that height; null: it is out of view. */
@@ -584,6 +601,7 @@ function picture(width, height, background) {
 }
 
 function save() {
+  if (!drawing) return;
   const stage = $('stage'), background = getComputedStyle(stage).backgroundColor;
   picture(2 * stage.clientWidth, 2 * stage.clientHeight, background).toBlob((blob) => {
     const link = make('a', { download: `${state.mesh.name}.png`, href: URL.createObjectURL(blob) });
@@ -648,7 +666,7 @@ function showBar() {
 
 function showLevel() {
   const chain = state.mesh.chain;
-  $('levels').hidden = !chain;
+  $('levels').hidden = !chain || !drawing;
   if (!canRead) return;
   complex = state.spheres === null ? state.mesh.result : chain.level(state.spheres);
   drawing?.setMedial(complex);
@@ -758,7 +776,7 @@ function turn(dx, dy) {
 }
 
 function move(dx, dy) {
-  const height = panelsOf($('stage').clientWidth, $('stage').clientHeight)[0].height, camera = cameraOf(1), size = (2 * HALF_VIEW * camera.away) / height;
+  const { width, height } = panelsOf($('stage').clientWidth, $('stage').clientHeight)[0], camera = cameraOf(width / height), size = (2 * HALF_VIEW * camera.away) / height;
   state.pan = state.pan.map((x, k) => Math.min(Math.max(x - size * (dx * camera.right[k] - dy * camera.up[k]), -1), 1));
   redraw();
 }
@@ -800,8 +818,11 @@ function listen() {
       redraw();
     });
   }
-  stage.addEventListener('contextmenu', (event) => event.preventDefault());
+  stage.addEventListener('contextmenu', (event) => {
+    if (drawing) event.preventDefault();
+  });
   stage.addEventListener('wheel', (event) => {
+    if (!drawing || event.target.closest('#keys')) return;
     event.preventDefault();
     zoom(Math.exp(0.0015 * Math.min(Math.max(event.deltaY, -200), 200)));
   }, { passive: false });
@@ -812,7 +833,7 @@ function listen() {
   addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrow = arrows[event.key], on = event.target;
-    if (arrow && (on === stage || on === document.body)) {
+    if (arrow && drawing && (on === stage || on === document.body)) {
       if (event.shiftKey) move(16 * arrow[0], 16 * arrow[1]);
       else turn(5 * arrow[0], 5 * arrow[1]);
       event.preventDefault();
@@ -840,6 +861,25 @@ function listen() {
   new ResizeObserver(redraw).observe(stage);
 }
 
+/** null: there is no WebGL, or it fails. */
+function newDrawing() {
+  try {
+    const made = canRead ? new Drawing($('canvas')) : {};
+    return made.gl ? made : null;
+  } catch (error) {
+    console.error(error);
+    return null;
+  }
+}
+
+/** Shows the drawing; without one, the still picture. */
+function setDrawing(made) {
+  drawing = made;
+  $('stage').classList.toggle('still', !drawing);
+  for (const id of ['canvas', 'labels', 'tools']) $(id).hidden = !drawing;
+  for (const id of ['still', 'without']) $(id).hidden = Boolean(drawing);
+}
+
 function start() {
   $('footer').textContent = `Made by qmat ${page.version}. Lengths in percent are shares of the diagonal of the bounding box.`;
   $('run').hidden = false;
@@ -859,24 +899,21 @@ function start() {
     $('mesh').append(option);
   });
   $('mesh-choice').hidden = meshes.length < 2;
-  const made = canRead ? new Drawing($('canvas')) : {};
-  const lost = () => {
-    drawing = null;
-    $('stage').classList.add('still');
-    for (const [id, hidden] of [['canvas', true], ['labels', true], ['still', false], ['tools', true], ['without', false], ['levels', true], ['bar-section', true]]) $(id).hidden = hidden;
-  };
-  if (made.gl) {
-    drawing = made;
-    for (const [id, hidden] of [['canvas', false], ['still', true], ['tools', false], ['without', true]]) $(id).hidden = hidden;
-    $('canvas').addEventListener('webglcontextlost', lost);
-  } else {
-    lost();
-  }
+  setDrawing(newDrawing());
+  $('canvas').addEventListener('webglcontextlost', (event) => {
+    event.preventDefault(); // it may come back
+    setDrawing(null);
+    showLevel();
+  });
+  $('canvas').addEventListener('webglcontextrestored', () => {
+    setDrawing(newDrawing());
+    drawing?.setSurface(state.mesh);
+    showLevel();
+  });
   listen();
   setView('both');
   showMesh();
   showTheme();
-  if (!drawing) lost();
 }
 
 start();

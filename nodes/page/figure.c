@@ -66,7 +66,8 @@ static void put_bar(qmat_writer *writer, const qmat_caption *caption) {
     format_colour(colour, hex);
     put(writer, "<stop offset='%d%%' stop-color='%s'/>", 25 * i, hex);
   }
-  qmat_format_bound(caption->range, range);
+  range[0] = '\0';
+  if (isfinite(caption->range)) qmat_format_bound(caption->range, range);
   put(writer,
       "</linearGradient></defs><rect x='640' y='26' width='296' height='10' rx='5' fill='url(#e)'/>\n"
       "<text x='640' y='58'>&#8722;%s</text><text x='788' y='58' text-anchor='middle'>0</text>"

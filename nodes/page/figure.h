@@ -9,7 +9,8 @@
 typedef struct qmat_caption {
   const char *name;             /* UTF-8; NULL: none */
   size_t spheres, cones, slabs; /* of all medial meshes */
-  double range;                 /* where the colours of the error end, as a share of the diagonal */
+  double range;                 /* where the colours of the error end, as a share of the diagonal; NAN: not the same
+                                 * for all meshes */
   double error_out, error_in;   /* the errors, as shares of the diagonal; NAN: not known */
   bool has_errors, has_medial;  /* the colour bar, and the colours of the primitives, are explained */
 } qmat_caption;

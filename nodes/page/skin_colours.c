@@ -47,19 +47,24 @@ static void linear_colours(uint8_t bytes[QMAT_LOOK_KINDS][4]) {
   }
 }
 
+enum { SLICE = 4096 }; /* vertices between two calls of the progress function */
+
 qmat_status qmat_skin_colours(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                               const uint8_t **colours) {
   uint8_t kinds[QMAT_LOOK_KINDS][4], *made = qmat_arena_alloc(&context->arena, skin->vertex_count, 4);
   *colours = made;
   if (!made) return qmat_fail_memory(context, "colours");
   qmat_envelope *envelope;
-  const qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);
-  if (status != QMAT_OK) return status;
+  qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);
   linear_colours(kinds);
   const int threads = qmat_threads(context);
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
-  for (size_t v = 0; v < skin->vertex_count; v++)
-    memcpy(made + 4 * v, kinds[kind_at(medial, envelope, skin->positions + 3 * v)], 4);
+  for (size_t first = 0; first < skin->vertex_count && status == QMAT_OK; first += SLICE) {
+    const size_t end = first + SLICE < skin->vertex_count ? first + SLICE : skin->vertex_count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
+    for (size_t v = first; v < end; v++)
+      memcpy(made + 4 * v, kinds[kind_at(medial, envelope, skin->positions + 3 * v)], 4);
+    status = qmat_progress(context, end, skin->vertex_count, "colours");
+  }
   qmat_envelope_free(envelope);
-  return qmat_progress(context, 0, 0, "colours");
+  return status;
 }

@@ -53,6 +53,7 @@ typedef struct wiring {
   const qmat_scene *scene;
   const qmat_mesh *skin;
   const qmat_report *report;
+  const qmat_colliders *colliders;
 } wiring;
 
 /* `report`: gets the report, which the caller releases; NULL: nobody wants it. */
@@ -65,6 +66,7 @@ static qmat_file *must_write_with_report(const qmat_medial *medial, wiring with,
   inputs[qmat_input_find(node, "scene")] = with.scene ? &with.scene->base : NULL;
   inputs[qmat_input_find(node, "skin")] = with.skin ? &with.skin->base : NULL;
   inputs[qmat_input_find(node, "report")] = with.report ? &with.report->base : NULL;
+  inputs[qmat_input_find(node, "colliders")] = with.colliders ? &with.colliders->base : NULL;
   qmat_value *outputs[2] = {NULL};
   void *params = make_params(node, settings);
   qmat_context context = {0};
@@ -397,6 +399,49 @@ static void test_a_file_in_the_units_of_a_mesh_says_so(void **state) {
   qmat_value_release(&medial->base);
 }
 
+/* Colliders of a centimetre mesh of a metre scene, beside a glTF file: a sphere of radius 2. */
+static void test_files_for_robots_are_in_metres(void **state) {
+  (void)state;
+  static const double tetrahedron[] = {-2, -2, -2, 2, 2, -2, -2, 2, 2, 2, -2, 2};
+  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  qmat_context context = {0};
+  qmat_scene *scene = qmat_scene_new();
+  qmat_colliders *c = qmat_colliders_new();
+  assert_true(scene && c);
+  scene->name = qmat_strdup("ball");
+  scene->format = qmat_strdup("glb");
+  scene->meters_per_unit = 1;
+  scene->mesh_count = 1;
+  scene->meshes = qmat_calloc(1, sizeof *scene->meshes);
+  c->sphere_count = c->shape_count = 1;
+  c->point_count = c->triangle_count = 4;
+  c->spheres = qmat_calloc(4, sizeof(double));
+  c->spheres[3] = 2;
+  c->shapes = qmat_calloc(3, sizeof(uint32_t));
+  c->points = qmat_alloc(12, sizeof(double));
+  c->triangles = qmat_alloc(12, sizeof(uint32_t));
+  memcpy(c->points, tetrahedron, sizeof tetrahedron);
+  memcpy(c->triangles, faces, sizeof faces);
+  c->hull_ends = qmat_alloc(2, sizeof(uint32_t));
+  c->hull_ends[0] = c->hull_ends[1] = 4;
+  assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
+  assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
+  qmat_medial *medial = make_medial();
+  qmat_report *given = make_report(json_pack("{s:f}", "meters_per_unit", 0.01)), *report;
+  const char *const settings[][2] = {{"format", "urdf"}, {NULL, NULL}};
+  qmat_file *file =
+      must_write_with_report(medial, (wiring){.scene = scene, .report = given, .colliders = c}, settings, &report);
+  assert_non_null(memmem(file->parts[0].bytes, file->parts[0].size, "radius=\"0.02\"", 13));
+  assert_int_equal(json_array_size(json_object_get(report->root, "warnings")), 0);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  qmat_value_release(&given->base);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&scene->base);
+  qmat_value_release(&c->base);
+  qmat_context_uninit(&context);
+}
+
 /* `mat -o x.glb -o x.ma --set asset.draco=true` makes both files with the same parameters. */
 static void test_compression_does_not_apply_to_formats_that_have_none(void **state) {
   (void)state;
@@ -500,6 +545,7 @@ int main(void) {
       cmocka_unit_test(test_each_format_is_made),
       cmocka_unit_test(test_ma_keeps_every_number),
       cmocka_unit_test(test_a_file_in_the_units_of_a_mesh_says_so),
+      cmocka_unit_test(test_files_for_robots_are_in_metres),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
       cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),
       cmocka_unit_test(test_what_is_not_certified_fails_where_that_is_required),

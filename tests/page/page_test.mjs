@@ -170,6 +170,28 @@ async function testHands(browser) {
   check('keys and fingers', did.turned && did.nearer && did.view === 'overlay' && did.marks === 1 && did.back && did.dark === 'dark' && did.pinched, JSON.stringify(did));
 }
 
+/** The drawing goes with the graphics context, and comes back with it. */
+async function testLostContext(browser) {
+  const png = readFileSync(`${folder}/both.png`).toString('base64');
+  const did = await browser.run(`${COMPARE}
+    const canvas = document.getElementById('canvas'), hand = canvas.getContext('webgl2').getExtension('WEBGL_lose_context');
+    const event = (name) => new Promise((give) => canvas.addEventListener(name, () => setTimeout(give, 50), { once: true }));
+    const hidden = () => ['canvas', 'tools', 'still', 'levels'].map((id) => document.getElementById(id).hidden).join();
+    const lost = event('webglcontextlost');
+    hand.loseContext();
+    await lost;
+    qmatPage.setLevel(30);
+    qmatPage.setLevel(null);
+    document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 's', bubbles: true }));
+    const without = hidden(), restored = event('webglcontextrestored');
+    hand.restoreContext();
+    await restored;
+    qmatPage.setView('both');
+    return { without, back: hidden(), apart: await compare(qmatPage.picture(640, 320), '${png}') };`);
+  check('a lost context leaves the picture', did.without === 'true,true,false,true', did.without);
+  check('a context that comes back draws the same', did.back === 'false,false,true,false' && did.apart.mean < 1.0 && did.apart.drawn > 0.05, JSON.stringify(did));
+}
+
 /** Texts and controls do not overlap, and nothing is wider than the window. */
 const LAYOUT = `
   const wide = [...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('#labels')).map((e) => e.id || e.tagName);
@@ -201,6 +223,7 @@ await inBrowser(['--enable-unsafe-swiftshader'], async (browser) => {
   await testView(browser);
   await testLevels(browser);
   await testHands(browser);
+  await testLostContext(browser);
   for (const [width, dark] of [[360, false], [768, true], [1600, false]]) {
     await browser.open(width, 900, dark);
     const layout = await browser.run(LAYOUT);

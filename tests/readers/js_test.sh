@@ -11,6 +11,7 @@ fi
 work=$2/reader_packages
 mkdir -p "$work"
 node "$1/tests/readers/js_test.mjs" "$1/examples/readers"
+node "$1/tests/readers/motion_test.mjs" "$1/examples/readers"
 if ! cmp -s "$1/tests/readers/package.json" "$work/package.json" || [ ! -e "$work/node_modules/.complete" ]; then
   cp "$1/tests/readers/package.json" "$work/package.json"
   if ! (cd "$work" && npm install --no-audit --no-fund --no-package-lock >install.log 2>&1 && touch node_modules/.complete); then

@@ -11,10 +11,12 @@ const folders = { '/assets/': assets, '/readers/': join(here, '../../readers'), 
 const types = { html: 'text/html', js: 'text/javascript', mjs: 'text/javascript', wasm: 'application/wasm', json: 'application/json' };
 
 const server = createServer((request, response) => {
-  let path = '/none';
+  let path = '/', about;
   try {
     path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-  } catch { /* a malformed address */ }
+  } catch {
+    path = '/none'; // a malformed address
+  }
   if (path === '/assets.json') {
     response.setHeader('Content-Type', 'application/json');
     response.end(JSON.stringify(readdirSync(assets).filter((name) => name.endsWith('.glb'))));
@@ -22,12 +24,15 @@ const server = createServer((request, response) => {
   }
   const prefix = Object.keys(folders).find((start) => path.startsWith(start));
   const file = join(folders[prefix], path === '/' ? 'index.html' : path.slice(prefix.length));
-  if (!statSync(file, { throwIfNoEntry: false })?.isFile()) {
+  try {
+    about = statSync(file);
+  } catch { /* none, or a name that no file can have */ }
+  if (!about?.isFile()) {
     response.statusCode = 404;
     response.end();
     return;
   }
   response.setHeader('Content-Type', types[file.split('.').pop()] ?? 'application/octet-stream');
-  createReadStream(file).pipe(response);
+  createReadStream(file).on('error', () => response.destroy()).pipe(response);
 });
 server.listen(Number(process.argv[3] ?? 8080), 'localhost', () => console.log(`http://localhost:${server.address().port}/`));
