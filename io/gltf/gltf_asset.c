@@ -243,17 +243,20 @@ size_t qmat_gltf_parent_of(const json_t *root, size_t node) {
   return SIZE_MAX;
 }
 
-void qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
+bool qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
                              bool (*is_dropped)(const json_t *root, const json_t *child)) {
   json_t *children = json_object_get(node, "children"), *nodes = json_object_get(root, "nodes");
+  bool any = false;
   for (size_t i = json_array_size(children); i-- > 0;) {
     const size_t id = (size_t)json_number_value(json_array_get(children, i));
     json_t *child = id < given ? json_array_get(nodes, id) : NULL;
     if (!child || !is_dropped(root, child)) continue;
     json_array_remove(children, i);
     json_object_clear(child);
+    any = true;
   }
   if (children && json_array_size(children) == 0) json_object_del(node, "children");
+  return any;
 }
 
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh) {

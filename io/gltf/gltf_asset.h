@@ -73,9 +73,10 @@ int64_t qmat_gltf_mesh_of(const json_t *node);
 /* The node that a node is a child of; SIZE_MAX: it is a root. Linear in all children. */
 size_t qmat_gltf_parent_of(const json_t *root, size_t node);
 
-/* Takes those children off a node that are among the first `given` nodes and for which is_dropped(root, child) holds.
- * Each stays in the asset as an empty node without a parent, so that the others keep their numbers. */
-void qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
+/* Takes those children off a node that are among the first `given` nodes and for which is_dropped(root, child) holds;
+ * whether there are any. Each stays in the asset as an empty node without a parent, so that the others keep their
+ * numbers. */
+bool qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
                              bool (*is_dropped)(const json_t *root, const json_t *child));
 
 /* Whether a mesh is a skin that qmat added to the asset. */

@@ -244,18 +244,14 @@ static bool is_earlier_collider(const json_t *root, const json_t *child) {
 
 /* Removes the colliders of an earlier run and how it lets the body move. */
 static void remove_earlier(json_t *root, json_t *body, size_t given) {
-  json_t *extensions = json_object_get(body, "extensions"), *nodes = json_object_get(root, "nodes");
-  const json_t *children = json_object_get(body, "children");
-  bool is_ours = false;
-  for (size_t i = 0; i < json_array_size(children) && !is_ours; i++)
-    is_ours = is_earlier_collider(root, json_array_get(nodes, (size_t)json_number_value(json_array_get(children, i))));
-  for (int form = 0; form < 2 && is_ours; form++) {
+  json_t *extensions = json_object_get(body, "extensions");
+  if (!qmat_gltf_drop_children(root, body, given, is_earlier_collider)) return;
+  for (int form = 0; form < 2; form++) {
     json_t *physics = json_object_get(extensions, body_extensions[form]);
     json_object_del(physics, "motion");
     if (physics && json_object_size(physics) == 0) json_object_del(extensions, body_extensions[form]);
   }
   if (extensions && json_object_size(extensions) == 0) json_object_del(body, "extensions");
-  qmat_gltf_drop_children(root, body, given, is_earlier_collider);
 }
 
 static double number_at(const json_t *numbers, size_t i) {

@@ -51,12 +51,25 @@ static void link_node(node *parent, node *child) {
   *place = child;
 }
 
+enum { NAME_SIZE = 256 };
+
+/* Takes the next name of a prim in a path. False: there is none, or no prim has it. */
+static bool take_name(const char **path, char name[NAME_SIZE]) {
+  if (**path == '/') ++*path;
+  const size_t length = strcspn(*path, "/{.[");
+  if (length == 0 || length >= NAME_SIZE || (*path)[length] == '.' || (*path)[length] == '[') return false;
+  memcpy(name, *path, length);
+  name[length] = '\0';
+  *path += length;
+  return true;
+}
+
 /* The prim or variant at a path in a layer; NULL when there is none. */
 static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char *path) {
   const qmat_usd_spec *spec = layer->root;
   if (*path != '/') return NULL;
   while (*path && spec) {
-    char name[256], variant[256];
+    char name[NAME_SIZE], variant[NAME_SIZE];
     if (*path == '{') {
       const char *equals = strchr(path, '='), *end = strchr(path, '}');
       if (!equals || !end || equals > end || equals - path > 255 || end - equals > 255) return NULL;
@@ -67,13 +80,8 @@ static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char 
       path = end + 1;
       continue;
     }
-    if (*path == '/') path++;
-    size_t length = strcspn(path, "/{.[");
-    if (length == 0 || length >= sizeof name || path[length] == '.' || path[length] == '[') return NULL;
-    memcpy(name, path, length);
-    name[length] = '\0';
+    if (!take_name(&path, name)) return NULL;
     spec = qmat_usd_child(layer, spec, QMAT_USD_PRIM, name);
-    path += length;
   }
   return spec;
 }
@@ -236,11 +244,8 @@ static bool has_arcs_above(const qmat_usd_stack *layers, const char *path) {
   static const char *const fields[] = {"inheritPaths", "references", "payload", "specializes", "variantSetNames"};
   for (size_t i = 0; i < layers->count; i++) {
     const qmat_usd_spec *spec = layers->layers[i]->root;
-    for (const char *part = path; spec && strchr(part + 1, '/'); part = strchr(part + 1, '/')) {
-      const size_t length = strcspn(part + 1, "/");
-      char name[256];
-      if (length >= sizeof name) return false;
-      snprintf(name, sizeof name, "%.*s", (int)length, part + 1);
+    char name[NAME_SIZE];
+    for (const char *rest = path; spec && take_name(&rest, name) && *rest == '/';) {
       spec = qmat_usd_child(layers->layers[i], spec, QMAT_USD_PRIM, name);
       for (size_t k = 0; spec && k < sizeof fields / sizeof *fields; k++)
         if (qmat_usd_field_value(spec, fields[k])) return true;
@@ -265,11 +270,10 @@ static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc a
   for (const char *slash = path; slash; slash = strchr(slash + 1, '/')) levels++;
   qmat_status status = QMAT_OK;
   node *above = NULL;
+  char name[NAME_SIZE];
+  const char *rest = path;
   *made = NULL;
-  for (const char *part = path; part && status == QMAT_OK; part = strchr(part + 1, '/')) {
-    char name[256];
-    const size_t length = strcspn(part + 1, "/");
-    snprintf(name, sizeof name, "%.*s", length < sizeof name ? (int)length : 0, part + 1);
+  while (take_name(&rest, name)) {
     c->prim->depth = depth - --levels; /* arcs of prims above are weaker */
     if (!above) {
       status = qmat_usd_new_node(c, at, arc, stack, layers->count, made);
@@ -285,7 +289,9 @@ static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc a
     above = *made;
     status = qmat_usd_add_arcs_of_copies(c, above);
     if (status == QMAT_OK) status = add_variants(c, above);
+    if (status != QMAT_OK) break;
   }
+  if (*rest) *made = NULL;
   c->prim->depth = depth;
   if (status == QMAT_OK && *made) set_introduced(*made, depth);
   return status;

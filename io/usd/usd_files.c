@@ -126,10 +126,6 @@ static qmat_status read_member(qmat_usd_files *files, const qmat_usd_prim *prim,
   return status;
 }
 
-static bool is_package(const uint8_t *bytes, size_t size) {
-  return size >= 4 && memcmp(bytes, "PK\3\4", 4) == 0;
-}
-
 /* Opens the archive in `bytes`, and reads its first member. `owned` is taken over. */
 static qmat_status open_package(qmat_usd_files *files, const qmat_usd_prim *prim, const qmat_bytes *bytes,
                                 qmat_bytes owned, const char *path, file **opened) {
@@ -158,7 +154,7 @@ static qmat_status open_member(qmat_usd_files *files, const qmat_usd_prim *prim,
   const qmat_usdz_member *member = qmat_usdz_find(&from->archive, path);
   file *added = add_file(files, path, beside->package);
   if (!added) return fail_memory(prim);
-  added->is_missing = !member || is_package(member->bytes, member->size);
+  added->is_missing = !member || qmat_usdz_is_package(member->bytes, member->size);
   if (added->is_missing)
     return qmat_usd_warn(prim, "the %s @%s@ is skipped: %s", what, qmat_usd_shown(asset),
                          member ? "packages in packages are not read" : "it is not in the package");
@@ -190,7 +186,7 @@ static qmat_status open_file(qmat_usd_files *files, const qmat_usd_prim *prim, c
   }
   *opened = added;
   files->bytes_read += bytes.size;
-  if (is_package(bytes.data, bytes.size)) {
+  if (qmat_usdz_is_package(bytes.data, bytes.size)) {
     status = open_package(files, prim, &bytes, bytes, path, &added->first);
     *opened = added->first;
     return status;
@@ -286,7 +282,7 @@ qmat_status qmat_usd_files_open(qmat_usd_files *files, const qmat_usd_prim *root
   size_t stack;
   qmat_status status;
   files->bytes_read = bytes->size;
-  if (is_package(bytes->data, bytes->size)) {
+  if (qmat_usdz_is_package(bytes->data, bytes->size)) {
     status = open_package(files, root, bytes, (qmat_bytes){0}, path, &opened);
   } else {
     opened = add_file(files, qmat_strdup(path), -1);

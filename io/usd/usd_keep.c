@@ -216,10 +216,6 @@ static qmat_status put_package(const keeper *k, const qmat_bytes *bytes, const c
   return status;
 }
 
-static bool is_package(const qmat_bytes *bytes) {
-  return bytes->size >= 4 && memcmp(bytes->data, "PK\3\4", 4) == 0;
-}
-
 /* Makes what was kept the only part of a scene. */
 static qmat_status store(const keeper *k, const qmat_writer *out, qmat_scene *scene) {
   scene->parts = qmat_calloc(1, sizeof *scene->parts);
@@ -243,15 +239,16 @@ qmat_status qmat_usd_keep(qmat_context *context, const qmat_usd_stage *stage, co
   qmat_writer out = {0};
   qmat_status status = QMAT_OK;
   qmat_usd_files_at(qmat_usd_stage_files(stage), 0, &path, &layer, &is_member);
-  char *beside = original && path && !is_package(bytes) ? qmat_usd_beside(path, original) : NULL;
+  char *beside =
+      original && path && !qmat_usdz_is_package(bytes->data, bytes->size) ? qmat_usd_beside(path, original) : NULL;
   if (beside) status = qmat_bytes_read_file(context, beside, &below);
   if (status == QMAT_OK && original)
     status = warn(&k, json_sprintf("what an earlier run has added is left out: an output as USD is a layer over '%s'",
                                    qmat_usd_shown(original)));
   const qmat_bytes *root = beside ? &below : bytes;
   if (status == QMAT_OK)
-    status = is_package(root) ? put_package(&k, root, beside ? NULL : original, &out)
-                              : put_layers(&k, root, beside != NULL, &out);
+    status = qmat_usdz_is_package(root->data, root->size) ? put_package(&k, root, beside ? NULL : original, &out)
+                                                          : put_layers(&k, root, beside != NULL, &out);
   if (status == QMAT_OK)
     status = k.why ? warn(&k, json_sprintf("the scene is not kept for an output as USD: %s", k.why))
                    : store(&k, &out, scene);

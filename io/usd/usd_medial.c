@@ -134,14 +134,13 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
 }
 
 static qmat_status search(reader *r, qmat_usd_prim *prim) {
-  const qmat_usd_value *data = prim->parent ? qmat_usd_prim_field(prim, "customData") : NULL;
-  if (qmat_usd_text(qmat_usd_entry(data, "qmat_version"))) {
+  if (prim->parent && qmat_usd_prim_is_medial(prim)) {
     const char *own = qmat_usd_shown(prim->name);
     if (!json_object_get(r->names, own) && (json_object_set_new(r->names, own, json_true()) != 0 ||
                                             json_array_append_new(r->found, json_string(own)) != 0))
       return qmat_fail_memory(r->context, "a medial mesh");
     if (r->lists || r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
-    return read_carrier(r, prim, data);
+    return read_carrier(r, prim, qmat_usd_prim_field(prim, "customData"));
   }
   const char *const *names;
   size_t count;

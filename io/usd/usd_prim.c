@@ -9,6 +9,10 @@ enum { MOST_WARNINGS = 100, PATH_TEXT = 256 };
 
 /* ---- messages ---- */
 
+bool qmat_usd_prim_is_medial(const qmat_usd_prim *prim) {
+  return qmat_usd_text(qmat_usd_entry(qmat_usd_prim_field(prim, "customData"), "qmat_version")) != NULL;
+}
+
 const char *qmat_usd_shown(const char *text) {
   return qmat_is_utf8(text) ? text : "?";
 }

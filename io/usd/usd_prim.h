@@ -60,6 +60,9 @@ qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim);
 /* The text, or "?" when it is not UTF-8. */
 const char *qmat_usd_shown(const char *text);
 
+/* Whether qmat has written the prim as a medial mesh. */
+bool qmat_usd_prim_is_medial(const qmat_usd_prim *prim);
+
 /* The names of the children in their order, in the prim's memory. QMAT_ERROR_MEMORY. */
 qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **names, size_t *count);
 

@@ -174,8 +174,7 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
     r->scene->prims_skipped++;
     return QMAT_OK;
   }
-  if (r->leaves_medials && qmat_usd_text(qmat_usd_entry(qmat_usd_prim_field(prim, "customData"), "qmat_version")))
-    return QMAT_OK;
+  if (r->leaves_medials && qmat_usd_prim_is_medial(prim)) return QMAT_OK;
   const char *specifier = qmat_usd_prim_specifier(prim);
   qmat_status status = QMAT_OK;
   if (strcmp(specifier, "class") == 0 && !state->is_prototype) return QMAT_OK;

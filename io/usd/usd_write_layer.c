@@ -184,7 +184,7 @@ static void put_metadata(qmat_writer *writer, const qmat_usd_spec *root, bool is
 /* ---- the file ---- */
 
 static const char *ending_of(const qmat_file_part *part) {
-  if (part->size >= 4 && memcmp(part->bytes, "PK\3\4", 4) == 0) return "usdz";
+  if (qmat_usdz_is_package(part->bytes, part->size)) return "usdz";
   return part->size >= 8 && memcmp(part->bytes, "PXR-USDC", 8) == 0 ? "usdc" : "usda";
 }
 

@@ -70,6 +70,10 @@ static qmat_status read_member(qmat_context *context, const qmat_bytes *bytes, c
   return QMAT_OK;
 }
 
+bool qmat_usdz_is_package(const uint8_t *bytes, size_t size) {
+  return size >= 4 && memcmp(bytes, "PK\3\4", 4) == 0;
+}
+
 qmat_status qmat_usdz_open(qmat_context *context, const qmat_bytes *bytes, const char *path, qmat_usdz *package) {
   *package = (qmat_usdz){0};
   const size_t end = find_end(bytes);

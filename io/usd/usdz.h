@@ -19,6 +19,9 @@ typedef struct qmat_usdz {
   qmat_usdz_member *members; /* in the archive's order */
 } qmat_usdz;
 
+/* Whether bytes are those of a package. */
+bool qmat_usdz_is_package(const uint8_t *bytes, size_t size);
+
 /* Finds the members of the archive in `bytes`, which must outlive the package. Compressed and encrypted members and
  * wrong checksums are refused; alignment is not required. QMAT_ERROR_FORMAT, QMAT_ERROR_MEMORY. Free with
  * qmat_usdz_uninit, also after a failure. Cost: linear. */

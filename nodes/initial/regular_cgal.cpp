@@ -22,7 +22,7 @@ using Sphere = Kernel::Weighted_point_3;
 using PowerTriangulation =
     CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<RegularVertexBase, RegularCellBase>>;
 
-constexpr size_t kPowerSimplicesPerReport = 65536;
+constexpr size_t kSimplicesPerReport = 65536;
 
 /* Copies the simplices, whose ids ascend, in lexicographic order. */
 template <size_t N>
@@ -44,14 +44,13 @@ qmat_status collect(qmat_context *context, const PowerTriangulation &triangulati
   qmat_status status;
   size_t done = 0;
   for (auto edge = triangulation.finite_edges_begin(); edge != triangulation.finite_edges_end(); edge++) {
-    if (done++ % kPowerSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "edges")) != QMAT_OK)
-      return status;
+    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "edges")) != QMAT_OK) return status;
     const uint32_t a = edge->first->vertex(edge->second)->info().value;
     const uint32_t b = edge->first->vertex(edge->third)->info().value;
     edges.push_back({std::min(a, b), std::max(a, b)});
   }
   for (auto facet = triangulation.finite_facets_begin(); facet != triangulation.finite_facets_end(); facet++) {
-    if (done++ % kPowerSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "facets")) != QMAT_OK)
+    if (done++ % kSimplicesPerReport == 0 && (status = qmat_progress(context, 0, 0, "facets")) != QMAT_OK)
       return status;
     std::array<uint32_t, 3> ids;
     for (int k = 0, n = 0; k < 4; k++)
