@@ -457,6 +457,7 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
     status = qmat_cache_open(context, &(qmat_cache_options){.folder = job->cache_folder}, &job->cache);
   if (status == QMAT_OK) status = qmat_run_plan(context, &job->graph, &options, &job->run);
   if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
+  if (status == QMAT_OK) status = qmat_run_make_files(context, &job->run);
   if (status == QMAT_OK) status = qmat_run_write(context, &job->run);
   if (status == QMAT_OK) { /* now, since it has texts of the graph, which may change */
     json_t *report = qmat_run_report(context, &job->run);

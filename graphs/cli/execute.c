@@ -262,6 +262,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                          void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
   const char *report_path = qmat_invocation_value(invocation, "report");
+  const char *depfile = qmat_invocation_value(invocation, "depfile");
   bool quiet = qmat_invocation_chooses(invocation, "quiet", "verbose");
   bool verbose = qmat_invocation_chooses(invocation, "verbose", "quiet");
   bool dry = qmat_invocation_value(invocation, "dry-run") != NULL;
@@ -278,8 +279,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
   if (status == QMAT_OK && report_path) status = qmat_make_folders(context, report_path);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
-  if (status == QMAT_OK && qmat_invocation_value(invocation, "depfile"))
-    status = qmat_run_check_path(context, run, "the depfile", qmat_invocation_value(invocation, "depfile"));
+  if (status == QMAT_OK && depfile) status = qmat_run_check_path(context, run, "the depfile", depfile);
   bool ready = status == QMAT_OK, reported = false;
   if (ready && dry) {
     qmat_run_foresee(run);
@@ -290,10 +290,15 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     status = qmat_run_execute(context, run, &observer);
     qmat_progress_view_end(&view);
     context->progress = NULL;
+    if (status == QMAT_OK) status = qmat_run_make_files(context, run);
+    if (status == QMAT_OK && report_path) {
+      status = qmat_run_check_later_file(context, run, "the report", report_path);
+      if (status != QMAT_OK) report_path = NULL; /* nor may the error be written there */
+    }
+    if (status == QMAT_OK && depfile) status = qmat_run_check_later_file(context, run, "the depfile", depfile);
     if (status == QMAT_OK) status = qmat_run_write(context, run);
     if (status == QMAT_OK) status = finish_stream(context, invocation, run);
   }
-  const char *depfile = qmat_invocation_value(invocation, "depfile");
   if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
   if (status == QMAT_OK && report_path && !dry) {
     json_t *report = qmat_run_report(context, run);
@@ -303,7 +308,8 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   }
   if (status == QMAT_OK && !quiet && !dry)
     qmat_print_run(run, verbose, invocation->streams.output[0] ? stderr : stdout);
-  if (status != QMAT_OK && report_path && !reported && (ready || may_write_error(invocation, report_path))) {
+  if (status != QMAT_OK && report_path && !reported &&
+      (ready ? !qmat_run_has_read(run, report_path) : may_write_error(invocation, report_path))) {
     /* A failure to write the report must not replace this error. */
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);

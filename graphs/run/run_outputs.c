@@ -26,15 +26,6 @@ static qmat_status add_part(qmat_context *context, part_group *group, const char
   return QMAT_OK;
 }
 
-/* Refuses a side file that would overwrite an input. Its name was not known before the run. */
-static qmat_status check_side_part(qmat_context *context, const qmat_run *run, const char *path, const char *name) {
-  char *side = qmat_path_beside(path, name);
-  if (!side) return qmat_fail_memory(context, "output path");
-  qmat_status status = qmat_run_check_not_input(context, run, "the output's side file", side);
-  qmat_free(side);
-  return status;
-}
-
 qmat_status qmat_json_to_file(qmat_context *context, const json_t *json, size_t flags, qmat_file **file) {
   char *text = json ? qmat_json_text(json, flags, NULL) : NULL;
   if (!text) return qmat_fail_memory(context, "report");
@@ -45,20 +36,35 @@ qmat_status qmat_json_to_file(qmat_context *context, const json_t *json, size_t 
   return qmat_writer_to_file(context, &writer, "json", file);
 }
 
-/* Refuses an output that would overwrite a file that the run has read, such as a texture or a layer of the model. Only
- * the run has found these. */
-static qmat_status check_not_read(qmat_context *context, const qmat_run *run, const char *path) {
+bool qmat_run_has_read(const qmat_run *run, const char *path) {
   for (size_t i = 0; i < run->hashed_count; i++)
-    if (run->hashed[i].readable && qmat_same_file(path, run->hashed[i].path))
-      return qmat_fail(context, QMAT_ERROR_USAGE, "the output '%s' would overwrite a file that the model refers to",
-                       path);
-  return QMAT_OK;
+    if (run->hashed[i].readable && qmat_same_file(path, run->hashed[i].path)) return true;
+  return false;
+}
+
+/* Refuses a file that would overwrite one that the run has read, such as a texture or a layer of the model. Only the
+ * run has found these. */
+static qmat_status check_not_read(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
+  return qmat_run_has_read(run, path) ? qmat_fail(context, QMAT_ERROR_USAGE,
+                                                  "%s '%s' would overwrite a file that the model refers to", what, path)
+                                      : QMAT_OK;
+}
+
+/* Refuses a side file that would overwrite an input. Its name was not known before the run. */
+static qmat_status check_side_part(qmat_context *context, const qmat_run *run, const char *path, const char *name) {
+  static const char what[] = "the output's side file";
+  char *side = qmat_path_beside(path, name);
+  if (!side) return qmat_fail_memory(context, "output path");
+  qmat_status status = qmat_run_check_not_input(context, run, what, side);
+  if (status == QMAT_OK) status = check_not_read(context, run, what, side);
+  qmat_free(side);
+  return status;
 }
 
 /* Makes the file of an output. Names its side files, and refuses those that would replace a file of something else. */
 static qmat_status make_file(qmat_context *context, const qmat_run *run, qmat_run_file *file) {
   const qmat_value *value = run->slots[file->slot].value;
-  qmat_status status = check_not_read(context, run, file->path);
+  qmat_status status = check_not_read(context, run, "the output", file->path);
   if (status != QMAT_OK) return status;
   if (file->written) qmat_value_release(&file->written->base);
   file->written = NULL;
@@ -112,9 +118,30 @@ static qmat_status write_group(qmat_context *context, qmat_run *run, size_t firs
   return status;
 }
 
-qmat_status qmat_run_write(qmat_context *context, qmat_run *run) {
+qmat_status qmat_run_make_files(qmat_context *context, qmat_run *run) {
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) status = make_file(context, run, &run->files[i]);
+  return status;
+}
+
+qmat_status qmat_run_check_later_file(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
+  qmat_status status = check_not_read(context, run, what, path);
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
+    const qmat_file *made = run->files[i].written;
+    for (size_t part = 1; part < made->part_count && status == QMAT_OK; part++) {
+      char *side = qmat_path_beside(run->files[i].path, made->parts[part].name);
+      if (!side) return qmat_fail_memory(context, "output path");
+      if (qmat_same_file(path, side))
+        status = qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite a side file of output '%s'", what, path,
+                           run->graph->outputs[run->files[i].output].name);
+      qmat_free(side);
+    }
+  }
+  return status;
+}
+
+qmat_status qmat_run_write(qmat_context *context, qmat_run *run) {
+  qmat_status status = QMAT_OK;
   for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++) {
     bool written = false;
     for (size_t before = 0; before < i; before++)

@@ -117,9 +117,9 @@ qmat_status qmat_run_step_now(qmat_executor *executor, size_t index) {
   lock_cache(executor);
   qmat_run_store(run, index, &reads);
   unlock_cache(executor);
-  qmat_run_note_reads(run, &reads);
   qmat_executor_done(executor, index);
 cleanup:
+  qmat_run_note_reads(run, &reads);
   qmat_step_reads_uninit(&reads);
   qmat_free(inputs);
   qmat_free(outputs);

@@ -112,7 +112,15 @@ for cached in "" --no-cache; do
   expect 2 "would overwrite a file that the model refers to" "$qmat" mat scene.usda -o layer.usda --epsilon 5% $coarse \
     $cached
 done
+for option in report depfile; do
+  expect 2 "would overwrite a file that the model refers to" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse \
+    --$option layer.usda
+done
+expect 2 "nothere" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse --set model.mesh=nothere --report layer.usda
 holds "the layer is untouched" cmp -s layer.usda kept.usda
+holds "no output of a refused run" test ! -e over.usda
+expect 2 "would overwrite a side file" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse \
+  --report over_original.usdz
 expect 0 "holds no colliders" "$qmat" mat scene.usda -o over.usda --colliders --epsilon 5% $coarse
 rm layer.usda kept.usda scene.usda over*
 

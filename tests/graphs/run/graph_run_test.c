@@ -103,6 +103,7 @@ static qmat_status execute(fixture *f) {
 static void run_all(fixture *f, qmat_run_options options) {
   test_ok(&f->context, plan(f, options));
   test_ok(&f->context, execute(f));
+  test_ok(&f->context, qmat_run_make_files(&f->context, &f->run));
   test_ok(&f->context, qmat_run_write(&f->context, &f->run));
 }
 
@@ -247,7 +248,7 @@ static void test_a_side_file_never_overwrites_an_input(void **state) {
   const qmat_run_save save = {0, in_folder(f, 1, "a.pair")};
   test_ok(&f->context, plan(f, (qmat_run_options){.saves = &save, .save_count = 1}));
   test_ok(&f->context, execute(f));
-  assert_int_equal(qmat_run_write(&f->context, &f->run), QMAT_ERROR_USAGE);
+  assert_int_equal(qmat_run_make_files(&f->context, &f->run), QMAT_ERROR_USAGE);
   check_file(input, "keep");
   assert_int_equal(count_files(f), 1);
 }
@@ -258,6 +259,7 @@ static void test_side_files_of_two_outputs_do_not_collide(void **state) {
   const qmat_run_save saves[] = {{0, in_folder(f, 0, "a.pair")}, {0, in_folder(f, 1, "b.pair")}};
   test_ok(&f->context, plan(f, (qmat_run_options){.saves = saves, .save_count = 2}));
   test_ok(&f->context, execute(f));
+  test_ok(&f->context, qmat_run_make_files(&f->context, &f->run));
   assert_int_equal(qmat_run_write(&f->context, &f->run), QMAT_ERROR_IO);
   assert_int_equal(count_files(f), 0);
   qmat_run_uninit(&f->run);
