@@ -170,7 +170,9 @@ typedef struct qmat_colliders {
   uint32_t *triangles; /* 3 * triangle_count: point ids, counter-clockwise from outside, shape by shape */
   uint32_t *hull_ends; /* 2 * shape_count: the end of its points, and of its triangles */
   size_t body_count;   /* 1; 0: mass properties are not known */
-  double *body; /* mass; centre x y z; inertia about it xx yy zz xy xz yz (products with their sign in the tensor) */
+  /* Mass in kg; centre x y z; inertia about it xx yy zz xy xz yz, in kg times the square of a model unit (products with
+   * their sign in the tensor). */
+  double *body;
 } qmat_colliders;
 
 /* Named counts and errors as a JSON object. It never contains times, so equal results have equal digests. */

@@ -248,8 +248,8 @@ static const qmat_param params[] = {
              "The largest number of vertices of a hull: PhysX takes 255 (64 on graphics cards), Jolt 256"),
     QMAT_LENGTH(medial_colliders_params, hull_error, 0.003, 1e-6, 1,
                 "How far a hull may be from its shape where hull_points allows"),
-    QMAT_FLOAT(medial_colliders_params, density, "mass per cubic model unit", 1, 1e-12, 1e12,
-               "The density of the solid, which its mass and inertia follow from"),
+    QMAT_FLOAT(medial_colliders_params, density, "kg/m^3", 1000, 1e-12, 1e12,
+               "The density of the solid, which its mass and inertia follow from; a model without a unit is in metres"),
     QMAT_INT(medial_colliders_params, samples, "points", 20000, 1, 1e8,
              "Points of the surface and of the shapes, and a tenth of those of the volume, for the measures"),
     {0},
@@ -271,7 +271,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 20,
+    .version = 21,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -287,7 +287,8 @@ const qmat_node qmat_node_medial_colliders = {
         "Sheets are divided and joined likewise; their hulls reach beyond them by least_radius. Open surfaces, and "
         "sheets with a thickness, keep the hulls of the shapes. inside changes radii and proves the opposite; "
         "otherwise hulls are inside their shapes. proved is false for open surfaces.\n\n"
-        "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. The measures are "
+        "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. Mass is in kg, inertia "
+        "in kg times the square of a model unit. The measures are "
         "those of cuRobo, in diagonals, and sampled: coverage of the solid's volume; protrusion, how far the shapes' "
         "boundary is outside; gap, how far the surface is from the shapes; iou is intersection over union. Thick "
         "sheets are parts of the solid, without mass. The measures are those of the shapes, not of hulls, but for "

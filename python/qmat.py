@@ -330,7 +330,7 @@ class Colliders(Value):
 
     @property
     def mass(self):
-        """The mass of the solid; None for an open surface, as the next two."""
+        """The mass of the solid in kg; None for an open surface, as the next two."""
         body = self.arrays["body"]
         return float(body[0, 0]) if len(body) else None
 

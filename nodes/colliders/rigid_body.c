@@ -40,7 +40,9 @@ bool qmat_rigid_body_of_surface(const qmat_surface *surface, double density, dou
   double centre[3], spread[6];
   for (int k = 0; k < 3; k++) centre[k] = first[k] / sum;
   for (int m = 0; m < 6; m++) spread[m] = sign * (second[m] - sum * centre[pairs[m][0]] * centre[pairs[m][1]]);
-  const double d = frame->diagonal, mass = density * *volume * d * d * d, square = density * d * d * d * d * d;
+  const double meters = (mesh->meters_per_unit > 0 ? mesh->meters_per_unit : 1) * frame->diagonal;
+  const double share = density * meters * meters * meters; /* kg per cubic diagonal */
+  const double mass = share * *volume, square = share * frame->diagonal * frame->diagonal;
   body[0] = mass;
   qmat_frame_to_model(frame, centre, 1, &body[1]);
   const double trace = spread[0] + spread[1] + spread[2];

@@ -117,16 +117,19 @@ static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
 
 static void test_mass_properties_of_a_box_by_hand(void **state) {
   (void)state;
-  static const double ball[] = {10, 20, 30, 0.5};
-  qmat_mesh *box = box_around(1, 2, 3);
-  shape_map(box, 1, 10, 20, 30);
-  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
-  const double mass = 2.5 * 48, *body = r.colliders->body;
-  const double expected[10] = {mass, 10, 20, 30, mass / 12 * (16 + 36), mass / 12 * (4 + 36), mass / 12 * (4 + 16)};
-  assert_int_equal(r.colliders->body_count, 1);
-  for (int k = 0; k < 10; k++) assert_near(body[k], expected[k], 1e-9 * mass);
-  assert_near(pipeline_number(r.report, "mass"), mass, 1e-9 * mass);
-  result_free(&r);
+  static const double ball[] = {10, 20, 30, 0.5}, units[] = {0, 1, 0.01}; /* a model without a unit is in metres */
+  for (size_t i = 0; i < 3; i++) {
+    qmat_mesh *box = box_around(1, 2, 3);
+    shape_map(box, 1, 10, 20, 30);
+    box->meters_per_unit = units[i];
+    result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
+    const double mass = 2.5 * (i < 2 ? 48 : 48e-6), *body = r.colliders->body;
+    const double expected[10] = {mass, 10, 20, 30, mass / 12 * (16 + 36), mass / 12 * (4 + 36), mass / 12 * (4 + 16)};
+    assert_int_equal(r.colliders->body_count, 1);
+    for (int k = 0; k < 10; k++) assert_near(body[k], expected[k], 1e-9 * (k > 0 && k < 4 ? 30 : mass));
+    assert_near(pipeline_number(r.report, "mass"), mass, 1e-9 * mass);
+    result_free(&r);
+  }
 }
 
 static void test_sheets_have_no_mass(void **state) {
@@ -136,7 +139,7 @@ static void test_sheets_have_no_mass(void **state) {
   shape_triangle(box, 0, 1, shape_vertex(box, 5, 6, 7));
   box->sheet_triangle_count = 1;
   box->closed = box->oriented = true;
-  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "", 0);
+  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
   const double expected[10] = {48, 0, 0, 0, 4 * 52, 4 * 40, 4 * 20};
   assert_int_equal(r.colliders->body_count, 1);
   for (int k = 0; k < 10; k++) assert_near(r.colliders->body[k], expected[k], 1e-6);
@@ -148,7 +151,7 @@ static void test_inertia_turns_with_the_solid(void **state) {
   static const double ball[] = {0, 0, 0, 0.5};
   qmat_mesh *box = box_around(1, 2, 3);
   shape_rotate(box);
-  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "", 0);
+  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
   const double *i = &r.colliders->body[4], m = 48 / 12.0;
   /* Invariants of the tensor: trace, sum of principal minors, determinant. */
   const double a = m * 52, b = m * 40, c = m * 20;
