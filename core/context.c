@@ -7,6 +7,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/text.h"
+
 static const int64_t PROGRESS_INTERVAL = 50000000; /* nanoseconds */
 
 void qmat_context_uninit(qmat_context *context) {
@@ -145,7 +147,8 @@ void qmat_error_format(const qmat_error *error, char *text, size_t size) {
 #undef APPEND
   /* Names and texts from libraries may contain line breaks and terminal controls. */
   for (size_t i = 0; i < used; i++) {
-    if ((unsigned char)line[i] < 0x20 || line[i] == 0x7F) line[i] = ' ';
+    const size_t length = qmat_control_length(&line[i]);
+    if (length > 0) memset(&line[i], ' ', length);
   }
   copy_text(text, size, line);
 }

@@ -180,22 +180,28 @@ void qmat_format_bytes(uint64_t bytes, char *text) {
   snprintf(text, 32, "%.20s %s", number, units[unit]);
 }
 
+size_t qmat_control_length(const char *text) {
+  const unsigned char first = (unsigned char)text[0], second = first ? (unsigned char)text[1] : 0;
+  if (first == 0xc2 && second >= 0x80 && second < 0xa0) return 2;
+  return first && (first < 0x20 || first == 0x7f);
+}
+
 /* The least percentage, and number of millimetres, that bounds are written as: what is below is an effect of rounding.
  */
 static const double least_written = 0.001;
 
+/* The least number of two digits that is not below `value`; 0 where that is not above 0. */
+static double round_up(double value) {
+  if (!(value > 0)) return 0;
+  value = fmax(value, least_written);
+  const double digits = floor(1 - floor(log10(value))), scale = pow(10, digits > 0 ? digits : 0);
+  /* The factor below 1 absorbs rounding errors: 0.98 must not be rounded up to 0.99. */
+  return ceil(value * scale * (1 - 1e-12)) / scale;
+}
+
 void qmat_format_bound(double fraction, char *text) {
-  double percent = fraction * 100;
-  if (!(percent > 0)) {
-    snprintf(text, 48, "0 %%");
-    return;
-  }
-  percent = fmax(percent, least_written);
-  /* The factor below 1 absorbs rounding errors: 0.98 % must not be rounded up to 0.99 %. */
-  double digits = floor(1 - floor(log10(percent)));
-  double scale = pow(10, digits > 0 ? digits : 0);
   char number[40];
-  qmat_format_number(ceil(percent * scale * (1 - 1e-12)) / scale, number, sizeof number);
+  qmat_format_number(round_up(fraction * 100), number, sizeof number);
   snprintf(text, 48, "%s %%", number);
 }
 
@@ -205,14 +211,10 @@ void qmat_format_length(double meters, char *text) {
     double scale, below;
   } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, 0}};
   size_t i = 0;
-  while (i < 2 && meters >= units[i].below) i++;
-  double value = meters * units[i].scale;
-  char number[40] = "0";
-  if (value > 0) {
-    value = fmax(value, least_written);
-    const double digits = floor(1 - floor(log10(value))), scale = pow(10, digits > 0 ? digits : 0);
-    qmat_format_number(ceil(value * scale * (1 - 1e-12)) / scale, number, sizeof number);
-  }
+  double value = round_up(meters * units[i].scale);
+  while (i < 2 && value >= units[i].below * units[i].scale) value = round_up(meters * units[++i].scale);
+  char number[40];
+  qmat_format_number(value, number, sizeof number);
   snprintf(text, 48, "%s %s", number, units[i].unit);
 }
 

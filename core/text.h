@@ -25,6 +25,10 @@ void qmat_repair_utf8(char *text);
  * empty component. */
 bool qmat_is_part_name(const char *name);
 
+/* The length in bytes of the control character of UTF-8 at the start of a text, which a terminal would obey; 0: it
+ * starts with none. */
+size_t qmat_control_length(const char *text);
+
 /* Parses all of `text` as a finite decimal number. A trailing '%' divides by 100: "0.1%" is the double nearest to
  * 0.001. Blanks, hexadecimal digits, infinities and NaN are rejected. On false, `*number` is unchanged. */
 bool qmat_parse_number(const char *text, double *number);

@@ -283,7 +283,7 @@ static qmat_status split_item(qmat_context *context, const char *text, char port
   char *end = NULL;
   errno = 0;
   if (bracket[1] >= '0' && bracket[1] <= '9') *item = strtoull(bracket + 1, &end, 10);
-  if (end && strcmp(end, "]") == 0 && errno == 0) return QMAT_OK;
+  if (end && strcmp(end, "]") == 0 && errno == 0 && *item != SIZE_MAX) return QMAT_OK;
   return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is not of the form node.port[item]", qmat_show(text).text);
 }
 

@@ -51,7 +51,10 @@ const char *qmat_scan_double(const char *text, const char *end, double *number) 
     for (; at < end && is_digit(*at); at++) {
       if (mantissa < (uint64_t)1 << 59) {
         mantissa = mantissa * 10 + (uint64_t)(*at - '0');
-        if (exponent > -1000) exponent--;
+        if (exponent > -1000)
+          exponent--;
+        else
+          exact = false;
       } else {
         exact = false;
       }

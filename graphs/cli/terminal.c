@@ -48,25 +48,33 @@ static size_t word_length(const char *text, int whole, int *columns) {
   return length;
 }
 
-/* Prints a byte; a terminal would obey control characters. */
-static void put_byte(FILE *out, char byte) {
-  fputc((unsigned char)byte < 0x20 || byte == 0x7f ? '?' : byte, out);
+/* Prints a part of a text. A terminal would obey control characters. */
+static void put_part(FILE *out, const char *text, size_t length) {
+  for (size_t i = 0; i < length; i++) {
+    const size_t control = qmat_control_length(&text[i]);
+    fputc(control > 0 ? '?' : text[i], out);
+    if (control > 1) i += control - 1;
+  }
 }
 
 void qmat_put_shown(FILE *out, const char *text) {
-  for (; *text; text++) put_byte(out, *text);
+  put_part(out, text, strlen(text));
+}
+
+/* The length in bytes of the first `count` characters of a word. */
+static size_t length_of(const char *word, size_t length, int count) {
+  size_t i = 0;
+  while (i < length && (count > 0 || !starts_character(word[i]))) count -= starts_character(word[i++]);
+  return i;
 }
 
 /* Prints a word without its middle, so that it takes `room` columns. */
 static void put_shortened(FILE *out, const char *word, size_t length, int columns, int room) {
   const int head = (room - 3) / 2, tail = room - 3 - head;
-  int column = 0;
-  for (size_t i = 0; i < length; i++) {
-    const bool starts = starts_character(word[i]);
-    if (starts && column == head) fputs("...", out);
-    column += starts;
-    if (column <= head || column > columns - tail) put_byte(out, word[i]);
-  }
+  const size_t end = length_of(word, length, head), start = length_of(word, length, columns - tail);
+  put_part(out, word, end);
+  fputs("...", out);
+  put_part(out, word + start, length - start);
 }
 
 void qmat_put_wrapped(FILE *out, const char *text, int column, int indent, int width, int whole) {
@@ -87,7 +95,7 @@ void qmat_put_wrapped(FILE *out, const char *text, int column, int indent, int w
       if (shortens && columns > width - indent && width - indent > 10)
         put_shortened(out, text, length, columns, width - indent);
       else
-        for (size_t i = 0; i < length; i++) put_byte(out, text[i]);
+        put_part(out, text, length);
       column += columns + blanks;
       first = false;
     }

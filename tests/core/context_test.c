@@ -112,8 +112,10 @@ static void test_an_error_may_quote_the_one_before(void **state) {
 static void test_control_characters_leave_one_line(void **state) {
   (void)state;
   qmat_context context = {0};
-  qmat_fail(&context, QMAT_ERROR_DEPENDENCY, "CGAL:\nline\t2 \x1b[31mred\x7f \xc3\xa4");
-  assert_format(&context, "CGAL: line 2  [31mred  \xc3\xa4");
+  qmat_fail(&context, QMAT_ERROR_DEPENDENCY,
+            "CGAL:\nline\t2 \x1b[31mred\x7f \xc2\x9b"
+            "1m \xc2\xa0 \xc3\xa4");
+  assert_format(&context, "CGAL: line 2  [31mred    1m \xc2\xa0 \xc3\xa4");
 }
 
 static void test_long_texts_are_cut_between_characters(void **state) {

@@ -192,8 +192,9 @@ static void test_lengths_are_rounded_up_in_a_fitting_unit(void **state) {
     double meters;
     const char *text;
   } lengths[] = {{0, "0 mm"},       {2e-12, "0.001 mm"}, {1.2345e-6, "0.0013 mm"}, {0.0049, "4.9 mm"},
-                 {0.00491, "5 mm"}, {0.0999, "100 mm"},  {0.123, "13 cm"},         {0.98, "98 cm"},
-                 {1, "1 m"},        {3.14, "3.2 m"},     {1234, "1234 m"}};
+                 {0.00491, "5 mm"}, {0.0999, "10 cm"},   {0.0991, "10 cm"},        {0.098, "98 mm"},
+                 {0.999, "1 m"},    {0.123, "13 cm"},    {0.98, "98 cm"},          {1, "1 m"},
+                 {3.14, "3.2 m"},   {1234, "1234 m"}};
   char text[48];
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
     qmat_format_length(lengths[i].meters, text);

@@ -269,6 +269,7 @@ static void test_values_are_given_read_and_passed_on(void **state) {
   assert_int_equal(qmat_job_value(second, "given.medial[0]", &value), QMAT_RESULT_USAGE);
   assert_int_equal(qmat_job_value(second, "given.medial[x]", &value), QMAT_RESULT_USAGE);
   assert_int_equal(qmat_job_value(second, "given.medial[0", &value), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_value(second, "given.medial[18446744073709551615]", &value), QMAT_RESULT_USAGE);
   qmat_job_free(second);
 }
 

@@ -48,6 +48,9 @@ static void test_numbers_are_read_exactly(void **state) {
                                       "3E+05"};
   for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
     assert_scans(texts[i], strtod(texts[i], NULL), strlen(texts[i]));
+  char zeros[1100]; /* 0.00...01e1000, with more zeros than are counted */
+  snprintf(zeros, sizeof zeros, "0.%01010d1e1000", 0);
+  assert_scans(zeros, strtod(zeros, NULL), strlen(zeros));
   assert_scans("INF", INFINITY, 3);
   assert_scans("-infinity", -INFINITY, 9);
   assert_scans("1e", 1, 1);
