@@ -70,6 +70,8 @@ static qmat_status check_skeletons(qmat_context *context, const qmat_rig *rig) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it ends at joint %zu of %zu", end, rig->bound_count);
     return qmat_fail_element(context, "skin", (int64_t)i);
   }
+  if (rig->skin_count == 0 && rig->bound_count > 0)
+    return qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu joints of skins, and no skin", rig->bound_count);
   return QMAT_OK;
 }
 
@@ -494,6 +496,17 @@ static qmat_status check_hulls(qmat_context *context, const qmat_colliders *c) {
   return qmat_fail(context, QMAT_ERROR_GEOMETRY, "points or triangles follow the last hull");
 }
 
+/* A capsule repeats its second sphere, a sphere its first. */
+static qmat_status check_shapes(qmat_context *context, const qmat_colliders *c) {
+  for (size_t i = 0; i < c->shape_count; i++) {
+    const uint32_t *s = &c->shapes[3 * i];
+    if (s[0] == s[1] ? s[1] == s[2] : s[0] != s[2]) continue;
+    qmat_fail(context, QMAT_ERROR_GEOMETRY, "it repeats its spheres in another order");
+    return qmat_fail_element(context, "shape", (int64_t)i);
+  }
+  return QMAT_OK;
+}
+
 static qmat_status check_colliders(qmat_context *context, const qmat_value *value) {
   const qmat_colliders *c = (const qmat_colliders *)value;
   qmat_status status = qmat_check_u32_count(context, c->sphere_count, "spheres");
@@ -503,6 +516,9 @@ static qmat_status check_colliders(qmat_context *context, const qmat_value *valu
   if (status == QMAT_OK)
     status = qmat_check_ids(context, c->shapes, 3 * c->shape_count, c->sphere_count, "shape", 3, "sphere");
   if (status == QMAT_OK) status = qmat_check_finite(context, c->points, c->point_count, 3, "point", "position");
+  if (status == QMAT_OK) status = check_shapes(context, c);
+  if (status == QMAT_OK && c->body_count > 1)
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu bodies, but colliders are one", c->body_count);
   if (status == QMAT_OK) status = qmat_check_finite(context, c->body, c->body_count, 10, "body", "mass property");
   for (size_t i = 0; i < c->sphere_count && status == QMAT_OK; i++) {
     if (c->spheres[4 * i + 3] > 0) continue;

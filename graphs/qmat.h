@@ -43,7 +43,7 @@ typedef enum qmat_result {
 
 typedef struct qmat_job qmat_job;
 
-/* The library's version, "0.2.0". Never NULL; not freed. */
+/* The library's version, "0.3.0". Never NULL; not freed. */
 QMAT_API const char *qmat_version(void);
 
 /* All node types with their ports and parameters, as JSON: what `qmat nodes --json` prints. NULL when memory is short;

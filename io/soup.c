@@ -300,8 +300,7 @@ static qmat_status check_facets(conversion *c) {
       continue;
     }
     if (!c->drops_defects) {
-      qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet has the same vertices as facet %u",
-                soup->facet_ordinals[table[slot]]);
+      qmat_fail(c->context, QMAT_ERROR_GEOMETRY, "the facet repeats facet %u", soup->facet_ordinals[table[slot]]);
     }
     qmat_status status = refuse_or_drop(c, f);
     if (status != QMAT_OK) return status;

@@ -117,7 +117,7 @@ static const qmat_param params[] = {
     QMAT_INT(qmat_simplify_params, refits, "passes", 8, 0, 1000,
              "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses"),
     QMAT_INT(qmat_simplify_params, effort, "starts", 1, 1, 1000,
-             "Runs from so many starts, side by side on all threads, of which the best result counts"),
+             "The number of different starts; they run side by side on all threads, and the best result is kept"),
     {0},
 };
 

@@ -622,8 +622,10 @@ static const qmat_param params[] = {
         "auto: each component by its winding number; as_is: nothing is done; close: all borders are closed; wrap: "
         "one closed surface around everything; sheet: everything is a sheet"),
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
-    QMAT_LENGTH(mesh_solid_params, epsilon, 0.01, 0, 1,
-                "A wrap keeps a quarter of this away, a flap sticks out by at most three quarters; 0: of 1%"),
+    QMAT_LENGTH(
+        mesh_solid_params, epsilon, 0.01, 0, 1,
+        "The epsilon of the run. A wrap lies a quarter of it outside the surface; a sheet that sticks out by at most "
+        "three quarters of it is a flap; 0: 1% is used"),
     {0},
 };
 

@@ -305,7 +305,7 @@ static qmat_status write_robot(qmat_context *context, const scene_write_params *
     return qmat_robot_write(context, (const qmat_colliders *)inputs[IN_COLLIDERS],
                             (qmat_robot_format)(params->format - FORMAT_URDF + QMAT_ROBOT_URDF),
                             scene ? scene->name : NULL, own > 0 ? own : of_scene, file);
-  qmat_fail(context, QMAT_ERROR_USAGE, "urdf, xml and yaml hold colliders, and there are none");
+  qmat_fail(context, QMAT_ERROR_USAGE, "urdf, xml and yaml hold only colliders, but the graph makes none");
   qmat_fail_field(context, "colliders");
   return qmat_fail_hint(context, "qmat mat: --colliders; in a graph: connect medial.colliders, as in colliders.yaml");
 }
@@ -542,7 +542,8 @@ static const qmat_param params[] = {
     QMAT_ENUM(scene_write_params, require, requirements, REQUIRE_NOTHING,
               "certified: the run fails, and nothing is written, where a result is not certified"),
     QMAT_BOOL(scene_write_params, khr_physics,
-              "Write colliders as KHR_implicit_shapes and KHR_physics_rigid_bodies (glb, gltf); so without a choice"),
+              "Write colliders as KHR_implicit_shapes and KHR_physics_rigid_bodies (glb, gltf); the default where no "
+              "other form is chosen"),
     QMAT_BOOL(scene_write_params, omi_physics,
               "Write colliders as OMI_physics_shape and OMI_physics_body (glb, gltf), which Godot reads"),
     QMAT_BOOL(scene_write_params, unreal_hulls, "Write hulls of colliders as meshes named UCX_name_01 (glb, gltf)"),

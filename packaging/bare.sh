@@ -10,7 +10,9 @@ folder=$1
 mirror=${2:-http://deb.debian.org/debian}
 [ -d "$folder/etc" ] || debootstrap --variant=minbase bookworm "$folder" "$mirror"
 rm -f "$folder/etc/apt/sources.list"
-cp -r /etc/apt/sources.list.d /etc/apt/apt.conf.d "$folder/etc/apt/"
+for sources in sources.list sources.list.d apt.conf.d; do
+  if [ -e "/etc/apt/$sources" ]; then cp -r "/etc/apt/$sources" "$folder/etc/apt/"; fi
+done
 cp /etc/resolv.conf "$folder/etc/"
 home=$folder/root/examples
 rm -rf "$home"

@@ -12,9 +12,11 @@ counts=${2:-/dev/null}
 data=$source/../shared/data
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 cd "$work" || exit 1
 QMAT_CACHE=off # this build has to compute its own results
-export QMAT_CACHE
+LC_ALL=C.UTF-8 # awk writes decimal points
+export QMAT_CACHE LC_ALL
 passed=0
 failed=0
 skipped=0

@@ -22,9 +22,12 @@ make_assets() {
 for generator in Ninja "Unix Makefiles"; do
   rm -rf game build
   cp -r "$source/examples/game" game
+  echo 'qmat_add_asset(TARGET game GRAPH colliders INPUT models/crate.off OUTPUT assets/crate.urdf SET epsilon=5%)' \
+    >>game/CMakeLists.txt
   cmake -G "$generator" -S game -B build -DCMAKE_PREFIX_PATH="$work/moved" >out.txt 2>&1 || die "$generator: configuring"
   make_assets
   [ "$made" = "crate.ma roof.ma " ] || die "$generator: the first build made '$made'"
+  grep -q '<robot' build/assets/crate.urdf || die "$generator: the asset of a built-in graph"
   build/game >out.txt || die "$generator: the game"
   grep -q '^crate: [1-9]' out.txt || die "$generator: the game has no colliders"
   make_assets
@@ -37,7 +40,7 @@ for generator in Ninja "Unix Makefiles"; do
   printf '\000\000\100\100' | dd of=game/models/roof.bin bs=1 seek=12 conv=notrunc status=none
   make_assets
   [ "$made" = "roof.ma " ] || die "$generator: an edited side file made '$made'"
-  echo "# edited" >>game/colliders.yaml
+  echo "# edited" >>game/spheres.yaml
   make_assets
   [ "$made" = "crate.ma roof.ma " ] || die "$generator: an edited graph made '$made'"
   make_assets

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # What the shell tests share: a working folder, counted failures, and a small model. Sourced first; a test that has
 # something to stop defines clean_up, which runs before the folder is removed. The last line of a test is `finish`.
+LC_ALL=C.UTF-8 # awk writes decimal points, and the program may write any character
+export LC_ALL
 work=$(mktemp -d) || exit 1
 clean_up() { :; }
 trap 'clean_up; rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM # dash runs no EXIT trap after a signal
 cd "$work" || exit 1
 : >out.txt
 : >err.txt
@@ -41,6 +44,11 @@ expect() {
   elif [ -n "$text" ] && ! cat out.txt err.txt | grep -qF -e "$text"; then
     fail "no '$text': $*"
   fi
+}
+
+# is_taken PORT: whether anybody listens on that port of this machine, on any of its addresses.
+is_taken() {
+  cat /proc/net/tcp /proc/net/tcp6 2>/dev/null | grep -q "$(printf '^ *[0-9]*: [0-9A-F]*:%04X 0*:0000 0A ' "$1")"
 }
 
 finish() {

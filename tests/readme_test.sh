@@ -14,6 +14,7 @@ source=$1
 build=$2
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 HOME=$work/home
 export HOME
 unset QMAT_CACHE XDG_CACHE_HOME QMAT_REMOTE_CACHE
@@ -33,8 +34,9 @@ fi
 for file in man/man1/qmat.1 bash-completion/completions/qmat zsh/site-functions/_qmat fish/vendor_completions.d/qmat.fish; do
   [ -s "$HOME/.local/share/$file" ] || fail "$file is not installed"
 done
-# The page says where this program is; it is not installed.
-ln -s "$build/qmat_models" "$HOME/.local/bin/"
+# The commands are typed where the build is; this program is not installed.
+mkdir -p "$work/folder/build"
+ln -s "$build" "$work/folder/build/release"
 PATH=$HOME/.local/bin:$PATH
 export PATH
 module=$(find "$HOME/.local" -name qmat.py)

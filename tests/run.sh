@@ -9,12 +9,16 @@
 set -u
 cd "$(dirname "$0")/.." || exit 1
 started=$(date +%s)
+export LC_ALL=C.UTF-8 # awk writes decimal points
 # Several tests at a time, each on all processors: a thread that waits gives its processor away.
 export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
 passed=0
 failed=0
 skipped=0
 skips=$(mktemp)
+counts=$(mktemp)
+trap 'rm -f "$skips" "$counts"' EXIT
+trap 'exit 1' HUP INT TERM
 
 step() {
   printf '\n== %s (%d s)\n' "$1" $(($(date +%s) - started))
@@ -37,7 +41,6 @@ finish() {
   fi
   printf '\nDisk space used:\n'
   du -sh build/* 2>/dev/null | awk '$1 !~ /K$/ { printf "  %6s %s\n", $1, $2 }'
-  rm -f "$skips"
   printf '\n%d passed, %d failed, %d skipped\n' "$passed" "$failed" "$skipped"
   [ "$failed" -eq 0 ]
   exit
@@ -102,14 +105,12 @@ if build release -DQMAT_WERROR=ON -DQMAT_TESTS=ON; then
   # One more than processors: some of these tests wait, for Slurm, for servers, or for clocks.
   run_ctest release $(($(nproc) + 1))
   step "The whole program"
-  counts=$(mktemp)
   { sh tests/end_to_end.sh "$PWD/build/release" "$counts"; echo $? >build/end_to_end.result; } | tee build/end_to_end.log
   result=$(cat build/end_to_end.result)
   rm -f build/end_to_end.result
   list_skips build/end_to_end.log >>"$skips"
   ok=0 bad=0 none=0
   read -r ok bad none <"$counts" || bad=1
-  rm -f "$counts"
   if [ "$result" -ne 0 ] && [ "${bad:-0}" -eq 0 ]; then bad=1; fi
   passed=$((passed + ${ok:-0}))
   failed=$((failed + ${bad:-1}))

@@ -10,7 +10,7 @@ const qmat_option qmat_cache_option_rows[] = {
     {"cache-size", 0, "SIZE", "Delete the least recently used results above this size; default 10GB"},
     {"cache-read-only", 0, NULL, "Read results from the cache, but store none"},
     {"remote-cache", 0, "URL",
-     "Share results through an HTTP server that takes GET and PUT; default $QMAT_REMOTE_CACHE"},
+     "Share results through an HTTP server that takes GET, HEAD and PUT; default $QMAT_REMOTE_CACHE"},
     {"remote-read-only", 0, NULL, "Read results from the remote cache, but send none"},
     {0},
 };

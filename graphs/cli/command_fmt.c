@@ -81,7 +81,7 @@ static const qmat_option options[] = {
 const qmat_command qmat_command_fmt = {
     .name = "fmt",
     .arguments = "FILE...",
-    .summary = "Lay out graph files in the one way that all have",
+    .summary = "Format graph files in the standard layout",
     .doc =
         "Writes graph files again ('-': from the standard input to the standard output): indented by two blanks, "
         "mappings in braces on one line where they were and fit in 120 columns, else one entry a line; comments behind "

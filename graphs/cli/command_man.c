@@ -90,7 +90,7 @@ static void put_examples(void) {
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const qmat_registry *registry = &invocation->registry;
   qmat_status status = QMAT_OK;
-  printf(".\\\" Written by 'qmat man'.\n.TH QMAT 1 2026-11-22 \"qmat %s\" \"User Commands\"\n", QMAT_VERSION);
+  printf(".\\\" Written by 'qmat man'.\n.TH QMAT 1 2026-11-30 \"qmat %s\" \"User Commands\"\n", QMAT_VERSION);
   put_section("NAME", "qmat - the medial axis transform of 3D models");
   puts(".SH SYNOPSIS\n.B qmat\n.I COMMAND\n.RI [ ARGUMENTS ]\n.RI [ OPTIONS ]");
   put_section("DESCRIPTION",
@@ -109,6 +109,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   puts(".SH ENVIRONMENT");
   put_row("QMAT_CACHE", "", "The folder of the cache; off: no cache.");
   put_row("QMAT_REMOTE_CACHE", "", "The address of a shared cache.");
+  put_row("XDG_CACHE_HOME", "", "Without QMAT_CACHE the cache is its folder qmat.");
+  put_row("TMPDIR", "", "The folder of temporary files, such as a model from the standard input.");
   put_row("COLUMNS", "", "The width of what is printed.");
   put_row("NO_COLOR", "", "Progress without colours.");
   return status;

@@ -21,9 +21,33 @@ static bool has_option(const qmat_invocation *invocation, const char *name) {
   return false;
 }
 
-/* The first input of a graph is the argument; each other input is an option of that name. */
+/* The description of the parameter that an input of a graph sets. */
+static void describe(const qmat_graph *graph, const qmat_graph_input *input, char *text, size_t size) {
+  const qmat_graph_node *node = &graph->nodes[input->params[0].node];
+  qmat_param_describe(node->type, &node->type->params[input->params[0].param], node->params, text, size);
+}
+
+static const qmat_graph_input *find_input(const qmat_graph *graph, const char *name) {
+  for (size_t i = 0; i < graph->input_count; i++)
+    if (strcmp(graph->inputs[i].name, name) == 0) return &graph->inputs[i];
+  return NULL;
+}
+
+/* Adds the default that an input has in the graph of --colliders, where that differs. */
+static void add_other_default(const char *own, const qmat_graph *other, const qmat_graph_input *input, char *doc,
+                              size_t room) {
+  static const char word[] = ", default ";
+  char text[QMAT_OPTION_DOC_SIZE];
+  describe(other, input, text, sizeof text);
+  const char *mine = strstr(own, word), *theirs = strstr(text, word);
+  if (mine && theirs && strcmp(mine, theirs) != 0)
+    snprintf(doc, room, " (with --colliders %s)", theirs + sizeof word - 1);
+}
+
+/* The first input of a graph is the argument; each other input is an option of that name. `other` is the other of the
+ * two graphs, which may lack the option. */
 static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation, const qmat_graph *graph,
-                              const char *prefix) {
+                              const qmat_graph *other, const char *only) {
   qmat_status status = QMAT_OK;
   for (size_t i = 1; i < graph->input_count && status == QMAT_OK; i++) {
     const qmat_graph_input *input = &graph->inputs[i];
@@ -34,9 +58,11 @@ static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation
     const int room = QMAT_OPTION_DOC_SIZE - QMAT_GRAPH_NAME_SIZE;
     /* The graph is freed before the options are. */
     snprintf(name, QMAT_GRAPH_NAME_SIZE, "%s", input->name);
-    const int length = snprintf(doc, (size_t)room, "%s%s: ", prefix, param->doc);
-    if (length > 0 && length < room)
-      qmat_param_describe(node->type, param, node->params, doc + length, (size_t)(room - length));
+    const qmat_graph_input *shared = find_input(other, input->name);
+    const int start = snprintf(doc, (size_t)room, "%s%s: ", shared ? "" : only, param->doc);
+    if (start > 0 && start < room) describe(graph, input, doc + start, (size_t)(room - start));
+    const size_t length = strlen(doc);
+    if (shared) add_other_default(doc, other, shared, doc + length, (size_t)room - length);
     status = qmat_invocation_add_option(context, invocation, (qmat_option){name, 0, "VALUE", doc});
   }
   return status;
@@ -57,15 +83,15 @@ static qmat_status add_output(qmat_context *context, qmat_invocation *invocation
 }
 
 static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
-  static const char *const prefixes[] = {"", "With --colliders: "};
+  static const char *const only[] = {"Not with --colliders: ", "With --colliders: "};
+  qmat_graph graphs[2] = {{0}};
   qmat_status status = QMAT_OK;
-  for (int i = 0; i < 2 && status == QMAT_OK; i++) {
-    qmat_graph graph = {0};
-    status = qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[i], &graph);
-    if (status == QMAT_OK && i == 0) status = add_output(context, invocation, &graph);
-    if (status == QMAT_OK) status = add_inputs(context, invocation, &graph, prefixes[i]);
-    qmat_graph_uninit(&graph);
-  }
+  for (int i = 0; i < 2 && status == QMAT_OK; i++)
+    status = qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[i], &graphs[i]);
+  if (status == QMAT_OK) status = add_output(context, invocation, &graphs[0]);
+  for (int i = 0; i < 2 && status == QMAT_OK; i++)
+    status = add_inputs(context, invocation, &graphs[i], &graphs[1 - i], only[i]);
+  for (int i = 0; i < 2; i++) qmat_graph_uninit(&graphs[i]);
   return status;
 }
 
@@ -197,7 +223,7 @@ const qmat_command qmat_command_mat = {
     .summary = "Describe a model by medial spheres, cones and slabs",
     .doc =
         "Runs the built-in graph qmat_plus on a model ('-': the standard input), or on several models, folders and "
-        "patterns as 'qmat batch' does. Of two options that say the same, the later counts. --vertices without "
+        "patterns as 'qmat batch' does. An option that is given twice counts as given last. --vertices without "
         "--epsilon sets epsilon to 0: "
         "no bound on the distance.\n"
         "A glTF scene saved as glTF keeps its contents, and each of its meshes gets a medial mesh. So does a USD scene "

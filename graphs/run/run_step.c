@@ -111,7 +111,8 @@ qmat_status qmat_run_step_now(qmat_executor *executor, size_t index) {
   if (status != QMAT_OK) goto cleanup;
   if (!take_outputs(run, step, outputs)) {
     executor->unsteady = true;
-    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the node makes other bytes than the cache has for it");
+    status = qmat_fail(context, QMAT_ERROR_INTERNAL,
+                       "the node's new result differs from its cached one: it does not depend on its inputs alone");
     goto cleanup;
   }
   lock_cache(executor);

@@ -42,18 +42,18 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
       QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                     \
                  "Stop when the cheapest collapse costs more than this; 0: no limit"),                                \
       QMAT_ENUM(qmat_simplify_params, compat, qmat_compat_choices, QMAT_COMPAT_OFF,                                   \
-                "Collapse as the public Q-MAT code does: sets cost, k, epsilon, on_exceed, topology, protect and "    \
-                "features; the stop is vertices"),                                                                    \
+                "Collapse as the public Q-MAT code does: sets cost, k, topology, protect and features, and in "       \
+                "medial.simplify epsilon and on_exceed; there `vertices` stops it"),                                  \
       QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                           \
                 "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
-                "loops and voids of the result are corrected to those of the solid (on_exceed=skip only). preserve: " \
-                "every collapse keeps the homotopy type of the initial medial mesh"),                                 \
+                "loops and voids of the result are corrected to those of the solid; the same as free where the "      \
+                "threshold rises. preserve: every collapse keeps the homotopy type of the initial medial mesh"),      \
       QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                \
                 "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
       QMAT_ENUM(                                                                                                      \
           qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                  \
           "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases. "   \
-          "auto: both are tried, and the better result counts (on_exceed=skip only, else as sharp)"),                 \
+          "auto: both are tried, and the better result counts; the same as sharp where the threshold rises"),         \
       QMAT_FLOAT(qmat_simplify_params, crease, "epsilon", 0.25, 0.01, 1,                                              \
                  "The largest distance of a crease from its remaining points, as a share of the threshold"),          \
       QMAT_FLOAT(qmat_simplify_params, theta, "mean thickness", 0.5, 0, 10,                                           \

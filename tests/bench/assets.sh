@@ -7,18 +7,12 @@
 # an error is above 1.25 epsilon.
 set -eu
 epsilon=2%
-seconds=60
-folder=
-while [ $# -gt 0 ]; do
-  case $1 in
-    --epsilon) epsilon=$2 && shift ;;
-    --timeout) seconds=$2 && shift ;;
-    *) folder=$1 ;;
-  esac
-  shift
-done
+timeout=60
+options="--epsilon --timeout"
 . "$(dirname "$0")/functions.sh"
-folder=${folder:-$top/../shared/data/assets}
+need /usr/bin/time time
+[ $# -le 1 ] || refuse "one folder, not $#"
+folder=${1:-$top/../shared/data/assets}
 if [ ! -d "$folder" ]; then
   echo "no folder $folder: name one with model files" >&2
   exit 2
@@ -59,7 +53,7 @@ echo '| --- | --- | ---: | ---: | ---: | ---: | --- | ---: | ---: | --- |'
 while read -r name; do
   rm -f "$work/report.json" "$work/out.glb"
   status=0
-  /usr/bin/time -f '%U %S %M' -o "$work/cost" timeout "$seconds" "$build/qmat" mat "$folder/$name" -o "$work/out.glb" \
+  /usr/bin/time -f '%U %S %M' -o "$work/cost" timeout "$timeout" "$build/qmat" mat "$folder/$name" -o "$work/out.glb" \
     --epsilon "$epsilon" --report "$work/report.json" --quiet --progress off 2>"$work/complaint" </dev/null || status=$?
   cost=$(tail -n 1 "$work/cost" | awk '{ printf "%.1f | %d", $1 + $2, $3 / 1024 }')
   reason=$(grep -v 'warning: ' "$work/complaint" | tail -n 1 | sed 's/|/\\|/g; s/^qmat: //' | cut -c 1-160)

@@ -11,25 +11,17 @@ epsilon=2%
 signals=3
 seed=1
 folder=
-while [ $# -gt 0 ]; do
-  case $1 in
-    --folder) folder=$2 ;;
-    --epsilon) epsilon=$2 ;;
-    --signals) signals=$2 ;;
-    --seed) seed=$2 ;;
-    --*) echo "cancel.sh: $1 is no option" >&2 && exit 2 ;;
-    *) break ;;
-  esac
-  shift 2
-done
-given=$epsilon
-unset epsilon
+options="--folder --epsilon --signals --seed"
 . "$(dirname "$0")/functions.sh"
+need /usr/bin/time time
 folder=${folder:-$top/../shared/data/assets}
 if [ $# -eq 0 ]; then
   set -- Avocado/Avocado.gltf DamagedHelmet.glb GlassVaseFlowers.glb SciFiHelmet/SciFiHelmet.gltf Chair.obj VC.glb \
     market.obj pirate.obj robot.obj OpenChessSet/chess_set.usda
 fi
+for name in "$@"; do
+  [ -f "$folder/$name" ] || refuse "there is no file $folder/$name: name files, and their folder with --folder"
+done
 QMAT_CACHE=off
 export QMAT_CACHE
 
@@ -38,7 +30,7 @@ export QMAT_CACHE
 describe() {
   status=0
   /usr/bin/time -q -f %e -o "$work/seconds" timeout --foreground --preserve-status -s INT "$1" "$build/qmat" mat \
-    "$folder/$2" -o "$work/out.glb" --epsilon "$given" --quiet --progress off >/dev/null 2>"$work/complaint" || status=$?
+    "$folder/$2" -o "$work/out.glb" --epsilon "$epsilon" --quiet --progress off >/dev/null 2>"$work/complaint" || status=$?
 }
 
 echo '| file | s to the end | interrupts | longest s from interrupt to end |'

@@ -8,17 +8,13 @@
 # surfaces. Needs node and npm, which fetches Rapier.
 set -eu
 epsilon=0.5%
+kind=hulls
+json=
+options="--epsilon --kind --json"
 . "$(dirname "$0")/functions.sh"
-kind=hulls json=
-if [ "${1:-}" = --kind ]; then
-  kind=$2
-  shift 2
-fi
-if [ "${1:-}" = --json ]; then
-  json=$2
-  : >"$json"
-  shift 2
-fi
+need node nodejs
+need npm npm
+if [ -n "$json" ]; then : >"$json"; fi
 if [ $# -eq 0 ]; then set -- "$top"/../shared/data/surfaces/*; fi
 if [ ! -e "$1" ]; then
   echo "no models: name some, or put them into ../shared/data/surfaces" >&2

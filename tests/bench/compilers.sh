@@ -8,6 +8,7 @@
 # code is 77. The builds stay in the folder QMAT_BUILDS (default: build): gcc's in release, clang's in clang.
 set -eu
 epsilon=5%
+options="--epsilon"
 . "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then
   for path in "$top"/../shared/data/surfaces/spot.* "$top"/../shared/data/surfaces/knight.*; do

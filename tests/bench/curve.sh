@@ -7,11 +7,8 @@
 #                                          generated models
 # QMAT_BUILD is the build folder, by default build/release. An error is the lower bound of medial.evaluate.
 set -eu
-svg=curve.svg
-if [ "${1:-}" = -o ]; then
-  svg=$2
-  shift 2
-fi
+out=curve.svg
+options="-o"
 default_models="ant plane spot"
 . "$(dirname "$0")/functions.sh"
 
@@ -46,5 +43,5 @@ for model in "$@"; do
     echo "$line"
   done
 done
-awk -f "$top/tests/bench/curve.awk" "$work/points" >"$svg.part"
-mv "$svg.part" "$svg"
+awk -f "$top/tests/bench/curve.awk" "$work/points" >"$out.part"
+mv "$out.part" "$out"

@@ -13,21 +13,11 @@ models=300
 first=0
 epsilon=2%
 resolution=16
-seconds=60
-while [ $# -gt 0 ]; do
-  case $1 in
-    --models) models=$2 ;;
-    --first) first=$2 ;;
-    --epsilon) epsilon=$2 ;;
-    --resolution) resolution=$2 ;;
-    --timeout) seconds=$2 ;;
-    *) echo "damaged.sh: $1 is no option" >&2 && exit 2 ;;
-  esac
-  shift 2
-done
-given=$epsilon
-unset epsilon
+timeout=60
+options="--models --first --epsilon --resolution --timeout"
 . "$(dirname "$0")/functions.sh"
+[ $# -eq 0 ] || refuse "$1 is no option"
+need_built qmat_damage
 QMAT_CACHE=off
 export QMAT_CACHE
 
@@ -39,7 +29,7 @@ while [ "$seed" -lt $((first + models)) ]; do
   status=0
   # The limit is of memory in use, as far as the shell can: of the data segment. A sanitizer reserves more than any limit.
   (if [ -z "${QMAT_SANITIZED:-}" ]; then ulimit -d 4194304 2>/dev/null || true; fi
-   exec timeout "$seconds" "$build/qmat" mat "$work/damaged.off" -o "$work/out.ma" --epsilon "$given" \
+   exec timeout "$timeout" "$build/qmat" mat "$work/damaged.off" -o "$work/out.ma" --epsilon "$epsilon" \
      --report "$work/report.json" --quiet --progress off) 2>"$work/complaint" || status=$?
   lines=$(grep -cv 'warning: ' "$work/complaint" || true)
   case $status in
@@ -47,7 +37,7 @@ while [ "$seed" -lt $((first + models)) ]; do
       outcome=certified
       if ! sed -n '/"summary"/,$p' "$work/report.json" | grep -q '"certified": true'; then
         outcome=$(awk -v a="$(number surface_to_envelope "$work/report.json")" \
-          -v b="$(number envelope_to_surface "$work/report.json")" -v e="$given" 'BEGIN {
+          -v b="$(number envelope_to_surface "$work/report.json")" -v e="$epsilon" 'BEGIN {
           e = e ~ /%/ ? e / 100 : e
           print ((a > b ? a : b) > 1.25 * e ? "beyond epsilon" : "not certified")
         }')

@@ -6,6 +6,7 @@
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
 epsilon=2%
+options="--epsilon"
 . "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then
   "$build/qmat_models" all "$work" >"$work/models.log"

@@ -8,8 +8,10 @@
 set -eu
 epsilon=0.5%
 kind=hulls
+options="--epsilon --kind"
 . "$(dirname "$0")/functions.sh"
-if [ "${1:-}" = --kind ]; then kind=$2 && shift 2; fi
+need node nodejs
+need npm npm
 if [ $# -eq 0 ]; then set -- "$top"/../shared/data/surfaces/*; fi
 if [ ! -e "$1" ]; then
   echo "no models: name some, or put them into ../shared/data/surfaces" >&2

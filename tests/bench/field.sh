@@ -10,29 +10,17 @@
 # goes on where it was: what field.json has is not measured again, unless --fresh. --page measures nothing and makes the
 # page of what field.json has. QMAT_BUILD is the build folder, by default build/release.
 set -eu
-. "$(dirname "$0")/functions.sh"
-out=$top/tests/bench/field
-command="sh tests/bench/field.sh"
+out=
 folder=
+models=
 planted=4
 limit=120
 fresh=no
-page_only=no
-list=
-while [ $# -gt 0 ]; do
-  case $1 in
-    --fresh) fresh=yes && shift && continue ;;
-    --page) page_only=yes && shift && continue ;;
-    -o) out=$2 ;;
-    --folder) folder=$2 && command="$command --folder $(basename "$2")" ;;
-    --models) list=$2 && command="$command --models $2" ;;
-    --planted) planted=$2 && command="$command --planted $2" ;;
-    --limit) limit=$2 && command="$command --limit $2" ;;
-    --*) echo "field.sh: $1 is no option" >&2 && exit 2 ;;
-    *) break ;;
-  esac
-  shift 2
-done
+page=no
+options="-o --folder --models --planted --limit --fresh! --page!"
+. "$(dirname "$0")/functions.sh"
+out=${out:-$top/tests/bench/field}
+command="sh tests/bench/field.sh$taken"
 mkdir -p "$out"
 rows=$work/rows
 paper=$top/graphs/paper
@@ -50,6 +38,7 @@ generated_models() {
 
 # planted_models: chains, trees, rings and slabs in turn; every second round has 0.1 % of noise.
 planted_models() {
+  if [ "$planted" -gt 0 ]; then need_built qmat_planted; fi
   i=0
   while [ "$i" -lt "$planted" ]; do
     case $((i % 4)) in 0) kind=chain ;; 1) kind=tree ;; 2) kind=ring ;; *) kind=slab ;; esac
@@ -73,7 +62,7 @@ mkdir "$work/models"
       generated_models
       given_models ant plane octopus spot knight bug chair fandisk homer pinion fertility | sed 's/^/surface /'
     } | while read -r section path; do
-      case ",${list:-$(name_of "$path")}," in *",$(name_of "$path"),"*) echo "$section $path" ;; esac
+      case ",${models:-$(name_of "$path")}," in *",$(name_of "$path"),"*) echo "$section $path" ;; esac
     done
     planted_models
   fi
@@ -151,7 +140,7 @@ for methods in "ours Q-MAT PMAT PC VC" SAT HEM; do
     for method in $methods; do
       if awk -F '\t' -v m="$name" -v k="$method" '$2 == m && $3 == k { found = 1 } END { exit !found }' "$rows"; then
         again=$((again + 1))
-      elif [ $page_only = yes ]; then
+      elif [ $page = yes ]; then
         missing=$((missing + 1))
       else
         measure "$section" "$name" "$method" "$path"

@@ -1,12 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # What the scripts of this folder share. A script sources it after setting
-#   epsilon          its default, which the option --epsilon E replaces (unset: the script has no such option)
+#   options          its options and flags, in any order, before and after models: "--name" takes a value and sets $name to
+#                    it, "--name!" sets $name to yes, "-o" sets $out. Any other option ends it (unset: all arguments stay)
 #   default_models   the models that it measures when none is named (unset: it chooses them itself)
-# and then has the models as its arguments. QMAT_BUILD is the build folder, by default build/release.
+# and then has the models as its arguments, and the options that were given, but for flags and -o, as $taken.
+# QMAT_BUILD is the build folder, by default build/release.
+LC_ALL=C.UTF-8 # awk writes decimal points
+export LC_ALL
 top=$(cd "$(dirname "$0")/../.." && pwd)
 build=${QMAT_BUILD:-$top/build/release}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
+
+# refuse WORDS...: ends the script, which cannot do what it was asked for.
+refuse() {
+  echo "$(basename "$0"): $*" >&2
+  exit 2
+}
+
+# need PROGRAM PACKAGE: ends the script where the program is missing.
+need() {
+  command -v "$1" >/dev/null || refuse "there is no $1 (Debian: apt install $2)"
+}
+
+# need_built TARGET: the same for a program of the build folder.
+need_built() {
+  [ -x "$build/$1" ] || refuse "there is no $build/$1: cmake -DQMAT_TESTS=ON $build && cmake --build $build --target $1"
+}
 
 # given_models NAME...: the path of each model in ../shared/data/surfaces, or of a generated model that replaces it; a
 # path a line, none twice.
@@ -150,9 +171,34 @@ made_by() {
     "processor seconds, summed over threads."
 }
 
-if [ -n "${epsilon:-}" ] && [ "${1:-}" = --epsilon ]; then
-  epsilon=$2
-  shift 2
+taken=
+if [ -n "${options+set}" ]; then
+  left=$#
+  while [ "$left" -gt 0 ]; do
+    left=$((left - 1))
+    case $1 in
+      -?*) ;;
+      *)
+        set -- "$@" "$1"
+        shift
+        continue
+        ;;
+    esac
+    variable=${1#--}
+    if [ "$1" = -o ]; then variable=out; fi
+    case " $options " in
+      *" $1! "*) eval "$variable=yes" ;;
+      *" $1 "*)
+        [ "$left" -gt 0 ] || refuse "$1 needs a value"
+        if [ "$1" != -o ]; then taken="$taken $1 $(basename -- "$2")"; fi
+        eval "$variable=\$2"
+        left=$((left - 1))
+        shift
+        ;;
+      *) refuse "$1 is no option" ;;
+    esac
+    shift
+  done
 fi
 if [ -n "${default_models:-}" ] && [ $# -eq 0 ]; then
   # shellcheck disable=SC2086 # names are words

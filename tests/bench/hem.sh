@@ -9,6 +9,7 @@
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
 epsilon=1%
+options="--epsilon"
 default_models="ant chair plane"
 . "$(dirname "$0")/functions.sh"
 

@@ -9,26 +9,17 @@
 # method alone: what it starts from comes from the cache. A method that takes more than SECONDS of them (default 120) is
 # ended, and its cell says so. QMAT_BUILD is the build folder, by default build/release. field.sh compares more models.
 set -eu
-. "$(dirname "$0")/functions.sh"
-out=$top/tests/bench/paper
-command="sh tests/bench/paper.sh"
-names="ant plane octopus spot knight bug chair fandisk homer pinion fertility"
+out=
+models=ant,plane,octopus,spot,knight,bug,chair,fandisk,homer,pinion,fertility
 shown=3
 limit=120
-while [ $# -gt 0 ]; do
-  case $1 in
-    -o) out=$2 ;;
-    --models) names=$(echo "$2" | tr , ' ') && command="$command --models $2" ;;
-    --shown) shown=$2 && command="$command --shown $2" ;;
-    --limit) limit=$2 && command="$command --limit $2" ;;
-    --*) echo "paper.sh: $1 is no option" >&2 && exit 2 ;;
-    *) break ;;
-  esac
-  shift 2
-done
+options="-o --models --shown --limit"
+. "$(dirname "$0")/functions.sh"
+out=${out:-$top/tests/bench/paper}
+command="sh tests/bench/paper.sh$taken"
 if [ $# -eq 0 ]; then
-  # shellcheck disable=SC2086 # names are words
-  given_models $names >"$work/models"
+  # shellcheck disable=SC2046 # names are words
+  given_models $(echo "$models" | tr , ' ') >"$work/models"
   while read -r model; do set -- "$@" "$model"; done <"$work/models"
 else
   command="$command$(for model in "$@"; do printf ' %s' "$(basename "$model")"; done)"

@@ -8,12 +8,10 @@
 set -eu
 epsilon=1%
 shapes=200
+options="--epsilon --shapes"
 . "$(dirname "$0")/functions.sh"
-if [ ! -x "$build/qmat_planted" ]; then
-  echo "planted.sh: $build/qmat_planted is missing: cmake --build $build --target qmat_planted" >&2
-  exit 1
-fi
-if [ "${1:-}" = --shapes ]; then shapes=$2; fi
+[ $# -eq 0 ] || refuse "$1 is no option"
+need_built qmat_planted
 QMAT_CACHE=off
 export QMAT_CACHE
 
@@ -49,6 +47,11 @@ while [ "$i" -lt "$shapes" ]; do
   fi
   i=$((i + 1))
 done | tee "$work/table"
+# A failure ends only the loop, which is not in this shell.
+if [ "$(wc -l <"$work/table")" -ne "$shapes" ]; then
+  echo "planted.sh: $(wc -l <"$work/table") of $shapes shapes were described" >&2
+  exit 1
+fi
 awk -F '|' '{ more = $6 - $3; n++; at_most += more <= 0; worst = more > worst ? more : worst; certified += $7 ~ /yes/
     right += $8 ~ /right/; if ($4 > 20000 && $9 > slowest) slowest = $9 }
   END { printf "\n%d shapes: at most the planted spheres on %.0f %%, at most %d more, %d certified, %d with the right Betti " \

@@ -5,6 +5,7 @@
 #   scale.sh [MODEL...]      the first model is measured again in a million triangles; default: a generated octopus
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
+options=
 . "$(dirname "$0")/functions.sh"
 cmake --build "$build" --target qmat qmat_scale >&2
 "$build/qmat_scale" "$build/qmat" "$work" "$@"

@@ -9,6 +9,7 @@
 # is not. A figure below the lower bound means that the samples missed the worst place.
 set -eu
 epsilon=1%
+options="--epsilon"
 . "$(dirname "$0")/functions.sh"
 if [ $# -eq 0 ]; then set -- "$top"/../shared/data/surfaces/*; fi
 if [ ! -e "$1" ]; then
@@ -37,11 +38,13 @@ printf '| model | triangles | initial spheres | spheres | surface to envelope, a
 echo " envelope to surface, at least | at most | apart |$judge rounds | simplify s | all s |$tail"
 rule=${QMAT_JUDGE:+ ---: |}
 echo "| --- | ---: | ---: | ---: | ---: | ---: | ---: |$rule ---: | ---: | ---: |$rule ---: | ---: | ---: |$rule$rule$rule"
+failed=0
 for model in "$@"; do
   name=$(basename "${model%.*}")
   if ! "$build/qmat" mat "$model" -o "$work/$name.ma" -o "$work/$name.glb" --epsilon "$epsilon" \
     --report "$work/report.json" --quiet --progress off 2>"$work/complaint"; then
     echo "| $name | $(cat "$work/complaint") |"
+    failed=$((failed + 1))
     continue
   fi
   if [ -n "${QMAT_JUDGE:-}" ]; then
@@ -62,3 +65,7 @@ for model in "$@"; do
   fi
   echo
 done
+if [ "$failed" -gt 0 ]; then
+  echo "surfaces.sh: $failed of $# models failed" >&2
+  exit 1
+fi

@@ -5,7 +5,9 @@
 # default: ../shared/data/surfaces/spot.off. Lines that progress drew over are left out, but their width counts. Exit 1
 # where a line is wider than the terminal.
 set -eu
+options=
 . "$(dirname "$0")/functions.sh"
+need script bsdutils
 model=$(realpath "${1:-$top/../shared/data/surfaces/spot.off}")
 qmat=$(realpath "$build/qmat")
 TERM=xterm

@@ -4,6 +4,7 @@
 #   theta.sh [MODEL...]      default: octopus and plane of ../shared/data/surfaces, else generated models
 # QMAT_BUILD is the build folder, by default build/release.
 set -eu
+options=
 default_models="octopus plane"
 . "$(dirname "$0")/functions.sh"
 echo "| model | theta | samples | medial vertices | largest distance, at least | at most | mean distance |"

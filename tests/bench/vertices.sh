@@ -7,16 +7,9 @@
 # The grid falls from 64 % in steps of 5 % until a result has more spheres than the largest N. The error of a result is the
 # larger upper bound of medial.evaluate. QMAT_BUILD is the build folder, by default build/release.
 set -eu
-svg=vertices.svg
+out=vertices.svg
 numbers="20 30 40 60 80 120 160 200"
-while [ $# -gt 0 ]; do
-  case $1 in
-    -o) svg=$2 ;;
-    --numbers) numbers=$2 ;;
-    *) break ;;
-  esac
-  shift 2
-done
+options="-o --numbers"
 default_models="octopus ant bug"
 . "$(dirname "$0")/functions.sh"
 
@@ -54,7 +47,13 @@ for model in "$@"; do
       }' "$work/grid"
   done
 done | tee "$work/table"
+# A failure ends only the loop, which is not in this shell.
+rows=$(($# * $(echo "$numbers" | wc -w)))
+if [ "$(wc -l <"$work/table")" -ne $rows ]; then
+  echo "vertices.sh: $(wc -l <"$work/table") of $rows rows were measured" >&2
+  exit 1
+fi
 awk -F '|' '{ n++; worst = $7 > worst ? $7 : worst; good += $7 <= 1.1; few += $4 <= $3 }
   END { printf "\n%d of %d within 1.1, the worst %.2f; %d with at most N spheres\n", good, n, worst, few }' "$work/table"
-awk -f "$top/tests/bench/curve.awk" "$work/points" >"$svg.part"
-mv "$svg.part" "$svg"
+awk -f "$top/tests/bench/curve.awk" "$work/points" >"$out.part"
+mv "$out.part" "$out"

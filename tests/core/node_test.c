@@ -417,6 +417,63 @@ static void test_numbers_do_not_depend_on_the_locale(void **state) {
   assert_string_equal(context.error.message, "epsilon must be between 0 and 1 (diagonal), not 1.5");
 }
 
+/* What a node does that breaks its promises. */
+typedef enum lapse { MAKES_ALL, MISSES_ONE, LEAVES_ONE_OPEN, MAKES_ANOTHER_TYPE, FAILS_IN_SILENCE, LAPSE_COUNT } lapse;
+
+static lapse present_lapse;
+static qmat_report *made_first; /* its first output, of which the test keeps a reference */
+
+static qmat_status make_with_lapse(qmat_context *context, const void *params, const qmat_value *const inputs[],
+                                   qmat_value *outputs[]) {
+  (void)params, (void)inputs;
+  const bool is_another = present_lapse == MAKES_ANOTHER_TYPE;
+  qmat_value *second = is_another ? &qmat_report_new()->base : &qmat_medial_new()->base;
+  assert_int_equal(qmat_value_seal(context, &made_first->base), QMAT_OK);
+  if (present_lapse != LEAVES_ONE_OPEN) assert_int_equal(qmat_value_seal(context, second), QMAT_OK);
+  outputs[0] = qmat_value_retain(&made_first->base);
+  outputs[1] = second;
+  if (present_lapse == MISSES_ONE) {
+    qmat_value_release(second);
+    outputs[1] = NULL;
+  }
+  return present_lapse == FAILS_IN_SILENCE ? QMAT_ERROR_GEOMETRY : QMAT_OK;
+}
+
+static void test_a_node_that_breaks_its_promises_is_an_error_without_outputs(void **state) {
+  (void)state;
+  static const qmat_port outputs_of_two[] = {
+      {.name = "report", .type = QMAT_REPORT}, {.name = "medial", .type = QMAT_MEDIAL}, {.name = NULL}};
+  static const qmat_node node = {.name = "test.two", .outputs = outputs_of_two, .run = make_with_lapse};
+  for (present_lapse = MAKES_ALL; present_lapse < LAPSE_COUNT; present_lapse++) {
+    qmat_context context = {0};
+    qmat_fail(&context, QMAT_ERROR_GEOMETRY, "an earlier error"); /* is not that of this run */
+    made_first = qmat_report_new();
+    qmat_value *outputs[2] = {(qmat_value *)&context, (qmat_value *)&context};
+    const qmat_status status = qmat_node_run(&context, &node, NULL, NULL, outputs);
+    if (present_lapse == MAKES_ALL) {
+      assert_int_equal(status, QMAT_OK);
+      assert_ptr_equal(outputs[0], made_first);
+      assert_int_equal(outputs[1]->type, QMAT_MEDIAL);
+      qmat_value_release(outputs[0]);
+      qmat_value_release(outputs[1]);
+    } else {
+      const bool is_silent = present_lapse == FAILS_IN_SILENCE;
+      assert_int_equal(status, is_silent ? QMAT_ERROR_GEOMETRY : QMAT_ERROR_INTERNAL);
+      assert_int_equal(context.error.status, status);
+      assert_string_equal(context.error.message, is_silent ? "the node failed without recording an error"
+                                                           : "the node did not make its output 'medial'");
+      assert_string_equal(context.error.field, is_silent ? "" : "medial");
+      assert_string_equal(context.error.node_type, "test.two");
+      assert_null(outputs[0]);
+      assert_null(outputs[1]);
+    }
+    assert_null(context.node_type);
+    assert_int_equal(made_first->base.references, 1); /* what was made was released */
+    qmat_value_release(&made_first->base);
+    qmat_context_uninit(&context);
+  }
+}
+
 static void test_values_are_sealed_and_handed_over_all_or_none(void **state) {
   (void)state;
   qmat_context context = {0};
@@ -461,6 +518,7 @@ int main(void) {
       cmocka_unit_test(test_formatted_values_read_back_to_themselves),
       cmocka_unit_test(test_formatting_cuts_at_the_size_given),
       cmocka_unit_test(test_numbers_do_not_depend_on_the_locale),
+      cmocka_unit_test(test_a_node_that_breaks_its_promises_is_an_error_without_outputs),
       cmocka_unit_test(test_values_are_sealed_and_handed_over_all_or_none),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

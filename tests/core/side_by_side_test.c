@@ -75,31 +75,56 @@ static qmat_status run_on(void *user, qmat_context *own, size_t item) {
   return QMAT_CANCELLED;
 }
 
-static bool refuse_later(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                         const char *unit) {
+/* Refuses to go on at call `stop_at`. It is asked at every opportunity. */
+typedef struct {
+  qmat_context *context;
+  size_t stop_at, calls;
+} stopper;
+
+static bool may_go_on(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                      const char *unit) {
   (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return --*(int *)user > 0;
+  stopper *stop = user;
+  stop->context->progress_time = 0;
+  return stop->calls++ < stop->stop_at;
+}
+
+/* `calls` gets how often the progress function was asked. */
+static qmat_status run_until(int threads, size_t stop_at, items *all, size_t *calls) {
+  qmat_context context = {.threads = threads, .progress = may_go_on};
+  stopper stop = {.context = &context, .stop_at = stop_at};
+  context.progress_user = &stop;
+  *all = (items){.first_failure = 64, .last_failure = 64};
+  const qmat_status status = qmat_run_side_by_side(&context, 64, run_item, all, &all->done, 64, "items");
+  if (status != QMAT_OK) assert_int_equal(context.error.status, status);
+  *calls = stop.calls;
+  qmat_context_uninit(&context);
+  return status;
 }
 
 static void test_it_can_be_cancelled(void **state) {
   (void)state;
-  for (int calls = 1; calls <= 2; calls++) {
-    int left = calls;
-    qmat_context context = {.threads = 2, .progress = refuse_later, .progress_user = &left};
-    items all = {.first_failure = 64, .last_failure = 64};
-    const qmat_status status = qmat_run_side_by_side(&context, 64, run_item, &all, &all.done, 64, "items");
-    if (calls == 1) assert_int_equal(status, QMAT_CANCELLED);
-    if (status != QMAT_OK) assert_int_equal(context.error.status, QMAT_CANCELLED);
-    qmat_context_uninit(&context);
+  items all;
+  size_t whole, calls;
+  assert_int_equal(run_until(1, SIZE_MAX, &all, &whole), QMAT_OK);
+  assert_int_equal(whole, 1 + 64); /* before the first item, then in each */
+  for (size_t stop_at = 0; stop_at < whole; stop_at++) {
+    assert_int_equal(run_until(1, stop_at, &all, &calls), QMAT_CANCELLED);
+    assert_int_equal(calls, stop_at + 1);
+    for (size_t i = 0; i < 64; i++) assert_int_equal(all.ran[i], i < stop_at);
   }
+  assert_int_equal(run_until(2, 0, &all, &calls), QMAT_CANCELLED);
+  assert_int_equal(calls, 1);
+  assert_int_equal(atomic_load(&all.done), 0);
 }
 
 /* One item for eight threads: the main thread hears of a cancel while another has the item. */
 static void test_it_can_be_cancelled_while_the_main_thread_waits(void **state) {
   (void)state;
   for (int round = 0; round < 20; round++) {
-    int left = 10;
-    qmat_context context = {.threads = 8, .progress = refuse_later, .progress_user = &left};
+    qmat_context context = {.threads = 8, .progress = may_go_on};
+    stopper stop = {.context = &context, .stop_at = 9};
+    context.progress_user = &stop;
     items all = {.first_failure = 64, .last_failure = 64};
     assert_int_equal(qmat_run_side_by_side(&context, 1, run_on, &all, &all.done, 1, "items"), QMAT_CANCELLED);
     qmat_context_uninit(&context);

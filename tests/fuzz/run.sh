@@ -20,6 +20,7 @@ done
 
 work=$(mktemp -d) || exit 2
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 if [ -z "$program" ]; then
   program=$top/build/asan/qmat_fuzz
   if ! (cd "$top" && cmake --preset asan && cmake --build --preset asan --target qmat_fuzz) >"$work/build.log" 2>&1; then

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "graphs/qmat.h"
+#include "tests/io/gltf/gltf_assets.h"
 
 enum { RINGS = 12, SECTORS = 24, VERTICES = 2 + (RINGS - 1) * SECTORS, TRIANGLES = 2 * SECTORS * (RINGS - 1) };
 
@@ -273,6 +274,140 @@ static void test_values_are_given_read_and_passed_on(void **state) {
   qmat_job_free(second);
 }
 
+/* A glTF file of a box and of a triangle that encloses nothing. */
+static void write_box_and_triangle(const char *path) {
+  static const char text[] =
+      "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0,1]}],'nodes':[{'mesh':0},{'mesh':1}],"
+      "'meshes':[{'name':'box','primitives':[{'attributes':{'POSITION':0},'indices':1}]},"
+      "{'name':'flap','primitives':[{'attributes':{'POSITION':0},'indices':2}]}],"
+      "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[3,1,1]},"
+      "{'bufferView':1,'componentType':5123,'count':36,'type':'SCALAR'},"
+      "{'bufferView':1,'componentType':5123,'count':3,'type':'SCALAR'}],"
+      "'bufferViews':[{'buffer':0,'byteLength':96},{'buffer':0,'byteOffset':96,'byteLength':72}],"
+      "'buffers':[{'byteLength':168}]}";
+  qmat_writer data = {0};
+  put_box_corners(&data, 3);
+  put_box_triangles(&data);
+  qmat_writer glb = asset_glb(text, data.bytes, data.size);
+  FILE *file = fopen(path, "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(glb.bytes, 1, glb.size, file), glb.size);
+  assert_int_equal(fclose(file), 0);
+  qmat_writer_uninit(&glb);
+  qmat_writer_uninit(&data);
+}
+
+static void test_items_of_a_list_are_read_one_by_one_and_one_that_failed_says_why(void **state) {
+  (void)state;
+  static const char text[] =
+      "qmat: 1\nnodes:\n  model: { type: scene.read }\n"
+      "  thickness: { type: mesh.sdf, in: { mesh: model.mesh } }\noutputs: { thickness: thickness.thickness }\n";
+  char folder[] = "/tmp/qmat-job-XXXXXX", path[64], assignment[96];
+  assert_non_null(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/two.glb", folder);
+  snprintf(assignment, sizeof assignment, "model.path=%s", path);
+  write_box_and_triangle(path);
+  qmat_job *job, *other;
+  ok(job, qmat_job_new_from_text(&job, text, sizeof text - 1));
+  ok(job, qmat_job_set(job, assignment));
+  ok(job, qmat_job_want(job, "model.mesh"));
+  ok(job, qmat_job_want(job, "thickness.thickness"));
+  ok(job, qmat_job_run(job, 2, NULL, NULL));
+  qmat_value_view value;
+  ok(job, qmat_job_value(job, "model.mesh", &value));
+  assert_string_equal(value.type, "mesh");
+  assert_string_equal(value.name, "");
+  assert_int_equal(value.item_count, 2);
+  assert_int_equal(value.array_count, 0);
+  static const char *const names[] = {"box", "flap"};
+  static const size_t triangles[] = {12, 1};
+  for (size_t i = 0; i < 2; i++) {
+    char port[32];
+    qmat_mesh_view mesh;
+    snprintf(port, sizeof port, "model.mesh[%zu]", i);
+    ok(job, qmat_job_value(job, port, &value));
+    assert_string_equal(value.type, "mesh");
+    assert_string_equal(value.name, names[i]);
+    assert_int_equal(value.item_count, 0);
+    assert_true(value.array_count >= 2);
+    ok(job, qmat_job_mesh(job, port, &mesh));
+    assert_int_equal(mesh.triangle_count, triangles[i]);
+  }
+  qmat_mesh_view mesh;
+  qmat_array_view array;
+  assert_int_equal(qmat_job_mesh(job, "model.mesh", &mesh), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_array(job, "model.mesh", 0, &array), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_mesh(job, "model.mesh[2]", &mesh), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "'model.mesh' is a list of 2 items, without item 2"));
+  /* One of two thicknesses was made. */
+  ok(job, qmat_job_value(job, "thickness.thickness", &value));
+  assert_string_equal(value.type, "field");
+  assert_int_equal(value.item_count, 2);
+  ok(job, qmat_job_array(job, "thickness.thickness[0]", 0, &array));
+  assert_int_equal(array.rows, 12);
+  assert_int_equal(qmat_job_value(job, "thickness.thickness[1]", &value), QMAT_RESULT_FAILED);
+  assert_string_equal(qmat_job_error(job)->element_kind, "item");
+  assert_int_equal(qmat_job_error(job)->element, 1);
+  assert_non_null(strstr(qmat_job_error(job)->message, "mesh.sdf: "));
+  /* All of a list, or an item, is given to another job. */
+  ok(other, qmat_job_new_from_text(&other, text, sizeof text - 1));
+  ok(other, qmat_job_give_result(other, "model.mesh", job, "model.mesh"));
+  ok(other, qmat_job_want(other, "thickness.thickness"));
+  ok(other, qmat_job_run(other, 1, NULL, NULL));
+  ok(other, qmat_job_value(other, "thickness.thickness", &value));
+  assert_int_equal(value.item_count, 2);
+  ok(other, qmat_job_give_result(other, "model.mesh", job, "model.mesh[0]"));
+  ok(other, qmat_job_run(other, 1, NULL, NULL));
+  ok(other, qmat_job_value(other, "thickness.thickness", &value));
+  assert_int_equal(value.item_count, 0);
+  qmat_job_free(other);
+  qmat_job_free(job);
+  unlink(path);
+  rmdir(folder);
+}
+
+/* Sets a variable of the environment, or removes it, and returns a copy of what it was. */
+static char *exchange(const char *name, const char *text) {
+  const char *now = getenv(name);
+  char *before = now ? strdup(now) : NULL;
+  assert_int_equal(text ? setenv(name, text, 1) : unsetenv(name), 0);
+  return before;
+}
+
+static void test_the_cache_folder_follows_the_environment(void **state) {
+  (void)state;
+  static const char *const names[] = {"QMAT_CACHE", "XDG_CACHE_HOME", "HOME"};
+  static const struct {
+    const char *values[3], *folder;
+  } cases[] = {{{"off", "/x", "/h"}, NULL},
+               {{"", "/x", "/h"}, NULL},
+               {{"a folder", "/x", "/h"}, "a folder"},
+               {{"offset", "/x", "/h"}, "offset"},
+               {{NULL, "/x", "/h"}, "/x/qmat"},
+               {{NULL, "", "/h"}, "/h/.cache/qmat"},
+               {{NULL, "relative", "/h"}, "/h/.cache/qmat"}, /* the XDG specification ignores it */
+               {{NULL, NULL, "/h"}, "/h/.cache/qmat"},
+               {{NULL, NULL, "relative"}, NULL},
+               {{NULL, NULL, NULL}, NULL}};
+  char *before[3];
+  for (size_t k = 0; k < 3; k++) before[k] = exchange(names[k], NULL);
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t k = 0; k < 3; k++) free(exchange(names[k], cases[i].values[k]));
+    char *folder = qmat_cache_folder();
+    if (cases[i].folder) {
+      assert_non_null(folder);
+      assert_string_equal(folder, cases[i].folder);
+    } else {
+      assert_null(folder);
+    }
+    qmat_text_free(folder);
+  }
+  for (size_t k = 0; k < 3; k++) {
+    free(exchange(names[k], before[k]));
+    free(before[k]);
+  }
+}
+
 static void test_mistakes_are_results_with_a_problem(void **state) {
   (void)state;
   qmat_job *job;
@@ -290,6 +425,11 @@ static void test_mistakes_are_results_with_a_problem(void **state) {
   assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_USAGE);
   assert_string_equal(qmat_job_error(job)->field, "path");
   assert_int_equal(qmat_job_run(job, -1, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the number of threads has to be from 0 to 1024, not -1"));
+  assert_int_equal(qmat_job_run(job, 1025, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the number of threads has to be from 0 to 1024, not 1025"));
+  assert_int_equal(qmat_job_run(job, 1024, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_string_equal(qmat_job_error(job)->field, "path"); /* still no model: 1024 threads are allowed */
   ok(job, qmat_job_set(job, "model=/nowhere/x.off"));
   assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_FAILED);
   assert_string_equal(qmat_job_error(job)->status, "io");
@@ -387,6 +527,8 @@ int main(void) {
       cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
       cmocka_unit_test(test_a_job_forgets_models_and_paths),
       cmocka_unit_test(test_values_are_given_read_and_passed_on),
+      cmocka_unit_test(test_items_of_a_list_are_read_one_by_one_and_one_that_failed_says_why),
+      cmocka_unit_test(test_the_cache_folder_follows_the_environment),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
       cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),

@@ -4,9 +4,11 @@
 # A small tree that keeps the rules is made to break one rule after the other.
 set -u
 source=$1
+unset GIT_DIR GIT_WORK_TREE GIT_INDEX_FILE # those of a hook are of another tree
 house=$source/tests/house
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 tree=$work/tree
 failures=0
 
@@ -91,6 +93,12 @@ passes sizes
 passes words
 passes links
 passes format
+passes versions
+
+# A node's version is in the changelog.
+printf 'const qmat_node node = {\n    .name = "mesh.scale",\n    .version = 2,\n};\n' >>"$tree/nodes/scale.c"
+printf -- '- `mesh.scale` 21: it is faster.\n' >"$tree/CHANGELOG.md"
+fails 'nodes/scale.c: CHANGELOG.md does not say what mesh.scale 2 changes' versions
 
 # Includes point down.
 add core/value.c '#include "io/off.h"'
@@ -174,5 +182,37 @@ echo '[a page](missing.md)' >>"$tree/README.md"
 fails 'README.md:4: there is no missing.md' links
 rm "$tree/tests/run.sh"
 fails 'README.md:3: there is no tests/run.sh' links
+
+# add_made: what the builds of a user leave, which breaks the rules.
+add_made() {
+  mkdir -p "$tree/examples/game/build" "$tree/examples/page/node_modules/three"
+  printf 'int f( void ) { return 1; }\n' >"$tree/examples/game/build/made.c"
+  printf 'The mantle of [a page](missing.md)\n' >"$tree/examples/game/build/README.md"
+  cp "$tree/examples/game/build/README.md" "$tree/examples/page/node_modules/three/"
+}
+add_made
+passes format
+passes words
+passes links
+if ! command -v git >"$work/said"; then
+  echo "skipped: the files of a clone (Debian: apt install git)"
+else
+  make_tree
+  printf 'build/\nnode_modules/\n' >"$tree/.gitignore"
+  git init -q "$tree" && git -C "$tree" add . && add_made
+  passes format
+  passes words
+  passes links
+  cp -r "$tree" "$work/clone"
+  printf '[a page](missing.md)\n' >"$tree/new.md"
+  fails 'new.md:1: there is no missing.md' links
+  cp -r "$work/clone/." "$tree"
+  printf 'int f( void ) { return 1; }\n' >"$tree/core/ugly.c"
+  fails 'ugly.c' format
+  cp -r "$work/clone/." "$tree"
+  rm "$tree/nodes/scale.h" "$tree/README.md" # deleted, and still in the index
+  passes format
+  passes words
+fi
 
 [ "$failures" -eq 0 ]

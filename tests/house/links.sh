@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # What the pages point at is there, as are the scripts that they name: links.sh SOURCE_FOLDER
 set -eu
+. "$(dirname "$0")/files.sh"
 cd "$1"
-find . -name '*.md' ! -path './build/*' | LC_ALL=C sort | xargs awk '
+source_files . | grep '\.md$' | xargs awk '
   /^```/ { fenced = !fenced; next }
   !fenced {
     folder = FILENAME

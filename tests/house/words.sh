@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The words that words.txt lists are in no product code and no page: words.sh SOURCE_FOLDER
 set -eu
+. "$(dirname "$0")/files.sh"
 words=$(cd "$(dirname "$0")" && pwd)/words.txt
 cd "$1"
 {
-  find core io nodes graphs -type f
-  find . -name '*.md' ! -path './build/*' | sed 's/^\.\///'
+  source_files core io nodes graphs
+  source_files . | grep '\.md$'
 } | LC_ALL=C sort | xargs awk '
   FNR == NR {
     if ($1 == "word") {

@@ -70,7 +70,7 @@ static void test_equal_spheres_stay_apart(void **state) {
   /* Draco's tools like to merge points of equal attributes; ids would then point elsewhere. */
   double spheres[16];
   for (int i = 0; i < 4; i++) memcpy(spheres + 4 * i, (const double[]){1, 2, 3, 0.5}, 4 * sizeof *spheres);
-  qmat_medial *medial = example_build(spheres, 4, (const uint32_t[]){0, 3}, 1, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 4, (const uint32_t[]){0, 3}, 1, NULL, 0);
   assert_round_trip(medial, 10, 10);
   qmat_value_release(&medial->base);
 }
@@ -80,10 +80,10 @@ static void test_far_and_tiny_models_keep_what_single_precision_holds(void **sta
   const double far[12] = {1e6, 1e6, 1e6, 1, 1e6 + 3, 1e6, 1e6, 2, 1e6, 1e6 + 4, 1e6, 0};
   const double tiny[12] = {0, 0, 0, 1e-30, 3e-30, 0, 0, 2e-30, 0, 4e-30, 0, 0};
   const uint32_t triangle[3] = {0, 1, 2};
-  qmat_medial *medial = example_build(far, 3, NULL, 0, triangle, 1);
+  qmat_medial *medial = sealed_medial_mesh(far, 3, NULL, 0, triangle, 1);
   assert_round_trip(medial, 16, 16);
   qmat_value_release(&medial->base);
-  medial = example_build(tiny, 3, NULL, 0, triangle, 1);
+  medial = sealed_medial_mesh(tiny, 3, NULL, 0, triangle, 1);
   assert_round_trip(medial, 16, 16);
   qmat_value_release(&medial->base);
 }
@@ -111,7 +111,7 @@ static void test_faces_are_triangles_then_edges_then_spheres(void **state) {
   (void)state;
   qmat_context context = {0};
   const double spheres[24] = {0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1, 5, 5, 5, 1, 6, 6, 6, 1};
-  qmat_medial *medial = example_build(spheres, 6, (const uint32_t[]){2, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 6, (const uint32_t[]){2, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
   uint8_t *bytes;
   size_t size;
   qmat_draco_mesh *mesh;
@@ -163,7 +163,7 @@ static void test_bad_bits_and_empty_medial_meshes_are_refused(void **state) {
   qmat_value_release(&medial->base);
 
   const double large[8] = {0, 0, 0, 1, 0, 1e300, 0, 1};
-  medial = example_build(large, 2, NULL, 0, NULL, 0);
+  medial = sealed_medial_mesh(large, 2, NULL, 0, NULL, 0);
   assert_int_equal(qmat_draco_encode_medial(&context, medial, NULL, 8, 8, &bytes, &size), QMAT_ERROR_GEOMETRY);
   assert_string_equal(context.error.element_kind, "sphere");
   assert_int_equal(context.error.element, 1);

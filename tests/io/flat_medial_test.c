@@ -33,7 +33,7 @@ static void test_a_cone_and_a_sphere_have_the_bytes_that_the_format_page_says(vo
   (void)state;
   const double spheres[] = {0, 0, 0, 0, 2, 0, 0, 1, 1, 3, 0, 0.5};
   const uint32_t edge[] = {0, 1};
-  qmat_medial *medial = example_build(spheres, 3, edge, 1, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 3, edge, 1, NULL, 0);
   uint8_t *bytes;
   size_t size;
   encode(medial, NULL, false, &bytes, &size);
@@ -142,7 +142,7 @@ static void test_more_spheres_than_16_bits_name_have_wide_ids(void **state) {
       spheres[4 * i + 3] = 1;
     }
     const uint32_t edge[] = {0, (uint32_t)count - 1};
-    qmat_medial *medial = example_build(spheres, count, edge, 1, NULL, 0);
+    qmat_medial *medial = sealed_medial_mesh(spheres, count, edge, 1, NULL, 0);
     uint8_t *bytes;
     size_t size;
     encode(medial, NULL, false, &bytes, &size);
@@ -164,7 +164,7 @@ static void test_spheres_that_do_not_fit_are_errors(void **state) {
   const double far[] = {0, 0, 0, 1, 1e39, 0, 0, 1};
   uint8_t *bytes;
   size_t size;
-  qmat_medial *medial = example_build(far, 2, NULL, 0, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(far, 2, NULL, 0, NULL, 0);
   assert_int_equal(qmat_flat_encode(&context, medial, NULL, NULL, false, &bytes, &size), QMAT_ERROR_GEOMETRY);
   assert_int_equal(context.error.element, 1);
   assert_null(bytes);

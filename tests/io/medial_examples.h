@@ -7,22 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/medial_build.h"
-
-static inline qmat_medial *example_build(const double *spheres, size_t sphere_count, const uint32_t *edges,
-                                         size_t edge_count, const uint32_t *triangles, size_t triangle_count) {
-  qmat_context context = {0};
-  qmat_medial *medial = qmat_medial_new();
-  assert_non_null(medial);
-  medial->spheres = qmat_alloc(4 * sphere_count, sizeof *medial->spheres);
-  assert_non_null(medial->spheres);
-  memcpy(medial->spheres, spheres, 4 * sphere_count * sizeof *spheres);
-  medial->sphere_count = sphere_count;
-  assert_int_equal(qmat_medial_set_simplices(&context, medial, edges, edge_count, triangles, triangle_count), QMAT_OK);
-  assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return medial;
-}
+#include "tests/medial_meshes.h"
 
 /* A spiral of `count` spheres: the first half in triangles, then edges that lie on none, and every seventh sphere
  * alone. One sphere is alone; three make one triangle. */
@@ -45,7 +30,7 @@ static inline qmat_medial *example_medial(size_t count) {
       memcpy(edges + 2 * edge_count++, e, sizeof e);
     }
   }
-  qmat_medial *medial = example_build(spheres, count, edges, edge_count, triangles, triangle_count);
+  qmat_medial *medial = sealed_medial_mesh(spheres, count, edges, edge_count, triangles, triangle_count);
   qmat_free(spheres);
   qmat_free(edges);
   qmat_free(triangles);

@@ -258,7 +258,7 @@ static void test_what_welding_collapses_repeats_or_turns_back_to_back_is_counted
   const int changed[] = {0, 1, 2, -1, 0, 1, 4, -1, 4, 5, 3, -1, 0, 5, 4, -1};
   json_t *report;
   assert_soup_refused(make_soup(positions, 6, facets, 4), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
-                      "file:13: facet 3: the facet has the same vertices as facet 2 (set 'defects: drop' "
+                      "file:13: facet 3: the facet repeats facet 2 (set 'defects: drop' "
                       "to drop such facets; qmat mat: --set model.defects=drop)");
   qmat_mesh *mesh = convert(make_soup(positions, 6, changed, 4), QMAT_DEFECTS_REFUSE, &report);
   assert_int_equal(mesh->vertex_count, 3);
@@ -278,7 +278,7 @@ static void test_defects_are_refused_with_facet_and_line_or_dropped_and_counted(
                       "to drop such facets; qmat mat: --set model.defects=drop)");
   const int repeated[] = {0, 3, 2, 1, -1, 4, 5, 6, 7, -1, 1, 2, 0, 3, -1, 0, 3, 2, -1};
   assert_soup_refused(make_soup(cube, 8, repeated, 4), QMAT_DEFECTS_REFUSE, QMAT_ERROR_GEOMETRY,
-                      "file:12: facet 2: the facet has the same vertices as facet 0 (set 'defects: drop' "
+                      "file:12: facet 2: the facet repeats facet 0 (set 'defects: drop' "
                       "to drop such facets; qmat mat: --set model.defects=drop)");
   json_t *report;
   qmat_mesh *mesh = convert(make_soup(cube, 8, twice, 3), QMAT_DEFECTS_DROP, &report);

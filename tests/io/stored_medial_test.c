@@ -29,12 +29,12 @@ static void test_the_origin_is_zero_where_single_precision_suffices(void **state
   (void)state;
   const double near_zero[] = {0.5, 0, -1, 1, 1, 0, -1, 0.5}, far[] = {4e5, 0, 5e6, 1, 4e5 + 1, 0.25, 5e6, 0.5};
   double origin[3];
-  qmat_medial *medial = example_build(near_zero, 2, NULL, 0, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(near_zero, 2, NULL, 0, NULL, 0);
   qmat_storage_origin(medial, NULL, 1e-5, origin);
   assert_true(origin[0] == 0 && origin[1] == 0 && origin[2] == 0);
   qmat_value_release(&medial->base);
 
-  medial = example_build(far, 2, NULL, 0, NULL, 0);
+  medial = sealed_medial_mesh(far, 2, NULL, 0, NULL, 0);
   qmat_storage_origin(medial, NULL, 1e-5, origin);
   for (int k = 0; k < 3; k++) {
     assert_true(fabs(origin[k] - far[k]) <= 4); /* the box is 2.5 wide: multiples of 4 */

@@ -16,6 +16,7 @@ if [ "${1:-}" = --check ]; then
 fi
 work=$(mktemp -d) || exit 2
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 separator=$(printf '\037') # a separator that no text holds
 
 # A mutant a line: number, name, text, replacement, test.

@@ -56,30 +56,49 @@ static inline void pipeline_release(const char *name, qmat_value *outputs[]) {
   for (size_t i = 0; i < qmat_output_count(qmat_node_find(name)); i++) qmat_value_release(outputs[i]);
 }
 
-/* A progress function that cancels after `*user` calls. */
-static inline bool pipeline_refuse(void *user, const char *node_id, const char *node_type, uint64_t done,
-                                   uint64_t total, const char *unit) {
+/* Cancels a run at call `stop_at` of the progress function, which is asked at every opportunity. */
+typedef struct pipeline_stopper {
+  qmat_context *context;
+  size_t stop_at, calls;
+} pipeline_stopper;
+
+static inline bool pipeline_may_go_on(void *user, const char *node_id, const char *node_type, uint64_t done,
+                                      uint64_t total, const char *unit) {
   (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return --*(int64_t *)user >= 0;
+  pipeline_stopper *stopper = user;
+  stopper->context->progress_time = 0;
+  return stopper->calls++ < stopper->stop_at;
 }
 
-/* Cancels a node on one thread after 0, 1, 3, 7, ... calls of the progress function, until it comes to its end. The
- * first call is before the node starts. */
+/* Runs a node that is cancelled at call `stop_at`; `calls` gets how often it asked. It has outputs only where it came
+ * to its end; the caller releases them. */
+static inline qmat_status pipeline_run_until(int threads, size_t stop_at, const char *name, const char *text,
+                                             const qmat_value *const inputs[], qmat_value *outputs[], size_t *calls) {
+  qmat_context context = {.threads = threads, .progress = pipeline_may_go_on};
+  pipeline_stopper stopper = {.context = &context, .stop_at = stop_at};
+  context.progress_user = &stopper;
+  const qmat_status status = pipeline_run(&context, name, text, inputs, outputs);
+  for (size_t i = 0; status != QMAT_OK && i < qmat_output_count(qmat_node_find(name)); i++) assert_null(outputs[i]);
+  if (status != QMAT_OK) assert_int_equal(context.error.status, status);
+  *calls = stopper.calls;
+  qmat_context_uninit(&context);
+  return status;
+}
+
+/* Cancels a node on one thread at calls 0, 1, 3, 7, ... of the progress function, up to the last one of a whole run. A
+ * cancel is obeyed at once. The first call is before the node starts. */
 static inline void pipeline_must_be_cancelled(const char *name, const char *text, const qmat_value *const inputs[]) {
-  int64_t calls = 0;
-  for (;; calls = 2 * calls + 1) {
-    int64_t left = calls;
-    qmat_context context = {.threads = 1, .progress = pipeline_refuse, .progress_user = &left};
-    qmat_value *outputs[PIPELINE_MOST_PORTS];
-    const qmat_status status = pipeline_run(&context, name, text, inputs, outputs);
-    qmat_context_uninit(&context);
-    if (status == QMAT_OK) {
-      pipeline_release(name, outputs);
-      break;
-    }
-    assert_int_equal(status, QMAT_CANCELLED);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  size_t whole, calls;
+  assert_int_equal(pipeline_run_until(1, SIZE_MAX, name, text, inputs, outputs, &whole), QMAT_OK);
+  pipeline_release(name, outputs);
+  assert_true(whole > 1);
+  for (size_t stop_at = 0; stop_at < whole; stop_at = 2 * stop_at + 1) {
+    assert_int_equal(pipeline_run_until(1, stop_at, name, text, inputs, outputs, &calls), QMAT_CANCELLED);
+    assert_int_equal(calls, stop_at + 1);
   }
-  assert_true(calls > 1);
+  assert_int_equal(pipeline_run_until(1, whole - 1, name, text, inputs, outputs, &calls), QMAT_CANCELLED);
+  assert_int_equal(calls, whole);
 }
 
 /* The node must fail because of the geometry in `field`. Returns whether it gives a hint. */

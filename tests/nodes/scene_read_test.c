@@ -89,7 +89,7 @@ static void test_defects_are_dropped_unless_they_are_to_be_refused(void **state)
   qmat_context context = {0};
   qmat_value *outputs[3];
   assert_int_equal(run(&context, repeated, "refuse", outputs), QMAT_ERROR_GEOMETRY);
-  assert_string_equal(context.error.message, "the facet has the same vertices as facet 0");
+  assert_string_equal(context.error.message, "the facet repeats facet 0");
   assert_string_equal(context.error.file, path);
   assert_int_equal(context.error.line, 6);
   for (int i = 0; i < 3; i++) assert_null(outputs[i]);

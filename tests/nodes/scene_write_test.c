@@ -14,6 +14,7 @@
 #include "io/draco.h"
 #include "io/mesh/ma.h"
 #include "nodes/nodes.h"
+#include "tests/io/gltf/gltf_assets.h"
 #include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
@@ -399,33 +400,58 @@ static void test_a_file_in_the_units_of_a_mesh_says_so(void **state) {
   qmat_value_release(&medial->base);
 }
 
-/* Colliders of a centimetre mesh of a metre scene, beside a glTF file: a sphere of radius 2. */
-static void test_files_for_robots_are_in_metres(void **state) {
-  (void)state;
-  static const double tetrahedron[] = {-2, -2, -2, 2, 2, -2, -2, 2, 2, 2, -2, 2};
-  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+/* A glTF scene of one mesh; `glb` (NULL: the file was not kept) is copied. */
+static qmat_scene *make_gltf_scene(const char *name, const qmat_writer *glb) {
   qmat_context context = {0};
   qmat_scene *scene = qmat_scene_new();
-  qmat_colliders *c = qmat_colliders_new();
-  assert_true(scene && c);
-  scene->name = qmat_strdup("ball");
+  assert_non_null(scene);
+  scene->name = qmat_strdup(name);
   scene->format = qmat_strdup("glb");
   scene->meters_per_unit = 1;
   scene->mesh_count = 1;
   scene->meshes = qmat_calloc(1, sizeof *scene->meshes);
-  c->sphere_count = c->shape_count = 1;
+  if (glb) {
+    scene->part_count = 1;
+    scene->parts = qmat_calloc(1, sizeof *scene->parts);
+    scene->parts[0] = (qmat_file_part){qmat_strdup(""), glb->size, qmat_alloc(glb->size, 1)};
+    memcpy(scene->parts[0].bytes, glb->bytes, glb->size);
+  }
+  assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return scene;
+}
+
+/* A sphere of radius 2 with a tetrahedron for a hull, and its mass properties. */
+static qmat_colliders *make_colliders(void) {
+  static const double tetrahedron[] = {-2, -2, -2, 2, 2, -2, -2, 2, 2, 2, -2, 2};
+  static const double body[] = {7, 0, 0, 0, 1, 1, 1, 0, 0, 0};
+  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  qmat_context context = {0};
+  qmat_colliders *c = qmat_colliders_new();
+  assert_non_null(c);
+  c->sphere_count = c->shape_count = c->body_count = 1;
   c->point_count = c->triangle_count = 4;
   c->spheres = qmat_calloc(4, sizeof(double));
   c->spheres[3] = 2;
   c->shapes = qmat_calloc(3, sizeof(uint32_t));
   c->points = qmat_alloc(12, sizeof(double));
   c->triangles = qmat_alloc(12, sizeof(uint32_t));
+  c->hull_ends = qmat_alloc(2, sizeof(uint32_t));
+  c->body = qmat_alloc(10, sizeof(double));
   memcpy(c->points, tetrahedron, sizeof tetrahedron);
   memcpy(c->triangles, faces, sizeof faces);
-  c->hull_ends = qmat_alloc(2, sizeof(uint32_t));
+  memcpy(c->body, body, sizeof body);
   c->hull_ends[0] = c->hull_ends[1] = 4;
-  assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
   assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
+  qmat_context_uninit(&context);
+  return c;
+}
+
+/* Colliders of a centimetre mesh of a metre scene, beside a glTF file: a sphere of radius 2. */
+static void test_files_for_robots_are_in_metres(void **state) {
+  (void)state;
+  qmat_scene *scene = make_gltf_scene("ball", NULL);
+  qmat_colliders *c = make_colliders();
   qmat_medial *medial = make_medial();
   qmat_report *given = make_report(json_pack("{s:f}", "meters_per_unit", 0.01)), *report;
   const char *const settings[][2] = {{"format", "urdf"}, {NULL, NULL}};
@@ -439,7 +465,118 @@ static void test_files_for_robots_are_in_metres(void **state) {
   qmat_value_release(&medial->base);
   qmat_value_release(&scene->base);
   qmat_value_release(&c->base);
-  qmat_context_uninit(&context);
+}
+
+/* Nodes with the name that show a mesh. */
+static size_t shown_as(json_t *root, const char *name) {
+  size_t count = 0, i;
+  json_t *node;
+  json_array_foreach(json_object_get(root, "nodes"), i, node) {
+    const char *own = json_string_value(json_object_get(node, "name"));
+    count += own && strcmp(own, name) == 0 && json_is_integer(json_object_get(node, "mesh"));
+  }
+  return count;
+}
+
+/* Nodes with the extension, whose object has the key. */
+static size_t extended_by(json_t *root, const char *extension, const char *key) {
+  size_t count = 0, i;
+  json_t *node;
+  json_array_foreach(json_object_get(root, "nodes"), i, node) count +=
+      json_object_get(json_object_get(json_object_get(node, "extensions"), extension), key) != NULL;
+  return count;
+}
+
+static void test_each_form_of_colliders_is_written_where_it_is_chosen(void **state) {
+  (void)state;
+  static const struct {
+    const char *chosen[2];
+    size_t unreal, godot, khronos, omi;
+  } cases[] = {{{NULL, NULL}, 0, 0, 1, 0},
+               {{"khr_physics", NULL}, 0, 0, 1, 0},
+               {{"omi_physics", NULL}, 0, 0, 0, 1},
+               {{"unreal_hulls", NULL}, 1, 0, 0, 0},
+               {{"godot_hulls", NULL}, 0, 1, 0, 0},
+               {{"unreal_hulls", "khr_physics"}, 1, 0, 1, 0},
+               {{"unreal_hulls", "godot_hulls"}, 1, 1, 0, 0}};
+  qmat_medial *medial = make_medial();
+  qmat_scene *scene = make_gltf_scene("ball", NULL);
+  qmat_colliders *c = make_colliders();
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    const char *const settings[][2] = {{cases[i].chosen[0], "true"}, {cases[i].chosen[1], "true"}, {NULL, NULL}};
+    qmat_file *file = must_write(medial, (wiring){.scene = scene, .colliders = c}, settings);
+    json_t *root = glb_root(file);
+    assert_int_equal(shown_as(root, "UCX_ball_01"), cases[i].unreal);
+    assert_int_equal(shown_as(root, "ball_01-convcolonly"), cases[i].godot);
+    assert_int_equal(extended_by(root, "KHR_physics_rigid_bodies", "collider"), cases[i].khronos);
+    assert_int_equal(extended_by(root, "OMI_physics_body", "collider"), cases[i].omi);
+    json_decref(root);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&c->base);
+  qmat_value_release(&scene->base);
+  qmat_value_release(&medial->base);
+}
+
+static void test_bodies_that_are_fixed_have_colliders_and_no_mass(void **state) {
+  (void)state;
+  static const char *const extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+  qmat_medial *medial = make_medial();
+  qmat_colliders *c = make_colliders();
+  for (int fixed = 0; fixed < 2; fixed++) {
+    const char *const settings[][2] = {
+        {"khr_physics", "true"}, {"omi_physics", "true"}, {"fixed", fixed ? "true" : "false"}, {NULL, NULL}};
+    qmat_file *file = must_write(medial, (wiring){.colliders = c}, settings);
+    json_t *root = glb_root(file);
+    for (size_t k = 0; k < 2; k++) {
+      assert_int_equal(extended_by(root, extensions[k], "collider"), 1);
+      assert_int_equal(extended_by(root, extensions[k], "motion"), !fixed);
+    }
+    char *text = json_dumps(root, JSON_COMPACT);
+    assert_non_null(text);
+    assert_int_equal(strstr(text, "\"mass\":7") != NULL, !fixed);
+    free(text);
+    json_decref(root);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&c->base);
+  qmat_value_release(&medial->base);
+}
+
+/* `draco` is about the skin, `draco_meshes` about the triangles of the scene. */
+static void test_triangles_of_a_scene_are_compressed_where_that_is_chosen(void **state) {
+  (void)state;
+  static const char box[] =
+      "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0]}],'nodes':[{'mesh':0}],"
+      "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+      "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]},"
+      "{'bufferView':1,'componentType':5123,'count':36,'type':'SCALAR'}],"
+      "'bufferViews':[{'buffer':0,'byteLength':96},{'buffer':0,'byteOffset':96,'byteLength':72}],"
+      "'buffers':[{'byteLength':168}]}";
+  static const char *const chosen[] = {"side_files", "draco", "draco_meshes"};
+  static const char *const extension = "KHR_draco_mesh_compression";
+  qmat_writer data = {0};
+  put_box_corners(&data, 1);
+  put_box_triangles(&data);
+  qmat_writer glb = asset_glb(box, data.bytes, data.size);
+  qmat_scene *scene = make_gltf_scene("box", &glb);
+  qmat_medial *medial = make_medial();
+  for (int i = 0; i < 3; i++) {
+    qmat_file *file =
+        must_write(medial, (wiring){.scene = scene}, (const char *const[][2]){{chosen[i], "true"}, {NULL, NULL}});
+    json_t *root = glb_root(file);
+    const json_t *mesh = json_array_get(json_object_get(root, "meshes"), 0);
+    const json_t *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
+    const json_t *required = json_array_get(json_object_get(root, "extensionsRequired"), 0);
+    assert_int_equal(json_object_get(json_object_get(primitive, "extensions"), extension) != NULL, i == 2);
+    assert_int_equal(json_is_string(required) && strcmp(json_string_value(required), extension) == 0, i == 2);
+    json_decref(root);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&medial->base);
+  qmat_value_release(&scene->base);
+  qmat_writer_uninit(&glb);
+  qmat_writer_uninit(&data);
 }
 
 /* `mat -o x.glb -o x.ma --set asset.draco=true` makes both files with the same parameters. */
@@ -546,6 +683,9 @@ int main(void) {
       cmocka_unit_test(test_ma_keeps_every_number),
       cmocka_unit_test(test_a_file_in_the_units_of_a_mesh_says_so),
       cmocka_unit_test(test_files_for_robots_are_in_metres),
+      cmocka_unit_test(test_each_form_of_colliders_is_written_where_it_is_chosen),
+      cmocka_unit_test(test_bodies_that_are_fixed_have_colliders_and_no_mass),
+      cmocka_unit_test(test_triangles_of_a_scene_are_compressed_where_that_is_chosen),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
       cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),
       cmocka_unit_test(test_what_is_not_certified_fails_where_that_is_required),

@@ -27,6 +27,7 @@ cp "$source"/examples/readers/*.mjs "$packages/readers"
 work=$(mktemp -d)
 server=
 trap 'if [ -n "$server" ]; then kill "$server"; fi; rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 QMAT_CACHE=$work/cache
 export QMAT_CACHE
 mkdir "$work/assets"

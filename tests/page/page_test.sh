@@ -13,6 +13,7 @@ if ! command -v node >/dev/null 2>&1; then
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 cat "$source/examples/readers/qmat_reader.mjs" "$source/io/page/page.js" >"$work/script.mjs"
 node --check "$work/script.mjs"
 size=$(gzip -9c "$work/script.mjs" | wc -c)

@@ -26,10 +26,12 @@ build=$(cd "${1:-$top/build/release}" && pwd) || exit 2
 [ $# -eq 0 ] || shift
 work=$(mktemp -d) || exit 2
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 reports=${reports:-$work/reports}
 mkdir -p "$reports/generated" "$reports/surfaces" || exit 2
 QMAT_CACHE=off # the figures are those of this build
-export QMAT_CACHE
+LC_ALL=C # awk writes decimal points
+export QMAT_CACHE LC_ALL
 
 "$build/qmat_models" all "$work/models" >"$work/made.txt" || exit 2
 

@@ -18,6 +18,7 @@ if ! blender --background --factory-startup --python-exit-code 1 --python-expr '
 fi
 out=$(mktemp)
 trap 'rm -f "$out"' EXIT
+trap 'exit 1' HUP INT TERM
 PYTHONDONTWRITEBYTECODE=1 blender --background --factory-startup --python-exit-code 1 --python "$test" -- "$1/examples/readers" \
   >"$out" 2>&1 || { tail -n 20 "$out"; exit 1; }
 grep '^ok' "$out"

@@ -9,5 +9,6 @@ if [ "${3:-}" = --renew ]; then
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
 "$1" "$work"
 diff -r -q "$work" "$golden"

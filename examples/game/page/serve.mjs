@@ -4,9 +4,10 @@
 // Serves the page with the assets that the build made: node serve.mjs [FOLDER_OF_ASSETS [PORT]]
 import { createReadStream, readdirSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
-import { join, normalize } from 'node:path';
+import { dirname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
 
-const here = import.meta.dirname, assets = process.argv[2] ?? join(here, '../build/assets');
+const here = dirname(fileURLToPath(import.meta.url)), assets = process.argv[2] ?? join(here, '../build/assets');
 const folders = { '/assets/': assets, '/readers/': join(here, '../../readers'), '/': here };
 const types = { html: 'text/html', js: 'text/javascript', mjs: 'text/javascript', wasm: 'application/wasm', json: 'application/json' };
 

@@ -12,8 +12,10 @@
 
 #include "core/geometry/medial_distance.h"
 #include "core/hash.h"
+#include "tests/shapes.h"
 
 #define EXACT 1e-14
+#define assert_exact(actual, expected) assert_near(actual, expected, EXACT)
 
 enum { SPHERES = 400, EDGES = 300, TRIANGLES = 250 };
 
@@ -67,22 +69,18 @@ static qmat_envelope *envelope_of(qmat_context *context, const random_medial *m)
   return envelope;
 }
 
-static void assert_near(double got, double wanted) {
-  if (!(fabs(got - wanted) <= EXACT)) fail_msg("%.17g is not %.17g", got, wanted);
-}
-
 /* The weighted sphere is at the distance. Nothing is written beyond the limit. */
 static void check_foot(const qmat_envelope *envelope, const random_medial *m, const double p[3], double wanted) {
   uint32_t ids[3];
   double weights[3], sphere[4] = {0}, sum = 0;
-  assert_near(qmat_envelope_foot_within(envelope, p, wanted + 1e-9, ids, weights), wanted);
+  assert_exact(qmat_envelope_foot_within(envelope, p, wanted + 1e-9, ids, weights), wanted);
   for (size_t k = 0; k < 3; k++) {
     sum += weights[k];
     if (ids[k] == UINT32_MAX) assert_true(k > 0 && weights[k] == 0);
     for (size_t j = 0; ids[k] != UINT32_MAX && j < 4; j++) sphere[j] += weights[k] * m->spheres[4 * ids[k] + j];
   }
-  assert_near(sum, 1);
-  assert_near(qmat_sphere_distance(sphere, p), wanted);
+  assert_exact(sum, 1);
+  assert_exact(qmat_sphere_distance(sphere, p), wanted);
   uint32_t untouched[3] = {7, 8, 9};
   assert_true(qmat_envelope_foot_within(envelope, p, wanted - 1e-9, untouched, weights) == INFINITY);
   assert_true(untouched[0] == 7 && untouched[1] == 8 && untouched[2] == 9);
@@ -104,21 +102,21 @@ static void test_the_minimum_matches_brute_force(void **unused) {
       size_t primitive, same;
       double got = qmat_envelope_distance(envelope, p, &primitive);
       inside += got < 0;
-      assert_near(got, wanted);
+      assert_exact(got, wanted);
       assert_true(primitive < qmat_envelope_primitive_count(envelope));
-      assert_near(qmat_envelope_nearest(envelope, p, &same, sphere), wanted);
+      assert_exact(qmat_envelope_nearest(envelope, p, &same, sphere), wanted);
       assert_int_equal(same, primitive);
-      assert_near(qmat_sphere_distance(sphere, p), wanted);
+      assert_exact(qmat_sphere_distance(sphere, p), wanted);
       uint32_t ids[3];
       int count = qmat_envelope_primitive(envelope, primitive, ids);
       const double *a = m.spheres + 4 * (size_t)ids[0];
       const double *b = m.spheres + 4 * (size_t)ids[count > 1 ? 1 : 0];
       const double *c = m.spheres + 4 * (size_t)ids[count > 2 ? 2 : 0];
-      assert_near(count == 3   ? qmat_slab_distance(a, b, c, p)
-                  : count == 2 ? qmat_cone_distance(a, b, p)
-                               : qmat_sphere_distance(a, p),
-                  wanted);
-      assert_near(qmat_envelope_distance_within(envelope, p, got + 1e-9), wanted);
+      assert_exact(count == 3   ? qmat_slab_distance(a, b, c, p)
+                   : count == 2 ? qmat_cone_distance(a, b, p)
+                                : qmat_sphere_distance(a, p),
+                   wanted);
+      assert_exact(qmat_envelope_distance_within(envelope, p, got + 1e-9), wanted);
       assert_true(qmat_envelope_distance_within(envelope, p, got - 1e-9) == INFINITY);
       check_foot(envelope, &m, p, wanted);
     }
@@ -146,7 +144,7 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
   for (size_t i = 0; i < 500; i++) {
     double corners[3][3], p[3], bound;
     random_triangle(i, corners, p);
-    assert_near(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, -INFINITY, &bound), brute(&m, p));
+    assert_exact(qmat_envelope_bound(envelope, p, (const double(*)[3])corners, 3, -INFINITY, &bound), brute(&m, p));
     uint32_t ids[3];
     size_t primitive;
     qmat_envelope_distance(envelope, p, &primitive);
@@ -158,7 +156,7 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
       wanted = fmax(wanted, count == 3   ? qmat_slab_distance(s[0], s[1], s[2], corners[c])
                             : count == 2 ? qmat_cone_distance(s[0], s[1], corners[c])
                                          : qmat_sphere_distance(s[0], corners[c]));
-    assert_near(bound, wanted);
+    assert_exact(bound, wanted);
     for (size_t w = 0; w < 10; w++) {
       double weights[3], sum = 0, between[3] = {0, 0, 0};
       for (size_t c = 0; c < 3; c++) sum += weights[c] = number(i, w, c);
@@ -206,7 +204,7 @@ static void test_few_spheres_match_brute_force(void **unused) {
     for (size_t i = 0; i < 50; i++) {
       double p[3];
       for (size_t k = 0; k < 3; k++) p[k] = 2 * number(7, i, k) - 0.5;
-      assert_near(qmat_envelope_distance(envelope, p, NULL), brute(&m, p));
+      assert_exact(qmat_envelope_distance(envelope, p, NULL), brute(&m, p));
     }
     qmat_envelope_free(envelope);
   }
@@ -233,9 +231,9 @@ static void test_primitives_are_numbered_slabs_cones_spheres(void **unused) {
     assert_memory_equal(ids, wanted[i], (size_t)counts[i] * sizeof *ids);
   }
   size_t primitive;
-  assert_near(qmat_envelope_distance(envelope, (double[3]){6, 0, 0.5}, &primitive), 0.25);
+  assert_exact(qmat_envelope_distance(envelope, (double[3]){6, 0, 0.5}, &primitive), 0.25);
   assert_int_equal(primitive, 4);
-  assert_near(qmat_envelope_distance(envelope, (double[3]){3.5, 0, 1}, &primitive), 0.75);
+  assert_exact(qmat_envelope_distance(envelope, (double[3]){3.5, 0, 1}, &primitive), 0.75);
   assert_int_equal(primitive, 1);
   qmat_envelope_free(envelope);
   qmat_context_uninit(&context);
@@ -251,9 +249,9 @@ static void test_coincident_primitives_are_searched_through(void **unused) {
   qmat_envelope *envelope;
   assert_int_equal(qmat_envelope_new(&context, spheres, COUNT, NULL, 0, NULL, 0, &envelope), QMAT_OK);
   size_t primitive;
-  assert_near(qmat_envelope_distance(envelope, (double[3]){0, 0, 0}, &primitive), -1.5);
+  assert_exact(qmat_envelope_distance(envelope, (double[3]){0, 0, 0}, &primitive), -1.5);
   assert_int_equal(primitive, 4321);
-  assert_near(qmat_envelope_distance(envelope, (double[3]){0, 3, 0}, NULL), 1.5);
+  assert_exact(qmat_envelope_distance(envelope, (double[3]){0, 3, 0}, NULL), 1.5);
   qmat_envelope_free(envelope);
   qmat_free(spheres);
   qmat_context_uninit(&context);

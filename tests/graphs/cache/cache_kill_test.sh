@@ -24,11 +24,12 @@ run() {
 round=0
 for spacing in 4% 5% 6% 7%; do run "right-$spacing.glb" $spacing --no-cache || die "round $round: a run without a cache"; done
 
-# Random delays from a counter, so that a failing seed can be run again.
+# next_delay: sets delay. Random numbers come from a counter, so that a failing seed can be run again. A subshell would lose
+# the counter.
 seed=${QMAT_TEST_SEED:-1}
-delay() {
+next_delay() {
   seed=$(((seed * 1103515245 + 12345) % 2147483648))
-  echo "0.0$((seed / 65536 % 90 + 10))"
+  delay=0.0$((seed / 65536 % 90 + 10))
 }
 
 killed=0
@@ -43,7 +44,8 @@ while [ "$round" -lt "$rounds" ]; do
     pids="$pids $!"
   done
   for pid in $pids; do
-    sleep "$(delay)"
+    next_delay
+    sleep $delay
     kill -KILL "$pid" 2>/dev/null
     wait "$pid" 2>/dev/null
     if [ $? -eq 137 ]; then killed=$((killed + 1)); fi

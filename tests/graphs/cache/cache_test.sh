@@ -74,6 +74,8 @@ graph=graph.yaml
 if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; then
   LOCPATH=$work/locale LC_ALL=de_DE.UTF-8 run -o a.glb
   all hit "de_DE.UTF-8"
+else
+  echo "skipped: the locale de_DE.UTF-8 (Debian: apt install locales)"
 fi
 if [ "$(id -u)" -eq 0 ] && command -v setpriv >/dev/null && setpriv --reuid 65534 --clear-groups test -x "$qmat"; then
   chmod -R a+rX "$work"

@@ -141,7 +141,9 @@ holds "a list of three as JSON" node -e '
     all[2].surface.triangles === 12 && all[2].solid.components.length === 1 ? 0 : 1)'
 expect 0 "" "$qmat" mat box.off -o box.ply --epsilon 5% $coarse --quiet
 expect 0 "box.ply: a medial mesh of" "$qmat" info box.ply
-expect 0 "standard input: " sh -c '"$0" info - <box.off | sed "s/.*stdin:/standard input:/"' "$qmat"
+"$qmat" info - <box.off >out.txt 2>err.txt
+holds "info of the standard input" test $? -eq 0
+holds "what is on the standard input" grep -q 'stdin: a surface$' out.txt
 sed 's/^{$/{"images": [{"uri": "\\u001b[2J.png"}],/' box.gltf >odd.gltf
 expect 0 'the file "?[2J.png" cannot be read' "$qmat" info odd.gltf
 expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
@@ -195,7 +197,9 @@ holds "--to gets there" grep -q mesh.sdf out.txt
 holds "--to stops there" sh -c '! grep -q medial.simplify out.txt'
 # A number of spheres alone means no bound on the distance.
 expect 0 "" "$qmat" mat box.off -o few.ma --vertices 5 --report few.json
-holds "--vertices sets epsilon to 0" grep -q '"epsilon": 0.0' few.json
+holds "--vertices sets epsilon to 0" node -e '
+  const simple = JSON.parse(require("fs").readFileSync("few.json")).nodes.find((node) => node.id === "simple");
+  process.exit(simple.params.epsilon === 0 && simple.params.vertices === 5 ? 0 : 1)'
 
 # Cancelled by a signal while a node runs: exit code 3 and no file. A wavy torus is enough work to be interrupted.
 awk 'BEGIN {
@@ -229,6 +233,8 @@ if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; t
   expect 0 "" env LOCPATH="$work/locale" LC_ALL=de_DE.UTF-8 "$qmat" mat box.off -o comma.glb --epsilon 0.05 $coarse \
     --report comma.json
   holds "the same bytes under de_DE" cmp box.glb comma.glb
+else
+  echo "skipped: the locale de_DE.UTF-8 (Debian: apt install locales)"
 fi
 
 finish

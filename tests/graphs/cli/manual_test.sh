@@ -20,9 +20,11 @@ else
   echo "skipped: mandoc (Debian: apt install mandoc)"
   sed 's/^\.S[HS] "\(.*\)"$/\1/; s/\\f[BR]//g; s/\\-/-/g' qmat.1 >page.txt
 fi
-if command -v groff >/dev/null; then
+if command -v groff >/dev/null && command -v man >/dev/null; then
   man --warnings -E UTF-8 -l qmat.1 2>out.txt >/dev/null
   holds "man's warnings" test ! -s out.txt
+else
+  echo "skipped: man's warnings (Debian: apt install man-db groff)"
 fi
 commands=$(qmat help | sed -n 's/^  \([a-z]*\) .*/\1/p')
 holds "there are commands" test "$(echo "$commands" | wc -l)" -ge 15

@@ -47,7 +47,13 @@ skip() {
 
 # ---- a cluster ----
 host=$(hostname -s)
-port=$((10000 + $$ % 20000)) # below those that systems give to clients
+port=$((20000 + $$ % 3000 * 3)) # three, below those that systems give to clients; remote_cache_test.sh has others
+tries=0
+while is_taken $port || is_taken $((port + 1)) || is_taken $((port + 2)); do
+  port=$((port + 3))
+  tries=$((tries + 1))
+  [ $tries -lt 100 ] || die "all ports up to $port are taken"
+done
 SLURM_CONF=$work/slurm.conf
 export SLURM_CONF
 cat >slurm.conf <<END

@@ -511,7 +511,7 @@ static void test_a_mesh_far_from_zero_has_its_medial_mesh_on_a_translated_child(
   fixture f;
   assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
   const double spheres[] = {4e5 + 0.1, 0, 5e6 + 0.3, 1, 4e5 + 1.3, 0, 5e6, 0.5};
-  qmat_medial *medial = example_build(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0), *back;
+  qmat_medial *medial = sealed_medial_mesh(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0), *back;
   qmat_stated_errors stated;
   const qmat_gltf_addition addition = {
       .medial = medial,
@@ -549,8 +549,8 @@ static void test_a_second_time_takes_away_children_of_the_first(void **state) {
   (void)state;
   fixture f, again = {0};
   assert_int_equal(read_scene(&f, true, "1"), QMAT_OK);
-  qmat_medial *medial = example_build((const double[]){4e5 + 0.1, 0, 5e6 + 0.3, 1, 4e5 + 1.3, 0, 5e6, 0.5}, 2,
-                                      (const uint32_t[]){0, 1}, 1, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh((const double[]){4e5 + 0.1, 0, 5e6 + 0.3, 1, 4e5 + 1.3, 0, 5e6, 0.5}, 2,
+                                           (const uint32_t[]){0, 1}, 1, NULL, 0);
   qmat_mesh *skin = shape_box(1, 1, 1);
   for (size_t i = 0; i < skin->vertex_count; i++) {
     skin->positions[3 * i] += 4e5;

@@ -8,7 +8,7 @@ static void test_a_medial_mesh_far_from_zero_comes_back_unchanged_with_what_is_s
   (void)state;
   qmat_context context = {0};
   const double spheres[] = {4e5 + 0.1, 0, 5e6, 1, 4e5 + 1.3, 0, 5e6, 0.5, 4e5, 1, 5e6 + 0.7, 0.25};
-  qmat_medial *medial = example_build(spheres, 3, NULL, 0, (const uint32_t[]){0, 1, 2}, 1), *back;
+  qmat_medial *medial = sealed_medial_mesh(spheres, 3, NULL, 0, (const uint32_t[]){0, 1, 2}, 1), *back;
   const qmat_stated_errors errors = {
       .diagonal = 3, .epsilon = 0.01, .error_out = 0.1 / 17, .error_in = 0.009, .certified = QMAT_CERTIFICATE_YES};
   qmat_file *file;

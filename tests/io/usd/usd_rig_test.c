@@ -296,8 +296,17 @@ static void test_a_rig_that_does_not_fit_together_is_refused(void **state) {
   static const struct {
     uint32_t parent, bound, skin, keys;
     double second;
-  } cases[] = {{UINT32_MAX, 0, 0, 2, 1}, {0, 0, 0, 2, 1},          {UINT32_MAX, 1, 0, 2, 1},
-               {UINT32_MAX, 0, 1, 2, 1}, {UINT32_MAX, 0, 0, 1, 1}, {UINT32_MAX, 0, 0, 2, 0}};
+    uint32_t moved, placed;
+    bool lacks_skin;
+  } cases[] = {{UINT32_MAX, 0, 0, 2, 1},
+               {0, 0, 0, 2, 1},
+               {UINT32_MAX, 1, 0, 2, 1},
+               {UINT32_MAX, 0, 1, 2, 1},
+               {UINT32_MAX, 0, 0, 1, 1},
+               {UINT32_MAX, 0, 0, 2, 0},
+               {UINT32_MAX, 0, 0, 2, 1, .moved = 1},
+               {UINT32_MAX, 0, 0, 2, 1, .placed = 1},
+               {UINT32_MAX, 0, 0, 2, 1, .lacks_skin = true}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     qmat_context context = {0};
     qmat_scene *scene = qmat_scene_new();
@@ -306,7 +315,8 @@ static void test_a_rig_that_does_not_fit_together_is_refused(void **state) {
     scene->format = qmat_strdup("usd");
     *rig = (qmat_rig){.skeleton_count = 1,
                       .joint_count = 1,
-                      .skin_count = 1,
+                      .skin_count = !cases[i].lacks_skin,
+                      .placed_count = cases[i].placed,
                       .bound_count = 1,
                       .curve_count = 1,
                       .key_count = 2,
@@ -334,6 +344,8 @@ static void test_a_rig_that_does_not_fit_together_is_refused(void **state) {
     rig->key_times = qmat_calloc(2, sizeof(double));
     rig->key_times[1] = cases[i].second;
     rig->moved_joints = qmat_calloc(1, sizeof(uint32_t));
+    rig->moved_joints[0] = cases[i].moved;
+    rig->placed_skins = qmat_calloc(1, sizeof(uint32_t));
     rig->values = qmat_calloc(6, sizeof(double));
     assert_int_equal(qmat_value_seal(&context, &scene->base), i == 0 ? QMAT_OK : QMAT_ERROR_GEOMETRY);
     qmat_value_release(&scene->base);

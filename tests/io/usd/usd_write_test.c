@@ -10,7 +10,7 @@
 /* A slab, an edge beside it, and a sphere alone. */
 static qmat_medial *make_small(void) {
   static const double spheres[] = {0, 0, 0, 1, 4, 0, 0, 0.5, 0, 4, 0, 0.25, 0.1, 0.2, 5, 0, 1e-3, -7.5, 9, 2};
-  return example_build(spheres, 5, (const uint32_t[]){1, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
+  return sealed_medial_mesh(spheres, 5, (const uint32_t[]){1, 3}, 1, (const uint32_t[]){0, 1, 2}, 1);
 }
 
 static qmat_file *must_write(const qmat_medial *medial, const qmat_mesh *skin, const qmat_usd_options *options) {
@@ -107,7 +107,7 @@ static void test_the_text_of_a_small_one_is_as_by_hand(void **state) {
       "            interpolation = \"vertex\"\n        )\n        float[] widths = [2, 1] (\n"
       "            interpolation = \"vertex\"\n        )\n        uniform token type = \"linear\"\n"
       "        uniform token purpose = \"guide\"\n    }\n}\n";
-  qmat_medial *medial = example_build(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0);
   const qmat_usd_options options = {.name = "2 caf\xC3\xA9\"s",
                                     .meters_per_unit = 0.01,
                                     .is_z_up = true,
@@ -155,7 +155,7 @@ static void test_a_scene_reader_sees_the_skin_only(void **state) {
 static void test_what_single_precision_cannot_hold_is_refused_by_its_element(void **state) {
   (void)state;
   static const double spheres[] = {0, 0, 0, 1, 0, 1e39, 0, 1};
-  qmat_medial *medial = example_build(spheres, 2, NULL, 0, NULL, 0);
+  qmat_medial *medial = sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0);
   qmat_context context = {0};
   qmat_file *file;
   const qmat_usd_options options = {0};
