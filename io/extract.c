@@ -211,7 +211,11 @@ static json_t *describe_carrier(const json_t *root, size_t index, const json_t *
   const bool alone = name && json_integer_value(json_object_get(name_counts, name)) == 1;
   json_t *carrier = json_object();
   json_t *text = alone ? json_string(name) : json_sprintf("%zu", index);
-  const int64_t mesh = qmat_gltf_mesh_of(node);
+  int64_t mesh = qmat_gltf_mesh_of(node);
+  if (mesh < 0) { /* far from zero the medial mesh is on a child of the node */
+    const size_t parent = qmat_gltf_parent_of(root, index);
+    if (parent != SIZE_MAX) mesh = qmat_gltf_mesh_of(json_array_get(json_object_get(root, "nodes"), parent));
+  }
   bool done = json_object_set_new(carrier, "node", text) == 0;
   if (mesh >= 0 && !qmat_gltf_is_skin(root, (size_t)mesh))
     done = json_object_set_new(carrier, "mesh", json_integer(mesh)) == 0 && done;

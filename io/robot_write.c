@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/robot_write.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -69,11 +70,28 @@ static const double *sphere_of(const qmat_colliders *c, size_t shape, int corner
 
 /* ---- URDF ---- */
 
+/* Single precision is too coarse for a hull that is farther from zero than this many times its size. */
+static const double farthest = 1000;
+
+/* The origin of the coordinates of a hull in STL: zero, or far from it one of its points. */
+static void find_origin(const qmat_colliders *c, size_t shape, double origin[3]) {
+  size_t points[2], rows[2];
+  range_of(c, shape, points, rows);
+  const double *first = &c->points[3 * points[0]];
+  double size = 0, distance = 0;
+  for (size_t i = points[0]; i < points[1]; i++)
+    size = qmat_larger(size, qmat_point_distance(first, &c->points[3 * i]));
+  for (int k = 0; k < 3; k++) distance = qmat_larger(distance, fabs(first[k]));
+  for (int k = 0; k < 3; k++) origin[k] = distance > farthest * size ? first[k] : 0;
+}
+
 /* A hull as binary STL. */
 static void put_stl(qmat_writer *writer, const qmat_colliders *c, size_t shape, double unit) {
   static const char header[STL_HEADER] = "qmat " QMAT_VERSION;
   size_t points[2], rows[2];
+  double origin[3];
   range_of(c, shape, points, rows);
+  find_origin(c, shape, origin);
   qmat_put_bytes(writer, header, sizeof header);
   qmat_put_u32(writer, (uint32_t)(rows[1] - rows[0]));
   for (size_t t = rows[0]; t < rows[1]; t++) {
@@ -86,7 +104,7 @@ static void put_stl(qmat_writer *writer, const qmat_colliders *c, size_t shape, 
     qmat_normalize(normal);
     for (int k = 0; k < 3; k++) qmat_put_f32(writer, (float)normal[k]);
     for (int i = 0; i < 3; i++)
-      for (int k = 0; k < 3; k++) qmat_put_f32(writer, (float)(unit * corners[i][k]));
+      for (int k = 0; k < 3; k++) qmat_put_f32(writer, (float)(unit * (corners[i][k] - origin[k])));
     qmat_put_u16(writer, 0);
   }
 }
@@ -115,7 +133,10 @@ static void put_urdf(output *o) {
       put(o, "\" rpy=\"0 0 0\"/>\n      <geometry>\n        <sphere radius=\"", i);
       put_numbers(o, &sphere[3], 1, o->unit);
     } else {
-      put(o, "0 0 0\" rpy=\"0 0 0\"/>\n      <geometry>\n        <mesh filename=\"%s_hull_%z.stl", i);
+      double origin[3];
+      find_origin(c, i, origin);
+      put_numbers(o, origin, 3, o->unit);
+      put(o, "\" rpy=\"0 0 0\"/>\n      <geometry>\n        <mesh filename=\"%s_hull_%z.stl", i);
     }
     put(o, "\"/>\n      </geometry>\n    </collision>\n", i);
   }

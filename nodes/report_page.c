@@ -5,6 +5,7 @@
 #include "core/node.h"
 #include "core/side_by_side.h"
 #include "io/page/page_write.h"
+#include "nodes/descriptor/certificate.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/page/figure.h"
 #include "nodes/page/look.h"
@@ -13,8 +14,9 @@
 typedef enum page_format { FORMAT_HTML, FORMAT_HTM } page_format;
 
 typedef struct report_page_params {
-  int format; /* a page_format */
-  int up;     /* of qmat_up_axes */
+  int format;  /* a page_format */
+  int up;      /* of qmat_up_axes */
+  int require; /* a qmat_requirement */
   int64_t levels;
   double turn, tilt;
 } report_page_params;
@@ -154,11 +156,15 @@ static qmat_status fill(qmat_context *context, const report_page_params *params,
 
 static qmat_status run(qmat_context *context, const void *parameters, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
+  const report_page_params *params = parameters;
   json_t *data = json_object();
   char *picture = NULL;
   qmat_writer writer = {0};
   qmat_file *file = NULL;
-  qmat_status status = data ? fill(context, parameters, inputs, data, &picture) : qmat_fail_memory(context, "the page");
+  qmat_status status = data ? QMAT_OK : qmat_fail_memory(context, "the page");
+  if (status == QMAT_OK && params->require == QMAT_REQUIRE_CERTIFIED)
+    status = qmat_check_reports_certify(context, inputs[QMAT_SHOWN_MEDIAL], inputs[QMAT_SHOWN_REPORT]);
+  if (status == QMAT_OK) status = fill(context, params, inputs, data, &picture);
   if (status == QMAT_OK) {
     const qmat_page page = {.title = title_of(inputs), .picture = picture ? picture : "", .data = data};
     status = qmat_page_put(context, &page, &writer);
@@ -182,6 +188,7 @@ static const qmat_param params[] = {
      .choices = formats,
      .flags = QMAT_PARAM_OUTPUT_FORMAT,
      .offset = offsetof(report_page_params, format)},
+    QMAT_REQUIRE_PARAM(report_page_params),
     QMAT_INT(report_page_params, levels, "spheres", 4000, 1, 1000000,
              "The finest level of detail of the slider; more make the page larger"),
     QMAT_SHOWN_PARAMS(report_page_params),

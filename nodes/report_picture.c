@@ -5,6 +5,7 @@
 
 #include "core/node.h"
 #include "io/png.h"
+#include "nodes/descriptor/certificate.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/page/figure.h"
 
@@ -16,6 +17,7 @@ typedef struct report_picture_params {
   int view;       /* a qmat_picture_view */
   int up;         /* of qmat_up_axes */
   int background; /* a background */
+  int require;    /* a qmat_requirement */
   int64_t width, height;
   double turn, tilt;
 } report_picture_params;
@@ -92,6 +94,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_writer writer = {0};
   qmat_file *file = NULL;
   qmat_status status = qmat_picture_init(context, (size_t)params->width, (size_t)params->height, &picture);
+  if (status == QMAT_OK && params->require == QMAT_REQUIRE_CERTIFIED)
+    status = qmat_check_reports_certify(context, inputs[QMAT_SHOWN_MEDIAL], inputs[QMAT_SHOWN_REPORT]);
   if (status == QMAT_OK) status = draw(context, params, inputs, &picture, &caption);
   const bool is_svg = params->format == FORMAT_SVG;
   if (status == QMAT_OK)
@@ -117,6 +121,7 @@ static const qmat_param params[] = {
      .choices = formats,
      .flags = QMAT_PARAM_OUTPUT_FORMAT,
      .offset = offsetof(report_picture_params, format)},
+    QMAT_REQUIRE_PARAM(report_picture_params),
     QMAT_ENUM(report_picture_params, view, views, QMAT_VIEW_BOTH,
               "Surface coloured by its error, medial mesh, both side by side, or the one inside the other"),
     QMAT_ENUM(report_picture_params, background, backgrounds, BACKGROUND_NONE, "Colour behind the model; none: clear"),

@@ -12,6 +12,7 @@
 #include "io/mesh/ply_medial.h"
 #include "io/robot_write.h"
 #include "io/usd/usd_write.h"
+#include "nodes/descriptor/certificate.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/storage_share.h"
@@ -35,14 +36,12 @@ typedef enum file_format {
   FORMAT_YAML
 } file_format;
 
-typedef enum requirement { REQUIRE_NOTHING, REQUIRE_CERTIFIED } requirement;
-
 typedef struct scene_write_params {
   int format; /* a file_format */
   bool draco, draco_meshes, skin_beside, skin_colours, side_files;
   int64_t position_bits, radius_bits;
   int flat;    /* a qmat_flat_form */
-  int require; /* a requirement */
+  int require; /* a qmat_requirement */
   bool khr_physics, omi_physics, unreal_hulls, godot_hulls, fixed;
 } scene_write_params;
 
@@ -64,18 +63,6 @@ static double diagonal_of(const qmat_medial *medial) {
   return sqrt(square);
 }
 
-/* A number of the report; NAN when there is none. */
-static double reported(const qmat_report *report, const char *key) {
-  const json_t *value = report ? json_object_get(report->root, key) : NULL;
-  return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
-static qmat_certificate certificate_of(const qmat_report *report) {
-  const json_t *certified = report ? json_object_get(report->root, "certified") : NULL;
-  if (!json_is_boolean(certified)) return QMAT_CERTIFICATE_UNKNOWN;
-  return json_is_true(certified) ? QMAT_CERTIFICATE_YES : QMAT_CERTIFICATE_NO;
-}
-
 /* The input for one mesh; NULL where there is none or it is a failure. */
 static const qmat_value *given_for(const qmat_value *value, size_t index) {
   const qmat_value *item = value ? qmat_value_at(value, index) : NULL;
@@ -84,13 +71,9 @@ static const qmat_value *given_for(const qmat_value *value, size_t index) {
 
 /* What the report says of one medial mesh. */
 static qmat_stated_errors errors_of(const qmat_medial *medial, const qmat_report *report) {
-  const double stated = reported(report, "diagonal");
-  return (qmat_stated_errors){.diagonal = stated > 0 || !medial ? stated : diagonal_of(medial),
-                              .meters_per_unit = reported(report, "meters_per_unit"),
-                              .epsilon = reported(report, "epsilon"),
-                              .error_out = reported(report, "surface_to_envelope"),
-                              .error_in = reported(report, "envelope_to_surface"),
-                              .certified = certificate_of(report)};
+  qmat_stated_errors errors = qmat_errors_of_report(report);
+  if (!(errors.diagonal > 0) && medial) errors.diagonal = diagonal_of(medial);
+  return errors;
 }
 
 /* The errors of the spheres that the report has, in model units and in the arena; NULL: none. */
@@ -400,31 +383,6 @@ static qmat_status check_spheres(qmat_context *context, const qmat_value *const 
   return QMAT_OK;
 }
 
-/* Fails unless the file states of each medial mesh that it is certified. */
-static qmat_status check_certified(qmat_context *context, const qmat_value *given, const qmat_stated_errors *stated) {
-  for (size_t i = 0; i < qmat_value_count(given); i++) {
-    if (given_for(given, i) && stated[i].certified == QMAT_CERTIFICATE_YES) continue;
-    char out[48], in[48], epsilon[48];
-    qmat_format_bound(stated[i].error_out, out);
-    qmat_format_bound(stated[i].error_in, in);
-    qmat_format_bound(stated[i].epsilon, epsilon);
-    if (!given_for(given, i))
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: %s", qmat_value_failure(qmat_value_at(given, i)));
-    else if (stated[i].certified == QMAT_CERTIFICATE_UNKNOWN)
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: no report says how large the errors are");
-    else if (fmax(stated[i].error_out, stated[i].error_in) <= stated[i].epsilon)
-      qmat_fail(context, QMAT_ERROR_GEOMETRY,
-                "not certified: the errors are estimates, since the surface is not closed");
-    else
-      qmat_fail(context, QMAT_ERROR_GEOMETRY, "not certified: the errors are %s and %s of the diagonal, and epsilon %s",
-                out, in, epsilon);
-    if (given->type == QMAT_LIST) qmat_fail_within(context, ((const qmat_list *)given)->names[i]);
-    qmat_fail_field(context, "require");
-    return qmat_fail_hint(context, "a larger epsilon, or qmat mat: --require none");
-  }
-  return QMAT_OK;
-}
-
 static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc", "usdz", "urdf", "xml", "yaml", NULL};
 
 /* Scales that differ by less come from rounding. */
@@ -492,8 +450,8 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
         break;
     }
   }
-  if (status == QMAT_OK && params->require == REQUIRE_CERTIFIED)
-    status = check_certified(context, inputs[IN_MEDIAL], stated);
+  if (status == QMAT_OK && params->require == QMAT_REQUIRE_CERTIFIED)
+    status = qmat_check_certified(context, inputs[IN_MEDIAL], stated);
   if (status == QMAT_OK) status = report_stated(context, inputs[IN_MEDIAL], stated, report->root);
   if (status == QMAT_OK) status = add_warnings(context, params, inputs, stated->meters_per_unit, report->root);
   if (status == QMAT_OK) status = qmat_value_seal(context, &report->base);
@@ -507,8 +465,6 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_value_release(report ? &report->base : NULL);
   return status;
 }
-
-static const char *const requirements[] = {[REQUIRE_NOTHING] = "none", [REQUIRE_CERTIFIED] = "certified", NULL};
 
 static const char *const flat_forms[] = {"auto", "short", "float", "none", NULL};
 
@@ -539,8 +495,7 @@ static const qmat_param params[] = {
     QMAT_ENUM(
         scene_write_params, flat, flat_forms, QMAT_FLAT_AUTO,
         "Numbers of the plain medial mesh (glb, gltf): 16 bits, single precision, or by epsilon; none: without it"),
-    QMAT_ENUM(scene_write_params, require, requirements, REQUIRE_NOTHING,
-              "certified: the run fails, and nothing is written, where a result is not certified"),
+    QMAT_REQUIRE_PARAM(scene_write_params),
     QMAT_BOOL(scene_write_params, khr_physics,
               "Write colliders as KHR_implicit_shapes and KHR_physics_rigid_bodies (glb, gltf); the default where no "
               "other form is chosen"),

@@ -274,8 +274,8 @@ static qmat_status describe_file(const info_call *call, const char *path) {
   const qmat_status carried = print_medials(call, path);
   if (carried == QMAT_OK) {
     status = QMAT_OK;
-  } else if (call->against || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
-    status = carried; /* its medial mesh is ambiguous, unreadable, or missing with --against */
+  } else if (call->against || call->node || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
+    status = carried; /* its medial mesh is ambiguous, unreadable, or missing with --against or --node */
   } else if (!has_surface) {
     context->error = first;
   }

@@ -65,7 +65,7 @@ int main(int argc, char **argv) {
   size_t count = argc > 2 ? (size_t)argc - 2 : 0;
   qmat_status status = call(&context, name, argv + (argc > 2 ? 2 : argc), count);
   if (status == QMAT_OK && argc < 2) status = qmat_fail(&context, QMAT_ERROR_USAGE, "no command is given");
-  if (fflush(stdout) != 0 && status == QMAT_OK)
+  if ((fflush(stdout) != 0 || ferror(stdout)) && status == QMAT_OK)
     status = qmat_fail(&context, QMAT_ERROR_IO, "cannot write to the standard output");
   if (status != QMAT_OK) {
     qmat_print_error(&context.error);

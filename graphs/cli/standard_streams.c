@@ -2,6 +2,7 @@
 #include "graphs/cli/standard_streams.h"
 
 #include <dirent.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,6 +54,7 @@ qmat_status qmat_streams_write(qmat_context *context, qmat_streams *streams, con
 
 qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *streams) {
   if (!streams->output[0]) return QMAT_OK;
+  signal(SIGPIPE, SIG_IGN); /* where nobody reads on, the folder is removed all the same */
   FILE *file = fopen(streams->output, "rbe");
   const bool done = file && copy(file, stdout) && fflush(stdout) == 0;
   if (file) fclose(file);

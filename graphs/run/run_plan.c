@@ -319,6 +319,8 @@ qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const 
     char what[QMAT_GRAPH_NAME_SIZE + 16];
     snprintf(what, sizeof what, "output '%s':", graph->outputs[run->files[i].output].name);
     status = qmat_run_check_not_input(context, run, what, run->files[i].path);
+    if (status == QMAT_OK && graph->outputs[run->files[i].output].path)
+      status = qmat_make_folders(context, run->files[i].path);
     if (status == QMAT_OK) status = qmat_check_can_write(context, run->files[i].path);
   }
 cleanup:

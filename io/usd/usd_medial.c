@@ -148,7 +148,8 @@ static qmat_status search(reader *r, qmat_usd_prim *prim) {
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     qmat_usd_prim child;
     status = qmat_usd_prim_child(r->stage, prim, names[i], &child);
-    if (status == QMAT_OK) status = search(r, &child);
+    const bool is_active = status == QMAT_OK && qmat_usd_truth(qmat_usd_prim_field(&child, "active"), true);
+    if (is_active) status = search(r, &child);
     qmat_usd_prim_uninit(&child);
   }
   return status;

@@ -52,7 +52,8 @@ typedef struct qmat_usd_addition {
 
 /* Makes a layer over a USD scene that was kept (io/usd/usd_keep.h): its sublayer is the scene's own file, and prims
  * with an "over" add a child to each prim that has a mesh. Prims whose names text cannot have get none. The child
- * references the class of the mesh's medial mesh, which is described once, in the mesh's space: "medial_0" for mesh 0.
+ * references the class of the mesh's medial mesh, which is described once, in the mesh's space: "medial_0" for mesh 0;
+ * other names where the scene has such prims. A medial mesh that a prim has already becomes inactive.
  * `additions` has one element per mesh of the scene. With instances in the scene, the prims on the way are no longer
  * instanceable, which would hide the additions. Layer metadata that only a root layer may have are copied: the default
  * prim, units, axis and times.

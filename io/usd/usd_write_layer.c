@@ -77,13 +77,86 @@ static void open_prims(qmat_writer *writer, const char *path, size_t open, bool 
   }
 }
 
-static void put_reference(qmat_writer *writer, size_t depth, uint32_t mesh) {
+/* Whether text can name a prim that a crate calls so. The name ends at a slash. */
+static bool is_valid_name(const char *name) {
+  const size_t length = strcspn(name, "/");
+  for (size_t i = 0; i < length; i++) {
+    const char c = name[i];
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+    if (!plain && !(c & 0x80)) return false;
+  }
+  return length > 0;
+}
+
+static bool has_valid_names(const char *path) {
+  for (; *path == '/'; path += strcspn(path, "/"))
+    if (!is_valid_name(++path)) return false;
+  return *path == '\0';
+}
+
+/* What the names of the prims begin with that are added, before the number of the mesh. */
+enum { LONGEST_STEM = 31 };
+
+/* Whether a prim of the original's root layer has a name that begins like those that are added. */
+static bool is_taken(const qmat_usd_spec *root, const char *stem) {
+  const size_t length = strlen(stem);
+  for (const qmat_usd_spec *spec = root; spec;) {
+    if (spec->kind == QMAT_USD_PRIM && strncmp(spec->name, stem, length) == 0) return true;
+    const qmat_usd_spec *next = spec->first_child;
+    for (; !next && spec != root; spec = spec->parent) next = spec->next;
+    if (spec == root && !next) return false;
+    spec = next;
+  }
+  return false;
+}
+
+/* Chooses the stem, so that no prim of the original gets opinions that are meant for another. */
+static void choose_stem(const qmat_usd_spec *root, char stem[LONGEST_STEM + 1]) {
+  snprintf(stem, LONGEST_STEM + 1, "medial_");
+  for (unsigned i = 2; is_taken(root, stem) && i < 1000; i++) snprintf(stem, LONGEST_STEM + 1, "medial%u_", i);
+}
+
+/* The prim of the original's root layer at a path; NULL: it has none. */
+static const qmat_usd_spec *find_prim(const qmat_usd_layer *layer, const char *path) {
+  const qmat_usd_spec *spec = layer->root;
+  char name[512];
+  while (spec && *path == '/') {
+    const size_t length = strcspn(++path, "/");
+    snprintf(name, sizeof name, "%.*s", (int)length, path);
+    spec = length < sizeof name ? qmat_usd_child(layer, spec, QMAT_USD_PRIM, name) : NULL;
+    path += length;
+  }
+  return spec;
+}
+
+/* Hides the medial meshes that a prim has already, as in a scene that was flattened after an earlier run. */
+static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_spec *prim) {
+  for (const qmat_usd_spec *child = prim ? prim->first_child : NULL; child; child = child->next) {
+    if (child->kind != QMAT_USD_PRIM || !is_valid_name(child->name) ||
+        !qmat_usd_text(qmat_usd_entry(qmat_usd_field_value(child, "customData"), "qmat_version")))
+      continue;
+    put_indent(writer, depth);
+    qmat_put_text(writer, "over \"");
+    qmat_put_text(writer, child->name);
+    qmat_put_text(writer, "\" (\n");
+    put_indent(writer, depth + 1);
+    qmat_put_text(writer, "active = false\n");
+    put_indent(writer, depth);
+    qmat_put_text(writer, ")\n");
+    put_indent(writer, depth);
+    qmat_put_text(writer, "{\n");
+    put_indent(writer, depth);
+    qmat_put_text(writer, "}\n");
+  }
+}
+
+static void put_reference(qmat_writer *writer, size_t depth, const char *stem, uint32_t mesh) {
   char line[128];
   put_indent(writer, depth);
-  snprintf(line, sizeof line, "def Xform \"medial_%u\" (\n", mesh);
+  snprintf(line, sizeof line, "def Xform \"%s%u\" (\n", stem, mesh);
   qmat_put_text(writer, line);
   put_indent(writer, depth + 1);
-  snprintf(line, sizeof line, "prepend references = </medial_%u>\n", mesh);
+  snprintf(line, sizeof line, "prepend references = </%s%u>\n", stem, mesh);
   qmat_put_text(writer, line);
   put_indent(writer, depth);
   qmat_put_text(writer, ")\n");
@@ -93,23 +166,9 @@ static void put_reference(qmat_writer *writer, size_t depth, uint32_t mesh) {
   qmat_put_text(writer, "}\n");
 }
 
-/* Whether text can name the prims of a path. A crate may have any names. */
-static bool has_valid_names(const char *path) {
-  for (; *path == '/'; path += strcspn(path, "/")) {
-    const char *name = ++path;
-    if (*name == '\0' || *name == '/') return false;
-    for (; *name && *name != '/'; name++) {
-      const char c = *name;
-      const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-      if (!plain && !(c & 0x80)) return false;
-    }
-  }
-  return *path == '\0';
-}
-
 /* Writes the prims that carry a mesh with a medial mesh. */
 static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                             qmat_writer *writer) {
+                             const qmat_usd_layer *original, const char *stem, qmat_writer *writer) {
   carrier *carriers = qmat_alloc(scene->placement_count, sizeof *carriers);
   if (!carriers) return fail_shortage(context);
   size_t count = 0, open = 0;
@@ -127,7 +186,8 @@ static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, con
     }
     open_prims(writer, path, open, scene->has_instances);
     open = count_names(path);
-    put_reference(writer, open, scene->meshes[carriers[i].mesh]);
+    hide_earlier(writer, open, find_prim(original, path));
+    put_reference(writer, open, stem, scene->meshes[carriers[i].mesh]);
   }
   while (open > 0) {
     put_indent(writer, --open);
@@ -189,20 +249,22 @@ static const char *ending_of(const qmat_file_part *part) {
 }
 
 static qmat_status put_text(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                            size_t count, const qmat_usd_spec *root, const char *sublayer, qmat_writer *text) {
+                            size_t count, const qmat_usd_layer *original, const char *sublayer, qmat_writer *text) {
   qmat_status status = QMAT_OK;
+  char stem[LONGEST_STEM + 1];
   const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   if (plain == (locale_t)0) return fail_shortage(context);
   const locale_t before = uselocale(plain);
-  put_metadata(text, root, scene->is_z_up, sublayer);
+  put_metadata(text, original->root, scene->is_z_up, sublayer);
+  choose_stem(original->root, stem);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
-    char prim[32];
+    char prim[LONGEST_STEM + 16];
     if (!additions[i].medial) continue;
-    snprintf(prim, sizeof prim, "medial_%u", scene->meshes[i]);
+    snprintf(prim, sizeof prim, "%s%u", stem, scene->meshes[i]);
     status = qmat_usd_put_class(context, additions[i].medial, additions[i].skin, &additions[i].options, prim, text);
     qmat_put_text(text, "\n");
   }
-  if (status == QMAT_OK) status = put_overs(context, scene, additions, text);
+  if (status == QMAT_OK) status = put_overs(context, scene, additions, original, stem, text);
   uselocale(before);
   freelocale(plain);
   return status;
@@ -291,7 +353,7 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
       snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
     else
       snprintf(sublayer, sizeof sublayer, in_package ? "original/scene.%s" : "original.%s", ending);
-    status = put_text(context, scene, additions, count, layer.root, sublayer, &text);
+    status = put_text(context, scene, additions, count, &layer, sublayer, &text);
   }
   if (status == QMAT_OK && text.failed) status = fail_shortage(context);
   if (status == QMAT_OK && form == QMAT_USD_CRATE) status = qmat_usdc_of_text(context, &text);

@@ -112,6 +112,9 @@ for cached in "" --no-cache; do
   expect 2 "would overwrite a file that the model refers to" "$qmat" mat scene.usda -o layer.usda --epsilon 5% $coarse \
     $cached
 done
+expect 1 "require: not certified" "$qmat" mat box.off -o box.png --vertices 1 --require certified $coarse
+expect 1 "require: not certified" "$qmat" mat box.off -o box.html --vertices 1 --require certified $coarse
+holds "no picture, no page" test ! -e box.png -a ! -e box.html
 for option in report depfile; do
   expect 2 "would overwrite a file that the model refers to" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse \
     --$option layer.usda
@@ -122,7 +125,34 @@ holds "no output of a refused run" test ! -e over.usda
 expect 2 "would overwrite a side file" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse \
   --report over_original.usdz
 expect 0 "holds no colliders" "$qmat" mat scene.usda -o over.usda --colliders --epsilon 5% $coarse
+expect 0 "a medial mesh of" "$qmat" info over.usda --node medial_0
+expect 1 "no prim of this name" "$qmat" info over.usda --node nosuch
 rm layer.usda kept.usda scene.usda over*
+
+# The extras of this node are no object, so that the medial mesh is on a child of it.
+cat >list.gltf <<'END'
+{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "n", "extras": [1], "scale": [2, 2, 2]}], "meshes": [{"name": "b", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}], "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}, {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}], "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}], "buffers": [{"byteLength": 168, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAgD8AAAAAAAAAAAAAAAAAAIA/AACAPwAAAAAAAIA/AAAAAAAAgD8AAIA/AACAPwAAgD8AAIA/AAACAAMAAAADAAEABAAFAAcABAAHAAYAAAABAAUAAAAFAAQAAgAGAAcAAgAHAAMAAAAEAAYAAAAGAAIAAQADAAcAAQAHAAUA"}]}
+END
+expect 0 "spheres" "$qmat" mat list.gltf -o list.glb --epsilon 5% $coarse
+expect 0 "not refuted" "$qmat" info list.glb --against list.gltf
+holds "both errors are in their bounds" sh -c '! grep -q REFUTED out.txt'
+
+# The path of an output in a graph gets its folder, too.
+printf 'qmat: 1\nnodes:\n  m: { type: medial.read, params: { path: ball.ma } }\n  w: { type: scene.write, in: { medial: m.medial } }
+outputs: { o: { from: w.file, path: made/by/graph.ma } }\n' >paths.yaml
+printf '1 0 0\nv 0 0 0 1\n' >ball.ma
+expect 0 "made/by/graph.ma" "$qmat" run paths.yaml
+holds "the file of the graph" test -s made/by/graph.ma
+rm -r list.* paths.yaml ball.ma made
+
+# A full disk, and a reader that ends early: an error, and no temporary folder is left.
+"$qmat" batch box.off --out full -f ma --json --set epsilon=5% $coarse >/dev/full 2>err.txt
+holds "a list that cannot be written is an error" test $? -eq 1
+rm -rf full
+mkdir streams
+(TMPDIR=$PWD/streams "$qmat" mat box.off -o -.html --quiet --epsilon 5% $coarse 2>/dev/null) | head -c 1 >/dev/null
+holds "no temporary folder is left" test -z "$(ls streams)"
+rmdir streams
 
 expect 0 "spheres" "$qmat" mat box.off -o box.glb -o box.gltf -o box.ma --epsilon 5% $coarse --report report.json \
   --threads 1

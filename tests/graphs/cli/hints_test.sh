@@ -46,7 +46,7 @@ sed 's/^8 6 0/8 7 0/' box.off >twice.off
 echo '4 0 3 2 1' >>twice.off
 printf 'OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n' >plane.off
 
-hint 1 'the facet has the same vertices' twice.off -o x.ma --set model.defects=refuse
+hint 1 'the facet repeats facet' twice.off -o x.ma --set model.defects=refuse
 hint 2 "the scene has no mesh 'none'" two.usda -o x.glb --set model.mesh=none
 hint 2 "2 different meshes have a path that ends in 'box'" two.usda -o x.ma --set model.mesh=box
 hint 2 'this format holds one medial mesh, not 2' two.usda -o x.ma --set model.mesh=all

@@ -288,6 +288,31 @@ static void test_robot_files_have_shapes_in_metres_and_mass(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* STL is single precision, which has steps of half a unit there. */
+static void test_hulls_of_urdf_far_from_zero_have_an_origin(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_colliders *c = example();
+  for (size_t i = 0; i < c->point_count; i++) c->points[3 * i + 1] += 5400000.1;
+  qmat_file *file;
+  assert_int_equal(qmat_robot_write(&context, c, QMAT_ROBOT_URDF, "arm", 0.5, &file), QMAT_OK);
+  double first, second, third;
+  const char *at = strstr((const char *)file->parts[0].bytes, "_01\">\n      <origin xyz=\"");
+  assert_non_null(at);
+  assert_int_equal(sscanf(strstr(at, "xyz"), "xyz=\"%lf %lf %lf", &first, &second, &third), 3);
+  assert_near(first, 0.5 * c->points[0], 1e-9);
+  assert_near(second, 0.5 * c->points[1], 1e-9);
+  assert_near(third, 0.5 * c->points[2], 1e-9);
+  float corner[3];
+  const uint8_t *triangle = file->parts[1].bytes + 84 + 12;
+  memcpy(corner, triangle, sizeof corner);
+  for (size_t k = 0; k < 3; k++)
+    assert_near((double)corner[k], 0.5 * (c->points[3 * (size_t)c->triangles[0] + k] - c->points[k]), 1e-6);
+  qmat_value_release(&file->base);
+  qmat_value_release(&c->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_usd_has_a_capsule_of_two_radii_and_convex_hulls(void **state) {
   (void)state;
   qmat_colliders *c = example();
@@ -315,6 +340,7 @@ int main(void) {
       cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),
       cmocka_unit_test(test_the_motion_of_a_body_is_that_of_the_last_run),
       cmocka_unit_test(test_robot_files_have_shapes_in_metres_and_mass),
+      cmocka_unit_test(test_hulls_of_urdf_far_from_zero_have_an_origin),
       cmocka_unit_test(test_usd_has_a_capsule_of_two_radii_and_convex_hulls),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,6 +6,7 @@
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_write.h"
 #include "io/placement.h"
+#include "io/save.h"
 #include "io/usd/usd_medial.h"
 #include "io/usd/usd_write.h"
 #include "io/usd/usdz.h"
@@ -471,8 +472,56 @@ static void test_the_prims_of_a_layer_are_opened_once(void **state) {
   release(&r);
 }
 
+/* A scene that was flattened after an earlier run has its medial mesh below the prim of the mesh. */
+static void test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidden(void **state) {
+  (void)state;
+  reading r = read_all(
+      "#usda 1.0\n"
+      "def Cube \"a\"\n{\n    double size = 1\n"
+      "    def Xform \"medial_0\" (\n        customData = {\n            string qmat_version = \"0.1.0\"\n        }\n  "
+      "  )\n"
+      "    {\n        def Points \"spheres\"\n        {\n            point3f[] points = [(0, 0, 0), (1, 0, 0)]\n"
+      "            float[] widths = [1, 1]\n        }\n    }\n}\n"
+      "def Xform \"medial2_1\"\n{\n}\n");
+  qmat_medial *medial = example_medial(1);
+  qmat_file *file = write_layer(&r, medial, NULL, QMAT_USD_TEXT);
+  char *text = qmat_alloc(file->parts[0].size + 1, 1);
+  memcpy(text, file->parts[0].bytes, file->parts[0].size);
+  text[file->parts[0].size] = '\0';
+  const char *overs = strstr(text, "\n}\n\nover ");
+  assert_non_null(overs);
+  assert_string_equal(overs + 4,
+                      "over \"a\"\n{\n    over \"medial_0\" (\n        active = false\n    )\n    {\n    }\n"
+                      "    def Xform \"medial3_0\" (\n        prepend references = </medial3_0>\n    )\n"
+                      "    {\n    }\n}\n");
+  char folder[] = "/tmp/qmat_test_XXXXXX", path[64];
+  assert_non_null(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/over.usda", folder);
+  qmat_context context = {0};
+  assert_int_equal(qmat_file_save(&context, file, path), QMAT_OK);
+  qmat_bytes bytes;
+  assert_int_equal(qmat_bytes_read_file(&context, path, &bytes), QMAT_OK);
+  qmat_medial *found;
+  json_t *facts = json_object();
+  assert_int_equal(qmat_usd_read_medial(&context, &bytes, path, NULL, &found, facts), QMAT_OK);
+  assert_int_equal(found->sphere_count, medial->sphere_count);
+  qmat_value_release(&found->base);
+  json_decref(facts);
+  qmat_bytes_uninit(&bytes);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/%s", folder, file->parts[1].name);
+  unlink(path);
+  assert_int_equal(rmdir(folder), 0);
+  qmat_context_uninit(&context);
+  qmat_free(text);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidden),
       cmocka_unit_test(test_equal_meshes_are_one_mesh_in_several_places),
       cmocka_unit_test(test_a_mesh_is_chosen_by_path_end_or_number),
       cmocka_unit_test(test_an_instancer_places_its_prototypes),
