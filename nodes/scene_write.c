@@ -6,6 +6,7 @@
 #include "core/json_text.h"
 #include "core/node.h"
 #include "core/text.h"
+#include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_write.h"
 #include "io/mesh/ma.h"
@@ -388,21 +389,45 @@ static const char *const formats[] = {"glb", "gltf", "ma", "ply", "usda", "usdc"
 /* Scales that differ by less come from rounding. */
 static const double same_scale = 1e-6;
 
-/* Whether a file without a scene has the coordinates of one of its meshes, whose nodes scale it. Files for robots are
- * in metres. */
+/* Whether a file without a scene has the coordinates of one of its meshes. */
+static bool is_alone(const scene_write_params *params, const qmat_scene *scene) {
+  return scene && scene->mesh_count > 0 && (holds_no_scene(params) || (is_usd(params) && !keeps_scene(params, scene)));
+}
+
+/* Whether its units are not the scene's, since nodes scale the mesh. Files for robots are in metres. */
 static bool has_own_units(const scene_write_params *params, const qmat_scene *scene, double own) {
-  const bool is_alone =
-      (holds_no_scene(params) && params->format < FORMAT_URDF) || (is_usd(params) && !keeps_scene(params, scene));
-  return is_alone && scene && scene->mesh_count > 0 && own > 0 && scene->meters_per_unit > 0 &&
+  return is_alone(params, scene) && params->format < FORMAT_URDF && own > 0 && scene->meters_per_unit > 0 &&
          fabs(own / scene->meters_per_unit - 1) > same_scale;
 }
 
-/* Warns of units that are not the scene's, and of colliders that a layer over a USD scene leaves out. */
+/* Whether the scene has its mesh elsewhere, or turned. */
+static qmat_status find_moved(qmat_context *context, const qmat_scene *scene, bool *moved) {
+  *moved = false;
+  for (size_t i = 0; i < scene->placement_count; i++)
+    for (size_t k = 0; k < 15; k++) *moved = *moved || (k % 5 != 0 && scene->placements[16 * i + k] != 0);
+  if (scene->placement_count > 0 || scene->part_count == 0) return QMAT_OK;
+  qmat_gltf_asset asset;
+  const qmat_status status =
+      qmat_gltf_asset_init(context, scene->parts[0].bytes, scene->parts[0].size, "the scene", &asset);
+  if (status == QMAT_OK) *moved = qmat_gltf_moves_mesh(asset.root, scene->meshes[0]);
+  qmat_gltf_asset_uninit(&asset);
+  return status;
+}
+
+/* Warns of places and units that are not the scene's, and of colliders that a layer over a USD scene leaves out. */
 static qmat_status add_warnings(qmat_context *context, const scene_write_params *params,
                                 const qmat_value *const inputs[], double own, json_t *report) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
   const char *format = formats[params->format];
+  bool moved = false;
   int bad = 0;
+  const qmat_status status = is_alone(params, scene) ? find_moved(context, scene, &moved) : QMAT_OK;
+  if (status != QMAT_OK) return status;
+  if (moved)
+    bad |= qmat_json_add_warning(report,
+                                 "the .%s file has the mesh where its own coordinates are, not where the scene's nodes "
+                                 "put it: a run that saves no glTF or USD scene, or has model.mesh=merged, does that",
+                                 format);
   if (has_own_units(params, scene, own))
     bad |= qmat_json_add_warning(report,
                                  "the .%s file is in the mesh's own units of %.4g m, not in the scene's of %.4g m: a "

@@ -182,11 +182,15 @@ void qmat_print_run(const qmat_run *run, bool table, FILE *out) {
   char text[512];
   long_text files = {0};
   if (table) print_table(run, out);
-  json_t *summary = qmat_run_summarise(run, text, sizeof text);
-  if (!summary)
-    snprintf(text, sizeof text, "%.400s: %zu step%s", run->name, run->step_count, run->step_count == 1 ? "" : "s");
-  qmat_print_summary(text, out);
-  json_decref(summary);
+  char last[sizeof text] = "";
+  for (size_t i = 0; i == 0 || i < run->file_count; i++) { /* files of the same medial mesh have one summary */
+    json_t *summary = qmat_run_summarise(run, i, text, sizeof text);
+    if (!summary)
+      snprintf(text, sizeof text, "%.400s: %zu step%s", run->name, run->step_count, run->step_count == 1 ? "" : "s");
+    if (strcmp(text, last) != 0) qmat_print_summary(text, out);
+    memcpy(last, text, sizeof last);
+    json_decref(summary);
+  }
   describe_files(run, &files);
   fputs("  ", out);
   qmat_put_wrapped(out, files.text ? files.text : "", 2, 2, qmat_terminal_width(out), true);

@@ -111,7 +111,7 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
   for (size_t i = 0; i < run->file_count; i++) json_array_append_new(outputs, file_json(run, &run->files[i]));
   char text[512], line[520];
-  json_t *summary = qmat_run_summarise(run, text, sizeof text);
+  json_t *summary = qmat_run_summarise(run, 0, text, sizeof text);
   const char *second = summary ? strchr(text, '\n') : NULL;
   if (second) snprintf(line, sizeof line, "%.*s; %s", (int)(second - text), text, second + 1);
   if (summary) json_object_set_new(summary, "text", qmat_json_string(second ? line : text));

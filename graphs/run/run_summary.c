@@ -111,13 +111,29 @@ static bool makes_files(const qmat_run *run, const qmat_run_step *step) {
   return false;
 }
 
-/* Replaces bounds and flags by those that the written files state: storage changes what is stored. */
-static void merge_written(const qmat_run *run, const qmat_report_summary *type, json_t *summary) {
+/* Marks a step and the steps that it needs. `marks` has one element per step. */
+static void mark_needed(const qmat_run *run, size_t last, bool *marks) {
+  memset(marks, 0, run->step_count * sizeof *marks);
+  marks[last] = true;
+  for (size_t i = last + 1; i-- > 0;) {
+    const qmat_run_step *step = &run->steps[i];
+    for (size_t port = 0; marks[i] && port < qmat_input_count(run->graph->nodes[step->node].type); port++) {
+      const size_t maker = step->inputs[port] == SIZE_MAX ? SIZE_MAX : run->slots[step->inputs[port]].step;
+      if (maker != SIZE_MAX) marks[maker] = true;
+    }
+  }
+}
+
+/* Replaces bounds and flags by those that the files made of `summarised` state: storage changes what is stored. */
+static void merge_written(const qmat_run *run, size_t summarised, bool *marks, json_t *summary) {
+  const qmat_report_summary *type = run->graph->nodes[run->steps[summarised].node].type->report_summary;
   bool first = true;
   for (size_t i = 0; i < run->step_count; i++) {
     const qmat_run_step *step = &run->steps[i];
     if (!step->done || !step->report || run->graph->nodes[step->node].type->report_summary != type) continue;
-    json_t *written = makes_files(run, step) ? summarise_step(run, step) : NULL;
+    if (!makes_files(run, step)) continue;
+    mark_needed(run, i, marks);
+    json_t *written = marks[summarised] ? summarise_step(run, step) : NULL;
     for (const qmat_summary_entry *entry = type->entries; written && entry->key; entry++) {
       const bool is_bound = entry->kind == QMAT_SUMMARY_BOUND || entry->kind == QMAT_SUMMARY_SIZE;
       if (is_bound || (entry->kind == QMAT_SUMMARY_ALL && json_object_get(summary, entry->key)))
@@ -128,16 +144,21 @@ static void merge_written(const qmat_run *run, const qmat_report_summary *type, 
   }
 }
 
-json_t *qmat_run_summarise(const qmat_run *run, char *text, size_t size) {
-  for (size_t i = run->step_count; i-- > 0;) {
+json_t *qmat_run_summarise(const qmat_run *run, size_t file, char *text, size_t size) {
+  bool *marks = qmat_alloc(run->step_count, sizeof *marks);
+  json_t *summary = NULL;
+  for (size_t i = run->step_count; marks && !summary && i-- > 0;) {
     const qmat_run_step *step = &run->steps[i];
     const qmat_report_summary *type = run->graph->nodes[step->node].type->report_summary;
     if (!step->done || !step->report || !type || makes_files(run, step)) continue;
-    json_t *summary = summarise_step(run, step);
+    const size_t maker = file < run->file_count ? run->slots[run->files[file].slot].step : SIZE_MAX;
+    if (maker != SIZE_MAX) mark_needed(run, maker, marks);
+    if (maker != SIZE_MAX && !marks[i]) continue;
+    summary = summarise_step(run, step);
     if (!summary) continue;
-    merge_written(run, type, summary);
+    merge_written(run, i, marks, summary);
     type->sentence(run->name, summary, text, size);
-    return summary;
   }
-  return NULL;
+  qmat_free(marks);
+  return summary;
 }

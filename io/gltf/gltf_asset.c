@@ -243,6 +243,30 @@ size_t qmat_gltf_parent_of(const json_t *root, size_t node) {
   return SIZE_MAX;
 }
 
+/* Whether an array of numbers, if it is one, differs from the other in the components that `mask` has a bit for. */
+static bool differs(const json_t *array, const double *plain, unsigned mask) {
+  for (size_t i = 0; i < json_array_size(array) && i < 16; i++)
+    if ((mask >> i & 1) && json_number_value(json_array_get(array, i)) != plain[i]) return true;
+  return false;
+}
+
+bool qmat_gltf_moves_mesh(const json_t *root, uint32_t mesh) {
+  static const double zero[16] = {0}, unturned[] = {0, 0, 0, 1};
+  const unsigned all = 0xffff, diagonal = 1u << 0 | 1u << 5 | 1u << 10 | 1u << 15;
+  const json_t *nodes = json_object_get(root, "nodes");
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    if (qmat_gltf_mesh_of(json_array_get(nodes, i)) != (int64_t)mesh) continue;
+    for (size_t at = i; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at)) {
+      const json_t *node = json_array_get(nodes, at);
+      if (differs(json_object_get(node, "translation"), zero, all) ||
+          differs(json_object_get(node, "rotation"), unturned, all) ||
+          differs(json_object_get(node, "matrix"), zero, all & ~diagonal))
+        return true;
+    }
+  }
+  return false;
+}
+
 bool qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
                              bool (*is_dropped)(const json_t *root, const json_t *child)) {
   json_t *children = json_object_get(node, "children"), *nodes = json_object_get(root, "nodes");

@@ -70,6 +70,9 @@ bool qmat_gltf_require_extension(json_t *root, const char *name);
 /* The number of the mesh that a node references, also if written as 3.0; -1: none. */
 int64_t qmat_gltf_mesh_of(const json_t *node);
 
+/* Whether nodes move or turn the mesh, whatever they scale: its coordinates are then not those of the scene. */
+bool qmat_gltf_moves_mesh(const json_t *root, uint32_t mesh);
+
 /* The node that a node is a child of; SIZE_MAX: it is a root. Linear in all children. */
 size_t qmat_gltf_parent_of(const json_t *root, size_t node);
 

@@ -88,19 +88,20 @@ static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char 
 
 /* ---- trees of children ---- */
 
-qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *parent, const char *name, node **made) {
+qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *parent, const char *name, int least,
+                               node **made) {
   qmat_status status = qmat_usd_new_node(c, parent, from->arc, from->stack, from->spec_count, made);
   if (status != QMAT_OK) return status;
   (*made)->introduced = from->introduced;
   (*made)->time = from->time;
-  for (size_t i = 0; i < from->spec_count; i++) {
+  for (size_t i = 0; i < from->spec_count && from->introduced >= least; i++) {
     const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
     if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
   }
   node **end = &(*made)->first_child;
   for (const node *child = from->first_child; child; child = child->next) {
     node *copy;
-    status = qmat_usd_copy_tree(c, child, *made, name, &copy);
+    status = qmat_usd_copy_tree(c, child, *made, name, least, &copy);
     if (status != QMAT_OK) return status;
     if (!copy) continue;
     *end = copy;
@@ -283,7 +284,7 @@ static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc a
         if (spec) qmat_usd_add_spec(*made, layers->layers[i], spec);
       }
     } else {
-      status = qmat_usd_copy_tree(c, above, at, name, made);
+      status = qmat_usd_copy_tree(c, above, at, name, 0, made);
     }
     if (status != QMAT_OK || !*made || levels == 0) break;
     above = *made;

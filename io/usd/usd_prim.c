@@ -88,9 +88,15 @@ void qmat_usd_prim_uninit(qmat_usd_prim *prim) {
 
 /* ---- opinions ---- */
 
+/* Whether opinion `i` counts for the children, too. */
+static bool is_of_children(const qmat_usd_prim *prim, size_t i) {
+  return prim->opinions[i].arc_depth >= prim->least_arc_depth;
+}
+
 /* Whether an opinion from number `first_opinion` on, or a weaker one, has the child. */
 static bool is_below(const qmat_usd_prim *prim, size_t first_opinion, const char *name) {
   for (size_t i = first_opinion; i < prim->opinion_count; i++) {
+    if (!is_of_children(prim, i)) continue;
     if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, QMAT_USD_PRIM, name)) return true;
   }
   return false;
@@ -107,6 +113,7 @@ qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **name
   *count = 0;
   /* From the weakest opinion to the strongest: each adds its new children at the end. */
   for (size_t i = prim->opinion_count; i-- > 0;) {
+    if (!is_of_children(prim, i)) continue;
     for (const qmat_usd_spec *child = prim->opinions[i].spec->first_child; child; child = child->next) {
       if (child->kind == QMAT_USD_PRIM && !is_below(prim, i + 1, child->name)) made[(*count)++] = child->name;
     }

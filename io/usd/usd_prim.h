@@ -24,6 +24,7 @@ typedef struct qmat_usd_opinion {
   const qmat_usd_spec *spec;
   bool is_inherited; /* through an inherit or specialize arc */
   int introduced;    /* the depth of the prim with the arc that brings the spec's paths into the scene; 0: none does */
+  int arc_depth;     /* the same, but variants count as arcs too */
   qmat_usd_time time;
 } qmat_usd_opinion;
 
@@ -43,7 +44,8 @@ typedef struct qmat_usd_prim {
   int depth;                          /* 0 for the root */
   size_t opinion_count;
   const qmat_usd_opinion *opinions; /* strongest first */
-  struct qmat_usd_node *tree;       /* for composing its children */
+  int least_arc_depth;        /* the children only have opinions of arcs from this depth on; above 0 for instances */
+  struct qmat_usd_node *tree; /* for composing its children */
   qmat_arena arena;
 } qmat_usd_prim;
 

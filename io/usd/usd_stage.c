@@ -88,6 +88,7 @@ static void list_opinions(const qmat_usd_files *files, const node *at, bool inhe
         .spec = at->specs[i],
         .is_inherited = inherited,
         .introduced = introduced,
+        .arc_depth = at->introduced,
         .time = qmat_usd_time_through(at->time, qmat_usd_stack_time(&files->stacks[at->stack], at->layers[i]))};
   for (const node *child = at->first_child; child; child = child->next)
     list_opinions(files, child, inherited, specialized, wanted, introduced, opinions, count);
@@ -101,6 +102,10 @@ static qmat_status finish_prim(composer *c) {
   list_opinions(c->files, prim->tree, false, false, false, 0, opinions, &prim->opinion_count);
   list_opinions(c->files, prim->tree, false, false, true, 0, opinions, &prim->opinion_count);
   prim->opinions = opinions;
+  /* Instances share what their own arcs bring. What layers above say of the prims below an instance does not count. */
+  bool has_arcs = false;
+  for (size_t i = 0; i < prim->opinion_count; i++) has_arcs = has_arcs || opinions[i].arc_depth == prim->depth;
+  if (has_arcs && qmat_usd_truth(qmat_usd_prim_field(prim, "instanceable"), false)) prim->least_arc_depth = prim->depth;
   return QMAT_OK;
 }
 
@@ -120,7 +125,7 @@ qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *pare
   composer c = {.files = &stage->files, .prim = child, .nodes_made = &stage->nodes_made};
   if (child->depth > QMAT_USD_DEEPEST)
     return qmat_usd_prim_fail(child, "prims are nested more than %d deep", QMAT_USD_DEEPEST);
-  qmat_status status = qmat_usd_copy_tree(&c, parent->tree, NULL, name, &child->tree);
+  qmat_status status = qmat_usd_copy_tree(&c, parent->tree, NULL, name, parent->least_arc_depth, &child->tree);
   if (status == QMAT_OK && !child->tree)
     return qmat_fail(stage->log.context, QMAT_ERROR_INTERNAL, "a prim of USD has no opinions");
   if (status == QMAT_OK) status = qmat_usd_add_arcs_of_copies(&c, child->tree);

@@ -143,6 +143,26 @@ outputs: { o: { from: w.file, path: made/by/graph.ma } }\n' >paths.yaml
 printf '1 0 0\nv 0 0 0 1\n' >ball.ma
 expect 0 "made/by/graph.ma" "$qmat" run paths.yaml
 holds "the file of the graph" test -s made/by/graph.ma
+# A node that moves the mesh: other files of the run have the mesh's own coordinates, and say so.
+sed 's/"extras": \[1\], "scale": \[2, 2, 2\]/"rotation": [0, 0, 1, 0]/' list.gltf >placed.gltf
+expect 0 "the .ma file has the mesh where its own" "$qmat" mat placed.gltf -o list.ma -o list.glb --epsilon 5% $coarse
+expect 0 "spheres" "$qmat" mat placed.gltf -o list.ma --epsilon 5% $coarse
+holds "alone it has the scene's coordinates" sh -c '! grep -q warning err.txt'
+sed 's/"extras": \[1\], "scale"/"scale"/' list.gltf >placed.gltf
+expect 0 "the .ma file is in the mesh" "$qmat" mat placed.gltf -o list.ma -o list.glb --epsilon 5% $coarse
+holds "a scale moves nothing" sh -c '! grep -q "where its own" err.txt'
+rm placed.gltf
+
+# The summary is that of the levels that are saved.
+count_of() { head -n 1 "$1" | cut -d ' ' -f 1; }
+expect 0 "" "$qmat" run lod --set model=box.off --set near=1% --set far=20% $coarse -o near=near.ma -o far=far.ma
+holds "two levels" test "$(count_of near.ma)" -ne "$(count_of far.ma)"
+holds "a summary of each" test "$(grep -o '[0-9]* spheres* describe' out.txt | cut -d ' ' -f 1 | tr '\n' ' ')" = \
+  "$(count_of near.ma) $(count_of far.ma) "
+expect 0 "box: $(count_of near.ma) spheres describe" "$qmat" run lod --set model=box.off --set near=1% --set far=20% $coarse \
+  -o near=near.ma
+rm near.ma far.ma
+
 rm -r list.* paths.yaml ball.ma made
 
 # A full disk, and a reader that ends early: an error, and no temporary folder is left.

@@ -484,7 +484,7 @@ static void test_the_reports_of_several_meshes_become_one_summary(void **state) 
     qmat_run_step step = {.done = true, .report = json_loads(report, 0, NULL)};
     assert_non_null(step.report);
     const qmat_run run = {.name = "x", .graph = &graph, .steps = &step, .step_count = 1};
-    json_t *summary = qmat_run_summarise(&run, text, sizeof text);
+    json_t *summary = qmat_run_summarise(&run, 0, text, sizeof text);
     assert_int_equal(summary != NULL, cases[i].text != NULL);
     snprintf(expected, sizeof expected, "%s", cases[i].text ? cases[i].text : "");
     for (char *c = expected; *c; c++)

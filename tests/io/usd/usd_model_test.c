@@ -103,6 +103,25 @@ static void test_equal_meshes_are_one_mesh_in_several_places(void **state) {
   release(&r);
 }
 
+/* What a scene says of the prims below an instance does not count: instances share what their arcs bring. */
+static void test_the_prims_below_an_instance_are_those_of_its_arcs(void **state) {
+  (void)state;
+#define BELOW(instanceable) \
+  "#usda 1.0\nclass \"shared\" {\n" CUBE("body", "") "}\n"                                                        \
+  "def Xform \"a\" ( references = </shared>\n instanceable = " instanceable " ) { over \"body\" { " AT(0, 0, 50) \
+      " }\n" CUBE("more", "double size = 4") AT(1, 0, 0) "}\n"                                                  \
+  "def Xform \"b\" ( instanceable = true ) { " CUBE("own", AT(0, 0, 7)) "}\n"
+  reading r = read_all(BELOW("true"));
+  assert_int_equal(r.scene->placement_count, 2);
+  assert_place(&r, 0, 0, "/a/body", 1, 0, 0);
+  assert_place(&r, 1, 0, "/b/own", 0, 0, 7); /* without arcs it is no instance */
+  release(&r);
+  r = read_all(BELOW("false"));
+  assert_int_equal(r.scene->placement_count, 3);
+  assert_place(&r, 0, 0, "/a/body", 1, 0, 50);
+  release(&r);
+}
+
 static void test_a_mesh_is_chosen_by_path_end_or_number(void **state) {
   (void)state;
   static const char scene[] = "#usda 1.0\ndef Xform \"a\" {\n" CUBE("x", "") "def Sphere \"y\" {}\n}\n"
@@ -523,6 +542,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidden),
       cmocka_unit_test(test_equal_meshes_are_one_mesh_in_several_places),
+      cmocka_unit_test(test_the_prims_below_an_instance_are_those_of_its_arcs),
       cmocka_unit_test(test_a_mesh_is_chosen_by_path_end_or_number),
       cmocka_unit_test(test_an_instancer_places_its_prototypes),
       cmocka_unit_test(test_inactive_instances_and_those_of_proxies_are_left_out),

@@ -298,15 +298,11 @@ static void test_a_rig_that_does_not_fit_together_is_refused(void **state) {
     double second;
     uint32_t moved, placed;
     bool lacks_skin;
-  } cases[] = {{UINT32_MAX, 0, 0, 2, 1},
-               {0, 0, 0, 2, 1},
-               {UINT32_MAX, 1, 0, 2, 1},
-               {UINT32_MAX, 0, 1, 2, 1},
-               {UINT32_MAX, 0, 0, 1, 1},
-               {UINT32_MAX, 0, 0, 2, 0},
-               {UINT32_MAX, 0, 0, 2, 1, .moved = 1},
-               {UINT32_MAX, 0, 0, 2, 1, .placed = 1},
-               {UINT32_MAX, 0, 0, 2, 1, .lacks_skin = true}};
+  } cases[] = {{UINT32_MAX, 0, 0, 2, 1, 0, 0, false}, {0, 0, 0, 2, 1, 0, 0, false},
+               {UINT32_MAX, 1, 0, 2, 1, 0, 0, false}, {UINT32_MAX, 0, 1, 2, 1, 0, 0, false},
+               {UINT32_MAX, 0, 0, 1, 1, 0, 0, false}, {UINT32_MAX, 0, 0, 2, 0, 0, 0, false},
+               {UINT32_MAX, 0, 0, 2, 1, 1, 0, false}, {UINT32_MAX, 0, 0, 2, 1, 0, 1, false},
+               {UINT32_MAX, 0, 0, 2, 1, 0, 0, true}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     qmat_context context = {0};
     qmat_scene *scene = qmat_scene_new();
