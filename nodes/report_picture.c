@@ -5,8 +5,8 @@
 
 #include "core/node.h"
 #include "io/png.h"
-#include "nodes/descriptor/certificate.h"
 #include "nodes/descriptor/libraries.h"
+#include "nodes/page/certificate.h"
 #include "nodes/page/figure.h"
 
 typedef enum picture_format { FORMAT_PNG, FORMAT_SVG } picture_format;

@@ -13,10 +13,10 @@
 #include "io/mesh/ply_medial.h"
 #include "io/robot_write.h"
 #include "io/usd/usd_write.h"
-#include "nodes/descriptor/certificate.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/storage_share.h"
+#include "nodes/page/certificate.h"
 #include "nodes/page/skin_colours.h"
 
 /* Without a report, epsilon is taken for this share of the diagonal. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/descriptor/certificate.h"
+#include "nodes/page/certificate.h"
 
 #include <math.h>
 

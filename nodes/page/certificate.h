@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_DESCRIPTOR_CERTIFICATE_H
-#define QMAT_NODES_DESCRIPTOR_CERTIFICATE_H
+#ifndef QMAT_NODES_PAGE_CERTIFICATE_H
+#define QMAT_NODES_PAGE_CERTIFICATE_H
 
 #include "core/node.h"
 #include "io/stored_medial.h"
