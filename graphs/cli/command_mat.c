@@ -84,7 +84,7 @@ static qmat_status add_output(qmat_context *context, qmat_invocation *invocation
 
 static qmat_status add_options(qmat_context *context, qmat_invocation *invocation) {
   static const char *const only[] = {"Not with --colliders: ", "With --colliders: "};
-  qmat_graph graphs[2] = {{0}};
+  qmat_graph graphs[2] = {{.nodes = NULL}, {.nodes = NULL}};
   qmat_status status = QMAT_OK;
   for (int i = 0; i < 2 && status == QMAT_OK; i++)
     status = qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[i], &graphs[i]);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_arcs.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -284,7 +285,7 @@ static qmat_status compose_target(qmat_usd_composer *c, node *at, qmat_usd_arc a
         if (spec) qmat_usd_add_spec(*made, layers->layers[i], spec);
       }
     } else {
-      status = qmat_usd_copy_tree(c, above, at, name, 0, made);
+      status = qmat_usd_copy_tree(c, above, at, name, INT_MIN, made);
     }
     if (status != QMAT_OK || !*made || levels == 0) break;
     above = *made;

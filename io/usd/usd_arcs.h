@@ -51,7 +51,7 @@ qmat_status qmat_usd_add_arcs(qmat_usd_composer *c, qmat_usd_node *at);
 
 /* Makes the part of the tree of the child `name` that comes from the arcs of its parent's tree, `from`; NULL when there
  * is none. `parent`: as in qmat_usd_new_node. Specs of nodes that are introduced above the depth `least` are left out:
- * 0 for none. */
+ * INT_MIN for none. */
 qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const qmat_usd_node *from, qmat_usd_node *parent, const char *name,
                                int least, qmat_usd_node **made);
 
