@@ -17,6 +17,7 @@
 #include "nodes/descriptor/medial_summary.h"
 #include "nodes/measure/storage_share.h"
 #include "nodes/page/certificate.h"
+#include "nodes/page/shown.h"
 #include "nodes/page/skin_colours.h"
 
 /* Without a report, epsilon is taken for this share of the diagonal. */
@@ -62,12 +63,6 @@ static double diagonal_of(const qmat_medial *medial) {
     if (high > low) square += (high - low) * (high - low);
   }
   return sqrt(square);
-}
-
-/* The input for one mesh; NULL where there is none or it is a failure. */
-static const qmat_value *given_for(const qmat_value *value, size_t index) {
-  const qmat_value *item = value ? qmat_value_at(value, index) : NULL;
-  return item && !qmat_value_failure(item) ? item : NULL;
 }
 
 /* What the report says of one medial mesh. */
@@ -193,11 +188,11 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < count; i++) {
     const bool shows = !kept || params->skin_beside;
-    additions[i] = addition_of(context, params, scene, (const qmat_medial *)given_for(inputs[IN_MEDIAL], i),
-                               shows ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
-                               (const qmat_report *)given_for(inputs[IN_REPORT], i),
+    additions[i] = addition_of(context, params, scene, (const qmat_medial *)qmat_shown_given(inputs[IN_MEDIAL], i),
+                               shows ? (const qmat_mesh *)qmat_shown_given(inputs[IN_SKIN], i) : NULL,
+                               (const qmat_report *)qmat_shown_given(inputs[IN_REPORT], i),
                                name_of(scene, inputs[IN_MEDIAL], i), &stated[i]);
-    additions[i].colliders = (const qmat_colliders *)given_for(inputs[IN_COLLIDERS], i);
+    additions[i].colliders = (const qmat_colliders *)qmat_shown_given(inputs[IN_COLLIDERS], i);
     additions[i].collider_forms = collider_forms(params);
     additions[i].dynamic = !params->fixed;
     if (status == QMAT_OK)
@@ -245,12 +240,12 @@ static qmat_status write_layer(qmat_context *context, const scene_write_params *
   qmat_usd_addition *additions = qmat_calloc(count, sizeof *additions);
   if (!additions) return qmat_fail_memory(context, "a USD file");
   for (size_t i = 0; i < count; i++) {
-    const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
+    const qmat_medial *medial = (const qmat_medial *)qmat_shown_given(inputs[IN_MEDIAL], i);
     additions[i] = (qmat_usd_addition){
         .medial = medial,
-        .skin = params->skin_beside ? (const qmat_mesh *)given_for(inputs[IN_SKIN], i) : NULL,
-        .options =
-            usd_options_of(params, scene, medial, (const qmat_report *)given_for(inputs[IN_REPORT], i), &stated[i]),
+        .skin = params->skin_beside ? (const qmat_mesh *)qmat_shown_given(inputs[IN_SKIN], i) : NULL,
+        .options = usd_options_of(params, scene, medial, (const qmat_report *)qmat_shown_given(inputs[IN_REPORT], i),
+                                  &stated[i]),
     };
     additions[i].options.prim = first_path(scene, i);
   }
@@ -327,7 +322,7 @@ static qmat_status report_stated(qmat_context *context, const qmat_value *given,
   json_t *meshes = given->type == QMAT_LIST ? json_array() : NULL;
   bool done = given->type != QMAT_LIST || json_object_set_new(report, "meshes", meshes) == 0;
   for (size_t i = 0; i < count && done; i++) {
-    const qmat_medial *medial = (const qmat_medial *)given_for(given, i);
+    const qmat_medial *medial = (const qmat_medial *)qmat_shown_given(given, i);
     if (!meshes) {
       done = put_stated(report, medial, &stated[i]);
       continue;
@@ -375,7 +370,7 @@ static bool reads(const void *data, const qmat_value *const *known, size_t input
 static qmat_status check_spheres(qmat_context *context, const qmat_value *const inputs[]) {
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   for (size_t i = 0; i < count; i++) {
-    const qmat_medial *medial = (const qmat_medial *)given_for(inputs[IN_MEDIAL], i);
+    const qmat_medial *medial = (const qmat_medial *)qmat_shown_given(inputs[IN_MEDIAL], i);
     if (!medial || medial->sphere_count > 0) continue;
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the medial mesh has no sphere");
     if (count > 1) qmat_fail_within(context, ((const qmat_list *)inputs[IN_MEDIAL])->names[i]);

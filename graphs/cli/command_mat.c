@@ -33,15 +33,10 @@ static const qmat_graph_input *find_input(const qmat_graph *graph, const char *n
   return NULL;
 }
 
-/* Adds the default that an input has in the graph of --colliders, where that differs. */
-static void add_other_default(const char *own, const qmat_graph *other, const qmat_graph_input *input, char *doc,
-                              size_t room) {
-  static const char word[] = ", default ";
-  char text[QMAT_OPTION_DOC_SIZE];
-  describe(other, input, text, sizeof text);
-  const char *mine = strstr(own, word), *theirs = strstr(text, word);
-  if (mine && theirs && strcmp(mine, theirs) != 0)
-    snprintf(doc, room, " (with --colliders %s)", theirs + sizeof word - 1);
+/* The value that an input has in its graph. */
+static void format_value(const qmat_graph *graph, const qmat_graph_input *input, char *text, size_t size) {
+  const qmat_graph_node *node = &graph->nodes[input->params[0].node];
+  qmat_param_format(&node->type->params[input->params[0].param], node->params, text, size);
 }
 
 /* The first input of a graph is the argument; each other input is an option of that name. `other` is the other of the
@@ -61,8 +56,12 @@ static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation
     const qmat_graph_input *shared = find_input(other, input->name);
     const int start = snprintf(doc, (size_t)room, "%s%s: ", shared ? "" : only, param->doc);
     if (start > 0 && start < room) describe(graph, input, doc + start, (size_t)(room - start));
+    char own[64], others[64];
+    format_value(graph, input, own, sizeof own);
+    if (shared) format_value(other, shared, others, sizeof others);
     const size_t length = strlen(doc);
-    if (shared) add_other_default(doc, other, shared, doc + length, (size_t)room - length);
+    if (shared && strcmp(own, others) != 0)
+      snprintf(doc + length, (size_t)room - length, " (with --colliders %s)", others);
     status = qmat_invocation_add_option(context, invocation, (qmat_option){name, 0, "VALUE", doc});
   }
   return status;
@@ -126,8 +125,8 @@ static qmat_status read_graph(qmat_context *context, qmat_invocation *invocation
   qmat_graph_uninit(graph);
   qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, built_in, graph);
   for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++) {
-    bool known = false, made = false;
-    for (size_t k = 0; k < graph->input_count; k++) known |= !strcmp(graph->inputs[k].name, invocation->given[i].name);
+    const bool known = find_input(graph, invocation->given[i].name) != NULL;
+    bool made = false;
     for (size_t k = 0; k < invocation->option_count; k++)
       made |= invocation->options[k].doc == invocation->docs[k] && invocation->options[k].letter != 'o' &&
               !strcmp(invocation->options[k].name, invocation->given[i].name);

@@ -145,16 +145,15 @@ static void merge_written(const qmat_run *run, size_t summarised, bool *marks, j
 }
 
 json_t *qmat_run_summarise(const qmat_run *run, size_t file, char *text, size_t size) {
+  const size_t maker = file < run->file_count ? run->slots[run->files[file].slot].step : SIZE_MAX;
   bool *marks = qmat_alloc(run->step_count, sizeof *marks);
   json_t *summary = NULL;
+  if (marks && maker != SIZE_MAX) mark_needed(run, maker, marks);
   for (size_t i = run->step_count; marks && !summary && i-- > 0;) {
     const qmat_run_step *step = &run->steps[i];
     const qmat_report_summary *type = run->graph->nodes[step->node].type->report_summary;
     if (!step->done || !step->report || !type || makes_files(run, step)) continue;
-    const size_t maker = file < run->file_count ? run->slots[run->files[file].slot].step : SIZE_MAX;
-    if (maker != SIZE_MAX) mark_needed(run, maker, marks);
-    if (maker != SIZE_MAX && !marks[i]) continue;
-    summary = summarise_step(run, step);
+    if (maker == SIZE_MAX || marks[i]) summary = summarise_step(run, step);
     if (!summary) continue;
     merge_written(run, i, marks, summary);
     type->sentence(run->name, summary, text, size);

@@ -65,8 +65,7 @@ static bool take_name(const char **path, char name[NAME_SIZE]) {
   return true;
 }
 
-/* The prim or variant at a path in a layer; NULL when there is none. */
-static const qmat_usd_spec *follow_path(const qmat_usd_layer *layer, const char *path) {
+const qmat_usd_spec *qmat_usd_spec_at(const qmat_usd_layer *layer, const char *path) {
   const qmat_usd_spec *spec = layer->root;
   if (*path != '/') return NULL;
   while (*path && spec) {
@@ -315,7 +314,7 @@ static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, 
     status = qmat_usd_new_node(c, at, arc, stack, layers->count, &made);
     if (status == QMAT_OK) made->time = own;
     for (size_t i = 0; i < layers->count && status == QMAT_OK; i++) {
-      const qmat_usd_spec *spec = follow_path(layers->layers[i], path);
+      const qmat_usd_spec *spec = qmat_usd_spec_at(layers->layers[i], path);
       if (spec) qmat_usd_add_spec(made, layers->layers[i], spec);
     }
   }
@@ -367,7 +366,7 @@ static qmat_status warn_of_class(const qmat_usd_composer *c, const node *at, con
     if (above->stack == at->stack) continue;
     const qmat_usd_stack *layers = &c->files->stacks[above->stack];
     for (size_t k = 0; k < layers->count; k++) {
-      if (!follow_path(layers->layers[k], path)) continue;
+      if (!qmat_usd_spec_at(layers->layers[k], path)) continue;
       qmat_status status = qmat_usd_warn(c->prim, "the opinions of a referring layer about the class <%s> are skipped",
                                          qmat_usd_shown(path));
       if (status != QMAT_OK) return status;

@@ -44,6 +44,9 @@ typedef struct qmat_usd_composer {
 qmat_status qmat_usd_new_node(qmat_usd_composer *c, qmat_usd_node *parent, qmat_usd_arc arc, size_t stack,
                               size_t most_specs, qmat_usd_node **made);
 
+/* The prim or variant at a path in a layer, "/a/b{set=choice}"; NULL when there is none. Cost: a look-up a name. */
+const qmat_usd_spec *qmat_usd_spec_at(const qmat_usd_layer *layer, const char *path);
+
 void qmat_usd_add_spec(qmat_usd_node *to, const qmat_usd_layer *layer, const qmat_usd_spec *spec);
 
 /* Adds the arcs of a node's specs, and their arcs, except variants. */

@@ -9,8 +9,12 @@ enum { MOST_WARNINGS = 100, PATH_TEXT = 256 };
 
 /* ---- messages ---- */
 
+bool qmat_usd_is_medial_data(const qmat_usd_value *custom_data) {
+  return qmat_usd_text(qmat_usd_entry(custom_data, "qmat_version")) != NULL;
+}
+
 bool qmat_usd_prim_is_medial(const qmat_usd_prim *prim) {
-  return qmat_usd_text(qmat_usd_entry(qmat_usd_prim_field(prim, "customData"), "qmat_version")) != NULL;
+  return qmat_usd_is_medial_data(qmat_usd_prim_field(prim, "customData"));
 }
 
 const char *qmat_usd_shown(const char *text) {

@@ -62,6 +62,8 @@ qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim);
 /* The text, or "?" when it is not UTF-8. */
 const char *qmat_usd_shown(const char *text);
 
+/* Whether a prim with this customData (NULL: none) was written by qmat as a medial mesh. */
+bool qmat_usd_is_medial_data(const qmat_usd_value *custom_data);
 /* Whether qmat has written the prim as a medial mesh. */
 bool qmat_usd_prim_is_medial(const qmat_usd_prim *prim);
 

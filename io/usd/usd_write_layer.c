@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/node.h"
+#include "io/usd/usd_arcs.h"
 #include "io/usd/usd_write.h"
 #include "io/usd/usda.h"
 #include "io/usd/usdc.h"
@@ -88,6 +89,7 @@ static bool is_valid_name(const char *name) {
   return length > 0;
 }
 
+/* The same of all names in a path. */
 static bool has_valid_names(const char *path) {
   for (; *path == '/'; path += strcspn(path, "/"))
     if (!is_valid_name(++path)) return false;
@@ -116,54 +118,39 @@ static void choose_stem(const qmat_usd_spec *root, char stem[LONGEST_STEM + 1]) 
   for (unsigned i = 2; is_taken(root, stem) && i < 1000; i++) snprintf(stem, LONGEST_STEM + 1, "medial%u_", i);
 }
 
-/* The prim of the original's root layer at a path; NULL: it has none. */
-static const qmat_usd_spec *find_prim(const qmat_usd_layer *layer, const char *path) {
-  const qmat_usd_spec *spec = layer->root;
-  char name[512];
-  while (spec && *path == '/') {
-    const size_t length = strcspn(++path, "/");
-    snprintf(name, sizeof name, "%.*s", (int)length, path);
-    spec = length < sizeof name ? qmat_usd_child(layer, spec, QMAT_USD_PRIM, name) : NULL;
-    path += length;
-  }
-  return spec;
-}
-
-/* Hides the medial meshes that a prim has already, as in a scene that was flattened after an earlier run. */
-static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_spec *prim) {
-  for (const qmat_usd_spec *child = prim ? prim->first_child : NULL; child; child = child->next) {
-    if (child->kind != QMAT_USD_PRIM || !is_valid_name(child->name) ||
-        !qmat_usd_text(qmat_usd_entry(qmat_usd_field_value(child, "customData"), "qmat_version")))
-      continue;
-    put_indent(writer, depth);
-    qmat_put_text(writer, "over \"");
-    qmat_put_text(writer, child->name);
-    qmat_put_text(writer, "\" (\n");
-    put_indent(writer, depth + 1);
-    qmat_put_text(writer, "active = false\n");
-    put_indent(writer, depth);
-    qmat_put_text(writer, ")\n");
-    put_indent(writer, depth);
-    qmat_put_text(writer, "{\n");
-    put_indent(writer, depth);
-    qmat_put_text(writer, "}\n");
-  }
-}
-
-static void put_reference(qmat_writer *writer, size_t depth, const char *stem, uint32_t mesh) {
-  char line[128];
+/* Writes a prim that has only metadata. */
+static void put_empty_prim(qmat_writer *writer, size_t depth, const char *kind, const char *name,
+                           const char *metadata) {
   put_indent(writer, depth);
-  snprintf(line, sizeof line, "def Xform \"%s%u\" (\n", stem, mesh);
-  qmat_put_text(writer, line);
+  qmat_put_text(writer, kind);
+  qmat_put_text(writer, " \"");
+  qmat_put_text(writer, name);
+  qmat_put_text(writer, "\" (\n");
   put_indent(writer, depth + 1);
-  snprintf(line, sizeof line, "prepend references = </%s%u>\n", stem, mesh);
-  qmat_put_text(writer, line);
+  qmat_put_text(writer, metadata);
+  qmat_put_text(writer, "\n");
   put_indent(writer, depth);
   qmat_put_text(writer, ")\n");
   put_indent(writer, depth);
   qmat_put_text(writer, "{\n");
   put_indent(writer, depth);
   qmat_put_text(writer, "}\n");
+}
+
+/* Hides the medial meshes that a prim (NULL: none) has already, as in a scene that was flattened after an earlier run.
+ */
+static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_spec *prim) {
+  for (const qmat_usd_spec *child = prim ? prim->first_child : NULL; child; child = child->next)
+    if (child->kind == QMAT_USD_PRIM && is_valid_name(child->name) &&
+        qmat_usd_is_medial_data(qmat_usd_field_value(child, "customData")))
+      put_empty_prim(writer, depth, "over", child->name, "active = false");
+}
+
+static void put_reference(qmat_writer *writer, size_t depth, const char *stem, uint32_t mesh) {
+  char name[LONGEST_STEM + 16], reference[sizeof name + 32];
+  snprintf(name, sizeof name, "%s%u", stem, mesh);
+  snprintf(reference, sizeof reference, "prepend references = </%s>", name);
+  put_empty_prim(writer, depth, "def Xform", name, reference);
 }
 
 /* Writes the prims that carry a mesh with a medial mesh. */
@@ -186,7 +173,7 @@ static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, con
     }
     open_prims(writer, path, open, scene->has_instances);
     open = count_names(path);
-    hide_earlier(writer, open, find_prim(original, path));
+    hide_earlier(writer, open, qmat_usd_spec_at(original, path));
     put_reference(writer, open, stem, scene->meshes[carriers[i].mesh]);
   }
   while (open > 0) {

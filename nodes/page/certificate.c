@@ -4,15 +4,10 @@
 #include <math.h>
 
 #include "core/text.h"
+#include "nodes/page/shown.h"
 
 const char *const qmat_requirement_choices[] = {
     [QMAT_REQUIRE_NOTHING] = "none", [QMAT_REQUIRE_CERTIFIED] = "certified", NULL};
-
-/* A number of the report; NAN when there is none. */
-static double reported(const qmat_report *report, const char *key) {
-  const json_t *value = report ? json_object_get(report->root, key) : NULL;
-  return json_is_number(value) ? json_number_value(value) : NAN;
-}
 
 static qmat_certificate certificate_of(const qmat_report *report) {
   const json_t *certified = report ? json_object_get(report->root, "certified") : NULL;
@@ -21,11 +16,11 @@ static qmat_certificate certificate_of(const qmat_report *report) {
 }
 
 qmat_stated_errors qmat_errors_of_report(const qmat_report *report) {
-  return (qmat_stated_errors){.diagonal = reported(report, "diagonal"),
-                              .meters_per_unit = reported(report, "meters_per_unit"),
-                              .epsilon = reported(report, "epsilon"),
-                              .error_out = reported(report, "surface_to_envelope"),
-                              .error_in = reported(report, "envelope_to_surface"),
+  return (qmat_stated_errors){.diagonal = qmat_shown_number(report, "diagonal"),
+                              .meters_per_unit = qmat_shown_number(report, "meters_per_unit"),
+                              .epsilon = qmat_shown_number(report, "epsilon"),
+                              .error_out = qmat_shown_number(report, "surface_to_envelope"),
+                              .error_in = qmat_shown_number(report, "envelope_to_surface"),
                               .certified = certificate_of(report)};
 }
 
@@ -58,9 +53,7 @@ qmat_status qmat_check_reports_certify(qmat_context *context, const qmat_value *
   const size_t count = qmat_value_count(medials);
   qmat_stated_errors *stated = qmat_arena_alloc(&context->arena, count, sizeof *stated);
   if (!stated) return qmat_fail_memory(context, "the errors");
-  for (size_t i = 0; i < count; i++) {
-    const qmat_value *report = reports ? qmat_value_at(reports, i) : NULL;
-    stated[i] = qmat_errors_of_report(report && !qmat_value_failure(report) ? (const qmat_report *)report : NULL);
-  }
+  for (size_t i = 0; i < count; i++)
+    stated[i] = qmat_errors_of_report((const qmat_report *)qmat_shown_given(reports, i));
   return qmat_check_certified(context, medials, stated);
 }

@@ -466,6 +466,14 @@ static void test_tiles_are_kept_and_other_files_are_named(void **state) {
   assert_int_equal(rmdir(folder), 0);
 }
 
+/* A copy of a file's bytes as text; free with qmat_free. */
+static char *text_of(const qmat_file *file) {
+  char *text = qmat_alloc(file->parts[0].size + 1, 1);
+  memcpy(text, file->parts[0].bytes, file->parts[0].size);
+  text[file->parts[0].size] = '\0';
+  return text;
+}
+
 /* The overs of a path that begins with another path are below its prim, and each prim is opened once. */
 static void test_the_prims_of_a_layer_are_opened_once(void **state) {
   (void)state;
@@ -473,9 +481,7 @@ static void test_the_prims_of_a_layer_are_opened_once(void **state) {
       read_all("#usda 1.0\n" CUBE("a", CUBE("x", "")) CUBE("a1", "") "def \"b\" { def \"a\" {" CUBE("x", "") "} }\n");
   qmat_medial *medial = example_medial(1);
   qmat_file *file = write_layer(&r, medial, NULL, QMAT_USD_TEXT);
-  char *text = qmat_alloc(file->parts[0].size + 1, 1);
-  memcpy(text, file->parts[0].bytes, file->parts[0].size);
-  text[file->parts[0].size] = '\0';
+  char *text = text_of(file);
   const char *overs = strstr(text, "\n}\n\nover ");
   assert_non_null(overs);
 #define CHILD(indent)                                                                                                  \
@@ -504,9 +510,7 @@ static void test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidd
       "def Xform \"medial2_1\"\n{\n}\n");
   qmat_medial *medial = example_medial(1);
   qmat_file *file = write_layer(&r, medial, NULL, QMAT_USD_TEXT);
-  char *text = qmat_alloc(file->parts[0].size + 1, 1);
-  memcpy(text, file->parts[0].bytes, file->parts[0].size);
-  text[file->parts[0].size] = '\0';
+  char *text = text_of(file);
   const char *overs = strstr(text, "\n}\n\nover ");
   assert_non_null(overs);
   assert_string_equal(overs + 4,
