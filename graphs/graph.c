@@ -43,6 +43,12 @@ const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node) {
   return NULL;
 }
 
+const qmat_graph_input *qmat_graph_input_called(const qmat_graph *graph, const char *name) {
+  for (size_t i = 0; i < graph->input_count; i++)
+    if (strcmp(graph->inputs[i].name, name) == 0) return &graph->inputs[i];
+  return NULL;
+}
+
 const char *qmat_graph_input_name(const qmat_graph *graph, size_t node, const qmat_param *param) {
   for (size_t i = 0; i < graph->input_count; i++)
     for (size_t k = 0; k < graph->inputs[i].param_count; k++) {

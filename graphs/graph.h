@@ -82,6 +82,9 @@ size_t qmat_graph_file_count(const qmat_graph *graph, size_t *last);
 /* The first required parameter of a node that is not set, or NULL. */
 const qmat_param *qmat_graph_missing_param(const qmat_graph_node *node);
 
+/* The graph's input of this name, or NULL. */
+const qmat_graph_input *qmat_graph_input_called(const qmat_graph *graph, const char *name);
+
 /* The name of the graph's input that sets this parameter, or NULL. */
 const char *qmat_graph_input_name(const qmat_graph *graph, size_t node, const qmat_param *param);
 

@@ -152,12 +152,12 @@ qmat_status qmat_graph_find_param(qmat_context *context, const qmat_graph *graph
 qmat_status qmat_graph_find_params(qmat_context *context, const qmat_graph *graph, const char *name,
                                    qmat_graph_param *single, const qmat_graph_param **params, size_t *count) {
   const bool dotted = strchr(name, '.') != NULL;
-  for (size_t i = 0; i < graph->input_count && !dotted; i++)
-    if (strcmp(graph->inputs[i].name, name) == 0) {
-      *params = graph->inputs[i].params;
-      *count = graph->inputs[i].param_count;
-      return QMAT_OK;
-    }
+  const qmat_graph_input *input = dotted ? NULL : qmat_graph_input_called(graph, name);
+  if (input) {
+    *params = input->params;
+    *count = input->param_count;
+    return QMAT_OK;
+  }
   if (dotted || find_node(graph, name) != SIZE_MAX) {
     *params = single;
     *count = 1;

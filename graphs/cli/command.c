@@ -67,8 +67,10 @@ static const qmat_option *find_option(const qmat_invocation *invocation, const c
 static bool is_input_of_mat(qmat_context *context, const qmat_registry *registry, const char *name) {
   qmat_graph graph = {0};
   bool found = false;
-  if (qmat_graph_read_built_in(context, registry, &qmat_built_in_graphs[0], &graph) == QMAT_OK)
-    for (size_t i = 1; i < graph.input_count; i++) found |= strcmp(graph.inputs[i].name, name) == 0;
+  if (qmat_graph_read_built_in(context, registry, &qmat_built_in_graphs[0], &graph) == QMAT_OK) {
+    const qmat_graph_input *input = qmat_graph_input_called(&graph, name);
+    found = input && input != &graph.inputs[0]; /* the first is an argument */
+  }
   qmat_graph_uninit(&graph);
   return found;
 }

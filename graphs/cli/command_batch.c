@@ -90,9 +90,7 @@ static bool is_shared(const batch_call *call, const char *name) {
   bool shared = strcmp(name, "set") == 0 || strcmp(name, "force") == 0 || strcmp(name, "colliders") == 0;
   for (const qmat_option *option = qmat_cache_option_rows; option->name; option++)
     shared = shared || strcmp(option->name, name) == 0;
-  for (size_t i = 0; call->invocation->inputs_are_options && i < graph->input_count; i++)
-    shared = shared || strcmp(graph->inputs[i].name, name) == 0;
-  return shared;
+  return shared || (call->invocation->inputs_are_options && qmat_graph_input_called(graph, name));
 }
 
 /* The format of an output that an ending means, with or without its dot; NULL: none. */

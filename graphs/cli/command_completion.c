@@ -78,10 +78,8 @@ static void offer_value(const completion *c, const char *option, char *const *wo
   if (strcmp(option, "set") == 0) offer_assignments(c, &graph);
   const bool is_node = strcmp(option, "to") == 0 || strcmp(option, "force") == 0;
   for (size_t i = 0; is_node && i < graph.node_count; i++) offer(c, "%s", graph.nodes[i].id);
-  for (size_t i = 0; i < graph.input_count; i++) {
-    const qmat_graph_param *at = graph.inputs[i].params;
-    if (strcmp(graph.inputs[i].name, option) == 0) offer_choices(c, "", &graph.nodes[at->node].type->params[at->param]);
-  }
+  const qmat_graph_input *input = qmat_graph_input_called(&graph, option);
+  if (input) offer_choices(c, "", &graph.nodes[input->params[0].node].type->params[input->params[0].param]);
   for (size_t i = 0; strcmp(option, "format") == 0 && i < graph.output_count; i++) {
     const qmat_param *format = qmat_output_format_param(graph.nodes[graph.outputs[i].node].type);
     if (format) offer_choices(c, "", format);

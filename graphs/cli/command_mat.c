@@ -27,12 +27,6 @@ static void describe(const qmat_graph *graph, const qmat_graph_input *input, cha
   qmat_param_describe(node->type, &node->type->params[input->params[0].param], node->params, text, size);
 }
 
-static const qmat_graph_input *find_input(const qmat_graph *graph, const char *name) {
-  for (size_t i = 0; i < graph->input_count; i++)
-    if (strcmp(graph->inputs[i].name, name) == 0) return &graph->inputs[i];
-  return NULL;
-}
-
 /* The value that an input has in its graph. */
 static void format_value(const qmat_graph *graph, const qmat_graph_input *input, char *text, size_t size) {
   const qmat_graph_node *node = &graph->nodes[input->params[0].node];
@@ -53,7 +47,7 @@ static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation
     const int room = QMAT_OPTION_DOC_SIZE - QMAT_GRAPH_NAME_SIZE;
     /* The graph is freed before the options are. */
     snprintf(name, QMAT_GRAPH_NAME_SIZE, "%s", input->name);
-    const qmat_graph_input *shared = find_input(other, input->name);
+    const qmat_graph_input *shared = qmat_graph_input_called(other, input->name);
     const int start = snprintf(doc, (size_t)room, "%s%s: ", shared ? "" : only, param->doc);
     if (start > 0 && start < room) describe(graph, input, doc + start, (size_t)(room - start));
     char own[64], others[64];
@@ -125,7 +119,7 @@ static qmat_status read_graph(qmat_context *context, qmat_invocation *invocation
   qmat_graph_uninit(graph);
   qmat_status status = qmat_graph_read_built_in(context, &invocation->registry, built_in, graph);
   for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++) {
-    const bool known = find_input(graph, invocation->given[i].name) != NULL;
+    const bool known = qmat_graph_input_called(graph, invocation->given[i].name) != NULL;
     bool made = false;
     for (size_t k = 0; k < invocation->option_count; k++)
       made |= invocation->options[k].doc == invocation->docs[k] && invocation->options[k].letter != 'o' &&
