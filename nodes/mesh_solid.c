@@ -37,7 +37,7 @@ static const double weld_tolerance = 1e-5;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
- * solids covers it then. */
+ * solids covers it then. Folds that are not longer need no union for the same reason. */
 static const double flap_reach = 0.75;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
@@ -578,7 +578,7 @@ static qmat_status make_solid(solidifier *s) {
   if (status == QMAT_OK) status = sort_triangles(s);
   if (status == QMAT_OK)
     status = qmat_unite_overlaps(s->context, s->mesh->vertex_count, s->mesh->positions, s->solids.count,
-                                 s->solids.corners, &s->united);
+                                 s->solids.corners, flap_reach * epsilon_of(s) * s->frame.diagonal, &s->united);
   /* The last resort: without their union, the inside of what intersects is not defined. */
   if (status == QMAT_OK && s->united.why_not) status = wrap_triangles(s, s->solids.corners, s->solids.count);
   return status == QMAT_OK ? review_sheets(s) : status;
@@ -624,8 +624,8 @@ static const qmat_param params[] = {
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
     QMAT_LENGTH(
         mesh_solid_params, epsilon, 0.01, 0, 1,
-        "The epsilon of the run. A wrap lies a quarter of it outside the surface; a sheet that sticks out by at most "
-        "three quarters of it is a flap; 0: 1% is used"),
+        "The epsilon of the run. A wrap lies a quarter of it outside the surface; three quarters of it are the longest "
+        "fold that stays, and how far a flap sticks out; 0: 1% is used"),
     {0},
 };
 
@@ -644,7 +644,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 7,
+    .version = 8,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
@@ -657,7 +657,9 @@ const qmat_node qmat_node_mesh_solid = {
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
         "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
         "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
-        "they become sheets.\n\n"
+        "they become sheets. A part that crosses only itself, in folds of at most three quarters of epsilon, stays as "
+        "it "
+        "is.\n\n"
         "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples "
         "are what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover "
         "it, but no spheres are made for it.\n\n"

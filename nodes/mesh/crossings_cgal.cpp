@@ -8,11 +8,12 @@
 
 namespace {
 
-bool share_a_vertex(const uint32_t *a, const uint32_t *b) {
+/* Whether two triangles have an edge in common: they could only lie on each other. */
+bool share_an_edge(const uint32_t *a, const uint32_t *b) {
+  int shared = 0;
   for (int i = 0; i < 3; i++)
-    for (int k = 0; k < 3; k++)
-      if (a[i] == b[k]) return true;
-  return false;
+    for (int k = 0; k < 3; k++) shared += a[i] == b[k];
+  return shared > 1;
 }
 
 void find(qmat_context *context, const qmat_shells &shells, uint8_t *crosses) {
@@ -22,7 +23,7 @@ void find(qmat_context *context, const qmat_shells &shells, uint8_t *crosses) {
     if (!mesh.is_flat(t)) triangles.push_back(t);
   qmat::for_each_box_pair(mesh, triangles, [&](uint32_t a, uint32_t b) {
     if (mesh.patch(a) != mesh.patch(b) || (crosses[a] && crosses[b])) return;
-    if (share_a_vertex(mesh.corners(a), mesh.corners(b)) || !qmat::do_meet(mesh, a, b)) return;
+    if (share_an_edge(mesh.corners(a), mesh.corners(b)) || !qmat::do_meet(mesh, a, b)) return;
     crosses[a] = crosses[b] = 1;
   });
 }

@@ -10,8 +10,8 @@ extern "C" {
 #endif
 
 /* Sets crosses[t] (zeroed, triangle_count) to 1 for triangles that meet another of their patch with which they share no
- * vertex. All triangles need a shell. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. One thread. Cost: n log
- * n, a microsecond or two per triangle. */
+ * edge, beyond a shared vertex. All triangles need a shell. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED.
+ * One thread. Cost: n log n, a microsecond or two per triangle. */
 qmat_status qmat_find_crossings(qmat_context *context, const qmat_shells *shells, uint8_t *crosses);
 
 #ifdef __cplusplus

@@ -123,7 +123,8 @@ static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
 }
 
 qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
-                                size_t triangle_count, const uint32_t *triangles, qmat_united *united) {
+                                size_t triangle_count, const uint32_t *triangles, double longest_fold,
+                                qmat_united *united) {
   *united = (qmat_united){.changed = false};
   if (triangle_count == 0) return QMAT_OK;
   unison u = {context, vertex_count, triangle_count, positions, triangles, NULL, NULL};
@@ -146,7 +147,8 @@ qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, cons
                        .shells = shells,
                        .patches = u.patches,
                        .reaches = reaches,
-                       .crosses = crosses};
+                       .crosses = crosses,
+                       .longest_fold = longest_fold};
   status = qmat_find_crossings(context, &input, crosses);
   if (status != QMAT_OK) return status;
   bool any = false;

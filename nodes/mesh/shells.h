@@ -18,6 +18,7 @@ typedef struct qmat_shells {
   const uint32_t *patches; /* triangle_count: the triangle that names its patch */
   const uint8_t *reaches;  /* triangle_count: 0 if no triangle of another patch is near */
   const uint8_t *crosses;  /* triangle_count: 1 if the triangle crosses another of its patch */
+  double longest_fold;     /* >= 0, in the unit of the positions: longer folds of a shell in itself are united */
 } qmat_shells;
 
 #endif

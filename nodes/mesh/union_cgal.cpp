@@ -11,16 +11,12 @@
 #include <tuple>
 #include <vector>
 
-#include "core/geometry/triangle.h"
 #include "nodes/mesh/arrangement_cgal.h"
 #include "nodes/mesh/union_mesh_cgal.h"
 #include "nodes/mesh/winding_number_cgal.h"
 
 namespace qmat {
 namespace {
-
-/* The least share of a shell's area that it hides from itself. */
-constexpr double kLeastHidden = 1e-3;
 
 struct Edge {
   uint32_t low, high, piece;
@@ -153,33 +149,24 @@ class Union {
     for (uint32_t i = 0; i < pieces_.size(); i++) region_of_[i] = qmat_set_leader(leaders, i);
   }
 
-  double area_of(const Corners &corners) const {
-    double p[3][3];
-    for (size_t k = 0; k < 3; k++) {
-      const uint32_t v = corners[k];
-      const Point &at = arrangement_.points[v];
-      for (size_t i = 0; i < 3; i++)
-        p[k][i] = v < mesh_.vertex_count() ? mesh_.position(v)[i] : CGAL::to_double(at[static_cast<int>(i)]);
-    }
-    double normal[3];
-    qmat_triangle_normal(p[0], p[1], p[2], normal);
-    return std::sqrt(qmat_dot(normal, normal)) / 2;
-  }
-
-  /* A shell that meets only itself, in a fold that hides next to nothing, stays: its union would leave crumbs. */
-  void leave_small_folds(const std::vector<int8_t> &kept) {
+  /* A shell that meets only itself, and hides only regions of up to the longest fold's length, stays: its union would
+   * leave crumbs. */
+  void leave_short_folds(const std::vector<int8_t> &kept) {
     std::vector<size_t> shells(mesh_.triangle_count());
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) shells[cluster_of_any(t)] += mesh_.shell(t) == t;
-    std::vector<double> all(mesh_.triangle_count()), hidden(mesh_.triangle_count());
+    std::vector<bool> has_long_fold(mesh_.triangle_count());
+    std::vector<CGAL::Bbox_3> boxes(pieces_.size()); /* per region */
     for (size_t i = 0; i < pieces_.size(); i++) {
-      const uint32_t cluster = cluster_of(pieces_[i].source);
-      if (shells[cluster] > 1) continue;
-      const double area = area_of(pieces_[i].corners);
-      all[cluster] += area;
-      if (!kept[region_of_[i]]) hidden[cluster] += area;
+      const uint32_t region = region_of_[i];
+      if (kept[region]) continue;
+      CGAL::Bbox_3 &box = boxes[region];
+      for (const uint32_t corner : pieces_[i].corners)
+        box += corner < mesh_.vertex_count() ? mesh_.inexact(corner).bbox() : arrangement_.points[corner].bbox();
+      const double length = std::hypot(box.x_span(), box.y_span(), box.z_span());
+      if (length > mesh_.longest_fold()) has_long_fold[cluster_of(pieces_[i].source)] = true;
     }
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
-      if (shells[t] == 1 && hidden[t] < kLeastHidden * all[t]) changed_[t] = false;
+      if (shells[t] == 1 && !has_long_fold[t]) changed_[t] = false;
   }
 
   /* Keeps the pieces with the inside behind them and the outside in front, each once. */
@@ -200,7 +187,7 @@ class Union {
       }
       if (!keeps || piece.layers != 1) changed_[cluster_of(piece.source)] = true;
     }
-    leave_small_folds(kept);
+    leave_short_folds(kept);
     size_t count = 0;
     for (size_t i = 0; i < pieces_.size(); i++)
       if (kept[region_of_[i]] && changed_[cluster_of(pieces_[i].source)]) pieces_[count++] = pieces_[i];

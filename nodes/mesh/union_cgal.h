@@ -23,11 +23,11 @@ typedef struct qmat_united {
 
 /* The boundary of the union: the points with a winding number above 0. Triangles are cut along their intersections in
  * exact arithmetic, and the pieces with the inside behind them and the outside in front are kept. Shells that lose no
- * surface to others stay as they are. Points on cuts are rounded to doubles at the end. Triangles that lose a corner by
- * that are left out; every edge still has as many triangles one way as the other. The caller frees the arrays
- * (qmat_free). QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY with CGAL's message, QMAT_CANCELLED. One thread. Cost: 5 to 20
- * microseconds per triangle of shells that intersect or vanish, 200 per pair of intersecting triangles, and a box test
- * with every 64th triangle for each region of the surface between cuts.
+ * surface to others, and no more than short folds to themselves, stay as they are. Points on cuts are rounded to
+ * doubles at the end. Triangles that lose a corner by that are left out; every edge still has as many triangles one way
+ * as the other. The caller frees the arrays (qmat_free). QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY with CGAL's message,
+ * QMAT_CANCELLED. One thread. Cost: 5 to 20 microseconds per triangle of shells that intersect or vanish, 200 per pair
+ * of intersecting triangles, and a box test with every 64th triangle for each region of the surface between cuts.
  * Source: Zhou, Grinspun, Zorin, Jacobson 2016, Mesh arrangements for solid geometry. */
 qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, qmat_united *united);
 

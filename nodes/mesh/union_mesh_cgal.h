@@ -71,6 +71,10 @@ class UnionMesh {
   bool crosses(uint32_t triangle) const {
     return shells_.crosses[triangle] != 0;
   }
+  double longest_fold() const {
+    return shells_.longest_fold;
+  }
+
   /* Whether the corners are collinear; false without a shell. */
   bool is_flat(uint32_t triangle) const {
     return is_flat_[triangle];

@@ -474,6 +474,36 @@ static void test_what_bounds_nothing_of_a_union_is_a_sheet(void **state) {
   release(&r);
 }
 
+/* Two tetrahedra on one triangle, one of them inside out: they cross only in triangles that share a corner. What the
+ * second hides, and its tip beyond the first, has a box of 3 x 3 x 2; with the distant box the diagonal is 63.1. */
+static void test_a_fold_longer_than_three_quarters_of_epsilon_is_united(void **state) {
+  (void)state;
+  static const struct {
+    const char *params;
+    bool stays;
+  } cases[] = {{"epsilon=0.1", true}, {"epsilon=0.098", false}, {"epsilon=0.01", false}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    qmat_mesh *mesh = shape_new();
+    const uint32_t a = shape_vertex(mesh, 0, 0, 0), b = shape_vertex(mesh, 3, 0, 0), c = shape_vertex(mesh, 0, 3, 0),
+                   top = shape_vertex(mesh, 0, 0, 3), tip = shape_vertex(mesh, 2, 2, 2);
+    shape_triangle(mesh, a, b, top);
+    shape_triangle(mesh, b, c, top);
+    shape_triangle(mesh, c, a, top);
+    shape_triangle(mesh, b, a, tip);
+    shape_triangle(mesh, c, b, tip);
+    shape_triangle(mesh, a, c, tip);
+    shape_add_box(mesh, 0, 0, -60, 1, 1, -59, false);
+    result r = unite_with(mesh, cases[i].params);
+    const qmat_mesh solids = qmat_mesh_of_solids(r.mesh);
+    assert_int_equal(pipeline_count(r.report, "parts_united"), !cases[i].stays);
+    assert_int_equal(pipeline_count(r.report, "unbounding_triangles"),
+                     cases[i].stays ? 0 : 4); /* the tip, and what it covers */
+    /* The first has a volume of 4.5, the second of 3, and both have 1.5 in common. */
+    assert_near(volume_of(&solids), 1 + (cases[i].stays ? 4.5 - 3 : 4.5 - 1.5), 1e-9);
+    release(&r);
+  }
+}
+
 /* The sleeve sticks out of its solid by 0.5 of a diagonal of 4.43, which is 11.3 %. */
 static void test_what_bounds_nothing_within_three_quarters_of_epsilon_is_a_flap(void **state) {
   (void)state;
@@ -1160,6 +1190,7 @@ int main(void) {
       cmocka_unit_test(test_open_parts_stay_and_do_not_keep_others_from_uniting),
       cmocka_unit_test(test_parts_that_meet_themselves),
       cmocka_unit_test(test_what_bounds_nothing_of_a_union_is_a_sheet),
+      cmocka_unit_test(test_a_fold_longer_than_three_quarters_of_epsilon_is_united),
       cmocka_unit_test(test_what_bounds_nothing_within_three_quarters_of_epsilon_is_a_flap),
       cmocka_unit_test(test_a_flap_is_a_whole_component_near_a_solid),
       cmocka_unit_test(test_what_bounds_nothing_is_found_between_plates),
