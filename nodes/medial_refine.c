@@ -9,6 +9,7 @@
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/json_text.h"
+#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/descriptor/sampled_solid.h"
 #include "nodes/initial/crease_spheres.h"
@@ -52,7 +53,7 @@ typedef struct {
 
 typedef struct {
   qmat_context *context;
-  const medial_refine_params *params;
+  medial_refine_params params;
   const qmat_mesh *mesh;
   qmat_mesh solids; /* the mesh without its sheets, which need no samples */
   const qmat_field *thickness;
@@ -180,7 +181,7 @@ static qmat_status make_medial(const refiner *r, const qmat_surface *surface, re
   qmat_context *context = r->context;
   qmat_medial *bare;
   qmat_crease_links links;
-  qmat_status status = qmat_voronoi_dual_make(context, &r->params->dual, r->mesh, surface, r->thickness, to->samples,
+  qmat_status status = qmat_voronoi_dual_make(context, &r->params.dual, r->mesh, surface, r->thickness, to->samples,
                                               to->reaches, &bare, NULL);
   if (status != QMAT_OK || r->creases.count == 0) {
     to->medial = bare;
@@ -252,7 +253,7 @@ static qmat_status refine_in_rounds(refiner *r, double epsilon, double limit, do
   double gap = 0;
   if (status == QMAT_OK) status = find_widest_gap(r, &rounds[0], limit, &gap);
   double spacing = qmat_larger(gap, limit);
-  for (int64_t i = 0; i < r->params->rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
+  for (int64_t i = 0; i < r->params.rounds && rounds[newest].farthest > enough && status == QMAT_OK; i++) {
     refinement *next = &rounds[newest + 1];
     const bool is_fine = spacing <= fine_share * limit;
     status = refine(r, surface, &rounds[newest], spacing, limit, next);
@@ -275,10 +276,10 @@ static qmat_status refine_in_rounds(refiner *r, double epsilon, double limit, do
 
 /* rounds[0] is the input; `*best` becomes the round to return. */
 static qmat_status refine_where_far(refiner *r, refinement *rounds, size_t *best) {
-  const medial_refine_params *params = r->params;
+  const medial_refine_params *params = &r->params;
   const double epsilon = params->dual.epsilon - r->mesh->deviation / r->frame.diagonal;
   *best = 0;
-  if (!(params->dual.epsilon > 0) || !(epsilon > 0) || !qmat_has_solids(r->mesh)) return QMAT_OK;
+  if (!(epsilon > 0) || !qmat_has_solids(r->mesh)) return QMAT_OK;
   r->positions = qmat_arena_alloc(&r->context->arena, r->mesh->vertex_count, 3 * sizeof *r->positions);
   if (!r->positions) return qmat_fail_memory(r->context, "the vertices");
   qmat_frame_to_unit(&r->frame, r->mesh->positions, r->mesh->vertex_count, r->positions);
@@ -308,10 +309,11 @@ static qmat_status make_report(qmat_context *context, const refinement *rounds, 
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   refiner r = {.context = context,
-               .params = raw_params,
+               .params = *(const medial_refine_params *)raw_params,
                .mesh = (const qmat_mesh *)inputs[0],
                .solids = qmat_mesh_of_solids((const qmat_mesh *)inputs[0]),
                .thickness = (const qmat_field *)inputs[1]};
+  if (r.params.dual.epsilon == 0) r.params.dual.epsilon = QMAT_FINEST_EPSILON;
   refinement rounds[MOST_ROUNDS + 1] = {
       {.samples = (qmat_samples *)qmat_value_retain(inputs[2]), .medial = (qmat_medial *)qmat_value_retain(inputs[3])}};
   size_t best = 0;
@@ -338,7 +340,8 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 static const qmat_param params[] = {
     QMAT_LENGTH(
         qmat_voronoi_dual_params, epsilon, 0.01, 0, 1,
-        "The largest distance between surface and envelope that the final result may have; 0: nothing is refined"),
+        "The largest distance between surface and envelope that the final result may have; 0: 0.25%, the least that "
+        "medial.simplify tries for a number of spheres"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.95, 0.1, 1,
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
@@ -368,7 +371,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 18,
+    .version = 19,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "

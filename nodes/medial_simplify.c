@@ -149,7 +149,7 @@ const qmat_node qmat_node_medial_simplify = {
         "sphere gets the mean joints and weights of the surface that it answers for.\n\n"
         "With vertices and epsilon=0 it is run at several epsilons, until the least one that leaves at most that "
         "number "
-        "is known to 4 %; it is at least finest.\n\n"
+        "is known to 4 %; it is at least finest. medial.refine with epsilon=0 refines for the default of finest.\n\n"
         "With on_exceed=stop or raise the threshold of both errors starts at finest and rises to epsilon; collapses do "
         "not depend on epsilon, no sphere is fitted, and medial.chain records them. cost=hausdorff keeps the end of "
         "the edge that leaves the surface nearest to the envelope; cost=pmat keeps the larger end. compat=qmat follows "

@@ -3,6 +3,7 @@
 #define QMAT_NODES_SIMPLIFY_SIMPLIFY_SETUP_H
 
 #include "core/node.h"
+#include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/sampled_solid.h"
 #include "nodes/simplify/decimation.h"
 
@@ -37,7 +38,7 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
             "The order of collapses: least slab error (eq. 6), least distance to the surface (HEM), or least ratio "  \
             "of length to difference of radii (PMAT)"),                                                               \
       QMAT_LENGTH(                                                                                                    \
-          qmat_simplify_params, finest, 0.0025, 1e-5, 1,                                                              \
+          qmat_simplify_params, finest, QMAT_FINEST_EPSILON, 1e-5, 1,                                                 \
           "The first threshold of both errors where it rises (on_exceed=stop, raise); a finer one takes longer"),     \
       QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                     \
                  "Stop when the cheapest collapse costs more than this; 0: no limit"),                                \

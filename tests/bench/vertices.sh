@@ -4,10 +4,11 @@
 # Markdown table, a summary, and both curves as an SVG.
 #   vertices.sh [-o FILE.svg] [--numbers "N..."] [MODEL...]
 #                                 default: vertices.svg; 20 to 200; octopus, ant and bug of ../shared/data/surfaces
-# The grid falls from 64 % in steps of 5 % until a result has more spheres than the largest N. The error of a result is the
-# larger upper bound of medial.evaluate. QMAT_BUILD is the build folder, by default build/release.
+# The grid falls from 64 % in steps of 5 % until a result has more spheres than the largest N, or to 0.25 %, the least that
+# `--vertices` tries. The error of a result is the larger upper bound of medial.evaluate. QMAT_BUILD is the build folder, by default build/release.
 set -eu
 out=vertices.svg
+finest=0.25
 numbers="20 30 40 60 80 120 160 200"
 options="-o --numbers"
 default_models="octopus ant bug"
@@ -32,8 +33,8 @@ for model in "$@"; do
     found=$(measure "$model" --epsilon "$epsilon%")
     echo "$epsilon $found" >>"$work/grid"
     echo "$found" | tr ' ' '\t' | sed "s/^/$name	--epsilon	/" >>"$work/points"
-    [ "${found%% *}" -le "$largest" ] || break
-    epsilon=$(awk -v e="$epsilon" 'BEGIN { print e / 1.05 }')
+    [ "${found%% *}" -le "$largest" ] && [ "$epsilon" != "$finest" ] || break
+    epsilon=$(awk -v e="$epsilon" -v finest="$finest" 'BEGIN { e /= 1.05; print e > finest ? e : finest }')
   done
   for n in $numbers; do
     found=$(measure "$model" --vertices "$n")

@@ -114,7 +114,7 @@ static void test_what_is_near_enough_is_handed_on_as_it_is(void **state) {
   (void)state;
   pipeline p;
   pipeline_make(&p, pipeline_model("torus", 24), "", "");
-  static const char *const params[] = {"epsilon=2%", "epsilon=1.5%", "epsilon=0", "epsilon=0.5% rounds=0"};
+  static const char *const params[] = {"epsilon=2%", "epsilon=1.5%", "epsilon=0.5% rounds=0", "epsilon=0 rounds=0"};
   for (size_t i = 0; i < sizeof params / sizeof *params; i++) {
     qmat_value *outputs[PIPELINE_MOST_PORTS];
     must_refine(&p, 0, params[i], outputs);
@@ -123,6 +123,22 @@ static void test_what_is_near_enough_is_handed_on_as_it_is(void **state) {
     assert_int_equal(pipeline_count((const qmat_report *)outputs[REFINED_REPORT], "samples_added"), 0);
     release(outputs);
   }
+  pipeline_free(&p);
+}
+
+/* A number of spheres alone may lead to any epsilon down to that. */
+static void test_no_epsilon_is_a_quarter_of_a_percent(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_box(3, 2, 1), "spacing=8%", "");
+  qmat_value *without[PIPELINE_MOST_PORTS], *with[PIPELINE_MOST_PORTS];
+  must_refine(&p, 0, "epsilon=0", without);
+  must_refine(&p, 0, "epsilon=0.25%", with);
+  assert_true(pipeline_count((const qmat_report *)without[REFINED_REPORT], "samples_added") > 0);
+  for (size_t i = 0; i <= REFINED_REPORT; i++)
+    assert_memory_equal(&without[i]->digest, &with[i]->digest, sizeof(qmat_digest));
+  release(without);
+  release(with);
   pipeline_free(&p);
 }
 
@@ -417,6 +433,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_cubes_inscribed_sphere_is_farthest_from_its_corners),
       cmocka_unit_test(test_what_is_near_enough_is_handed_on_as_it_is),
+      cmocka_unit_test(test_no_epsilon_is_a_quarter_of_a_percent),
       cmocka_unit_test(test_more_samples_bring_a_coarse_solid_nearer),
       cmocka_unit_test(test_places_that_are_near_stay_as_they_were),
       cmocka_unit_test(test_a_coarse_solid_is_certified),
