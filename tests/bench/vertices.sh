@@ -34,7 +34,7 @@ for model in "$@"; do
     echo "$epsilon $found" >>"$work/grid"
     echo "$found" | tr ' ' '\t' | sed "s/^/$name	--epsilon	/" >>"$work/points"
     [ "${found%% *}" -le "$largest" ] && [ "$epsilon" != "$finest" ] || break
-    epsilon=$(awk -v e="$epsilon" -v finest="$finest" 'BEGIN { e /= 1.05; print e > finest ? e : finest }')
+    epsilon=$(awk -v e="$epsilon" -v finest="$finest" 'BEGIN { e /= 1.05; print (e > finest ? e : finest) }')
   done
   for n in $numbers; do
     found=$(measure "$model" --vertices "$n")

@@ -24,7 +24,7 @@
 
 /* A run at the bound of a parameter can take hours. Its progress function stops it after PATIENCE seconds, and it must
  * return within LATENCY seconds. */
-static const double PATIENCE = 1, LATENCY = 20;
+static const double PATIENCE = 0.5, LATENCY = 20;
 
 /* The number of points at which a run is stopped or runs out of memory; fewer if the run is one of many (with each
  * choice of a parameter). */

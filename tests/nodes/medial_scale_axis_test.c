@@ -88,7 +88,7 @@ static void test_torus_gives_a_ring_around_its_hole(void **state) {
 static void test_envelope_of_a_box_is_near_its_surface(void **state) {
   (void)state;
   pipeline p;
-  pipeline_sample(&p, shape_box(3, 2, 1), "spacing=2%");
+  pipeline_sample(&p, shape_box(3, 2, 1), "spacing=2.5%");
   axis a = make_axis(&p, 0, "");
   assert_int_equal(pipeline_components(a.medial), 1);
   double errors[2];
