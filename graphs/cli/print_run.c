@@ -133,7 +133,25 @@ __attribute__((format(printf, 2, 3))) static void append(long_text *to, const ch
   free(piece);
 }
 
-/* "a.glb (515 kB), a.bin (2 kB) in 4.2 s". */
+/* Side files beyond that number are counted. */
+enum { MOST_NAMED = 4 };
+
+static void describe_side_files(const qmat_run_file *file, long_text *text) {
+  const size_t count = file->written && file->written->part_count > 0 ? file->written->part_count - 1 : 0;
+  size_t bytes = 0;
+  char size[32];
+  for (size_t part = 1; part <= count; part++) {
+    bytes += file->written->parts[part].size;
+    qmat_format_bytes(file->written->parts[part].size, size);
+    if (count <= MOST_NAMED)
+      append(text, ", %.*s%s (%s)", (int)qmat_folder_length(file->path), file->path, file->written->parts[part].name,
+             size);
+  }
+  qmat_format_bytes(bytes, size);
+  if (count > MOST_NAMED) append(text, " with %zu files beside it (%s)", count, size);
+}
+
+/* "a.gltf (515 kB), a.bin (2 kB) in 4.2 s". */
 static void describe_files(const qmat_run *run, long_text *text) {
   char size[32];
   size_t hits = 0;
@@ -141,11 +159,7 @@ static void describe_files(const qmat_run *run, long_text *text) {
     const qmat_run_file *file = &run->files[i];
     qmat_format_bytes(file->bytes, size);
     append(text, "%s%s (%s)", text->size ? ", " : "", file->path, size);
-    for (size_t part = 1; file->written && part < file->written->part_count; part++) {
-      qmat_format_bytes(file->written->parts[part].size, size);
-      append(text, ", %.*s%s (%s)", (int)qmat_folder_length(file->path), file->path, file->written->parts[part].name,
-             size);
-    }
+    describe_side_files(file, text);
   }
   for (size_t i = 0; i < run->step_count; i++) hits += run->steps[i].state == QMAT_STEP_HIT;
   append(text, "%s %.1f s", text->size ? " in" : "in", run->seconds);

@@ -130,6 +130,20 @@ holds "MuJoCo's colliders" grep -q '<geom .*type="sphere"' box.xml
 expect 0 "" "$qmat" run colliders --set model=box.off --set kind=spheres --set epsilon=10% --set samples.spacing=10% \
   -o run.xml
 holds "as the graph makes them" cmp run.xml box.xml
+awk 'NR == 2 { n = $1 }
+  NR > 2 && NR <= n + 2 { for (i = 0; i < 5; i++) corner[i, NR - 2] = sprintf("v %s %s %s", $1 + 9 * i, $2, $3) }
+  NR > n + 2 { for (k = 2; k <= $1 + 1; k++) side[NR] = side[NR] " " $k + 1 }
+  END {
+    for (i = 0; i < 5; i++) for (k = 1; k <= n; k++) print corner[i, k]
+    for (i = 0; i < 5; i++) for (s in side) {
+      m = split(side[s], ids, " ")
+      printf "f"
+      for (k = 1; k <= m; k++) printf " %d", ids[k] + n * i
+      print ""
+    }
+  }' box.off >boxes.obj
+expect 0 "with 5 files beside it (" "$qmat" mat boxes.obj -o boxes.urdf --colliders --kind hulls \
+  --epsilon 10% --set samples.spacing=10%
 expect 2 "'--kind' is for --colliders" "$qmat" mat box.off -o box.xml --kind spheres
 expect 2 "'--vertices' is not for --colliders" "$qmat" mat box.off -o box.xml --colliders --vertices 9
 
