@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/geometry/vector.h"
 #include "nodes/mesh/arrangement_cgal.h"
 #include "nodes/mesh/union_mesh_cgal.h"
 #include "nodes/mesh/winding_number_cgal.h"
@@ -149,21 +150,57 @@ class Union {
     for (uint32_t i = 0; i < pieces_.size(); i++) region_of_[i] = qmat_set_leader(leaders, i);
   }
 
-  /* A shell that meets only itself, and hides only regions of up to the longest fold's length, stays: its union would
-   * leave crumbs. */
+  std::array<double, 3> near_point(uint32_t vertex) const {
+    const Point &at = arrangement_.points[vertex];
+    if (vertex >= mesh_.vertex_count())
+      return {CGAL::to_double(at.x()), CGAL::to_double(at.y()), CGAL::to_double(at.z())};
+    const double *p = mesh_.position(vertex);
+    return {p[0], p[1], p[2]};
+  }
+
+  double distance(uint32_t a, uint32_t b) const {
+    return qmat_point_distance(near_point(a).data(), near_point(b).data());
+  }
+
+  /* Whether a vertex is farther than the longest fold from all of these. */
+  bool is_far(uint32_t vertex, const std::vector<uint32_t> &from) const {
+    return std::none_of(from.begin(), from.end(),
+                        [&](uint32_t other) { return distance(vertex, other) <= mesh_.longest_fold(); });
+  }
+
+  bool is_large(const Corners &c) const {
+    return std::max({distance(c[0], c[1]), distance(c[1], c[2]), distance(c[2], c[0])}) > 2 * mesh_.longest_fold();
+  }
+
+  /* A shell that meets only itself stays where all vertices that it hides are near the border of their region, and no
+   * hidden piece is large: its union would leave crumbs. */
   void leave_short_folds(const std::vector<int8_t> &kept) {
     std::vector<size_t> shells(mesh_.triangle_count());
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) shells[cluster_of_any(t)] += mesh_.shell(t) == t;
-    std::vector<bool> has_long_fold(mesh_.triangle_count());
-    std::vector<CGAL::Bbox_3> boxes(pieces_.size()); /* per region */
+    std::vector<bool> is_kept(arrangement_.points.size()), has_long_fold(mesh_.triangle_count());
+    std::vector<Pair> hidden; /* region, vertex */
     for (size_t i = 0; i < pieces_.size(); i++) {
-      const uint32_t region = region_of_[i];
-      if (kept[region]) continue;
-      CGAL::Bbox_3 &box = boxes[region];
-      for (const uint32_t corner : pieces_[i].corners)
-        box += corner < mesh_.vertex_count() ? mesh_.inexact(corner).bbox() : arrangement_.points[corner].bbox();
-      const double length = std::hypot(box.x_span(), box.y_span(), box.z_span());
-      if (length > mesh_.longest_fold()) has_long_fold[cluster_of(pieces_[i].source)] = true;
+      const uint32_t cluster = cluster_of(pieces_[i].source);
+      const Corners &corners = pieces_[i].corners;
+      if (kept[region_of_[i]]) {
+        for (const uint32_t corner : corners) is_kept[corner] = true;
+      } else if (shells[cluster] == 1 && !has_long_fold[cluster]) {
+        for (const uint32_t corner : corners) hidden.emplace_back(region_of_[i], corner);
+        has_long_fold[cluster] = is_large(corners);
+      }
+    }
+    std::sort(hidden.begin(), hidden.end());
+    hidden.erase(std::unique(hidden.begin(), hidden.end()), hidden.end());
+    std::vector<uint32_t> border;
+    for (size_t first = 0, last; first < hidden.size(); first = last) {
+      const uint32_t region = hidden[first].first, cluster = cluster_of(pieces_[region].source);
+      border.clear();
+      for (last = first; last < hidden.size() && hidden[last].first == region; last++)
+        if (is_kept[hidden[last].second]) border.push_back(hidden[last].second);
+      for (size_t i = first; i < last && !has_long_fold[cluster]; i++) {
+        if (i % 64 == 0) mesh_.progress(i, hidden.size(), "hidden vertices");
+        if (!is_kept[hidden[i].second] && is_far(hidden[i].second, border)) has_long_fold[cluster] = true;
+      }
     }
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
       if (shells[t] == 1 && !has_long_fold[t]) changed_[t] = false;

@@ -474,14 +474,15 @@ static void test_what_bounds_nothing_of_a_union_is_a_sheet(void **state) {
   release(&r);
 }
 
-/* Two tetrahedra on one triangle, one of them inside out: they cross only in triangles that share a corner. What the
- * second hides, and its tip beyond the first, has a box of 3 x 3 x 2; with the distant box the diagonal is 63.1. */
+/* Two tetrahedra on one triangle, one of them inside out: they cross only in triangles that share a corner. The tip is
+ * sqrt(3) from where it comes out, and half of the longest hidden side is sqrt(4.5); with the distant box the diagonal
+ * is 63.14. */
 static void test_a_fold_longer_than_three_quarters_of_epsilon_is_united(void **state) {
   (void)state;
   static const struct {
     const char *params;
     bool stays;
-  } cases[] = {{"epsilon=0.1", true}, {"epsilon=0.098", false}, {"epsilon=0.01", false}};
+  } cases[] = {{"epsilon=4.5%", true}, {"epsilon=4.45%", false}, {"epsilon=1%", false}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     qmat_mesh *mesh = shape_new();
     const uint32_t a = shape_vertex(mesh, 0, 0, 0), b = shape_vertex(mesh, 3, 0, 0), c = shape_vertex(mesh, 0, 3, 0),
