@@ -150,6 +150,7 @@ class Union {
     for (uint32_t i = 0; i < pieces_.size(); i++) region_of_[i] = qmat_set_leader(leaders, i);
   }
 
+  /* A vertex up to rounding, without the cost of its exact place (see `rounded`). */
   std::array<double, 3> near_point(uint32_t vertex) const {
     const Point &at = arrangement_.points[vertex];
     if (vertex >= mesh_.vertex_count())
@@ -164,8 +165,10 @@ class Union {
 
   /* Whether a vertex is farther than the longest fold from all of these. */
   bool is_far(uint32_t vertex, const std::vector<uint32_t> &from) const {
-    return std::none_of(from.begin(), from.end(),
-                        [&](uint32_t other) { return distance(vertex, other) <= mesh_.longest_fold(); });
+    const std::array<double, 3> p = near_point(vertex);
+    return std::none_of(from.begin(), from.end(), [&](uint32_t other) {
+      return qmat_point_distance(p.data(), near_point(other).data()) <= mesh_.longest_fold();
+    });
   }
 
   bool is_large(const Corners &c) const {
@@ -235,10 +238,7 @@ class Union {
 
   /* The nearest doubles. They must not come from an interval, whose width depends on the computations before. */
   std::array<double, 3> rounded(uint32_t vertex) const {
-    if (vertex < mesh_.vertex_count()) {
-      const double *p = mesh_.position(vertex);
-      return {p[0], p[1], p[2]};
-    }
+    if (vertex < mesh_.vertex_count()) return near_point(vertex);
     const auto &p = CGAL::exact(arrangement_.points[vertex]);
     return {CGAL::to_double(p.x()), CGAL::to_double(p.y()), CGAL::to_double(p.z())};
   }

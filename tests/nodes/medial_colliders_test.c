@@ -526,7 +526,7 @@ static void test_hulls_of_the_solid_contain_it(void **state) {
   qmat_surface *surface;
   assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
   size_t inside = 0, outside = 0, held = 0, of_shapes = 0;
-  for (uint64_t i = 0; inside < 30000; i++) {
+  for (uint64_t i = 0; inside < 100000; i++) {
     double point[3];
     for (uint64_t k = 0; k < 3; k++) point[k] = 1.2 * qmat_hash_unit(qmat_hash3(7, i, k)) - 0.6;
     const bool is_inside = qmat_surface_inside(surface, point);

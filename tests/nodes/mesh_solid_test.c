@@ -662,7 +662,7 @@ static void test_the_volume_of_two_spheres(void **state) {
   const double lens = 2 * pi * cap * cap * (3 * radius - cap) / 3;
   const double exact = 2 * 4 * pi / 3 - lens;
   double before = INFINITY;
-  for (uint32_t rings = 8; rings <= 32; rings *= 2) {
+  for (uint32_t rings = 8; rings <= 64; rings *= 2) {
     qmat_mesh *mesh = sphere_at(0, 0, 0, radius, rings);
     add(mesh, sphere_at(apart * 0.48, apart * 0.6, apart * 0.64, radius, rings));
     result r = unite(mesh);
