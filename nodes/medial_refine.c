@@ -19,10 +19,16 @@
 
 typedef struct {
   qmat_voronoi_dual_params dual;
+  int64_t vertices;
   double trigger;
   double target;
   int64_t rounds;
 } medial_refine_params;
+
+/* The error of N spheres, in diagonals, is more than this divided by N where they describe an organic shape (a third
+ * for ant and bug), so the initial medial mesh need not be nearer. The more it is refined, the longer each run of the
+ * search takes. */
+static const double least_error_of_one_sphere = 0.25;
 
 /* The spacing of the test points on the surface, as a share of epsilon. */
 static const double spacing_share = 0.5;
@@ -39,6 +45,12 @@ static const double fine_share = 0.25;
 static const double reach_of_samples = 3;
 
 enum { MOST_ROUNDS = 8 };
+
+/* The epsilon to refine for, in diagonals, where only the number of spheres of the result is given (0: any). */
+static double epsilon_of_count(int64_t vertices) {
+  if (vertices == 0) return QMAT_FINEST_EPSILON;
+  return fmin(fmax(least_error_of_one_sphere / (double)vertices, QMAT_FINEST_EPSILON), QMAT_DEFAULT_EPSILON);
+}
 
 /* Samples, and the initial medial mesh made of them. */
 typedef struct {
@@ -313,7 +325,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
                .mesh = (const qmat_mesh *)inputs[0],
                .solids = qmat_mesh_of_solids((const qmat_mesh *)inputs[0]),
                .thickness = (const qmat_field *)inputs[1]};
-  if (r.params.dual.epsilon == 0) r.params.dual.epsilon = QMAT_FINEST_EPSILON;
+  if (r.params.dual.epsilon == 0) r.params.dual.epsilon = epsilon_of_count(r.params.vertices);
   refinement rounds[MOST_ROUNDS + 1] = {
       {.samples = (qmat_samples *)qmat_value_retain(inputs[2]), .medial = (qmat_medial *)qmat_value_retain(inputs[3])}};
   size_t best = 0;
@@ -338,10 +350,13 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 }
 
 static const qmat_param params[] = {
-    QMAT_LENGTH(
-        qmat_voronoi_dual_params, epsilon, 0.01, 0, 1,
-        "The largest distance between surface and envelope that the final result may have; 0: 0.25%, the least that "
-        "medial.simplify tries for a number of spheres"),
+    QMAT_LENGTH(qmat_voronoi_dual_params, epsilon, 0.01, 0, 1,
+                "The largest distance between surface and envelope that the final result may have; 0: it follows from "
+                "vertices"),
+    QMAT_INT(
+        medial_refine_params, vertices, "spheres", 0, 0, 4294967294.0,
+        "With epsilon=0: the number of spheres of the final result. The initial medial mesh is refined for a quarter "
+        "divided by it, at least 0.25% and at most 1%; 0: for 0.25%, the least that medial.simplify tries"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.95, 0.1, 1,
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,
@@ -371,7 +386,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_refine = {
     .name = "medial.refine",
-    .version = 19,
+    .version = 20,
     .summary = "Adds samples where the initial medial mesh is too far from the surface, and makes it again",
     .doc =
         "Simplification cannot repair an initial medial mesh that is too far from the surface. This node measures the "

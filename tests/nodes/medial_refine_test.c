@@ -126,19 +126,27 @@ static void test_what_is_near_enough_is_handed_on_as_it_is(void **state) {
   pipeline_free(&p);
 }
 
-/* A number of spheres alone may lead to any epsilon down to that. */
-static void test_no_epsilon_is_a_quarter_of_a_percent(void **state) {
+/* Both runs must give the same. */
+static void must_refine_alike(pipeline *p, const char *params, const char *others) {
+  qmat_value *a[PIPELINE_MOST_PORTS], *b[PIPELINE_MOST_PORTS];
+  must_refine(p, 0, params, a);
+  must_refine(p, 0, others, b);
+  assert_true(pipeline_count((const qmat_report *)a[REFINED_REPORT], "samples_added") > 0);
+  for (size_t i = 0; i <= REFINED_REPORT; i++) assert_memory_equal(&a[i]->digest, &b[i]->digest, sizeof(qmat_digest));
+  release(a);
+  release(b);
+}
+
+/* A number of spheres alone may lead to an epsilon down to 0.25 %, but a small one cannot be that near. */
+static void test_without_epsilon_the_number_of_spheres_decides(void **state) {
   (void)state;
   pipeline p;
   pipeline_make(&p, shape_box(3, 2, 1), "spacing=8%", "");
-  qmat_value *without[PIPELINE_MOST_PORTS], *with[PIPELINE_MOST_PORTS];
-  must_refine(&p, 0, "epsilon=0", without);
-  must_refine(&p, 0, "epsilon=0.25%", with);
-  assert_true(pipeline_count((const qmat_report *)without[REFINED_REPORT], "samples_added") > 0);
-  for (size_t i = 0; i <= REFINED_REPORT; i++)
-    assert_memory_equal(&without[i]->digest, &with[i]->digest, sizeof(qmat_digest));
-  release(without);
-  release(with);
+  must_refine_alike(&p, "epsilon=0", "epsilon=0.25%");
+  must_refine_alike(&p, "epsilon=0 vertices=1000", "epsilon=0.25%");
+  must_refine_alike(&p, "epsilon=0 vertices=50", "epsilon=0.5%");
+  must_refine_alike(&p, "epsilon=0 vertices=5", "epsilon=1%");
+  must_refine_alike(&p, "epsilon=0.5% vertices=5", "epsilon=0.5%");
   pipeline_free(&p);
 }
 
@@ -433,7 +441,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_cubes_inscribed_sphere_is_farthest_from_its_corners),
       cmocka_unit_test(test_what_is_near_enough_is_handed_on_as_it_is),
-      cmocka_unit_test(test_no_epsilon_is_a_quarter_of_a_percent),
+      cmocka_unit_test(test_without_epsilon_the_number_of_spheres_decides),
       cmocka_unit_test(test_more_samples_bring_a_coarse_solid_nearer),
       cmocka_unit_test(test_places_that_are_near_stay_as_they_were),
       cmocka_unit_test(test_a_coarse_solid_is_certified),
