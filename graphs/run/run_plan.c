@@ -112,27 +112,19 @@ static void mark_inputs(run_planner *planner, size_t index, int format, void *pa
       planner->needed[node->links[port].node] = true;
 }
 
-/* Whether all that is saved is made on request: then it is all that is wanted of the graph's files. */
-static bool saves_only_requested(const qmat_graph *graph, const qmat_run_options *options) {
-  bool only = options->save_count > 0;
-  for (size_t i = 0; i < options->save_count; i++)
-    only = only && qmat_graph_on_request(graph, options->saves[i].output);
-  return only;
-}
-
 static qmat_status plan_needs(run_planner *planner) {
   const qmat_graph *graph = planner->graph;
   const qmat_run_options *options = planner->options;
-  const bool only_requested = saves_only_requested(graph, options);
   for (size_t i = 0; i < options->want_count; i++) planner->needed[options->wants[i].node] = true;
   if (options->to_node) {
     for (size_t i = 0; i < graph->node_count; i++)
       if (strcmp(graph->nodes[i].id, options->to_node) == 0) planner->needed[i] = true;
   } else if (!options->only_wanted) {
     for (size_t i = 0; i < graph->output_count; i++) {
-      bool saved = has_save(options, i) || graph->outputs[i].path;
-      bool unwanted =
-          qmat_graph_on_request(graph, i) || (only_requested && qmat_graph_output_type(graph, i) == QMAT_FILE);
+      const bool saved = has_save(options, i) || graph->outputs[i].path;
+      /* Where files are saved, these are all that is wanted of the graph's files. */
+      const bool unwanted =
+          qmat_graph_on_request(graph, i) || (options->save_count > 0 && qmat_graph_output_type(graph, i) == QMAT_FILE);
       if (!saved && !unwanted) planner->needed[graph->outputs[i].node] = true;
     }
     for (size_t i = 0; i < graph->node_count; i++)

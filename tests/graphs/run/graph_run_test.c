@@ -136,6 +136,27 @@ static void test_only_what_is_wanted_runs(void **state) {
   assert_true(test_value(qmat_run_value(&f->run, 3, 0)) == 1);
 }
 
+/* Values, such as reports, are made all the same. */
+static void test_files_that_are_not_saved_are_not_made(void **state) {
+  fixture *f = *state;
+  static const char two_files[] =
+      "qmat: 1\n"
+      "nodes:\n"
+      "  one:  { type: test.number, params: { value: 1 } }\n"
+      "  two:  { type: test.number, params: { value: 2 } }\n"
+      "  near: { type: test.print, in: { number: one.number } }\n"
+      "  far:  { type: test.print, in: { number: two.number } }\n"
+      "outputs: { near: near.file, far: far.file }\n";
+  read_graph(f, two_files);
+  const qmat_run_save save = {0, in_folder(f, 0, "near.txt")};
+  run_all(f, (qmat_run_options){.saves = &save, .save_count = 1});
+  assert_string_equal(f->log, "one near ");
+  qmat_run_uninit(&f->run);
+  f->log[0] = 0;
+  run_all(f, (qmat_run_options){0});
+  assert_string_equal(f->log, "one two near far ");
+}
+
 static void test_a_run_stops_at_the_named_node(void **state) {
   fixture *f = *state;
   read_graph(f, sum_graph);
@@ -515,6 +536,7 @@ int main(void) {
       TEST(test_nodes_run_after_what_they_need_in_the_order_of_the_file),
       TEST(test_values_are_released_unless_they_are_wanted),
       TEST(test_only_what_is_wanted_runs),
+      TEST(test_files_that_are_not_saved_are_not_made),
       TEST(test_a_run_stops_at_the_named_node),
       TEST(test_the_last_node_runs_once_a_format_and_the_others_once),
       TEST(test_paths_in_the_graph_are_used_unless_others_are_given),
