@@ -18,7 +18,7 @@
 /* Two boxes: `near` is on two nodes, of which the second has extras that are a text; `far` is on one, below a camera's
  * parent. A third mesh has points only, a fourth is on no node. */
 static const char scene_text[] =
-    "{'asset':{'version':'2.0','copyright':'nobody','extras':{'x':1.0}},'scene':0,"
+    "{'asset':{'version':'2.0','copyright':'nobody','extras':{'x':1.0,'y':'a\\u0000b'}},'scene':0,"
     "'scenes':[{'name':'all','nodes':[0,1,2,5]}],"
     "'extensionsUsed':['ACME_glow','KHR_lights_punctual'],"
     "'extensions':{'ACME_glow':{'much':1e-7,'deep':[{'a':null},true]},'KHR_lights_punctual':{'lights':[{'type':'point'}"
