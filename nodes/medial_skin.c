@@ -440,9 +440,16 @@ static qmat_status make_envelope_surface(skin *s) {
   return status == QMAT_OK && p->error > 0 ? decimate_contour(s, detail) : status;
 }
 
-/* Says that the mesh is farther from the envelope than it should be. Nonzero when memory is short. */
+/* Says that the mesh has more triangles, or is farther from the envelope, than it should. Nonzero when memory is
+ * short. */
 static int add_warning(const skin *s, json_t *root) {
-  if (s->params->triangles > 0 || distance_of(s) <= s->params->error) return 0;
+  const int64_t most = s->params->triangles, count = (int64_t)s->surface.triangle_count;
+  if (most > 0 && count > most)
+    return qmat_json_add_warning(root,
+                                 "the visible mesh has %lld triangles, not %lld: fewer would turn over, or change "
+                                 "its topology",
+                                 (long long)count, (long long)most);
+  if (most > 0 || distance_of(s) <= s->params->error) return 0;
   return qmat_json_add_warning(root,
                                "the visible mesh is up to %.2g %% of the diagonal from the envelope, not %.2g %%; a "
                                "finer one: --set skin.detail=%d",
@@ -576,7 +583,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 17,
+    .version = 18,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "

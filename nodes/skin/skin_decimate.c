@@ -25,13 +25,15 @@ enum { MOST_FACE_POINTS = 128 };
 /* The costs of edges in a plane are all 0: without this limit a few vertices would take in thousands of triangles. */
 enum { MOST_STAR_FACES = 48 };
 static const double NEAR_SHARE = 0.25;
+/* Nothing in the unit frame is farther away. */
+static const double MOST_ERROR = 1;
 /* No point, no face. */
 #define NONE UINT32_MAX
 
 typedef struct decimation {
   qmat_context *context;
   const qmat_envelope *envelope;
-  double error; /* allowed at samples; INFINITY: anything */
+  double error; /* allowed at samples */
   size_t point_count, face_count;
   double *points;        /* 3 each: the vertices of the original */
   uint32_t *first;       /* per face: the first point that is nearest to it, or NONE */
@@ -263,7 +265,7 @@ static qmat_status collapse(decimation *d, size_t most, qmat_skin_triangles *sur
   return status == QMAT_CANCELLED ? d->status : fail(d->context, status);
 }
 
-/* Decimates to `most` triangles, or as far as `error` allows. */
+/* Collapses edges down to `most` triangles, or as far as `error` allows. */
 static qmat_status decimate(decimation *d, size_t most, qmat_skin_triangles *surface, qmat_skin_errors *errors) {
   double farthest = 0;
   qmat_status status = start(d, surface);
@@ -273,17 +275,24 @@ static qmat_status decimate(decimation *d, size_t most, qmat_skin_triangles *sur
   return status;
 }
 
+/* Removes what the estimate of meshoptimizer allows, down to `most` triangles. */
+static qmat_status thin(qmat_context *context, double error, size_t most, qmat_skin_triangles *surface) {
+  const qmat_status status = qmat_skin_thin(context, THIN_SHARE * error, most, surface);
+  /* Thinning leaves slivers along straight edges, which no collapse may touch. */
+  return status == QMAT_OK ? fail(context, qmat_skin_flip_slivers(surface)) : status;
+}
+
 qmat_status qmat_skin_decimate(qmat_context *context, const qmat_envelope *envelope, double error, size_t most,
                                qmat_skin_triangles *surface, qmat_skin_errors *errors) {
   decimation d = {.context = context, .envelope = envelope, .error = SAMPLE_SHARE * error};
   *errors = (qmat_skin_errors){0};
-  qmat_status status = qmat_skin_thin(context, THIN_SHARE * error, surface);
-  /* Thinning leaves slivers along straight edges, which no collapse may touch. */
-  if (status == QMAT_OK) status = fail(context, qmat_skin_flip_slivers(surface));
-  if (status == QMAT_OK) status = decimate(&d, 4, surface, errors);
-  if (status == QMAT_OK && most > 0 && surface->triangle_count > most) {
-    d = (decimation){.context = context, .envelope = envelope, .error = INFINITY};
+  qmat_status status = thin(context, error, 0, surface);
+  if (status == QMAT_OK) status = decimate(&d, 0, surface, errors);
+  while (status == QMAT_OK && most > 0 && surface->triangle_count > most && 2 * error < MOST_ERROR) {
+    error *= 2;
+    d = (decimation){.context = context, .envelope = envelope, .error = SAMPLE_SHARE * error};
     status = decimate(&d, most, surface, errors);
+    if (status == QMAT_OK && surface->triangle_count > most) status = thin(context, error, most, surface);
   }
   if (status == QMAT_OK) errors->to_envelope = measure(&d, surface, NULL);
   return status;

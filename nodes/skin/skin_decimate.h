@@ -16,7 +16,8 @@ typedef struct qmat_skin_errors {
  * (qmat_skin_thin), then edges collapse (qmat_skin_collapse). An edge collapses only where |F| at samples of the new
  * triangles is at most 3/4 of `error` (above 0), or what it was there before; where each vertex that thinning left and
  * that was nearest stays as near to the new triangles; and where no triangle turns over or degenerates. With `most`
- * above 0, collapses go on to so many triangles whatever the errors. `errors` gets those of the result.
+ * above 0, both go on for twice the error, and so on, until so many triangles are left or no more can go. `errors` gets
+ * those of the result.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. The same triangles for any number of threads. Cost: some 10 microseconds a
  * triangle of the surface. */
 qmat_status qmat_skin_decimate(qmat_context *context, const qmat_envelope *envelope, double error, size_t most,

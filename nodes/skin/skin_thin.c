@@ -55,7 +55,7 @@ static qmat_status start(qmat_context *context, const qmat_skin_triangles *surfa
 
 /* Thins out the triangles without a locked vertex, of the components with so many halvings; their border stays. Returns
  * the number of triangles of these components. */
-static size_t thin_components(thinning *t, double error, int halvings) {
+static size_t thin_components(thinning *t, double error, size_t most, int halvings) {
   const qmat_skin_triangles *surface = t->surface;
   size_t count = 0, taken = 0;
   for (size_t i = 0; i < surface->triangle_count; i++) {
@@ -70,16 +70,17 @@ static size_t thin_components(thinning *t, double error, int halvings) {
   const float scale = meshopt_simplifyScale(t->positions, surface->vertex_count, stride);
   t->thinned_count +=
       meshopt_simplify(t->thinned + 3 * t->thinned_count, t->open, 3 * count, t->positions, surface->vertex_count,
-                       stride, 0, (float)error / scale, meshopt_SimplifyLockBorder, NULL) /
+                       stride, 3 * (most > t->thinned_count ? most - t->thinned_count : 0), (float)error / scale,
+                       meshopt_SimplifyLockBorder, NULL) /
       3;
   return taken;
 }
 
-static void thin(thinning *t, double error) {
+static void thin(thinning *t, double error, size_t most) {
   size_t taken = 0;
   t->thinned_count = 0;
   for (int halvings = 0; taken < t->surface->triangle_count; halvings++)
-    taken += thin_components(t, ldexp(error, -halvings), halvings);
+    taken += thin_components(t, ldexp(error, -halvings), most, halvings);
 }
 
 static void sort_corners(thinning *t) {
@@ -178,11 +179,11 @@ static void take(const thinning *t, qmat_skin_triangles *surface) {
   surface->triangle_count = t->thinned_count;
 }
 
-qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triangles *surface) {
+qmat_status qmat_skin_thin(qmat_context *context, double error, size_t most, qmat_skin_triangles *surface) {
   thinning t;
   qmat_status status = start(context, surface, &t);
   for (int round = 0; round < MOST_ROUNDS && status == QMAT_OK; round++) {
-    thin(&t, error);
+    thin(&t, error, most);
     sort_corners(&t);
     status = qmat_progress(context, (uint64_t)round, MOST_ROUNDS, "rounds of thinning");
     if (status != QMAT_OK || lock_faults(&t) || spare_changed_components(&t)) continue;

@@ -6,10 +6,11 @@
 #include "nodes/skin/skin_triangles.h"
 
 /* Removes vertices of a closed, oriented 2-manifold (meshoptimizer) while its quadric error stays below `error` (above
- * 0, in the unit of the positions), which is an estimate and no bound. It stays such a manifold, of the same topology:
- * meshoptimizer does not promise that. Where it fails, triangles are left as they were, or their component is thinned
- * out for less; after some rounds all is left as it was. `surface` keeps the vertices that are left, in their order.
- * QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread; deterministic. Cost: some 1 microsecond a triangle. */
-qmat_status qmat_skin_thin(qmat_context *context, double error, qmat_skin_triangles *surface);
+ * 0, in the unit of the positions), which is an estimate and no bound, and while more than `most` triangles are left.
+ * It stays such a manifold, of the same topology: meshoptimizer does not promise that. Where it fails, triangles are
+ * left as they were, or their component is thinned out for less; after some rounds all is left as it was. `surface`
+ * keeps the vertices that are left, in their order. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread; deterministic. Cost:
+ * some 1 microsecond a triangle. */
+qmat_status qmat_skin_thin(qmat_context *context, double error, size_t most, qmat_skin_triangles *surface);
 
 #endif

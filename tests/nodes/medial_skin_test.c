@@ -456,6 +456,49 @@ static void test_decimation_leaves_few_triangles_of_a_box(void **unused) {
   release(result);
 }
 
+/* The medial mesh of a cube of side 1: its corners, the ball inside, and a slab to each edge. */
+static qmat_medial *cube(void) {
+  double spheres[4 * 9] = {0.5, 0.5, 0.5, 0.5};
+  uint32_t triangles[3 * 12];
+  size_t count = 0;
+  for (uint32_t a = 0; a < 8; a++) {
+    const double corner[4] = {(double)(a & 1), (double)(a >> 1 & 1), (double)(a >> 2), 0};
+    memcpy(spheres + 4 * (size_t)(a + 1), corner, sizeof corner);
+    for (uint32_t axis = 0; axis < 3; axis++) {
+      if (a >> axis & 1) continue;
+      const uint32_t row[3] = {0, a + 1, (a | 1u << axis) + 1};
+      memcpy(triangles + 3 * count++, row, sizeof row);
+    }
+  }
+  return sealed_medial_mesh(spheres, 9, NULL, 0, triangles, count);
+}
+
+/* Its faces are flat: no collapse of their edges has a best place. */
+static void test_a_cube_takes_any_number_of_triangles(void **unused) {
+  (void)unused;
+  static const size_t numbers[] = {60, 20, 12};
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+    char settings[64];
+    snprintf(settings, sizeof settings, "error=0.2%% triangles=%zu", numbers[i]);
+    skin_result result = skin(cube(), settings);
+    assert_true(result.mesh->triangle_count <= numbers[i]);
+    assert_true(number_of(result, "envelope_to_mesh") < 2e-3 && number_of(result, "mesh_to_envelope") < 2e-3);
+    check_shape(result, 2, 1, 6, 1, 0.02);
+    assert_null(json_object_get(result.report->root, "warnings"));
+    release(result);
+  }
+}
+
+static void test_a_number_of_triangles_that_is_too_small_is_told(void **unused) {
+  (void)unused;
+  skin_result result = skin(ring(), "error=0.2% triangles=5");
+  assert_manifold(result.mesh);
+  assert_true(result.mesh->triangle_count > 5);
+  assert_near(number_of(result, "euler_characteristic"), 0, 0);
+  assert_int_equal(json_array_size(json_object_get(result.report->root, "warnings")), 1);
+  release(result);
+}
+
 /* A plate that is thin everywhere would take twenty million of the finest cells. */
 static void test_a_thin_plate_takes_larger_cells(void **unused) {
   (void)unused;
@@ -801,6 +844,8 @@ int main(void) {
       cmocka_unit_test(test_a_number_of_triangles_comes_before_the_error),
       cmocka_unit_test(test_decimation_keeps_every_soup_of_primitives_a_closed_manifold_of_its_topology),
       cmocka_unit_test(test_decimation_leaves_few_triangles_of_a_box),
+      cmocka_unit_test(test_a_cube_takes_any_number_of_triangles),
+      cmocka_unit_test(test_a_number_of_triangles_that_is_too_small_is_told),
       cmocka_unit_test(test_a_thin_plate_takes_larger_cells),
       cmocka_unit_test(test_decimation_does_not_shorten_a_hair),
       cmocka_unit_test(test_finer_cells_come_closer),
