@@ -48,6 +48,12 @@ static bool add_warnings(const qmat_gltf_counts *counts, bool placed, const qmat
   if (placed && ignores(document, "EXT_mesh_gpu_instancing"))
     done = json_array_append_new(
                warnings, json_string("EXT_mesh_gpu_instancing is not read: each of its meshes is in one place")) == 0;
+  if (counts->meshes_of_several_weights > 0) {
+    json_t *text =
+        json_sprintf("%zu meshes have nodes with different morph weights: their shape is that of the mesh's own",
+                     counts->meshes_of_several_weights);
+    done = json_array_append_new(warnings, text) == 0 && done;
+  }
   if (counts->primitives_skipped > 0) {
     json_t *text = json_sprintf("%zu of %zu primitives are passed over: points, lines, or without positions",
                                 counts->primitives_skipped, counts->primitives_skipped + counts->primitives_read);

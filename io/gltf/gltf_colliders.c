@@ -7,12 +7,12 @@
 #include "core/geometry/vector.h"
 #include "io/collider_frames.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/gltf/gltf_motion.h"
 #include "io/gltf/gltf_skin.h"
 
 enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
 
 static const char *const shape_extensions[] = {"KHR_implicit_shapes", "OMI_physics_shape"};
-static const char *const body_extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
 
 /* object[key], an object that is created where there is none; NULL when out of memory. */
 static json_t *member(json_t *object, const char *key) {
@@ -149,7 +149,8 @@ qmat_status qmat_gltf_colliders_init(qmat_context *context, json_t *root, json_i
   for (int form = 0; form < 2 && done; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
     const json_t *shapes = json_object_get(json_object_get(root, "extensions"), shape_extensions[form]);
-    done = use_extension(root, body_extensions[form]) && (!shapes || use_extension(root, shape_extensions[form]));
+    done = use_extension(root, qmat_gltf_body_extensions[form]) &&
+           (!shapes || use_extension(root, shape_extensions[form]));
   }
   return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
 }
@@ -217,7 +218,7 @@ static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders 
              add_child(root, body, *node);
     }
     if (done) {
-      done = set_extension(*node, body_extensions[form], collider);
+      done = set_extension(*node, qmat_gltf_body_extensions[form], collider);
     } else {
       json_decref(collider);
     }
@@ -244,58 +245,7 @@ static bool is_earlier_collider(const json_t *root, const json_t *child) {
 
 /* Removes the colliders of an earlier run and how it lets the body move. */
 static void remove_earlier(json_t *root, json_t *body, size_t given) {
-  json_t *extensions = json_object_get(body, "extensions");
-  if (!qmat_gltf_drop_children(root, body, given, is_earlier_collider)) return;
-  for (int form = 0; form < 2; form++) {
-    json_t *physics = json_object_get(extensions, body_extensions[form]);
-    json_object_del(physics, "motion");
-    if (physics && json_object_size(physics) == 0) json_object_del(extensions, body_extensions[form]);
-  }
-  if (extensions && json_object_size(extensions) == 0) json_object_del(body, "extensions");
-}
-
-static double number_at(const json_t *numbers, size_t i) {
-  return json_number_value(json_array_get(numbers, i));
-}
-
-/* How much a node's transform lengthens what is in it, on the average of all directions. */
-static double scale_of(const json_t *node) {
-  const json_t *m = json_object_get(node, "matrix"), *scale = json_object_get(node, "scale");
-  if (scale) return cbrt(fabs(number_at(scale, 0) * number_at(scale, 1) * number_at(scale, 2)));
-  if (!m) return 1;
-  double columns[3][3], normal[3];
-  for (size_t c = 0; c < 3; c++)
-    for (size_t r = 0; r < 3; r++) columns[c][r] = number_at(m, 4 * c + r);
-  qmat_cross(columns[1], columns[2], normal);
-  return cbrt(fabs(qmat_dot(columns[0], normal)));
-}
-
-/* Metres per unit of a node's space: by its own transform and those of the nodes above it. Checked nodes form trees. */
-static double meters_at(const json_t *root, size_t node) {
-  const json_t *nodes = json_object_get(root, "nodes");
-  double meters = 1;
-  for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at))
-    meters *= scale_of(json_array_get(nodes, at));
-  return meters;
-}
-
-/* What a body that moves has, in both forms. The centre is in the node's space, the moments are in kg m^2. */
-static json_t *motion_of(const qmat_gltf_colliders *added, const double shift[3], double meters) {
-  const qmat_colliders *c = added->colliders;
-  json_t *motion = json_object();
-  if (c->body_count == 0 || !motion) return motion;
-  double moments[3], q[4];
-  qmat_principal_inertia(c->body, moments, q);
-  for (int k = 0; k < 3; k++) moments[k] *= meters * meters;
-  const bool done =
-      qmat_gltf_set(motion, "mass", json_real(c->body[0])) &&
-      qmat_gltf_set(motion, "centerOfMass",
-                    json_pack("[f, f, f]", c->body[1] - shift[0], c->body[2] - shift[1], c->body[3] - shift[2])) &&
-      qmat_gltf_set(motion, "inertiaDiagonal", json_pack("[f, f, f]", moments[0], moments[1], moments[2])) &&
-      qmat_gltf_set(motion, "inertiaOrientation", json_pack("[f, f, f, f]", q[0], q[1], q[2], q[3]));
-  if (done) return motion;
-  json_decref(motion);
-  return NULL;
+  if (qmat_gltf_drop_children(root, body, given, is_earlier_collider)) qmat_gltf_drop_motion(body);
 }
 
 bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
@@ -303,12 +253,13 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
   json_t *body = json_array_get(json_object_get(root, "nodes"), (size_t)node);
   bool done = body != NULL;
   if (done) remove_earlier(root, body, added->nodes_given);
-  for (int form = 0; form < 2 && done && added->dynamic; form++) {
+  const bool moves = done && added->dynamic && !qmat_gltf_has_own_motion(root, (size_t)node);
+  for (int form = 0; form < 2 && done && moves; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
-    json_t *motion = motion_of(added, shift, meters_at(root, (size_t)node));
+    json_t *motion = qmat_gltf_motion_of(root, (size_t)node, added->colliders, shift, added->meters);
     done = motion && (form == 0 || qmat_gltf_set(motion, "type", json_string("dynamic")));
     json_t *extensions = done ? member(body, "extensions") : NULL;
-    json_t *physics = extensions ? member(extensions, body_extensions[form]) : NULL;
+    json_t *physics = extensions ? member(extensions, qmat_gltf_body_extensions[form]) : NULL;
     if (physics) {
       done = qmat_gltf_set(physics, "motion", motion); /* what else the asset says of the body stays */
     } else {
@@ -359,7 +310,7 @@ static json_t *add_bound_node(json_t *root, json_t *joint, const qmat_gltf_colli
   if (moves) done = done && qmat_gltf_set(node, "matrix", numbers);
   for (int form = 0; form < 2 && done && added->dynamic; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
-    done = set_extension(node, body_extensions[form],
+    done = set_extension(node, qmat_gltf_body_extensions[form],
                          form == 0 ? json_pack("{s:{s:b}}", "motion", "isKinematic", 1)
                                    : json_pack("{s:{s:s}}", "motion", "type", "kinematic"));
   }

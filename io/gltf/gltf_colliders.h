@@ -20,7 +20,8 @@ typedef struct qmat_gltf_colliders {
   const qmat_colliders *colliders;
   unsigned forms;
   const char *name;   /* UTF-8, of the model; not empty */
-  bool dynamic;       /* carriers are bodies that move: they get mass properties */
+  bool dynamic;       /* carriers are bodies that move: they get mass properties, unless the asset says how they move */
+  double meters;      /* per unit of the colliders' space, which their mass takes; 0: that of the carrier */
   size_t nodes_given; /* the asset's nodes before anything was added: colliders among them are an earlier run's */
   double origin[3];   /* what hulls are relative to */
   json_int_t *shapes; /* 2 per shape, KHR and OMI: its number among the asset's; -1: none. Owned */
@@ -28,9 +29,10 @@ typedef struct qmat_gltf_colliders {
   json_int_t *nodes;  /* per shape: a node outside of all scenes with that mesh, for KHR; -1: none. Owned */
 } qmat_gltf_colliders;
 
-/* Adds the shapes and the hull meshes that the forms need. Set the first five members before. Hull data are appended to
- * `data`, which starts at `offset` in buffer `buffer`, padded to 4 bytes. QMAT_ERROR_MEMORY; QMAT_ERROR_GEOMETRY names
- * a shape beyond single precision. Free with qmat_gltf_colliders_uninit, also after a failure. */
+/* Adds the shapes and the hull meshes that the forms need. Set the first six members, and `origin`, before. Hull data
+ * are appended to `data`, which starts at `offset` in buffer `buffer`, padded to 4 bytes. QMAT_ERROR_MEMORY;
+ * QMAT_ERROR_GEOMETRY names a shape beyond single precision. Free with qmat_gltf_colliders_uninit, also after a
+ * failure. */
 qmat_status qmat_gltf_colliders_init(qmat_context *context, json_t *root, json_int_t buffer, size_t offset,
                                      qmat_writer *data, qmat_gltf_colliders *added);
 void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added);

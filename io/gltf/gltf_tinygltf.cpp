@@ -194,6 +194,7 @@ class Reader {
       must(qmat_progress(context_, which_, count, "meshes"));
       const qmat_tinygltf::Mesh &mesh = model_.meshes[meshes[which_]];
       scales[which_] = scale_of(meshes[which_]);
+      const std::vector<double> &weights = weights_of(meshes[which_]);
       for (const qmat_tinygltf::Primitive &primitive : mesh.primitives) {
         if (primitive.attributes.empty()) {
           counts_->primitives_skipped++;
@@ -203,7 +204,7 @@ class Reader {
         const std::unique_ptr<Shape> shape = read_shape(primitive);
         check_room(shape->positions.size() / 3, shape->corners.size() / 3);
         world_ = shape->positions;
-        add_targets(primitive, mesh.weights, world_);
+        add_targets(primitive, weights, world_);
         find_joints(*shape, joint_count_of(meshes[which_]));
         emit(*shape);
       }
@@ -425,6 +426,20 @@ class Reader {
   }
 
   /* The largest length that the nodes of a mesh, or its joints, make of a unit, to six digits. */
+  /* The weights of the targets that the nodes with the mesh have; where these differ, those of the mesh. */
+  const std::vector<double> &weights_of(size_t mesh) {
+    const std::vector<double> &own = model_.meshes[mesh].weights, *common = nullptr;
+    for (const qmat_tinygltf::Node &node : model_.nodes) {
+      if (node.mesh != static_cast<int>(mesh)) continue;
+      const std::vector<double> &weights = node.weights.empty() ? own : node.weights;
+      if (!common) common = &weights;
+      if (*common == weights) continue;
+      counts_->meshes_of_several_weights++;
+      return own;
+    }
+    return common ? *common : own;
+  }
+
   double scale_of(size_t mesh) {
     double scale = 0;
     for (size_t i = 0; i < model_.nodes.size(); i++) {

@@ -26,6 +26,7 @@ typedef qmat_status qmat_gltf_sink(void *user, size_t which, const double *posit
 
 typedef struct qmat_gltf_counts {
   size_t primitives_read, primitives_skipped, meshes_placed, meshes_skinned;
+  size_t meshes_of_several_weights; /* their nodes move the morph targets differently */
 } qmat_gltf_counts;
 
 /* Passes triangles to `sink`. If `meshes` is NULL: the first scene in world space, node by node, parents first. Else:

@@ -518,6 +518,7 @@ static qmat_status add_colliders(qmat_context *context, const qmat_scene *scene,
                                .forms = addition->collider_forms,
                                .name = name ? name : "model",
                                .dynamic = addition->dynamic,
+                               .meters = addition->options.errors.meters_per_unit,
                                .nodes_given = document->nodes_given,
                                .origin = {origin[0], origin[1], origin[2]}};
   qmat_status status = qmat_gltf_colliders_init(context, document->root, document->buffer, document->data_start,

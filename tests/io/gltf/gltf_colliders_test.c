@@ -101,12 +101,12 @@ static double at(const json_t *value, const char *key) {
   return json_number_value(json_object_get(value, key));
 }
 
-/* An asset of one node that carries the colliders. */
-static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *data) {
+/* An asset of one node that carries the colliders, whose mass takes `meters` per unit. */
+static json_t *write_in(double meters, unsigned forms, bool dynamic, json_t *root, qmat_writer *data) {
   qmat_context context = {0};
   qmat_colliders *c = example();
   static const double none[3] = {0, 0, 0};
-  qmat_gltf_colliders added = {.colliders = c, .forms = forms, .name = "Mesh", .dynamic = dynamic};
+  qmat_gltf_colliders added = {.colliders = c, .forms = forms, .name = "Mesh", .dynamic = dynamic, .meters = meters};
   if (!root) root = json_pack("{s:[{}]}", "nodes");
   added.nodes_given = json_array_size(json_object_get(root, "nodes"));
   assert_int_equal(qmat_gltf_colliders_init(&context, root, 0, 0, data, &added), QMAT_OK);
@@ -115,6 +115,18 @@ static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *da
   qmat_value_release(&c->base);
   qmat_context_uninit(&context);
   return root;
+}
+
+static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *data) {
+  return write_in(0, forms, dynamic, root, data);
+}
+
+static const char *const body_extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+
+/* The motion of node 0, or NULL. */
+static const json_t *motion_of(const json_t *root, int form) {
+  const json_t *node = json_array_get(json_object_get(root, "nodes"), 0);
+  return json_object_get(json_object_get(json_object_get(node, "extensions"), body_extensions[form]), "motion");
 }
 
 /* The children of node 0 that have the extension, or of which the name contains `name`. */
@@ -168,33 +180,78 @@ static void test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_n
   qmat_writer_uninit(&data);
 }
 
-/* The moments are in kg m^2, whatever scales the node. */
-static void test_moments_follow_the_scales_above_a_body(void **state) {
+/* The transforms above a body scale its mass and its second moments in each direction. Here they are a scale of 6, 6
+ * and -0.75 in all, and a quarter of a turn. */
+static void test_a_body_follows_the_scales_above_it(void **state) {
   (void)state;
-  static const char *const extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
-  double moments[2][2];
-  for (int scaled = 0; scaled < 2; scaled++) {
+  static const double stretch[3] = {6, 6, -0.75};
+  qmat_colliders *c = example();
+  const double *in = &c->body[4], half = 0.5 * (in[0] + in[1] + in[2]);
+  const double spread[6] = {half - in[0], half - in[1], half - in[2], -in[3], -in[4], -in[5]};
+  for (int with_meters = 0; with_meters < 2; with_meters++) {
     qmat_writer data = {0};
-    json_t *given =
-        json_loads(scaled ? "{\"nodes\": [{\"scale\": [3, 3, 3]}, {\"children\": [0], \"scale\": [1, 1, -0.125]},"
-                            " {\"children\": [1], \"matrix\": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]}]}"
-                          : "{\"nodes\": [{}]}",
-                   0, NULL);
-    json_t *root = write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, given, &data);
+    const double meters = with_meters ? 6 : 0, share = with_meters ? 27.0 / 216 : 1;
+    json_t *root = json_loads(
+        "{\"nodes\": [{\"scale\": [3, 3, 3]}, {\"children\": [0], \"scale\": [1, 1, -0.125]},"
+        " {\"children\": [1], \"matrix\": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]}]}",
+        0, NULL);
+    write_in(meters, QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, root, &data);
     for (int form = 0; form < 2; form++) {
-      const json_t *motion = json_object_get(
-          json_object_get(json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions"),
-                          extensions[form]),
-          "motion");
-      assert_near(at(motion, "mass"), 2, 0);
-      moments[scaled][form] = json_number_value(json_array_get(json_object_get(motion, "inertiaDiagonal"), 0));
+      const json_t *motion = motion_of(root, form);
+      double q[4], tensor[3][3] = {{0}};
+      assert_near(at(motion, "mass"), 2 * share, 1e-12);
+      for (size_t k = 0; k < 4; k++)
+        q[k] = json_number_value(json_array_get(json_object_get(motion, "inertiaOrientation"), k));
+      for (size_t k = 0; k < 3; k++) {
+        const double moment = json_number_value(json_array_get(json_object_get(motion, "inertiaDiagonal"), k));
+        double axis[3];
+        turn(q, (const double[]){k == 0, k == 1, k == 2}, axis);
+        for (int i = 0; i < 3; i++)
+          for (int j = 0; j < 3; j++) tensor[i][j] += moment * axis[i] * axis[j];
+      }
+      static const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+      double trace = 0;
+      for (int k = 0; k < 3; k++) trace += share * spread[k] * stretch[k] * stretch[k];
+      for (int m = 0; m < 6; m++) {
+        const int i = pairs[m][0], j = pairs[m][1];
+        assert_near(tensor[i][j], (m < 3 ? trace : 0) - share * spread[m] * stretch[i] * stretch[j], 1e-9);
+      }
     }
     json_decref(root);
     qmat_writer_uninit(&data);
   }
-  for (int form = 0; form < 2; form++) /* 3 * 0.5 * 2 = 3 */
-    assert_near(moments[1][form], 9 * moments[0][form], 1e-12 * moments[1][form]);
-  assert_true(moments[0][0] > 0);
+  qmat_value_release(&c->base);
+}
+
+/* A motion of the asset, on the node or above it, a wall that stands still, and a trigger. */
+static void test_the_motion_that_the_asset_states_stays(void **state) {
+  (void)state;
+  static const char *const assets[] = {
+      "{'nodes':[{'extensions':{'KHR_physics_rigid_bodies':{'motion':{'isKinematic':true}}}}]}",
+      "{'nodes':[{'extensions':{'OMI_physics_body':{'motion':{'type':'kinematic'}}}}]}",
+      "{'nodes':[{},{'children':[0],'extensions':{'KHR_physics_rigid_bodies':{'motion':{'mass':5}}}}]}",
+      "{'nodes':[{'extensions':{'KHR_physics_rigid_bodies':{'collider':{'geometry':{'node':0}}}}}]}",
+      "{'nodes':[{'extensions':{'OMI_physics_body':{'trigger':{}}}}]}",
+  };
+  for (size_t i = 0; i < sizeof assets / sizeof *assets; i++) {
+    char text[256];
+    snprintf(text, sizeof text, "%s", assets[i]);
+    for (char *c = text; *c; c++) *c = *c == '\'' ? '"' : *c;
+    json_t *root = json_loads(text, 0, NULL), *before = json_deep_copy(json_object_get(root, "nodes"));
+    qmat_writer data = {0};
+    for (int run = 0; run < 2; run++) {
+      write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, root, &data);
+      for (size_t n = 0; n < json_array_size(before); n++) {
+        json_t *was = json_object_get(json_array_get(before, n), "extensions");
+        json_t *is = json_object_get(json_array_get(json_object_get(root, "nodes"), n), "extensions");
+        assert_true(was ? json_equal(was, is) : !is);
+      }
+      assert_true(children_with(root, "KHR_physics_rigid_bodies", NULL) >= 4);
+    }
+    json_decref(before);
+    json_decref(root);
+    qmat_writer_uninit(&data);
+  }
 }
 
 static void test_omi_has_convex_meshes_where_radii_differ(void **state) {
@@ -236,12 +293,12 @@ static void test_the_motion_of_a_body_is_that_of_the_last_run(void **state) {
   (void)state;
   static const char *const keys[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
   qmat_writer data = {0};
-  json_t *root = json_pack("{s:[{s:{s:{s:{}}}}]}", "nodes", "extensions", keys[0], "trigger");
+  json_t *root = json_pack("{s:[{s:{s:{s:{}}}}]}", "nodes", "extensions", keys[0], "extras");
   for (int run = 0; run < 3; run++) {
     const bool moves = run != 1;
     write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, moves, root, &data);
     const json_t *own = json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions");
-    assert_non_null(json_object_get(json_object_get(own, keys[0]), "trigger"));
+    assert_non_null(json_object_get(json_object_get(own, keys[0]), "extras"));
     for (int form = 0; form < 2; form++)
       assert_true(moves == (json_object_get(json_object_get(own, keys[form]), "motion") != NULL));
   }
@@ -335,7 +392,8 @@ int main(void) {
       cmocka_unit_test(test_a_capsules_frame_turns_y_to_its_axis),
       cmocka_unit_test(test_principal_moments_and_axes_make_the_tensor),
       cmocka_unit_test(test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_nodes),
-      cmocka_unit_test(test_moments_follow_the_scales_above_a_body),
+      cmocka_unit_test(test_a_body_follows_the_scales_above_it),
+      cmocka_unit_test(test_the_motion_that_the_asset_states_stays),
       cmocka_unit_test(test_omi_has_convex_meshes_where_radii_differ),
       cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),
       cmocka_unit_test(test_the_motion_of_a_body_is_that_of_the_last_run),

@@ -24,14 +24,15 @@ static const char scene_text[] =
     "'extensions':{'ACME_glow':{'much':1e-7,'deep':[{'a':null},true]},'KHR_lights_punctual':{'lights':[{'type':'point'}"
     "]}},"
     "'nodes':[{'mesh':0,'name':'A','translation':[5,0,0.1],'extras':{'keep':[1,2.5,null]}},"
-    "{'mesh':0,'name':'B','scale':[1,2,3],'extras':'a text'},{'mesh':1,'children':[3,4]},{'camera':0},"
+    "{'mesh':0,'name':'B','weights':[0.5],'scale':[1,2,3],'extras':'a text'},{'mesh':1,'weights':[1],'children':[3,4]},{'camera':0},"
     "{'extensions':{'KHR_lights_punctual':{'light':0}}},{'mesh':2}],"
     "'cameras':[{'type':'perspective','perspective':{'yfov':0.7,'znear':0.01}}],"
     "'materials':[{'name':'red','pbrMetallicRoughness':{'baseColorFactor':[1,0,0,1]}}],"
     "'images':[{'uri':'tex/a%20b.png'},{'uri':'tex/gone.png'}],"
     "'animations':[{'channels':[],'samplers':[]}],"
-    "'meshes':[{'name':'near','primitives':[{'attributes':{'POSITION':0},'indices':1,'material':0}],'extras':7},"
-    "{'name':'far','primitives':[{'attributes':{'POSITION':2},'indices':1}]},"
+    "'meshes':[{'name':'near','primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':2}],'indices':1,"
+    "'material':0}],'extras':7},"
+    "{'name':'far','primitives':[{'attributes':{'POSITION':2},'targets':[{'POSITION':0}],'indices':1}]},"
     "{'name':'dust','primitives':[{'attributes':{'POSITION':0},'mode':0}]},"
     "{'name':'unused','primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
     "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]},"
@@ -185,7 +186,7 @@ static void test_meshes_are_read_once_each_in_their_own_space(void **state) {
     assert_int_equal(f.scene->mesh_count, 2);
     assert_int_equal(f.scene->meshes[0], 0);
     assert_int_equal(f.scene->meshes[1], 1);
-    const double lengths[] = {1, 4};
+    const double lengths[] = {1, 5}; /* the node of the second moves its target, those of the first differ */
     for (size_t i = 0; i < 2; i++) {
       const qmat_mesh *mesh = (const qmat_mesh *)list->items[i];
       assert_int_equal(mesh->vertex_count, 8);
@@ -202,10 +203,11 @@ static void test_meshes_are_read_once_each_in_their_own_space(void **state) {
     const json_t *meshes = json_object_get(f.report->root, "meshes");
     assert_int_equal(json_integer_value(json_object_get(json_array_get(meshes, 0), "nodes")), 2);
     const json_t *warnings = json_object_get(f.report->root, "warnings");
-    assert_int_equal(json_array_size(warnings), 3);
-    assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "1 of 3 primitives"));
-    assert_non_null(strstr(json_string_value(json_array_get(warnings, 1)), "node 1 "));
-    assert_non_null(strstr(json_string_value(json_array_get(warnings, 2)), "tex/gone.png"));
+    assert_int_equal(json_array_size(warnings), 4);
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "1 meshes have nodes with different"));
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 1)), "1 of 3 primitives"));
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 2)), "node 1 "));
+    assert_non_null(strstr(json_string_value(json_array_get(warnings, 3)), "tex/gone.png"));
     assert_int_equal(f.scene->part_count, binary ? 2 : 3);
     assert_string_equal(f.scene->parts[1].name, "tex/a b.png");
     if (!binary) assert_string_equal(f.scene->parts[2].name, "the data.bin");

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf/gltf_motion.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/geometry/vector.h"
+#include "io/collider_frames.h"
+#include "io/gltf/gltf_asset.h"
+
+const char *const qmat_gltf_body_extensions[2] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
+
+/* The linear part of a transform, and the rotation in it. Row by row. */
+typedef struct {
+  double linear[3][3], rotation[3][3];
+} turn;
+
+static double number_at(const json_t *numbers, size_t i) {
+  return json_number_value(json_array_get(numbers, i));
+}
+
+static void multiply(double a[3][3], double b[3][3], double product[3][3]) {
+  double made[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) made[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+  memcpy(product, made, sizeof made);
+}
+
+static double determinant(double a[3][3]) {
+  double cross[3];
+  qmat_cross(a[1], a[2], cross);
+  return qmat_dot(a[0], cross);
+}
+
+static turn turn_of_matrix(const json_t *m) {
+  turn t;
+  double lengths[3];
+  for (size_t c = 0; c < 3; c++) {
+    lengths[c] = 0;
+    for (size_t r = 0; r < 3; r++) t.linear[r][c] = number_at(m, 4 * c + r);
+    for (size_t r = 0; r < 3; r++) lengths[c] += t.linear[r][c] * t.linear[r][c];
+    lengths[c] = sqrt(lengths[c]);
+  }
+  if (determinant(t.linear) < 0) lengths[0] = -lengths[0]; /* a mirror, which is no rotation */
+  for (size_t c = 0; c < 3; c++)
+    for (size_t r = 0; r < 3; r++) t.rotation[r][c] = lengths[c] != 0 ? t.linear[r][c] / lengths[c] : r == c;
+  return t;
+}
+
+static turn turn_of_node(const json_t *node) {
+  const json_t *m = json_object_get(node, "matrix"), *scale = json_object_get(node, "scale"),
+               *q = json_object_get(node, "rotation");
+  if (m) return turn_of_matrix(m);
+  const double x = number_at(q, 0), y = number_at(q, 1), z = number_at(q, 2), w = q ? number_at(q, 3) : 1;
+  turn t = {.rotation = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                         {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                         {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
+  for (size_t r = 0; r < 3; r++)
+    for (size_t c = 0; c < 3; c++) t.linear[r][c] = t.rotation[r][c] * (scale ? number_at(scale, c) : 1);
+  return t;
+}
+
+/* From the node's space to that of the body, which has the node's rotation in the world and its lengths in metres.
+ * Checked nodes form trees. */
+static void stretch_of(const json_t *root, size_t node, double stretch[3][3]) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  turn world = {.linear = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at)) {
+    turn t = turn_of_node(json_array_get(nodes, at));
+    multiply(t.linear, world.linear, world.linear);
+    multiply(t.rotation, world.rotation, world.rotation);
+  }
+  double back[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) back[i][j] = world.rotation[j][i];
+  multiply(back, world.linear, stretch);
+}
+
+/* The mass and the inertia of a stretched body: of body[] those of qmat_colliders. Stretching multiplies the second
+ * moments of the mass, of which the inertia is the trace less themselves. */
+static void stretch_body(const double body[10], double stretch[3][3], double share, double made[10]) {
+  static const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  const double half = 0.5 * (body[4] + body[5] + body[6]);
+  double moments[3][3], turned[3][3];
+  for (int m = 0; m < 6; m++) {
+    const int i = pairs[m][0], j = pairs[m][1];
+    moments[i][j] = moments[j][i] = share * ((m < 3 ? half : 0) - body[4 + m]);
+  }
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) turned[i][j] = stretch[j][i];
+  multiply(stretch, moments, moments);
+  multiply(moments, turned, moments);
+  memcpy(made, body, 10 * sizeof *made);
+  made[0] *= share;
+  const double trace = moments[0][0] + moments[1][1] + moments[2][2];
+  for (int m = 0; m < 6; m++) made[4 + m] = (m < 3 ? trace : 0) - moments[pairs[m][0]][pairs[m][1]];
+}
+
+json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_colliders *colliders, const double shift[3],
+                            double meters) {
+  json_t *motion = json_object();
+  if (!motion || !qmat_gltf_set(motion, "extras", json_pack("{s:b}", QMAT_GLTF_COLLIDER_MARK, 1))) {
+    json_decref(motion);
+    return NULL;
+  }
+  if (colliders->body_count == 0) return motion;
+  double stretch[3][3], body[10], moments[3], q[4];
+  stretch_of(root, node, stretch);
+  const double volume = fabs(determinant(stretch));
+  stretch_body(colliders->body, stretch, meters > 0 ? volume / (meters * meters * meters) : 1, body);
+  qmat_principal_inertia(body, moments, q);
+  const bool done =
+      qmat_gltf_set(motion, "mass", json_real(body[0])) &&
+      qmat_gltf_set(motion, "centerOfMass",
+                    json_pack("[f, f, f]", body[1] - shift[0], body[2] - shift[1], body[3] - shift[2])) &&
+      qmat_gltf_set(motion, "inertiaDiagonal", json_pack("[f, f, f]", moments[0], moments[1], moments[2])) &&
+      qmat_gltf_set(motion, "inertiaOrientation", json_pack("[f, f, f, f]", q[0], q[1], q[2], q[3]));
+  if (done) return motion;
+  json_decref(motion);
+  return NULL;
+}
+
+static bool is_ours(const json_t *motion) {
+  return json_object_get(json_object_get(motion, "extras"), QMAT_GLTF_COLLIDER_MARK) != NULL;
+}
+
+bool qmat_gltf_has_own_motion(const json_t *root, size_t node) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at)) {
+    const json_t *extensions = json_object_get(json_array_get(nodes, at), "extensions");
+    for (int form = 0; form < 2; form++) {
+      const json_t *physics = json_object_get(extensions, qmat_gltf_body_extensions[form]);
+      const json_t *motion = json_object_get(physics, "motion");
+      if (motion && !is_ours(motion)) return true;
+      if (at == node && (json_object_get(physics, "collider") || json_object_get(physics, "trigger"))) return true;
+    }
+  }
+  return false;
+}
+
+void qmat_gltf_drop_motion(json_t *node) {
+  json_t *extensions = json_object_get(node, "extensions");
+  for (int form = 0; form < 2; form++) {
+    json_t *physics = json_object_get(extensions, qmat_gltf_body_extensions[form]);
+    if (is_ours(json_object_get(physics, "motion"))) json_object_del(physics, "motion");
+    if (physics && json_object_size(physics) == 0) json_object_del(extensions, qmat_gltf_body_extensions[form]);
+  }
+  if (extensions && json_object_size(extensions) == 0) json_object_del(node, "extensions");
+}
