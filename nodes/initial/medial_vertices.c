@@ -59,6 +59,27 @@ static bool spans_gap(const qmat_dual_complex *d, const uint32_t *corners) {
   return false;
 }
 
+/* Of the radius of a circumsphere: more than the rounding of one that is well conditioned. */
+static const double rounding_of_radius = 1e-6;
+
+/* Whether a computed circumsphere goes through all corners and is empty, as the exact one of a Delaunay tetrahedron
+ * does and is. Where the corners are nearly on a circle, rounding puts the centre anywhere near the circle's axis, also
+ * into another part of the solid. */
+static bool is_delaunay_sphere(const qmat_dual_complex *d, size_t cell, const double sphere[4]) {
+  const uint32_t *corners = &d->cells.corners[4 * cell];
+  const double tolerance = rounding_of_radius * sphere[3];
+  for (size_t k = 0; k < 4; k++) {
+    if (fabs(qmat_point_distance(sphere, &d->points[3 * (size_t)corners[k]]) - sphere[3]) > tolerance) return false;
+    const uint32_t next = d->cells.neighbours[4 * cell + k];
+    for (size_t i = 0; next != QMAT_NO_TETRAHEDRON && i < 4; i++) {
+      const uint32_t corner = d->cells.corners[4 * (size_t)next + i];
+      if (corner == corners[0] || corner == corners[1] || corner == corners[2] || corner == corners[3]) continue;
+      if (qmat_point_distance(sphere, &d->points[3 * (size_t)corner]) < sphere[3] - tolerance) return false;
+    }
+  }
+  return true;
+}
+
 /* Algorithm 1 for one tetrahedron. With incentres "all" a tetrahedron belongs to the solid if its incentre is inside;
  * its medial vertex is still the circumcentre if that is inside too. */
 static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t cell, double sphere[4]) {
@@ -74,7 +95,7 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
   const bool all = d->params->incentres == QMAT_INCENTRES_ALL;
   const bool in_solid = (all || thin) && deep_inside(d->surface, centre);
   if (all && (!in_solid || spans_gap(d, corner))) return QMAT_CELL_DROPPED;
-  if (qmat_circumsphere(p, 0.5, sphere)) {
+  if (qmat_circumsphere(p, 0.5, sphere) && is_delaunay_sphere(d, cell, sphere)) {
     const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
     /* No surface comes between a circumcentre and an incentre that is nearer than the surface. */
     const bool is_beside = in_solid && qmat_point_distance(sphere, centre) < (1 - 1e-9) * nearest;
