@@ -7,6 +7,7 @@
 #include "core/geometry/frame.h"
 #include "core/json_text.h"
 #include "core/node.h"
+#include "core/text.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/skin/envelope_surface.h"
 #include "nodes/skin/flat_primitives.h"
@@ -450,10 +451,12 @@ static int add_warning(const skin *s, json_t *root) {
                                  "its topology",
                                  (long long)count, (long long)most);
   if (most > 0 || distance_of(s) <= s->params->error) return 0;
+  char distance[48];
+  qmat_format_bound(distance_of(s), distance);
   return qmat_json_add_warning(root,
-                               "the visible mesh is up to %.2g %% of the diagonal from the envelope, not %.2g %%; a "
-                               "finer one: --set skin.detail=%d",
-                               100 * distance_of(s), 100 * s->params->error, (int)s->params->detail + 2);
+                               "the visible mesh is up to %s of the diagonal from the envelope, not %.2g %%; a finer "
+                               "one: --set skin.detail=%d",
+                               distance, 100 * s->params->error, (int)s->params->detail + 2);
 }
 
 static qmat_status fill_report(skin *s, qmat_report *report) {
