@@ -73,7 +73,7 @@ static qmat_skin_triangles thinned(qmat_mesh *mesh, double error) {
   qmat_context context = {0};
   qmat_skin_triangles surface = copy_of(mesh);
   const int64_t euler = euler_of(&surface);
-  assert_int_equal(qmat_skin_thin(&context, error, &surface), QMAT_OK);
+  assert_int_equal(qmat_skin_thin(&context, error, 0, &surface), QMAT_OK);
   assert_manifold(&surface);
   assert_int_equal(euler_of(&surface), euler);
   qmat_context_uninit(&context);
@@ -170,12 +170,27 @@ static bool cancel(void *user, const char *id, const char *type, uint64_t done, 
   return false;
 }
 
+/* A collapse takes two triangles, so the number is met to one of them. */
+static void test_a_number_of_triangles_ends_it(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_mesh *mesh = shape_seal(shape_sphere(1, 16));
+  qmat_skin_triangles surface = copy_of(mesh);
+  const size_t most = mesh->triangle_count / 2;
+  assert_int_equal(qmat_skin_thin(&context, 0.5, most, &surface), QMAT_OK);
+  assert_manifold(&surface);
+  assert_true(surface.triangle_count <= most && surface.triangle_count + 2 > most);
+  drop(&surface);
+  qmat_value_release(&mesh->base);
+  qmat_context_uninit(&context);
+}
+
 static void test_a_cancel_is_obeyed(void **state) {
   (void)state;
   qmat_context context = {.progress = cancel};
   qmat_mesh *mesh = shape_seal(shape_sphere(1, 16));
   qmat_skin_triangles surface = copy_of(mesh);
-  assert_int_equal(qmat_skin_thin(&context, 0.01, &surface), QMAT_CANCELLED);
+  assert_int_equal(qmat_skin_thin(&context, 0.01, 0, &surface), QMAT_CANCELLED);
   assert_int_equal(surface.triangle_count, mesh->triangle_count);
   drop(&surface);
   qmat_value_release(&mesh->base);
@@ -189,6 +204,7 @@ int main(void) {
       cmocka_unit_test(test_a_component_stays_where_it_is_smaller_than_the_error),
       cmocka_unit_test(test_faults_keep_few_triangles),
       cmocka_unit_test(test_a_component_that_would_change_its_topology_is_thinned_out_for_less),
+      cmocka_unit_test(test_a_number_of_triangles_ends_it),
       cmocka_unit_test(test_a_cancel_is_obeyed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
