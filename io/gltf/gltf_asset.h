@@ -25,6 +25,8 @@ enum {
 #define QMAT_GLTF_SKIN_MARK "qmat_skin"
 /* The extras of a node with a collider that qmat added have this. */
 #define QMAT_GLTF_COLLIDER_MARK "qmat_collider"
+/* The same where the motion of the body is ours, too. */
+#define QMAT_GLTF_MOTION_MARK "qmat_motion"
 
 /* The JSON and chunks of a .glb or .gltf. Only the container is checked. A zeroed one is empty and valid. */
 typedef struct qmat_gltf_asset {

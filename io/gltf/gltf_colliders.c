@@ -163,11 +163,15 @@ void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added) {
 
 /* ---- nodes ---- */
 
-/* Adds a child with an extension object (may be NULL: none) in its `extensions`. */
-static bool add_child(json_t *root, json_t *body, json_t *child) {
+/* Adds a child of a body that moves by our motion, or does not. */
+static bool add_child(json_t *root, json_t *body, json_t *child, bool moves) {
   json_int_t number;
-  return child && qmat_gltf_set(child, "extras", json_pack("{s:b}", QMAT_GLTF_COLLIDER_MARK, 1)) &&
-         qmat_gltf_add(root, "nodes", json_incref(child), &number) &&
+  json_t *extras = json_pack("{s:b}", QMAT_GLTF_COLLIDER_MARK, 1);
+  if (extras && moves && !qmat_gltf_set(extras, QMAT_GLTF_MOTION_MARK, json_true())) {
+    json_decref(extras);
+    return false;
+  }
+  return child && qmat_gltf_set(child, "extras", extras) && qmat_gltf_add(root, "nodes", json_incref(child), &number) &&
          qmat_gltf_add(body, "children", json_integer(number), NULL);
 }
 
@@ -188,7 +192,7 @@ static bool set_extension(json_t *node, const char *name, json_t *value) {
 
 /* The collider of one form. Shapes of several forms share a node where they have the same frame. */
 static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders *added, size_t shape,
-                          const double shift[3]) {
+                          const double shift[3], bool moves) {
   const qmat_colliders *c = added->colliders;
   const uint32_t *ids = &c->shapes[3 * shape];
   double middle[3], rotation[4], length, at_origin[3];
@@ -215,7 +219,7 @@ static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders 
     if (!*node) {
       *node = json_object();
       done = *node && place(*node, takes_hull ? at_origin : middle, takes_hull ? NULL : rotation) &&
-             add_child(root, body, *node);
+             add_child(root, body, *node, moves);
     }
     if (done) {
       done = set_extension(*node, qmat_gltf_body_extensions[form], collider);
@@ -232,7 +236,7 @@ static bool add_colliders(json_t *root, json_t *body, const qmat_gltf_colliders 
            qmat_gltf_set(node, "name",
                          form == 0 ? json_sprintf("UCX_%s_%02zu", added->name, shape + 1)
                                    : json_sprintf("%s_%02zu-convcolonly", added->name, shape + 1)) &&
-           add_child(root, body, node);
+           add_child(root, body, node, moves);
     json_decref(node);
   }
   return done;
@@ -245,7 +249,8 @@ static bool is_earlier_collider(const json_t *root, const json_t *child) {
 
 /* Removes the colliders of an earlier run and how it lets the body move. */
 static void remove_earlier(json_t *root, json_t *body, size_t given) {
-  if (qmat_gltf_drop_children(root, body, given, is_earlier_collider)) qmat_gltf_drop_motion(body);
+  qmat_gltf_drop_motion(root, body);
+  qmat_gltf_drop_children(root, body, given, is_earlier_collider);
 }
 
 bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
@@ -267,7 +272,8 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
       done = false;
     }
   }
-  for (size_t i = 0; i < added->colliders->shape_count && done; i++) done = add_colliders(root, body, added, i, shift);
+  for (size_t i = 0; i < added->colliders->shape_count && done; i++)
+    done = add_colliders(root, body, added, i, shift, moves);
   return done;
 }
 
@@ -314,7 +320,7 @@ static json_t *add_bound_node(json_t *root, json_t *joint, const qmat_gltf_colli
                          form == 0 ? json_pack("{s:{s:b}}", "motion", "isKinematic", 1)
                                    : json_pack("{s:{s:s}}", "motion", "type", "kinematic"));
   }
-  done = done && add_child(root, joint, node);
+  done = done && add_child(root, joint, node, false);
   json_decref(node); /* the root's array holds it */
   return done ? node : NULL;
 }
@@ -336,7 +342,7 @@ bool qmat_gltf_colliders_attach_to_joints(json_t *root, json_int_t node, const q
     const uint32_t named = joint_of(added, i, medial), joint = named < count ? named : 0;
     json_t *owner = json_array_get(nodes, (size_t)json_number_value(json_array_get(ids, joint)));
     if (!bound[joint]) bound[joint] = add_bound_node(root, owner, added, &matrices[16 * (size_t)joint]);
-    done = bound[joint] && add_colliders(root, bound[joint], added, i, none);
+    done = bound[joint] && add_colliders(root, bound[joint], added, i, none, false);
   }
   qmat_free(bound);
   return done;

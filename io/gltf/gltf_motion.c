@@ -99,11 +99,7 @@ static void stretch_body(const double body[10], double stretch[3][3], double sha
 json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_colliders *colliders, const double shift[3],
                             double meters) {
   json_t *motion = json_object();
-  if (!motion || !qmat_gltf_set(motion, "extras", json_pack("{s:b}", QMAT_GLTF_COLLIDER_MARK, 1))) {
-    json_decref(motion);
-    return NULL;
-  }
-  if (colliders->body_count == 0) return motion;
+  if (!motion || colliders->body_count == 0) return motion;
   double stretch[3][3], body[10], moments[3], q[4];
   stretch_of(root, node, stretch);
   const double volume = fabs(determinant(stretch));
@@ -120,29 +116,34 @@ json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_collider
   return NULL;
 }
 
-static bool is_ours(const json_t *motion) {
-  return json_object_get(json_object_get(motion, "extras"), QMAT_GLTF_COLLIDER_MARK) != NULL;
+static bool is_ours(const json_t *root, const json_t *node) {
+  const json_t *nodes = json_object_get(root, "nodes"), *children = json_object_get(node, "children");
+  for (size_t i = 0; i < json_array_size(children); i++) {
+    const json_t *child = json_array_get(nodes, (size_t)json_number_value(json_array_get(children, i)));
+    if (json_object_get(json_object_get(child, "extras"), QMAT_GLTF_MOTION_MARK)) return true;
+  }
+  return false;
 }
 
 bool qmat_gltf_has_own_motion(const json_t *root, size_t node) {
   const json_t *nodes = json_object_get(root, "nodes");
   for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at)) {
-    const json_t *extensions = json_object_get(json_array_get(nodes, at), "extensions");
+    const json_t *body = json_array_get(nodes, at), *extensions = json_object_get(body, "extensions");
     for (int form = 0; form < 2; form++) {
       const json_t *physics = json_object_get(extensions, qmat_gltf_body_extensions[form]);
-      const json_t *motion = json_object_get(physics, "motion");
-      if (motion && !is_ours(motion)) return true;
+      if (json_object_get(physics, "motion") && !is_ours(root, body)) return true;
       if (at == node && (json_object_get(physics, "collider") || json_object_get(physics, "trigger"))) return true;
     }
   }
   return false;
 }
 
-void qmat_gltf_drop_motion(json_t *node) {
+void qmat_gltf_drop_motion(const json_t *root, json_t *node) {
   json_t *extensions = json_object_get(node, "extensions");
+  if (!is_ours(root, node)) return;
   for (int form = 0; form < 2; form++) {
     json_t *physics = json_object_get(extensions, qmat_gltf_body_extensions[form]);
-    if (is_ours(json_object_get(physics, "motion"))) json_object_del(physics, "motion");
+    json_object_del(physics, "motion");
     if (physics && json_object_size(physics) == 0) json_object_del(extensions, qmat_gltf_body_extensions[form]);
   }
   if (extensions && json_object_size(extensions) == 0) json_object_del(node, "extensions");
