@@ -49,9 +49,9 @@ static bool add_warnings(const qmat_gltf_counts *counts, bool placed, const qmat
     done = json_array_append_new(
                warnings, json_string("EXT_mesh_gpu_instancing is not read: each of its meshes is in one place")) == 0;
   if (counts->meshes_of_several_weights > 0) {
-    json_t *text =
-        json_sprintf("%zu meshes have nodes with different morph weights: their shape is that of the mesh's own",
-                     counts->meshes_of_several_weights);
+    json_t *text = json_sprintf(
+        "the morph weights of nodes with the same mesh differ, in %zu cases: the shape is that of its own weights",
+        counts->meshes_of_several_weights);
     done = json_array_append_new(warnings, text) == 0 && done;
   }
   if (counts->primitives_skipped > 0) {

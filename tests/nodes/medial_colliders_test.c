@@ -317,7 +317,10 @@ static void place_square(double u, double v, double point[3]) {
 /* Slabs touch the sides of a box, and those of a thick sheet, all over. */
 static void test_inside_fills_a_box_and_a_thick_sheet(void **state) {
   (void)state;
-  result r = make_of_model("box", "fit=inside");
+  qmat_mesh *of_box;
+  qmat_medial *medial;
+  describe("box", "epsilon=2%", &of_box, &medial);
+  result r = make(of_box, medial, "fit=inside", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_true(pipeline_number(r.report, "coverage") > 0.9);
   result_free(&r);
