@@ -54,7 +54,7 @@ asset deep_arcs 19 solids=0 sheets=2 sheet_triangles=160
 asset torn_capsule 176 solids=0 sheets=33
 asset creased_capsule 136 solids=0 sheets=8
 # Flat tetrahedra whose corners lie on a circle, up to rounding: a computed circumcentre was in the other lobe of the
-# letter, and its links went through air. Of the first it was equally far from all corners, of the second not.
+# letter, and its links went through air.
 asset letter_b 30 solids=1 sheets=0
 asset pierced_letter_b 30 solids=1 sheets=0
 asset card 4 solids=0 sheets=1 sheet_triangles=120
