@@ -66,3 +66,14 @@ void qmat_placement_quaternion(double a[3][3], double q[4]) {
   const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (int k = 0; k < 4; k++) q[k] /= length;
 }
+
+void qmat_placement_turn(const double q[4], double axes[3][3]) {
+  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const bool turns = length > 0;
+  const double x = turns ? q[0] / length : 0, y = turns ? q[1] / length : 0, z = turns ? q[2] / length : 0;
+  const double w = turns ? q[3] / length : 1;
+  const double made[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
+                             {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
+                             {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)}};
+  memcpy(axes, made, sizeof made);
+}

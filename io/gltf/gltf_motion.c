@@ -7,6 +7,7 @@
 #include "core/geometry/vector.h"
 #include "io/collider_frames.h"
 #include "io/gltf/gltf_asset.h"
+#include "io/placement.h"
 
 const char *const qmat_gltf_body_extensions[2] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
 
@@ -51,10 +52,12 @@ static turn turn_of_node(const json_t *node) {
   const json_t *m = json_object_get(node, "matrix"), *scale = json_object_get(node, "scale"),
                *q = json_object_get(node, "rotation");
   if (m) return turn_of_matrix(m);
-  const double x = number_at(q, 0), y = number_at(q, 1), z = number_at(q, 2), w = q ? number_at(q, 3) : 1;
-  turn t = {.rotation = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-                         {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-                         {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
+  const double quaternion[4] = {number_at(q, 0), number_at(q, 1), number_at(q, 2), number_at(q, 3)};
+  double axes[3][3];
+  turn t;
+  qmat_placement_turn(quaternion, axes);
+  for (size_t r = 0; r < 3; r++)
+    for (size_t c = 0; c < 3; c++) t.rotation[r][c] = axes[c][r];
   for (size_t r = 0; r < 3; r++)
     for (size_t c = 0; c < 3; c++) t.linear[r][c] = t.rotation[r][c] * (scale ? number_at(scale, c) : 1);
   return t;

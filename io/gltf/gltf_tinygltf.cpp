@@ -39,6 +39,7 @@
 #include "core/geometry/joint_weights.h"
 #include "io/draco_draco.h"
 #include "io/gltf/gltf_tinygltf.h"
+#include "io/placement.h"
 #include "io/stretch.h"
 
 namespace {
@@ -96,28 +97,10 @@ Matrix local_matrix(const qmat_tinygltf::Node &node) {
     return m;
   }
   if (node.rotation.size() == 4) {
-    double x = node.rotation[0], y = node.rotation[1], z = node.rotation[2], w = node.rotation[3];
-    const double length = std::sqrt(x * x + y * y + z * z + w * w);
-    x /= length;
-    y /= length;
-    z /= length;
-    w /= length;
-    m = {1 - 2 * (y * y + z * z),
-         2 * (x * y + z * w),
-         2 * (x * z - y * w),
-         0,
-         2 * (x * y - z * w),
-         1 - 2 * (x * x + z * z),
-         2 * (y * z + x * w),
-         0,
-         2 * (x * z + y * w),
-         2 * (y * z - x * w),
-         1 - 2 * (x * x + y * y),
-         0,
-         0,
-         0,
-         0,
-         1};
+    double axes[3][3];
+    qmat_placement_turn(node.rotation.data(), axes);
+    for (size_t k = 0; k < 3; k++)
+      for (size_t row = 0; row < 3; row++) m[4 * k + row] = axes[k][row];
   }
   for (size_t k = 0; k < 3; k++) {
     const double scale = node.scale.size() == 3 ? node.scale[k] : 1;

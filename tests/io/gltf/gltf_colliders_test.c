@@ -10,8 +10,10 @@
 
 #include "io/collider_frames.h"
 #include "io/gltf/gltf_colliders.h"
+#include "io/gltf/gltf_motion.h"
 #include "io/robot_write.h"
 #include "io/usd/usd_colliders.h"
+#include "tests/io/gltf/gltf_assets.h"
 #include "tests/shapes.h"
 
 /* A sphere, a capsule of two radii, one of one radius that points down, and a slab; each with a tetrahedron for a hull.
@@ -121,12 +123,11 @@ static json_t *write(unsigned forms, bool dynamic, json_t *root, qmat_writer *da
   return write_in(0, forms, dynamic, root, data);
 }
 
-static const char *const body_extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
-
 /* The motion of node 0, or NULL. */
 static const json_t *motion_of(const json_t *root, int form) {
   const json_t *node = json_array_get(json_object_get(root, "nodes"), 0);
-  return json_object_get(json_object_get(json_object_get(node, "extensions"), body_extensions[form]), "motion");
+  return json_object_get(json_object_get(json_object_get(node, "extensions"), qmat_gltf_body_extensions[form]),
+                         "motion");
 }
 
 /* The children of node 0 that have the extension, or of which the name contains `name`. */
@@ -170,8 +171,7 @@ static void test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_n
   assert_near(at(hidden, "mesh"), 0, 0);
   assert_int_equal(json_array_size(json_object_get(root, "meshes")), 1);
   assert_int_equal(data.size, 4 * 12 + 12 * 2);
-  const json_t *motion = json_object_get(
-      json_object_get(json_object_get(json_array_get(nodes, 0), "extensions"), "KHR_physics_rigid_bodies"), "motion");
+  const json_t *motion = motion_of(root, 0);
   assert_near(at(motion, "mass"), 2, 0);
   assert_int_equal(json_array_size(json_object_get(motion, "inertiaOrientation")), 4);
   assert_int_equal(json_array_size(json_object_get(root, "extensionsUsed")), 2);
@@ -181,7 +181,7 @@ static void test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_n
 }
 
 /* The transforms above a body scale its mass and its second moments in each direction. Here they are a scale of 6, 6
- * and -0.75 in all, and a quarter of a turn. */
+ * and -0.75 in all, and turns, one of them by a quaternion of length 2. */
 static void test_a_body_follows_the_scales_above_it(void **state) {
   (void)state;
   static const double stretch[3] = {6, 6, -0.75};
@@ -193,7 +193,8 @@ static void test_a_body_follows_the_scales_above_it(void **state) {
     const double meters = with_meters ? 6 : 0, share = with_meters ? 27.0 / 216 : 1;
     json_t *root = json_loads(
         "{\"nodes\": [{\"scale\": [3, 3, 3]}, {\"children\": [0], \"scale\": [1, 1, -0.125]},"
-        " {\"children\": [1], \"matrix\": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]}]}",
+        " {\"children\": [1], \"matrix\": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]},"
+        " {\"children\": [2], \"rotation\": [0, 0, 2, 0]}]}",
         0, NULL);
     write_in(meters, QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, root, &data);
     for (int form = 0; form < 2; form++) {
@@ -234,9 +235,7 @@ static void test_the_motion_that_the_asset_states_stays(void **state) {
       "{'nodes':[{'extensions':{'OMI_physics_body':{'trigger':{}}}}]}",
   };
   for (size_t i = 0; i < sizeof assets / sizeof *assets; i++) {
-    char text[256];
-    snprintf(text, sizeof text, "%s", assets[i]);
-    for (char *c = text; *c; c++) *c = *c == '\'' ? '"' : *c;
+    char *text = asset_json(assets[i]);
     json_t *root = json_loads(text, 0, NULL), *before = json_deep_copy(json_object_get(root, "nodes"));
     qmat_writer data = {0};
     for (int run = 0; run < 2; run++) {
@@ -250,6 +249,7 @@ static void test_the_motion_that_the_asset_states_stays(void **state) {
     }
     json_decref(before);
     json_decref(root);
+    free(text);
     qmat_writer_uninit(&data);
   }
 }
@@ -291,16 +291,14 @@ static void test_names_of_hulls_and_a_second_run_replaces_the_first(void **state
 /* What the asset says of its body stays; how an earlier run let it move goes with the next one that does not. */
 static void test_the_motion_of_a_body_is_that_of_the_last_run(void **state) {
   (void)state;
-  static const char *const keys[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
   qmat_writer data = {0};
-  json_t *root = json_pack("{s:[{s:{s:{s:{}}}}]}", "nodes", "extensions", keys[0], "extras");
+  json_t *root = json_pack("{s:[{s:{s:{s:{}}}}]}", "nodes", "extensions", qmat_gltf_body_extensions[0], "extras");
   for (int run = 0; run < 3; run++) {
     const bool moves = run != 1;
     write(QMAT_GLTF_KHR | QMAT_GLTF_OMI, moves, root, &data);
     const json_t *own = json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "extensions");
-    assert_non_null(json_object_get(json_object_get(own, keys[0]), "extras"));
-    for (int form = 0; form < 2; form++)
-      assert_true(moves == (json_object_get(json_object_get(own, keys[form]), "motion") != NULL));
+    assert_non_null(json_object_get(json_object_get(own, qmat_gltf_body_extensions[0]), "extras"));
+    for (int form = 0; form < 2; form++) assert_true(moves == (motion_of(root, form) != NULL));
   }
   json_decref(root);
   qmat_writer_uninit(&data);
