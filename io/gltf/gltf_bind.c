@@ -4,9 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "io/base64.h"
 #include "io/bytes.h"
 #include "io/gltf/gltf_keep.h"
+#include "io/gltf/gltf_uri.h"
 
 /* A whole number of the JSON, also if written as 3.0; `missing` where there is none. */
 static size_t number(const json_t *object, const char *key, size_t missing) {
@@ -27,14 +27,12 @@ static qmat_status find_bytes(qmat_context *context, const qmat_scene *scene, co
     *size = asset->chunk_size;
     return QMAT_OK;
   }
-  const char *text = json_string_value(uri), *comma = text ? strchr(text, ',') : NULL;
+  const char *text = json_string_value(uri);
   if (!text) return QMAT_OK;
-  if (comma && strncmp(text, "data:", 5) == 0) {
-    const qmat_status status = qmat_base64_decode(context, comma + 1, strlen(comma + 1), owned, size);
-    *bytes = *owned;
-    return status;
-  }
-  const qmat_status status = qmat_gltf_find_part(context, scene, text, json_string_length(uri), &part);
+  qmat_status status = qmat_gltf_decode_uri(context, text, json_string_length(uri), owned, size);
+  *bytes = *owned;
+  if (status != QMAT_OK || *owned) return status;
+  status = qmat_gltf_find_part(context, scene, text, json_string_length(uri), &part);
   if (status != QMAT_OK || part == 0) return status;
   *bytes = scene->parts[part].bytes;
   *size = scene->parts[part].size;

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "core/arena.h"
-#include "io/base64.h"
 #include "io/gltf/gltf_check_meshopt.h"
 #include "io/gltf/gltf_uri.h"
 
@@ -46,15 +45,12 @@ static qmat_status load_external(const qmat_gltf_checker *check, size_t index, c
 
 static qmat_status load_data_uri(const qmat_gltf_checker *check, size_t index, const char *uri, size_t uri_length) {
   qmat_gltf_buffer *buffer = &check->document->buffers[index];
-  const char *comma = memchr(uri, ',', uri_length);
-  if (!comma || comma - uri < 12 || memcmp(comma - 7, ";base64", 7) != 0)
-    return qmat_gltf_fail(check, "buffer", index, "the data URI is not base64");
-  size_t length = uri_length - (size_t)(comma + 1 - uri);
-  qmat_status status = qmat_base64_decode(check->context, comma + 1, length, &buffer->owned, &buffer->size);
+  const qmat_status status = qmat_gltf_decode_uri(check->context, uri, uri_length, &buffer->owned, &buffer->size);
   if (status != QMAT_OK) {
     qmat_fail_element(check->context, "buffer", (int64_t)index);
     return qmat_fail_at(check->context, check->path, 0, 0);
   }
+  if (!buffer->owned) return qmat_gltf_fail(check, "buffer", index, "the data URI is not base64");
   buffer->bytes = buffer->owned;
   return QMAT_OK;
 }

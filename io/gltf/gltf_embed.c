@@ -25,21 +25,42 @@ typedef struct embedder {
   bool any;
 } embedder;
 
-/* The part that `object`'s URI names; 0: none. */
-static qmat_status find_part(const embedder *e, const json_t *object, size_t *part) {
+/* The bytes that a URI stands for; NULL: they are not there. */
+typedef struct source {
+  const uint8_t *bytes;
+  size_t size, part; /* 0: in a data URI */
+  uint8_t *decoded;  /* of a data URI; owned */
+} source;
+
+static qmat_status find_source(const embedder *e, const json_t *object, source *found) {
   const json_t *uri = json_object_get(object, "uri");
-  *part = 0;
-  if (!json_is_string(uri)) return QMAT_OK;
-  return qmat_gltf_find_part(e->context, e->scene, json_string_value(uri), json_string_length(uri), part);
+  const char *text = json_string_value(uri);
+  const qmat_error before = e->context->error;
+  *found = (source){0};
+  if (!text) return QMAT_OK;
+  qmat_status status = qmat_gltf_decode_uri(e->context, text, json_string_length(uri), &found->decoded, &found->size);
+  if (status == QMAT_ERROR_FORMAT) { /* a reader of the output may refuse it; the medial mesh does not need it */
+    e->context->error = before;
+    return QMAT_OK;
+  }
+  found->bytes = found->decoded;
+  if (status != QMAT_OK || found->decoded) return status;
+  status = qmat_gltf_find_part(e->context, e->scene, text, json_string_length(uri), &found->part);
+  if (status != QMAT_OK || found->part == 0) return status;
+  found->bytes = e->scene->parts[found->part].bytes;
+  found->size = e->scene->parts[found->part].size;
+  return QMAT_OK;
 }
 
-/* Appends a part to the chunk, once. */
-static void put_part(embedder *e, size_t part) {
-  if (e->offsets[part] != SIZE_MAX) return;
+/* Appends the bytes to the chunk, those of a part once. Returns their offset. */
+static size_t put_source(embedder *e, const source *from) {
+  if (from->part > 0 && e->offsets[from->part] != SIZE_MAX) return e->offsets[from->part];
   qmat_gltf_pad(&e->chunk, 0);
-  e->offsets[part] = e->chunk.size;
-  qmat_put_bytes(&e->chunk, e->scene->parts[part].bytes, e->scene->parts[part].size);
+  const size_t offset = e->chunk.size;
+  if (from->part > 0) e->offsets[from->part] = offset;
+  qmat_put_bytes(&e->chunk, from->bytes, from->size);
   e->any = true;
+  return offset;
 }
 
 static qmat_status embed_buffers(embedder *e, const uint8_t *chunk, size_t size) {
@@ -47,40 +68,41 @@ static qmat_status embed_buffers(embedder *e, const uint8_t *chunk, size_t size)
   qmat_status status = QMAT_OK;
   for (size_t i = 0; i < e->buffer_count && status == QMAT_OK; i++) {
     const json_t *buffer = json_array_get(buffers, i);
-    size_t part;
+    source from;
     e->buffer[i] = -1;
     if (i == 0 && chunk && !json_object_get(buffer, "uri")) {
       e->buffer[i] = 0;
       qmat_put_bytes(&e->chunk, chunk, size);
       continue;
     }
-    status = find_part(e, buffer, &part);
-    if (status != QMAT_OK || part == 0) continue;
-    if (json_number_value(json_object_get(buffer, "byteLength")) > (double)e->scene->parts[part].size) continue;
-    put_part(e, part);
-    e->buffer[i] = (json_int_t)e->offsets[part];
+    status = find_source(e, buffer, &from);
+    if (from.bytes && json_number_value(json_object_get(buffer, "byteLength")) <= (double)from.size)
+      e->buffer[i] = (json_int_t)put_source(e, &from);
+    qmat_free(from.decoded);
   }
   return status;
 }
 
 static qmat_status embed_image(embedder *e, json_t *image) {
-  size_t part;
-  const qmat_status status = find_part(e, image, &part);
-  if (status != QMAT_OK || part == 0) return status;
-  const qmat_file_part *file = &e->scene->parts[part];
-  const char *type = qmat_gltf_image_type(file->bytes, file->size);
-  if (!type) return QMAT_OK;
+  source from;
+  const qmat_status status = find_source(e, image, &from);
+  const char *type = from.bytes ? qmat_gltf_image_type(from.bytes, from.size) : NULL;
   bool done = true;
-  if (e->views[part] < 0) {
-    put_part(e, part);
-    json_t *view = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)e->offsets[part], "byteLength",
-                             (json_int_t)file->size);
-    done = qmat_gltf_add(e->root, "bufferViews", view, &e->views[part]);
+  if (type) {
+    json_int_t view = from.part > 0 ? e->views[from.part] : -1;
+    if (view < 0) {
+      const json_int_t offset = (json_int_t)put_source(e, &from);
+      json_t *added =
+          json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", offset, "byteLength", (json_int_t)from.size);
+      done = qmat_gltf_add(e->root, "bufferViews", added, &view);
+      e->views[from.part] = view;
+    }
+    done = done && qmat_gltf_set(image, "bufferView", json_integer(view));
+    if (!json_object_get(image, "mimeType")) done = done && qmat_gltf_set(image, "mimeType", json_string(type));
+    json_object_del(image, "uri");
   }
-  done = done && qmat_gltf_set(image, "bufferView", json_integer(e->views[part]));
-  if (!json_object_get(image, "mimeType")) done = done && qmat_gltf_set(image, "mimeType", json_string(type));
-  json_object_del(image, "uri");
-  return done ? QMAT_OK : qmat_fail_memory(e->context, "a glTF file");
+  qmat_free(from.decoded);
+  return done ? status : qmat_fail_memory(e->context, "a glTF file");
 }
 
 /* Converts owner.buffer and owner.byteOffset from the old buffers to the new ones. */

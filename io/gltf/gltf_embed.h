@@ -6,11 +6,11 @@
 
 #include "core/value.h"
 
-/* Copies the files that buffers and images refer to from `scene` into the binary chunk of a GLB. In `root`, the asset's
- * JSON, all embedded buffers merge into the first buffer; embedded images get buffer views at the end of the list. The
- * `size` bytes of `chunk` (NULL: none) stay at the front if a buffer uses them. Data URIs, other addresses, files that
- * are not in the scene and images of unknown type are unchanged. `*made` is the new chunk of `*made_size` bytes, freed
- * by the caller with qmat_free; NULL if nothing was embedded. QMAT_ERROR_MEMORY. Linear. */
+/* Copies the files of `scene` and the data URIs that buffers and images refer to into the binary chunk of a GLB. In
+ * `root`, the asset's JSON, all embedded buffers merge into the first buffer; embedded images get buffer views at the
+ * end of the list. The `size` bytes of `chunk` (NULL: none) stay at the front if a buffer uses them. Other addresses,
+ * files that are not in the scene, invalid base64 and images of unknown type are unchanged. `*made` is the new chunk of
+ * `*made_size` bytes, freed by the caller with qmat_free; NULL if nothing was embedded. QMAT_ERROR_MEMORY. Linear. */
 qmat_status qmat_gltf_embed(qmat_context *context, const qmat_scene *scene, json_t *root, const uint8_t *chunk,
                             size_t size, uint8_t **made, size_t *made_size);
 

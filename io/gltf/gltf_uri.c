@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/arena.h"
+#include "io/base64.h"
 #include "io/bytes.h"
 
 static int hex_digit(char c) {
@@ -112,6 +113,18 @@ char *qmat_gltf_beside(const char *asset, const char *name) {
   if (slash) qmat_put_bytes(&writer, asset, (size_t)(slash - asset) + 1);
   qmat_put_text(&writer, name);
   return take_text(&writer);
+}
+
+qmat_status qmat_gltf_decode_uri(qmat_context *context, const char *uri, size_t length, uint8_t **bytes, size_t *size) {
+  static const char mark[] = ";base64";
+  const size_t mark_length = sizeof mark - 1;
+  const char *comma = memchr(uri, ',', length);
+  *bytes = NULL;
+  *size = 0;
+  if (strncmp(uri, "data:", 5) != 0 || !comma || (size_t)(comma - uri) < 5 + mark_length ||
+      memcmp(comma - mark_length, mark, mark_length) != 0)
+    return QMAT_OK;
+  return qmat_base64_decode(context, comma + 1, length - (size_t)(comma + 1 - uri), bytes, size);
 }
 
 static bool is_uri(const char *key) {

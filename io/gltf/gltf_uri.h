@@ -27,6 +27,10 @@ char *qmat_gltf_uri_of(const char *name);
 /* The path of file `name` in the folder of the file `asset`. NULL when out of memory; free it with qmat_free. */
 char *qmat_gltf_beside(const char *asset, const char *name);
 
+/* Decodes a data URI of `length` characters. `*bytes` (free it with qmat_free) gets `*size` bytes; NULL if it is no
+ * data URI in base64. QMAT_ERROR_FORMAT for invalid base64, QMAT_ERROR_MEMORY. Linear. */
+qmat_status qmat_gltf_decode_uri(qmat_context *context, const char *uri, size_t length, uint8_t **bytes, size_t *size);
+
 typedef enum qmat_gltf_uri_kind { QMAT_GLTF_BUFFER_URI, QMAT_GLTF_IMAGE_URI, QMAT_GLTF_OTHER_URI } qmat_gltf_uri_kind;
 
 /* Receives the URI string `owner[key]`. It may set that member and no other. */

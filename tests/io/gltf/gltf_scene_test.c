@@ -409,11 +409,13 @@ static void test_a_long_name_of_a_missing_file_is_told_in_whole_characters(void 
   qmat_context_uninit(&context);
 }
 
-/* A buffer in a data URI comes first, the box in a file, one image twice, and one that is no image. */
+/* A buffer in a data URI comes first, the box in a file, one image twice, one in a data URI, and two that are no image.
+ */
 static const char outside_text[] =
     "{'asset':{'version':'2.0'},'scene':0,'scenes':[{'nodes':[0]}],'nodes':[{'mesh':0}],"
     "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
-    "'images':[{'uri':'a%20b.png'},{'uri':'./a%20b.png','name':'twin'},{'uri':'../SECRET'},{'uri':'odd.png'}],"
+    "'images':[{'uri':'a%20b.png'},{'uri':'./a%20b.png','name':'twin'},{'uri':'../SECRET'},{'uri':'odd.png'},"
+    "{'uri':'data:image/png;base64,iVBORw0KGgo='},{'uri':'data:image/png;base64,?'}],"
     "'accessors':[{'bufferView':1,'componentType':5126,'count':8,'type':'VEC3'},"
     "{'bufferView':2,'componentType':5123,'count':36,'type':'SCALAR'}],"
     "'bufferViews':[{'buffer':0,'byteLength':4},{'buffer':1,'byteOffset':0,'byteLength':96},"
@@ -465,18 +467,19 @@ static void test_a_glb_takes_in_buffers_and_images_and_renumbers_them(void **sta
   assert_string_equal(file->parts[1].name, "odd.png");
   qmat_gltf_asset after = open_part(&file->parts[0]);
   const json_t *buffers = json_object_get(after.root, "buffers");
-  assert_int_equal(json_array_size(buffers), 2);
+  assert_int_equal(json_array_size(buffers), 1);
   assert_null(json_object_get(json_array_get(buffers, 0), "uri"));
-  assert_string_equal(json_string_value(json_object_get(json_array_get(buffers, 0), "name")), "box");
-  assert_non_null(json_object_get(json_array_get(buffers, 1), "uri"));
-  assert_int_equal(number_at(after.root, "bufferViews", 0, "buffer"), 1);
+  assert_int_equal(number_at(after.root, "bufferViews", 0, "byteOffset"), 0);
   assert_int_equal(number_at(after.root, "bufferViews", 1, "buffer"), 0);
+  assert_int_equal(number_at(after.root, "bufferViews", 1, "byteOffset"), 4);
+  assert_int_equal(number_at(after.root, "bufferViews", 2, "byteOffset"), 4 + 96);
   const json_t *packed = json_object_get(
       json_object_get(json_array_get(json_object_get(after.root, "bufferViews"), 2), "extensions"), "ACME_packed");
   assert_int_equal(json_integer_value(json_object_get(packed, "buffer")), 0);
-  assert_int_equal(json_integer_value(json_object_get(packed, "byteOffset")), 4);
+  assert_int_equal(json_integer_value(json_object_get(packed, "byteOffset")), 4 + 4);
   assert_int_equal(after.chunk_size, number_at(after.root, "buffers", 0, "byteLength"));
-  assert_memory_equal(after.chunk, data.bytes, 168);
+  assert_memory_equal(after.chunk, "\0\0\0\0", 4);
+  assert_memory_equal(after.chunk + 4, data.bytes, 168);
   const size_t view = (size_t)number_at(after.root, "images", 0, "bufferView");
   assert_int_equal(number_at(after.root, "images", 1, "bufferView"), view);
   assert_memory_equal(after.chunk + number_at(after.root, "bufferViews", view, "byteOffset"), png, sizeof png - 1);
@@ -484,6 +487,11 @@ static void test_a_glb_takes_in_buffers_and_images_and_renumbers_them(void **sta
   assert_string_equal(json_string_value(json_object_get(image, "mimeType")), "image/png");
   assert_string_equal(json_string_value(json_object_get(image, "name")), "twin");
   assert_null(json_object_get(image, "uri"));
+  const size_t data_view = (size_t)number_at(after.root, "images", 4, "bufferView");
+  assert_memory_equal(after.chunk + number_at(after.root, "bufferViews", data_view, "byteOffset"), png, 8);
+  assert_int_equal(number_at(after.root, "bufferViews", data_view, "byteLength"), 8);
+  assert_null(json_object_get(json_array_get(json_object_get(after.root, "images"), 4), "uri"));
+  assert_non_null(json_object_get(json_array_get(json_object_get(after.root, "images"), 5), "uri")); /* no base64 */
 
   /* The same surface is read from it, alone in another place. */
   qmat_soup soup = {0};
