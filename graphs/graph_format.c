@@ -5,6 +5,7 @@
 #include <yaml.h>
 
 #include "graphs/yaml_tree.h"
+#include "io/scanner.h"
 
 /* libyaml's tokens say where each name, value and brace stands. Comments and line breaks are what is between them. */
 typedef struct token {
@@ -427,7 +428,8 @@ static bool says_the_same(qmat_context *context, const char *file, const qmat_tr
 qmat_status qmat_graph_format(qmat_context *context, const char *file, const char *text, size_t size,
                               qmat_writer *formatted) {
   *formatted = (qmat_writer){0};
-  if (size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) text += 3, size -= 3; /* UTF-8's mark */
+  const size_t mark = qmat_byte_order_mark(text, size);
+  text += mark, size -= mark;
   qmat_arena arena = {0};
   const qmat_tree *tree;
   qmat_status status = qmat_tree_read(context, &arena, file, text, size, &tree);

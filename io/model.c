@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "io/gltf/gltf.h"
 #include "io/gltf/gltf_asset.h"
@@ -89,7 +90,7 @@ qmat_format qmat_format_of_bytes(const qmat_bytes *bytes) {
   const char *word = qmat_scan_token(&scanner, &length);
   if (length == 0) return QMAT_FORMAT_UNKNOWN;
   if (word[0] == '{') return QMAT_FORMAT_GLTF;
-  if (length >= 3 && length <= 8 && qmat_is_word(word + length - 3, 3, "OFF")) return QMAT_FORMAT_OFF;
+  if (length >= 3 && length <= 8 && strncasecmp(word + length - 3, "OFF", 3) == 0) return QMAT_FORMAT_OFF;
   if (qmat_is_word(word, length, "ply")) return QMAT_FORMAT_PLY;
   if (qmat_is_word(word, length, "solid")) return QMAT_FORMAT_STL;
   static const char *const obj_words[] = {"v", "vn", "vt", "vp", "f", "o", "g", "s", "mtllib", "usemtl"};

@@ -103,16 +103,21 @@ const char *qmat_scan_double(const char *text, const char *end, double *number) 
   return at;
 }
 
+size_t qmat_byte_order_mark(const void *bytes, size_t size) {
+  static const char mark[] = "\xEF\xBB\xBF";
+  const size_t length = sizeof mark - 1;
+  return size >= length && memcmp(bytes, mark, length) == 0 ? length : 0;
+}
+
 void qmat_scanner_init(qmat_scanner *scanner, qmat_context *context, const char *file, const char *text, size_t size,
                        char comment) {
   *scanner = (qmat_scanner){.context = context,
                             .file = file,
-                            .at = text,
+                            .at = text + qmat_byte_order_mark(text, size),
                             .end = text + size,
                             .line_start = text,
                             .line = 1,
                             .comment = comment};
-  if (size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0) scanner->at += 3;
 }
 
 /* The length of the line end at `at`: 0, 1 or 2. */

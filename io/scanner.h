@@ -15,6 +15,9 @@
  * after it, or NULL when `text` starts with no number. `*end` must be readable and a zero byte. */
 const char *qmat_scan_double(const char *text, const char *end, double *number);
 
+/* The length of the UTF-8 byte order mark that `size` bytes start with: 3, or 0 for none. */
+size_t qmat_byte_order_mark(const void *bytes, size_t size);
+
 /* Walks through text as blank-separated tokens and counts lines. Blanks are space, tab, line feed, carriage return,
  * vertical tab and form feed; "\n", "\r\n" and a lone "\r" end a line. */
 typedef struct qmat_scanner {

@@ -12,6 +12,7 @@
 #include "graphs/run/run_paths.h"
 #include "io/bytes.h"
 #include "io/model.h"
+#include "io/scanner.h"
 
 enum { MOST_FOLDERS = 64 }; /* in each other; a link may lead back */
 
@@ -146,13 +147,14 @@ static qmat_status add_argument(finder *f, const char *argument) {
   return qmat_fail_at(f->context, argument, 0, 0);
 }
 
-/* Adds the files of a list, whose paths are relative to its folder. */
+/* Adds the files of a list, whose paths are relative to its folder. Lines that start with # are comments. */
 static qmat_status read_list(finder *f, const char *path) {
   qmat_bytes bytes = {0};
   qmat_status status = qmat_bytes_read_file(f->context, path, &bytes);
-  const char *line = (const char *)bytes.data;
+  const char *line = (const char *)bytes.data, *const end = line + bytes.size;
   const size_t before = f->batch->count;
-  for (const char *end = line + bytes.size; status == QMAT_OK && line < end;) {
+  line += qmat_byte_order_mark(line, bytes.size);
+  while (status == QMAT_OK && line < end) {
     const size_t length = strcspn(line, "\r\n");
     char model[4096];
     if (memchr(line, 0, length + 1) && line + length < end) {

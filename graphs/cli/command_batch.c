@@ -510,7 +510,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 }
 
 static const qmat_option options[] = {
-    {"inputs", 'i', "GLOB|LIST", "More models: a folder, a quoted pattern, or a file with one path a line"},
+    {"inputs", 'i', "GLOB|LIST",
+     "More models: a folder, a quoted pattern, or a file with one path a line (# starts a comment)"},
     {"out", 'o', "DIR", "Folder of the results, which get the models' names; made if it is missing"},
     {"format", 'f', "ENDING", "Format of the results; default the graph's; may be repeated"},
     {"pages", 0, NULL, "Also save a page and a picture of each model, and DIR/index.html with all of them"},

@@ -8,6 +8,7 @@
 
 #include "core/arena.h"
 #include "core/json_text.h"
+#include "io/scanner.h"
 
 /* ---- the container ---- */
 
@@ -79,7 +80,8 @@ qmat_status qmat_gltf_asset_init(qmat_context *context, const uint8_t *bytes, si
   json_error_t error;
   const qmat_status status = open_container(context, bytes, size, path, asset, &text, &length);
   if (status != QMAT_OK) return status;
-  asset->root = json_loadb(text, length, JSON_REJECT_DUPLICATES | JSON_ALLOW_NUL, &error);
+  const size_t mark = qmat_byte_order_mark(text, length);
+  asset->root = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES | JSON_ALLOW_NUL, &error);
   if (!asset->root && json_error_code(&error) == json_error_out_of_memory) {
     qmat_fail_memory(context, "a glTF asset");
     return qmat_fail_at(context, path, 0, 0);

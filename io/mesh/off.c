@@ -1,21 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <string.h>
+#include <strings.h>
 
 #include "io/mesh/mesh_formats.h"
 #include "io/scanner.h"
 
-/* Reads the keyword [ST][C][N][4][n]OFF. A file without a keyword starts with its counts. In files of ModelNet the
- * first count follows OFF without a blank. */
+/* Reads the keyword [ST][C][N][4][n]OFF; some writers write "off". A file without a keyword starts with its counts. In
+ * files of ModelNet the first count follows OFF without a blank. */
 static qmat_status read_keyword(qmat_scanner *scanner) {
   size_t length;
   if (!qmat_scan_find(scanner)) return qmat_scan_expected(scanner, "'OFF'");
   const qmat_scanner start = *scanner;
   const char *token = qmat_scan_token(scanner, &length);
-  if (length > 3 && memcmp(token, "OFF", 3) == 0 && token[3] >= '0' && token[3] <= '9') {
+  if (length > 3 && strncasecmp(token, "OFF", 3) == 0 && token[3] >= '0' && token[3] <= '9') {
     scanner->at = token + 3;
     return QMAT_OK;
   }
-  if (length < 3 || memcmp(token + length - 3, "OFF", 3) != 0) {
+  if (length < 3 || strncasecmp(token + length - 3, "OFF", 3) != 0) {
     *scanner = start;
     return token[0] >= '0' && token[0] <= '9' ? QMAT_OK : qmat_scan_expected(scanner, "'OFF'");
   }

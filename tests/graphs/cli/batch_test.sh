@@ -133,7 +133,7 @@ timeout 100 "$qmat" run pages.yaml --set model=models/box1.off -o alone.png --no
 holds "a picture alone makes nothing else" sh -c 'grep -q report.picture alone.json && ! grep -q "scene.write\|report.page" alone.json'
 
 # A list, relative to its folder.
-printf '# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
+printf '\357\273\277# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
 batch --inputs models/list.txt --out listed --quiet
 holds "a list" test "$code" -eq 0 -a "$(ls listed | wc -l)" -eq 2
 holds "quiet" test ! -s out.txt -a ! -s err.txt

@@ -738,6 +738,12 @@ static void test_damaged_json_is_placed_by_line(void **state) {
   assert_int_equal(r.context.error.line, 3);
   assert_string_equal(r.context.error.file, "test.gltf");
   done(&r);
+  const char *marked = "\xEF\xBB\xBF{}"; /* a byte order mark is no damage */
+  r = (reading){.report = json_object()};
+  assert_int_equal(qmat_gltf_parse(&r.context, (const uint8_t *)marked, strlen(marked), "test.gltf", &r.soup, r.report),
+                   QMAT_ERROR_FORMAT);
+  assert_non_null(strstr(r.context.error.message, "asset"));
+  done(&r);
 }
 
 /* ---- truncation and noise ---- */

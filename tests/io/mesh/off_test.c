@@ -43,17 +43,10 @@ static void test_vertices_facets_and_their_lines_are_read(void **state) {
 static void test_every_way_of_writing_the_header_gives_the_same(void **state) {
   (void)state;
   static const char body[] = "0 0 0\n1.5 0 0\n0 1 0\n0 0 -0.25\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3";
-  static const char *const headers[] = {"OFF 4 4 6\n",
-                                        "OFF4 4 6\n",
-                                        "OFF\n4 4 0\n",
-                                        "OFF\n4 4\n",
-                                        "4 4 6\n",
-                                        "OFF\r\n4 4 6\r\n",
-                                        "# c\n\nOFF\n# c\n4\n4\n",
-                                        "COFF\n4 4 6\n",
-                                        "STCNOFF 4 4 6\n",
-                                        "OFF\r4 4 6\r",
-                                        "\xEF\xBB\xBFOFF\n4 4 6\n"};
+  static const char *const headers[] = {
+      "OFF 4 4 6\n",   "OFF4 4 6\n",      "OFF\n4 4 0\n",     "OFF\n4 4\n",
+      "4 4 6\n",       "off\n4 4 6\n",    "OFF\r\n4 4 6\r\n", "# c\n\nOFF\n# c\n4\n4\n",
+      "COFF\n4 4 6\n", "STCNOFF 4 4 6\n", "OFF\r4 4 6\r",     "\xEF\xBB\xBFOFF\n4 4 6\n"};
   for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
     char text[256];
     snprintf(text, sizeof text, "%s%s", headers[i], body);
