@@ -24,6 +24,7 @@ static const qmat_value_row scene_rows[] = {SCALAR(qmat_scene, name, TEXT),
                                             ARRAY(qmat_scene, placed, U32, placement_count, 1),
                                             ARRAY(qmat_scene, placements, F64, placement_count, 16),
                                             ARRAY(qmat_scene, placement_paths, NAMES, placement_count, 1),
+                                            ARRAY(qmat_scene, placement_bodies, U32, placement_count, 1),
                                             SCALAR(qmat_scene, has_instances, BOOL),
                                             ARRAY(qmat_scene, rig.skeleton_paths, NAMES, rig.skeleton_count, 1),
                                             ARRAY(qmat_scene, rig.skeleton_placements, F64, rig.skeleton_count, 16),
@@ -142,6 +143,8 @@ static qmat_status check_scene(qmat_context *context, const qmat_value *value) {
     of_rows = qmat_check_finite(context, scene->placements, scene->placement_count, 16, "placement", "transform");
   for (size_t i = 0; i < scene->placement_count && of_rows == QMAT_OK; i++)
     of_rows = qmat_check_utf8(context, scene->placement_paths[i], "path of a mesh");
+  if (of_rows == QMAT_OK)
+    of_rows = qmat_check_ids(context, scene->placement_bodies, scene->placement_count, 2, "placement", 1, "body");
   if (of_rows == QMAT_OK) of_rows = check_rig(context, scene);
   return of_rows != QMAT_OK ? of_rows : qmat_check_parts(context, scene->parts, scene->part_count);
 }

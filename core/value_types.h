@@ -67,8 +67,11 @@ typedef struct qmat_scene {
   uint32_t *placed;       /* placement_count: a mesh, from 0 to mesh_count - 1 */
   double *placements;     /* 16 * placement_count: from the mesh's space into the scene's, p' = (p, 1) * m by rows */
   char **placement_paths; /* placement_count: of the prim with the mesh */
-  bool has_instances;     /* prims are marked as instanceable: the prims below them take no opinions */
-  qmat_rig rig;           /* of a USD scene */
+  /* placement_count: 1 where the scene itself says whether the prim moves: it or one above it is a rigid body, or it is
+   * a collider; else 0. */
+  uint32_t *placement_bodies;
+  bool has_instances; /* prims are marked as instanceable: the prims below them take no opinions */
+  qmat_rig rig;       /* of a USD scene */
 } qmat_scene;
 
 /* A triangle mesh. Corner k of triangle t is triangles[3 * t + k]. The first triangles bound solids; the last ones may

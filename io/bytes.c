@@ -156,6 +156,10 @@ void qmat_put_text(qmat_writer *writer, const char *text) {
   qmat_put_bytes(writer, text, strlen(text));
 }
 
+void qmat_put_indent(qmat_writer *writer, size_t depth) {
+  for (size_t i = 0; i < depth; i++) qmat_put_text(writer, "    ");
+}
+
 void qmat_put_integer(qmat_writer *writer, int64_t number) {
   char text[24];
   size_t at = sizeof text;

@@ -68,6 +68,8 @@ typedef struct qmat_writer {
 
 void qmat_put_bytes(qmat_writer *writer, const void *bytes, size_t size);
 void qmat_put_text(qmat_writer *writer, const char *text);
+/* Four blanks for each level. */
+void qmat_put_indent(qmat_writer *writer, size_t depth);
 /* The shortest text that reads back as the same number; "nan", "inf" and "-inf". */
 void qmat_put_number(qmat_writer *writer, double number);
 void qmat_put_integer(qmat_writer *writer, int64_t number);

@@ -60,3 +60,26 @@ void qmat_principal_inertia(const double body[10], double moments[3], double rot
   for (int k = 0; k < 3; k++) moments[k] = a[k][k];
   qmat_placement_quaternion(axes, rotation); /* Jacobi rotations keep the determinant 1 */
 }
+
+void qmat_placed_body(const double body[10], double linear[3][3], double rotation[3][3], double scale,
+                      double made[10]) {
+  static const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  const double share = scale > 0 ? fabs(qmat_determinant(linear)) / (scale * scale * scale) : 1;
+  const double half = 0.5 * (body[4] + body[5] + body[6]);
+  double stretch[3][3], moments[3][3], turned[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) turned[i][j] = rotation[j][i];
+  qmat_multiply(turned, linear, stretch);
+  for (int m = 0; m < 6; m++) {
+    const int i = pairs[m][0], j = pairs[m][1];
+    moments[i][j] = moments[j][i] = share * ((m < 3 ? half : 0) - body[4 + m]);
+  }
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) turned[i][j] = stretch[j][i];
+  qmat_multiply(stretch, moments, moments);
+  qmat_multiply(moments, turned, moments);
+  made[0] = share * body[0];
+  for (int k = 1; k < 4; k++) made[k] = body[k];
+  const double trace = moments[0][0] + moments[1][1] + moments[2][2];
+  for (int m = 0; m < 6; m++) made[4 + m] = (m < 3 ? trace : 0) - moments[pairs[m][0]][pairs[m][1]];
+}

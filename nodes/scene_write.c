@@ -216,6 +216,7 @@ static qmat_usd_options usd_options_of(const scene_write_params *params, const q
       .meters_per_unit = scene ? scene->meters_per_unit : 0,
       .is_z_up = scene && scene->is_z_up,
       .moved = storage_of(&errors),
+      .dynamic = !params->fixed,
       .errors = errors,
       .stated = stated,
   };
@@ -248,6 +249,8 @@ static qmat_status write_layer(qmat_context *context, const scene_write_params *
                                   &stated[i]),
     };
     additions[i].options.prim = first_path(scene, i);
+    if (!is_skinned(scene, i))
+      additions[i].options.colliders = (const qmat_colliders *)qmat_shown_given(inputs[IN_COLLIDERS], i);
   }
   const qmat_status status = qmat_usd_write_layer(context, scene, additions, count, file);
   qmat_free(additions);
@@ -409,7 +412,8 @@ static qmat_status find_moved(qmat_context *context, const qmat_scene *scene, bo
   return status;
 }
 
-/* Warns of places and units that are not the scene's, and of colliders that a layer over a USD scene leaves out. */
+/* Warns of places and units that are not the scene's, and of colliders that a layer over a USD scene leaves out, since
+ * no prim in it moves with a joint. */
 static qmat_status add_warnings(qmat_context *context, const scene_write_params *params,
                                 const qmat_value *const inputs[], double own, json_t *report) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
@@ -428,11 +432,14 @@ static qmat_status add_warnings(qmat_context *context, const scene_write_params 
                                  "the .%s file is in the mesh's own units of %.4g m, not in the scene's of %.4g m: a "
                                  "run that saves no glTF or USD scene, or has model.mesh=merged, uses the scene's",
                                  format, own, scene->meters_per_unit);
+  size_t skinned = 0;
   if (inputs[IN_COLLIDERS] && is_usd(params) && keeps_scene(params, scene))
+    for (size_t i = 0; i < scene->mesh_count; i++) skinned += is_skinned(scene, i);
+  if (skinned > 0)
     bad |= qmat_json_add_warning(report,
-                                 "the .%s file, a layer over the scene, holds no colliders: save them as glTF, or use "
-                                 "model.mesh=merged",
-                                 format);
+                                 "the .%s file holds no colliders of %zu meshes that move with joints: save them as "
+                                 "glTF, or use model.mesh=merged",
+                                 format, skinned);
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
@@ -524,7 +531,7 @@ static const qmat_param params[] = {
     QMAT_BOOL(scene_write_params, unreal_hulls, "Write hulls of colliders as meshes named UCX_name_01 (glb, gltf)"),
     QMAT_BOOL(scene_write_params, godot_hulls,
               "Write hulls of colliders as meshes named name_01-convcolonly (glb, gltf)"),
-    QMAT_BOOL(scene_write_params, fixed, "Bodies with colliders do not move: they get no mass (glb, gltf)"),
+    QMAT_BOOL(scene_write_params, fixed, "Bodies with colliders do not move: they get no mass (glb, gltf, USD)"),
     {0},
 };
 

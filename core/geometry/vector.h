@@ -25,6 +25,19 @@ static inline void qmat_cross(const double a[3], const double b[3], double out[3
   out[1] = a[2] * b[0] - a[0] * b[2];
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
+/* The product of two matrices, row by row; `product` may be one of them. */
+static inline void qmat_multiply(double a[3][3], double b[3][3], double product[3][3]) {
+  double made[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) made[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) product[i][j] = made[i][j];
+}
+static inline double qmat_determinant(double a[3][3]) {
+  double cross[3];
+  qmat_cross(a[1], a[2], cross);
+  return qmat_dot(a[0], cross);
+}
 /* Scales a vector to length 1; its length must not be 0. */
 static inline void qmat_normalize(double v[3]) {
   const double length = sqrt(qmat_dot(v, v));

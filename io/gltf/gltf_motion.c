@@ -20,19 +20,6 @@ static double number_at(const json_t *numbers, size_t i) {
   return json_number_value(json_array_get(numbers, i));
 }
 
-static void multiply(double a[3][3], double b[3][3], double product[3][3]) {
-  double made[3][3];
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) made[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
-  memcpy(product, made, sizeof made);
-}
-
-static double determinant(double a[3][3]) {
-  double cross[3];
-  qmat_cross(a[1], a[2], cross);
-  return qmat_dot(a[0], cross);
-}
-
 static turn turn_of_matrix(const json_t *m) {
   turn t;
   double lengths[3];
@@ -42,7 +29,7 @@ static turn turn_of_matrix(const json_t *m) {
     for (size_t r = 0; r < 3; r++) lengths[c] += t.linear[r][c] * t.linear[r][c];
     lengths[c] = sqrt(lengths[c]);
   }
-  if (determinant(t.linear) < 0) lengths[0] = -lengths[0]; /* a mirror, which is no rotation */
+  if (qmat_determinant(t.linear) < 0) lengths[0] = -lengths[0]; /* a mirror, which is no rotation */
   for (size_t c = 0; c < 3; c++)
     for (size_t r = 0; r < 3; r++) t.rotation[r][c] = lengths[c] != 0 ? t.linear[r][c] / lengths[c] : r == c;
   return t;
@@ -63,50 +50,25 @@ static turn turn_of_node(const json_t *node) {
   return t;
 }
 
-/* From the node's space to that of the body, which has the node's rotation in the world and its lengths in metres.
- * Checked nodes form trees. */
-static void stretch_of(const json_t *root, size_t node, double stretch[3][3]) {
+/* From the node's space to the world. Checked nodes form trees. */
+static turn turn_in_world(const json_t *root, size_t node) {
   const json_t *nodes = json_object_get(root, "nodes");
   turn world = {.linear = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at)) {
     turn t = turn_of_node(json_array_get(nodes, at));
-    multiply(t.linear, world.linear, world.linear);
-    multiply(t.rotation, world.rotation, world.rotation);
+    qmat_multiply(t.linear, world.linear, world.linear);
+    qmat_multiply(t.rotation, world.rotation, world.rotation);
   }
-  double back[3][3];
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) back[i][j] = world.rotation[j][i];
-  multiply(back, world.linear, stretch);
-}
-
-/* The mass and the inertia of a stretched body: of body[] those of qmat_colliders. Stretching multiplies the second
- * moments of the mass, of which the inertia is the trace less themselves. */
-static void stretch_body(const double body[10], double stretch[3][3], double share, double made[10]) {
-  static const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-  const double half = 0.5 * (body[4] + body[5] + body[6]);
-  double moments[3][3], turned[3][3];
-  for (int m = 0; m < 6; m++) {
-    const int i = pairs[m][0], j = pairs[m][1];
-    moments[i][j] = moments[j][i] = share * ((m < 3 ? half : 0) - body[4 + m]);
-  }
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) turned[i][j] = stretch[j][i];
-  multiply(stretch, moments, moments);
-  multiply(moments, turned, moments);
-  memcpy(made, body, 10 * sizeof *made);
-  made[0] *= share;
-  const double trace = moments[0][0] + moments[1][1] + moments[2][2];
-  for (int m = 0; m < 6; m++) made[4 + m] = (m < 3 ? trace : 0) - moments[pairs[m][0]][pairs[m][1]];
+  return world;
 }
 
 json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_colliders *colliders, const double shift[3],
                             double meters) {
   json_t *motion = json_object();
   if (!motion || colliders->body_count == 0) return motion;
-  double stretch[3][3], body[10], moments[3], q[4];
-  stretch_of(root, node, stretch);
-  const double volume = fabs(determinant(stretch));
-  stretch_body(colliders->body, stretch, meters > 0 ? volume / (meters * meters * meters) : 1, body);
+  double body[10], moments[3], q[4];
+  turn world = turn_in_world(root, node);
+  qmat_placed_body(colliders->body, world.linear, world.rotation, meters, body);
   qmat_principal_inertia(body, moments, q);
   const bool done =
       qmat_gltf_set(motion, "mass", json_real(body[0])) &&

@@ -25,22 +25,30 @@ static void put_attribute(qmat_writer *writer, const char *declaration, double n
   qmat_put_text(writer, "\n");
 }
 
-void qmat_usd_put_body_schemas(qmat_writer *writer) {
-  qmat_put_text(writer, "    prepend apiSchemas = [\"PhysicsRigidBodyAPI\", \"PhysicsMassAPI\"]\n");
+void qmat_usd_put_body_schemas(qmat_writer *writer, size_t depth) {
+  qmat_put_indent(writer, depth);
+  qmat_put_text(writer, "prepend apiSchemas = [\"PhysicsRigidBodyAPI\", \"PhysicsMassAPI\"]\n");
 }
 
-void qmat_usd_put_body(qmat_writer *writer, const qmat_colliders *colliders, const double origin[3]) {
-  if (colliders->body_count == 0) return;
-  const double *body = colliders->body;
+void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double *body, const double origin[3],
+                       double kilograms) {
+  if (!body) return;
   double moments[3], rotation[4], centre[3];
   qmat_principal_inertia(body, moments, rotation);
+  for (int k = 0; k < 3; k++) moments[k] /= kilograms;
   qmat_subtract(&body[1], origin, centre);
-  put_attribute(writer, "\n    float physics:mass = ", body[0]);
-  qmat_put_text(writer, "    point3f physics:centerOfMass = ");
+  qmat_put_indent(writer, depth);
+  put_attribute(writer, "float physics:mass = ", body[0] / kilograms);
+  qmat_put_indent(writer, depth);
+  qmat_put_text(writer, "point3f physics:centerOfMass = ");
   put_tuple(writer, centre, 3);
-  qmat_put_text(writer, "\n    float3 physics:diagonalInertia = ");
+  qmat_put_text(writer, "\n");
+  qmat_put_indent(writer, depth);
+  qmat_put_text(writer, "float3 physics:diagonalInertia = ");
   put_tuple(writer, moments, 3);
-  qmat_put_text(writer, "\n    quatf physics:principalAxes = ");
+  qmat_put_text(writer, "\n");
+  qmat_put_indent(writer, depth);
+  qmat_put_text(writer, "quatf physics:principalAxes = ");
   put_rotation(writer, rotation);
   qmat_put_text(writer, "\n");
 }

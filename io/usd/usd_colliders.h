@@ -5,11 +5,16 @@
 #include "core/value.h"
 #include "io/bytes.h"
 
-/* Parts of a USD text layer, for the prim that becomes a rigid body: the metadata and the attributes of USD Physics
- * that make it one, and a child "colliders" with a Sphere, Capsule_1 or Mesh (approximated by its convex hull) for each
- * shape, of purpose "guide". Points are relative to `origin`. */
-void qmat_usd_put_body_schemas(qmat_writer *writer);
-void qmat_usd_put_body(qmat_writer *writer, const qmat_colliders *colliders, const double origin[3]);
+/* Parts of a USD text layer. Points are relative to `origin`. */
+
+/* The metadata of a prim that becomes a rigid body, indented by `depth` levels. */
+void qmat_usd_put_body_schemas(qmat_writer *writer, size_t depth);
+/* Its attributes for a body as qmat_colliders has them, the mass in units of `kilograms`; indented by `depth` levels.
+ * NULL: the mass is not known, and nothing is put. */
+void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double *body, const double origin[3], double kilograms);
+
+/* A child "colliders" of a root prim with a Sphere, Capsule_1 or Mesh (approximated by its convex hull) for each shape,
+ * of purpose "guide". */
 void qmat_usd_put_colliders(qmat_writer *writer, const qmat_colliders *colliders, const double origin[3]);
 
 #endif

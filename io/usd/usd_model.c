@@ -99,7 +99,9 @@ static qmat_status list_places(qmat_context *context, const qmat_usd_scene *from
   scene->placed = qmat_alloc(count, sizeof *scene->placed);
   scene->placements = qmat_alloc(count, 16 * sizeof *scene->placements);
   scene->placement_paths = qmat_calloc(count, sizeof *scene->placement_paths);
-  if (!scene->meshes || !scene->placed || !scene->placements || !scene->placement_paths) return fail_shortage(context);
+  scene->placement_bodies = qmat_alloc(count, sizeof *scene->placement_bodies);
+  if (!scene->meshes || !scene->placed || !scene->placements || !scene->placement_paths || !scene->placement_bodies)
+    return fail_shortage(context);
   memcpy(scene->meshes, meshes->ids, meshes->count * sizeof *scene->meshes);
   scene->mesh_count = meshes->count;
   for (size_t i = 0; i < from->placement_count; i++) {
@@ -107,6 +109,7 @@ static qmat_status list_places(qmat_context *context, const qmat_usd_scene *from
     if (!chosen[placement->mesh]) continue;
     const size_t at = scene->placement_count++;
     scene->placed[at] = items[placement->mesh];
+    scene->placement_bodies[at] = placement->states_body;
     memcpy(scene->placements + 16 * at, placement->world.m, sizeof placement->world.m);
     scene->placement_paths[at] = shown_copy(placement->path);
     if (!scene->placement_paths[at]) return fail_shortage(context);

@@ -221,6 +221,25 @@ qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, con
   return status;
 }
 
+static bool holds_text(const qmat_usd_value *list, const char *text) {
+  for (size_t i = 0; qmat_usd_is_text(list->type) && i < list->count; i++)
+    if (strcmp(list->texts[i], text) == 0) return true;
+  return false;
+}
+
+bool qmat_usd_prim_has_schema(const qmat_usd_prim *prim, const char *name) {
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_value *value = qmat_usd_field_value(prim->opinions[i].spec, "apiSchemas");
+    if (!value || value->type != QMAT_USD_LIST_OP) continue;
+    const qmat_usd_list_op *op = value->list_op;
+    static const qmat_usd_edit givers[] = {QMAT_USD_EXPLICIT, QMAT_USD_ADDED, QMAT_USD_PREPENDED, QMAT_USD_APPENDED};
+    for (size_t k = 0; k < sizeof givers / sizeof *givers; k++)
+      if (holds_text(&op->lists[givers[k]], name)) return true;
+    if (op->is_explicit || holds_text(&op->lists[QMAT_USD_DELETED], name)) return false; /* weaker ones do not count */
+  }
+  return false;
+}
+
 bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name) {
   for (size_t i = 0; i < prim->opinion_count; i++) {
     if (qmat_usd_child(prim->opinions[i].layer, prim->opinions[i].spec, QMAT_USD_RELATIONSHIP, name)) return true;

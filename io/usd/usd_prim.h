@@ -95,6 +95,9 @@ const qmat_usd_value *qmat_usd_prim_metadata(const qmat_usd_prim *prim, const ch
  */
 qmat_status qmat_usd_prim_token(const qmat_usd_prim *prim, const char *name, const char *otherwise, const char **token);
 
+/* Whether an API schema of this name is applied to the prim. */
+bool qmat_usd_prim_has_schema(const qmat_usd_prim *prim, const char *name);
+
 /* Whether any opinion has a relationship of this name. */
 bool qmat_usd_prim_has_relationship(const qmat_usd_prim *prim, const char *name);
 

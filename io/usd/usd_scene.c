@@ -21,6 +21,7 @@ typedef struct inherited {
   const char *purpose; /* "default" when no prim above has one */
   int instancers;      /* above it */
   bool is_prototype;   /* it is itself the prototype of an instancer */
+  bool is_body;        /* it or a prim above it is a rigid body */
 } inherited;
 
 typedef struct reader {
@@ -89,7 +90,11 @@ static qmat_status add_placement(const reader *r, const qmat_usd_prim *prim, con
 static qmat_status place_mesh(const reader *r, const qmat_usd_prim *prim, uint32_t mesh, uint32_t skin,
                               const inherited *state) {
   const qmat_usd_placement placement = {
-      .mesh = mesh, .world = state->world, .skin = skin, .path = qmat_usd_prim_path(prim, &r->scene->arena)};
+      .mesh = mesh,
+      .world = state->world,
+      .skin = skin,
+      .states_body = state->is_body || qmat_usd_prim_has_schema(prim, "PhysicsCollisionAPI"),
+      .path = qmat_usd_prim_path(prim, &r->scene->arena)};
   return placement.path ? add_placement(r, prim, &placement) : qmat_usd_fail_prim_memory(prim);
 }
 
@@ -276,6 +281,7 @@ static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherite
   const inherited own = {.world = qmat_usd_identity(),
                          .purpose = state->purpose,
                          .instancers = state->instancers + 1,
+                         .is_body = state->is_body,
                          .is_prototype = true};
   prototype p = {.r = r, .state = &own};
   for (size_t i = 0; i < instancer.prototype_count && status == QMAT_OK; i++) {
@@ -297,6 +303,7 @@ static qmat_status read_prim(reader *r, qmat_usd_prim *prim, inherited state) {
   qmat_status status = find_skipped(r, prim, &state, &skipped);
   if (status != QMAT_OK || skipped) return status;
   state.is_prototype = false;
+  state.is_body = state.is_body || qmat_usd_prim_has_schema(prim, "PhysicsRigidBodyAPI");
   const char *type = qmat_usd_text(qmat_usd_prim_field(prim, "typeName"));
   if (!type) type = "";
   if (qmat_usd_truth(qmat_usd_prim_field(prim, "instanceable"), false)) r->scene->instances++;

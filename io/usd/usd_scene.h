@@ -12,6 +12,7 @@ typedef struct qmat_usd_placement {
   uint32_t mesh;
   qmat_usd_transform world; /* from the mesh's own space into that of the scene */
   uint32_t skin;            /* of the rig; UINT32_MAX: none */
+  bool states_body;         /* the prim or one above it is a rigid body, or the prim is a collider */
   const char *path;         /* of the prim with the mesh; for a point instance, of its prototype's prim */
 } qmat_usd_placement;
 

@@ -342,16 +342,20 @@ static void put_translation(qmat_writer *writer, const double origin[3]) {
 static void put_prim(qmat_writer *writer, const stored *s, const qmat_usd_options *options,
                      const qmat_stated_errors *stated, const char *specifier, const char *prim) {
   const qmat_medial *medial = &s->medial;
+  const bool is_body = options->colliders && options->dynamic && strcmp(specifier, "def") == 0;
   qmat_put_text(writer, specifier);
   qmat_put_text(writer, " Xform ");
   put_quoted(writer, prim);
   qmat_put_text(writer, " (\n");
-  if (options->colliders) qmat_usd_put_body_schemas(writer);
+  if (is_body) qmat_usd_put_body_schemas(writer, 1);
   put_custom_data(writer, s, options->name, options->prim, stated);
   if (!options->prim) qmat_put_text(writer, "    kind = \"component\"\n");
   qmat_put_text(writer, ")\n{");
   if (has_origin(s)) put_translation(writer, s->origin);
-  if (options->colliders) qmat_usd_put_body(writer, options->colliders, s->origin);
+  if (is_body && options->colliders->body_count > 0) {
+    qmat_put_text(writer, "\n");
+    qmat_usd_put_body(writer, 1, options->colliders->body, s->origin, 1);
+  }
   if (s->skin.triangle_count > 0) put_skin(writer, &s->skin);
   put_spheres(writer, medial);
   if (medial->edge_count > 0) put_cones(writer, medial);

@@ -17,7 +17,8 @@ typedef struct qmat_usd_options {
   bool is_z_up;                    /* else y is up */
   double moved;                    /* how far single precision may move the solid, model units; above zero */
   qmat_stated_errors errors;       /* of the medial mesh before it is stored */
-  const qmat_colliders *colliders; /* NULL: none; else the prim becomes a rigid body (io/usd/usd_colliders.h) */
+  const qmat_colliders *colliders; /* NULL: none (io/usd/usd_colliders.h) */
+  bool dynamic;                    /* the prim with colliders is a rigid body that moves */
   qmat_stated_errors *stated;      /* becomes the errors that the file states; may be NULL */
 } qmat_usd_options;
 
@@ -38,8 +39,8 @@ typedef struct qmat_usd_options {
 qmat_status qmat_usd_write(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                            const qmat_usd_options *options, qmat_file **file);
 
-/* Appends the same prim as a class named `prim`, with options->prim in its customData as qmat_prim. The locale's
- * decimal point must be that of C. Otherwise as above. */
+/* Appends the same prim as a class named `prim`, with options->prim in its customData as qmat_prim; it is no rigid
+ * body. The locale's decimal point must be that of C. Otherwise as above. */
 qmat_status qmat_usd_put_class(qmat_context *context, const qmat_medial *medial, const qmat_mesh *skin,
                                const qmat_usd_options *options, const char *prim, qmat_writer *writer);
 
@@ -57,6 +58,9 @@ typedef struct qmat_usd_addition {
  * `additions` has one element per mesh of the scene. With instances in the scene, the prims on the way are no longer
  * instanceable, which would hide the additions. Layer metadata that only a root layer may have are copied: the default
  * prim, units, axis and times.
+ *
+ * With colliders, the prims become rigid bodies, each with the mass and the inertia of its place, in the units of mass
+ * and length of the scene; not where a prim, or one above it, is a body already or is a collider (placement_bodies).
  *
  * A layer that is no package has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package
  * contains everything: the layer first, and the scene's files in the folder "original". options->form and name are

@@ -6,8 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
 #include "core/node.h"
+#include "io/collider_frames.h"
 #include "io/usd/usd_arcs.h"
+#include "io/usd/usd_colliders.h"
 #include "io/usd/usd_write.h"
 #include "io/usd/usda.h"
 #include "io/usd/usdc.h"
@@ -18,6 +21,7 @@
 typedef struct carrier {
   const char *path;
   uint32_t mesh;
+  size_t place; /* number in the scene's placements */
 } carrier;
 
 static qmat_status fail_shortage(qmat_context *context) {
@@ -32,10 +36,6 @@ static int compare_carriers(const void *a, const void *b) {
   const int first = *p == '/' ? 1 : *p, second = *q == '/' ? 1 : *q;
   if (first != second) return first - second;
   return (x->mesh > y->mesh) - (x->mesh < y->mesh);
-}
-
-static void put_indent(qmat_writer *writer, size_t depth) {
-  for (size_t i = 0; i < depth; i++) qmat_put_text(writer, "    ");
 }
 
 /* The number of names that two paths begin with. */
@@ -54,28 +54,54 @@ static size_t count_names(const char *path) {
   return count;
 }
 
-/* Opens the prims of a path behind its first `open` names. */
-static void open_prims(qmat_writer *writer, const char *path, size_t open, bool has_instances) {
+/* Opens the prims of a path behind its first `open` names. The last one becomes a rigid body where `is_body`. */
+static void open_prims(qmat_writer *writer, const char *path, size_t open, bool has_instances, bool is_body) {
   size_t depth = 0;
   while (*path) {
     const size_t length = strcspn(++path, "/");
     if (depth >= open) {
-      put_indent(writer, depth);
+      const bool makes_body = is_body && path[length] == '\0';
+      qmat_put_indent(writer, depth);
       qmat_put_text(writer, "over \"");
       qmat_put_bytes(writer, path, length);
-      qmat_put_text(writer, has_instances ? "\" (\n" : "\"\n");
+      qmat_put_text(writer, has_instances || makes_body ? "\" (\n" : "\"\n");
       if (has_instances) {
-        put_indent(writer, depth + 1);
+        qmat_put_indent(writer, depth + 1);
         qmat_put_text(writer, "instanceable = false\n");
-        put_indent(writer, depth);
+      }
+      if (makes_body) qmat_usd_put_body_schemas(writer, depth + 1);
+      if (has_instances || makes_body) {
+        qmat_put_indent(writer, depth);
         qmat_put_text(writer, ")\n");
       }
-      put_indent(writer, depth);
+      qmat_put_indent(writer, depth);
       qmat_put_text(writer, "{\n");
     }
     path += length;
     depth++;
   }
+}
+
+/* The attributes of a body at a place, in the scene's units. A transform may shear: the axes of the body are then those
+ * of its columns, made orthonormal in turn. */
+static void put_body(qmat_writer *writer, size_t depth, const qmat_scene *scene, size_t place,
+                     const qmat_usd_options *options, double kilograms) {
+  static const double origin[3] = {0, 0, 0};
+  const double *m = scene->placements + 16 * place;
+  double linear[3][3], axes[3][3], rotation[3][3], body[10];
+  if (options->colliders->body_count == 0) return;
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) linear[r][c] = axes[c][r] = m[4 * c + r];
+  qmat_normalize(axes[0]);
+  const double along = qmat_dot(axes[0], axes[1]);
+  for (int k = 0; k < 3; k++) axes[1][k] -= along * axes[0][k];
+  qmat_normalize(axes[1]);
+  qmat_cross(axes[0], axes[1], axes[2]);
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) rotation[r][c] = axes[c][r];
+  const double unit = scene->meters_per_unit > 0 ? scene->meters_per_unit : 1;
+  qmat_placed_body(options->colliders->body, linear, rotation, options->errors.meters_per_unit / unit, body);
+  qmat_usd_put_body(writer, depth, body, origin, kilograms);
 }
 
 /* Whether text can name a prim that a crate calls so. The name ends at a slash. */
@@ -121,19 +147,19 @@ static void choose_stem(const qmat_usd_spec *root, char stem[LONGEST_STEM + 1]) 
 /* Writes a prim that has only metadata. */
 static void put_empty_prim(qmat_writer *writer, size_t depth, const char *kind, const char *name,
                            const char *metadata) {
-  put_indent(writer, depth);
+  qmat_put_indent(writer, depth);
   qmat_put_text(writer, kind);
   qmat_put_text(writer, " \"");
   qmat_put_text(writer, name);
   qmat_put_text(writer, "\" (\n");
-  put_indent(writer, depth + 1);
+  qmat_put_indent(writer, depth + 1);
   qmat_put_text(writer, metadata);
   qmat_put_text(writer, "\n");
-  put_indent(writer, depth);
+  qmat_put_indent(writer, depth);
   qmat_put_text(writer, ")\n");
-  put_indent(writer, depth);
+  qmat_put_indent(writer, depth);
   qmat_put_text(writer, "{\n");
-  put_indent(writer, depth);
+  qmat_put_indent(writer, depth);
   qmat_put_text(writer, "}\n");
 }
 
@@ -158,26 +184,36 @@ static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, con
                              const qmat_usd_layer *original, const char *stem, qmat_writer *writer) {
   carrier *carriers = qmat_alloc(scene->placement_count, sizeof *carriers);
   if (!carriers) return fail_shortage(context);
-  size_t count = 0, open = 0;
+  const double kilograms = qmat_usd_number(qmat_usd_field_value(original->root, "kilogramsPerUnit"), 1);
+  size_t count = 0, open = 0,
+         body = SIZE_MAX; /* the depth of the open prim that is a body: one below is a part of it */
   for (size_t i = 0; i < scene->placement_count; i++)
     if (additions[scene->placed[i]].medial && has_valid_names(scene->placement_paths[i]))
-      carriers[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i]};
+      carriers[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i], .place = i};
   qsort(carriers, count, sizeof *carriers, compare_carriers);
   for (size_t i = 0; i < count; i++) {
     const char *path = carriers[i].path, *before = i > 0 ? carriers[i - 1].path : "";
     if (i > 0 && strcmp(path, before) == 0) continue; /* a prototype of several instances */
     const size_t shared = i > 0 ? common_names(path, before) : 0;
     while (open > shared) {
-      put_indent(writer, --open);
+      qmat_put_indent(writer, --open);
       qmat_put_text(writer, "}\n");
     }
-    open_prims(writer, path, open, scene->has_instances);
+    if (body >= open) body = SIZE_MAX;
+    const qmat_usd_options *options = &additions[carriers[i].mesh].options;
+    const bool is_body =
+        options->colliders && options->dynamic && body == SIZE_MAX && !scene->placement_bodies[carriers[i].place];
+    open_prims(writer, path, open, scene->has_instances, is_body);
     open = count_names(path);
+    if (is_body) {
+      body = open - 1;
+      put_body(writer, open, scene, carriers[i].place, options, kilograms > 0 ? kilograms : 1);
+    }
     hide_earlier(writer, open, qmat_usd_spec_at(original, path));
     put_reference(writer, open, stem, scene->meshes[carriers[i].mesh]);
   }
   while (open > 0) {
-    put_indent(writer, --open);
+    qmat_put_indent(writer, --open);
     qmat_put_text(writer, "}\n");
   }
   qmat_free(carriers);

@@ -387,8 +387,8 @@ static uint64_t put_value(crate *c, qmat_usd_layer *layer, const char *field, co
       return put_dictionary(c, layer, v);
     case QMAT_USD_LIST_OP:
       return put_list_op(c, layer, field, v->list_op);
-    default:
-      return put_plain(c, v, type_name);
+    default: /* other fields of an attribute have types of their own */
+      return put_plain(c, v, strcmp(field, "default") == 0 ? type_name : "");
   }
 }
 

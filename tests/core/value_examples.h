@@ -42,6 +42,7 @@ static inline qmat_scene *rigged_scene_example(void) {
   ASSIGN(scene->placed, (uint32_t[]){0});
   ASSIGN(scene->placements, (double[]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1});
   scene->placement_paths = names_of(1, (const char *const[]){"/Root/Mesh"});
+  ASSIGN(scene->placement_bodies, (uint32_t[]){1});
   qmat_rig *rig = &scene->rig;
   rig->skeleton_count = 1;
   rig->skeleton_paths = names_of(1, (const char *const[]){"/Root/Skeleton"});

@@ -145,8 +145,8 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
       [QMAT_FAILURE] = 10,
       [QMAT_COLLIDERS] = 8 * 8 + 3 * 4 + 12 * 8 + 12 * 4 + 2 * 4 + 10 * 8,
       [QMAT_LIST] = 2 * (3 * 8 + 10),
-      [EXAMPLE_WHOLE_SCENE] = 6 + 3 + 8 + 2 * 4 + 4 + 16 * 8 + 32 * 8 + 2 * 4 + 2 * 4 + 20 * 8 + 2 * 4 + 2 * 4 + 3 * 4 +
-                              48 * 8 + 4 + 6 * 4 + 3 * 8 + 2 * 4 + 10 * 8,
+      [EXAMPLE_WHOLE_SCENE] = 6 + 3 + 8 + 2 * 4 + 4 + 4 + 16 * 8 + 32 * 8 + 2 * 4 + 2 * 4 + 20 * 8 + 2 * 4 + 2 * 4 +
+                              3 * 4 + 48 * 8 + 4 + 6 * 4 + 3 * 8 + 2 * 4 + 10 * 8,
       [EXAMPLE_CAGE] = 12 * 8 + 12 * 4 + 16 * 4 + 16 * 8 + 3 * 2 * 4 + 21 * 8 + 2 * 4 + 7 * 4 + 4 + 2 * 4 + 8 + 4 + 8,
       [EXAMPLE_SHEETS] = 12 * 8 + 12 * 4,
       [EXAMPLE_FACET_FIELD] = 3 * 8,

@@ -518,6 +518,10 @@ static void test_each_form_of_colliders_is_written_where_it_is_chosen(void **sta
   qmat_value_release(&medial->base);
 }
 
+static bool has_text(const qmat_file *file, const char *text) {
+  return memmem(file->parts[0].bytes, file->parts[0].size, text, strlen(text)) != NULL;
+}
+
 static void test_bodies_that_are_fixed_have_colliders_and_no_mass(void **state) {
   (void)state;
   static const char *const extensions[] = {"KHR_physics_rigid_bodies", "OMI_physics_body"};
@@ -537,6 +541,12 @@ static void test_bodies_that_are_fixed_have_colliders_and_no_mass(void **state) 
     assert_int_equal(strstr(text, "\"mass\":7") != NULL, !fixed);
     free(text);
     json_decref(root);
+    qmat_value_release(&file->base);
+    const char *const usd[][2] = {{"format", "usda"}, {"fixed", fixed ? "true" : "false"}, {NULL, NULL}};
+    file = must_write(medial, (wiring){.colliders = c}, usd);
+    assert_int_equal(has_text(file, "physics:mass = 7"), !fixed);
+    assert_int_equal(has_text(file, "PhysicsRigidBodyAPI"), !fixed);
+    assert_true(has_text(file, "PhysicsCollisionAPI"));
     qmat_value_release(&file->base);
   }
   qmat_value_release(&c->base);

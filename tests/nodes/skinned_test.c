@@ -314,6 +314,7 @@ static void assert_joints_follow(const double *places, size_t stride, const uint
 static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **state) {
   (void)state;
   qmat_value *read[PIPELINE_MOST_PORTS], *simple[PIPELINE_MOST_PORTS], *written[PIPELINE_MOST_PORTS];
+  qmat_value *shapes[PIPELINE_MOST_PORTS];
   read_usd_arm("none", "", read);
   const qmat_mesh *mesh = (const qmat_mesh *)read[1];
   assert_int_equal(mesh->skinned_count, RINGS * AROUND + 2);
@@ -329,7 +330,12 @@ static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **s
   const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
   inputs[qmat_input_find(write, "medial")] = simple[0];
   inputs[qmat_input_find(write, "scene")] = read[0];
+  pipeline_must_run(1, "medial.colliders", "kind=spheres", (const qmat_value *[]){read[1], simple[0]}, shapes);
+  inputs[qmat_input_find(write, "colliders")] = shapes[0];
   pipeline_must_run(1, "scene.write", "format=usda", inputs, written);
+  const json_t *warnings = json_object_get(((const qmat_report *)written[1])->root, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "no colliders of 1 meshes that move with"));
   const qmat_file *file = (const qmat_file *)written[0];
   char *text = calloc(file->parts[0].size + 1, 1);
   assert_non_null(text);
@@ -345,8 +351,10 @@ static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **s
   }
   assert_int_equal(strncmp(at, "] (\n            elementSize = 4\n", 20), 0);
   assert_non_null(strstr(at, "float[] primvars:skel:jointWeights = ["));
+  assert_null(strstr(text, "Physics"));
   free(text);
-  for (int i = 0; i < 2; i++) qmat_value_release(simple[i]), qmat_value_release(written[i]);
+  for (int i = 0; i < 2; i++)
+    qmat_value_release(simple[i]), qmat_value_release(written[i]), qmat_value_release(shapes[i]);
   for (int i = 0; i < 3; i++) qmat_value_release(read[i]);
   pipeline_free(&p);
 }

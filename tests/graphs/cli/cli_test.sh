@@ -124,7 +124,8 @@ holds "the layer is untouched" cmp -s layer.usda kept.usda
 holds "no output of a refused run" test ! -e over.usda
 expect 2 "would overwrite a side file" "$qmat" mat scene.usda -o over.usda --epsilon 5% $coarse \
   --report over_original.usdz
-expect 0 "holds no colliders" "$qmat" mat scene.usda -o over.usda --colliders --epsilon 5% $coarse
+expect 0 "spheres describe" "$qmat" mat scene.usda -o over.usda --colliders --epsilon 5% $coarse
+holds "the prim is a body, its class is not" test "$(grep -c PhysicsRigidBodyAPI over.usda)" -eq 1
 expect 0 "a medial mesh of" "$qmat" info over.usda --node medial_0
 expect 1 "no prim of this name" "$qmat" info over.usda --node nosuch
 rm layer.usda kept.usda scene.usda over*

@@ -372,7 +372,7 @@ static void test_usd_has_a_capsule_of_two_radii_and_convex_hulls(void **state) {
   (void)state;
   qmat_colliders *c = example();
   qmat_writer writer = {0};
-  qmat_usd_put_body(&writer, c, (const double[]){1, 0, 0});
+  qmat_usd_put_body(&writer, 1, c->body, (const double[]){1, 0, 0}, 1);
   qmat_usd_put_colliders(&writer, c, (const double[]){1, 0, 0});
   qmat_put_u8(&writer, 0);
   const char *text = (const char *)writer.bytes;

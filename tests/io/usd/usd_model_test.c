@@ -542,6 +542,84 @@ static void test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidd
   release(&r);
 }
 
+/* The numbers after `key` in what the layer says of the prim that `over` opens; NAN where it says nothing there. */
+static void numbers_of(const char *text, const char *over, const char *key, double numbers[3]) {
+  const char *prim = strstr(text, over), *at = prim ? strstr(prim, key) : NULL;
+  assert_non_null(prim);
+  const char *child = strstr(prim, "def Xform");
+  for (int k = 0; k < 3; k++) numbers[k] = NAN;
+  if (!at || at > child) return;
+  at += strlen(key);
+  for (int k = 0; k < 3 && *at != '\n'; k++) {
+    char *end;
+    numbers[k] = strtod(at + strspn(at, "(, "), &end);
+    at = end;
+  }
+}
+
+/* Each place has the mass and the inertia of its own transform, in the scene's units; the scene's own bodies, what is
+ * below them, and colliders that do not move stay as they are. */
+static void test_prims_with_colliders_are_bodies_with_the_mass_of_their_place(void **state) {
+  (void)state;
+  reading r = read_all(
+      "#usda 1.0\n( kilogramsPerUnit = 0.001 metersPerUnit = 0.01 )\n" CUBE("plain", CUBE("part", "")) CUBE(
+          "turned",
+          "float xformOp:rotateZ = 90\nfloat3 xformOp:scale = (2, -1, 1)\n"
+          "uniform token[] xformOpOrder = [\"xformOp:rotateZ\", \"xformOp:scale\"]\n")
+      "def Xform \"body\" ( prepend apiSchemas = [\"PhysicsRigidBodyAPI\"] ) {" CUBE("own", "") "}\n"
+      "def Cube \"wall\" ( apiSchemas = [\"PhysicsCollisionAPI\"] ) {}\n"
+      "class \"giver\" ( apiSchemas = [\"PhysicsRigidBodyAPI\"] ) {}\n"
+      "def Cube \"freed\" ( delete apiSchemas = [\"PhysicsRigidBodyAPI\"] inherits = </giver> ) {}\n"
+      "def Cube \"heir\" ( inherits = </giver> ) {}\n");
+  static const uint32_t stated[] = {0, 0, 0, 1, 1, 0, 1};
+  assert_int_equal(r.scene->placement_count, 7);
+  assert_memory_equal(r.scene->placement_bodies, stated, sizeof stated);
+  r.scene->meters_per_unit = 0.01;
+  qmat_medial *medial = example_medial(1);
+  double body[10] = {2, 1, 2, 3, 5, 4, 3, 0, 0, 0}; /* the second moments are 1, 2, 3 */
+  const qmat_colliders colliders = {.body_count = 1, .body = body};
+  for (int dynamic = 0; dynamic < 2; dynamic++) {
+    const qmat_usd_addition addition = {.medial = medial,
+                                        .options = {.form = QMAT_USD_TEXT,
+                                                    .name = "thing",
+                                                    .prim = "/plain",
+                                                    .moved = 1e-3,
+                                                    .errors = {.meters_per_unit = 0.02},
+                                                    .dynamic = dynamic,
+                                                    .colliders = &colliders}};
+    qmat_file *file;
+    assert_int_equal(qmat_usd_write_layer(&r.context, r.scene, &addition, 1, &file), QMAT_OK);
+    char *text = text_of(file);
+    const char *class_end = strstr(text, "\n}\n");
+    assert_non_null(strstr(text, "def Scope \"colliders\""));
+    assert_true(!strstr(text, "PhysicsRigidBodyAPI") || strstr(text, "PhysicsRigidBodyAPI") > class_end);
+    const struct {
+      const char *over;
+      double mass, inertia[3];
+    } expected[] = {{"over \"plain\"", 250, {625, 500, 375}}, /* an eighth: the mass is that of the double size */
+                    {"over \"turned\"", 500, {1250, 1750, 1500}}, {"over \"freed\"", 250, {625, 500, 375}},
+                    {"over \"part\"", NAN, {NAN, NAN, NAN}}, /* a part of the body above it */
+                    {"over \"own\"", NAN, {NAN, NAN, NAN}},       {"over \"wall\"", NAN, {NAN, NAN, NAN}}};
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+      double mass[3], inertia[3], centre[3];
+      numbers_of(text, expected[i].over, "float physics:mass = ", mass);
+      numbers_of(text, expected[i].over, "physics:diagonalInertia = ", inertia);
+      numbers_of(text, expected[i].over, "physics:centerOfMass = ", centre);
+      const bool is_body = dynamic && !isnan(expected[i].mass);
+      for (int k = 0; k < 3; k++) {
+        assert_true(isnan(inertia[k]) == !is_body && isnan(centre[k]) == !is_body);
+        if (is_body) assert_near(inertia[k], expected[i].inertia[k], 1e-9);
+        if (is_body) assert_near(centre[k], k + 1, 0);
+      }
+      if (is_body) assert_near(mass[0], expected[i].mass, 1e-9);
+    }
+    qmat_free(text);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidden),
@@ -556,6 +634,7 @@ int main(void) {
       cmocka_unit_test(test_a_layer_adds_medial_meshes_and_takes_nothing),
       cmocka_unit_test(test_tiles_are_kept_and_other_files_are_named),
       cmocka_unit_test(test_the_prims_of_a_layer_are_opened_once),
+      cmocka_unit_test(test_prims_with_colliders_are_bodies_with_the_mass_of_their_place),
       cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
