@@ -61,6 +61,31 @@ void qmat_principal_inertia(const double body[10], double moments[3], double rot
   qmat_placement_quaternion(axes, rotation); /* Jacobi rotations keep the determinant 1 */
 }
 
+/* Scales an axis to length 1; one of zeros becomes axis `k` of space. */
+static void make_unit(double axis[3], int k) {
+  if (qmat_dot(axis, axis) > 0) {
+    qmat_normalize(axis);
+  } else {
+    for (int i = 0; i < 3; i++) axis[i] = i == k;
+  }
+}
+
+void qmat_rotation_in(double linear[3][3], double rotation[3][3]) {
+  double axes[3][3];
+  const double sign = qmat_determinant(linear) < 0 ? -1 : 1;
+  for (int k = 0; k < 3; k++) {
+    axes[0][k] = sign * linear[k][0];
+    axes[1][k] = linear[k][1];
+  }
+  make_unit(axes[0], 0);
+  const double along = qmat_dot(axes[0], axes[1]);
+  for (int k = 0; k < 3; k++) axes[1][k] -= along * axes[0][k];
+  make_unit(axes[1], 1);
+  qmat_cross(axes[0], axes[1], axes[2]);
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) rotation[r][c] = axes[c][r];
+}
+
 void qmat_placed_body(const double body[10], double linear[3][3], double rotation[3][3], double scale,
                       double made[10]) {
   static const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};

@@ -18,6 +18,10 @@ void qmat_capsule_frame(const double first[4], const double second[4], double mi
  * body; by Jacobi rotations. */
 void qmat_principal_inertia(const double body[10], double moments[3], double rotation[4]);
 
+/* The rotation in a linear map, both row by row: its columns made orthonormal in turn, the first one turned round where
+ * the map mirrors. The identity's where they are zero. */
+void qmat_rotation_in(double linear[3][3], double rotation[3][3]);
+
 /* A body (the 10 numbers of qmat_colliders) that a place maps by `linear`, row by row. body[0] is the
  * mass where a unit of the colliders is as long as `scale` units of the place; 0: at every place. `made` has the mass
  * at this place, the centre as it is, and the inertia along the axes that the rotation matrix `rotation` turns to, in

@@ -259,10 +259,15 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
   bool done = body != NULL;
   if (done) remove_earlier(root, body, added->nodes_given);
   const bool moves = done && added->dynamic && !qmat_gltf_has_own_motion(root, (size_t)node);
+  const bool is_animated = moves && qmat_gltf_is_animated(root, (size_t)node);
   for (int form = 0; form < 2 && done && moves; form++) {
     if (!(added->forms & (form == 0 ? QMAT_GLTF_KHR : QMAT_GLTF_OMI))) continue;
     json_t *motion = qmat_gltf_motion_of(root, (size_t)node, added->colliders, shift, added->meters);
-    done = motion && (form == 0 || qmat_gltf_set(motion, "type", json_string("dynamic")));
+    done = motion != NULL;
+    if (form == 1)
+      done = done && qmat_gltf_set(motion, "type", json_string(is_animated ? "kinematic" : "dynamic"));
+    else if (is_animated)
+      done = done && qmat_gltf_set(motion, "isKinematic", json_true());
     json_t *extensions = done ? member(body, "extensions") : NULL;
     json_t *physics = extensions ? member(extensions, qmat_gltf_body_extensions[form]) : NULL;
     if (physics) {

@@ -422,8 +422,10 @@ static qmat_status compress_primitive(compressor *c, json_t *primitive, size_t m
 
 /* Extensions that refer to data only in places that this file handles, or not at all. */
 static bool is_harmless(const char *name) {
-  static const char *const starts[] = {"KHR_materials_", "KHR_lights_punctual",   "KHR_texture_", "KHR_xmp",
-                                       "EXT_texture_",   "KHR_animation_pointer", "KHR_node_",    QMAT_GLTF_DRACO};
+  static const char *const starts[] = {
+      "KHR_materials_", "KHR_lights_punctual",   "KHR_texture_", "KHR_xmp",
+      "EXT_texture_",   "KHR_animation_pointer", "KHR_node_",    "KHR_mesh_quantization",
+      "KHR_physics_",   "KHR_implicit_shapes",   "OMI_physics_", QMAT_GLTF_DRACO};
   for (size_t i = 0; i < sizeof starts / sizeof *starts; i++)
     if (starts_with(name, starts[i])) return true;
   return false;

@@ -22,16 +22,9 @@ static double number_at(const json_t *numbers, size_t i) {
 
 static turn turn_of_matrix(const json_t *m) {
   turn t;
-  double lengths[3];
-  for (size_t c = 0; c < 3; c++) {
-    lengths[c] = 0;
-    for (size_t r = 0; r < 3; r++) t.linear[r][c] = number_at(m, 4 * c + r);
-    for (size_t r = 0; r < 3; r++) lengths[c] += t.linear[r][c] * t.linear[r][c];
-    lengths[c] = sqrt(lengths[c]);
-  }
-  if (qmat_determinant(t.linear) < 0) lengths[0] = -lengths[0]; /* a mirror, which is no rotation */
   for (size_t c = 0; c < 3; c++)
-    for (size_t r = 0; r < 3; r++) t.rotation[r][c] = lengths[c] != 0 ? t.linear[r][c] / lengths[c] : r == c;
+    for (size_t r = 0; r < 3; r++) t.linear[r][c] = number_at(m, 4 * c + r);
+  qmat_rotation_in(t.linear, t.rotation);
   return t;
 }
 
@@ -69,6 +62,7 @@ json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_collider
   double body[10], moments[3], q[4];
   turn world = turn_in_world(root, node);
   qmat_placed_body(colliders->body, world.linear, world.rotation, meters, body);
+  if (!(body[0] > 0)) return motion; /* a node of no size, as one that is hidden by its scale */
   qmat_principal_inertia(body, moments, q);
   const bool done =
       qmat_gltf_set(motion, "mass", json_real(body[0])) &&
@@ -79,6 +73,22 @@ json_t *qmat_gltf_motion_of(const json_t *root, size_t node, const qmat_collider
   if (done) return motion;
   json_decref(motion);
   return NULL;
+}
+
+bool qmat_gltf_is_animated(const json_t *root, size_t node) {
+  const json_t *animations = json_object_get(root, "animations");
+  for (size_t a = 0; a < json_array_size(animations); a++) {
+    const json_t *channels = json_object_get(json_array_get(animations, a), "channels");
+    for (size_t c = 0; c < json_array_size(channels); c++) {
+      const json_t *target = json_object_get(json_array_get(channels, c), "target"),
+                   *number = json_object_get(target, "node");
+      const char *path = json_string_value(json_object_get(target, "path"));
+      if (!number || !path || strcmp(path, "weights") == 0) continue;
+      for (size_t at = node; at != SIZE_MAX; at = qmat_gltf_parent_of(root, at))
+        if ((double)at == json_number_value(number)) return true;
+    }
+  }
+  return false;
 }
 
 static bool is_ours(const json_t *root, const json_t *node) {

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
 #include "core/node.h"
 #include "io/collider_frames.h"
 #include "io/usd/usd_arcs.h"
@@ -82,24 +81,17 @@ static void open_prims(qmat_writer *writer, const char *path, size_t open, bool 
   }
 }
 
-/* The attributes of a body at a place, in the scene's units. A transform may shear: the axes of the body are then those
- * of its columns, made orthonormal in turn. */
+/* The attributes of a body at a place, in the scene's units. */
 static void put_body(qmat_writer *writer, size_t depth, const qmat_scene *scene, size_t place,
                      const qmat_usd_options *options, double kilograms) {
   static const double origin[3] = {0, 0, 0};
   const double *m = scene->placements + 16 * place;
-  double linear[3][3], axes[3][3], rotation[3][3], body[10];
+  double linear[3][3], rotation[3][3], body[10];
   if (options->colliders->body_count == 0) return;
   for (int r = 0; r < 3; r++)
-    for (int c = 0; c < 3; c++) linear[r][c] = axes[c][r] = m[4 * c + r];
-  qmat_normalize(axes[0]);
-  const double along = qmat_dot(axes[0], axes[1]);
-  for (int k = 0; k < 3; k++) axes[1][k] -= along * axes[0][k];
-  qmat_normalize(axes[1]);
-  qmat_cross(axes[0], axes[1], axes[2]);
-  for (int r = 0; r < 3; r++)
-    for (int c = 0; c < 3; c++) rotation[r][c] = axes[c][r];
+    for (int c = 0; c < 3; c++) linear[r][c] = m[4 * c + r];
   const double unit = scene->meters_per_unit > 0 ? scene->meters_per_unit : 1;
+  qmat_rotation_in(linear, rotation);
   qmat_placed_body(options->colliders->body, linear, rotation, options->errors.meters_per_unit / unit, body);
   qmat_usd_put_body(writer, depth, body, origin, kilograms);
 }

@@ -224,6 +224,63 @@ static void test_a_body_follows_the_scales_above_it(void **state) {
   qmat_value_release(&c->base);
 }
 
+/* A matrix that shears, of determinant 1, and one that mirrors: the mass stays, and so does the trace of the moments of
+ * the sheared body, which no rotation changes. */
+static void test_a_body_follows_matrices_that_are_no_scale(void **state) {
+  (void)state;
+  qmat_colliders *c = example();
+  const double *in = &c->body[4], half = 0.5 * (in[0] + in[1] + in[2]);
+  const double xx = half - in[0], yy = half - in[1], zz = half - in[2], xy = -in[3];
+  static const char *const matrices[] = {"[1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]",
+                                         "[-1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]"};
+  for (int i = 0; i < 2; i++) {
+    char text[160];
+    snprintf(text, sizeof text, "{\"nodes\": [{\"matrix\": %s}]}", matrices[i]);
+    json_t *root = json_loads(text, 0, NULL);
+    qmat_writer data = {0};
+    write_in(1, QMAT_GLTF_KHR, true, root, &data);
+    const json_t *motion = motion_of(root, 0);
+    double sum = 0;
+    for (size_t k = 0; k < 3; k++)
+      sum += json_number_value(json_array_get(json_object_get(motion, "inertiaDiagonal"), k));
+    assert_near(at(motion, "mass"), 2, 1e-12);
+    assert_near(sum, 2 * (xx + (i == 0 ? 1 : -1) * xy + 0.25 * yy + yy + zz), 1e-12);
+    json_decref(root);
+    qmat_writer_uninit(&data);
+  }
+  qmat_value_release(&c->base);
+}
+
+/* What an animation moves, itself or by a node above it, is no toy of gravity; what has no size has no mass. */
+static void test_animated_bodies_are_kinematic(void **state) {
+  (void)state;
+  static const struct {
+    const char *asset;
+    bool kinematic, massless;
+  } cases[] = {
+      {"{'nodes':[{},{'children':[0]}],'animations':[{'channels':[{'target':{'node':1,'path':'scale'}}]}]}", true,
+       false},
+      {"{'nodes':[{}],'animations':[{'channels':[]},{'channels':[{'target':{'node':0,'path':'rotation'}}]}]}", true,
+       false},
+      {"{'nodes':[{}],'animations':[{'channels':[{'target':{'node':0,'path':'weights'}},{'target':{}}]}]}", false,
+       false},
+      {"{'nodes':[{},{}],'animations':[{'channels':[{'target':{'node':1,'path':'translation'}}]}]}", false, false},
+      {"{'nodes':[{'scale':[0,0,0]}]}", false, true}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char *text = asset_json(cases[i].asset);
+    json_t *root = json_loads(text, 0, NULL);
+    qmat_writer data = {0};
+    write_in(1, QMAT_GLTF_KHR | QMAT_GLTF_OMI, true, root, &data);
+    const json_t *khr = motion_of(root, 0), *omi = motion_of(root, 1);
+    assert_int_equal(json_is_true(json_object_get(khr, "isKinematic")), cases[i].kinematic);
+    assert_string_equal(json_string_value(json_object_get(omi, "type")), cases[i].kinematic ? "kinematic" : "dynamic");
+    assert_int_equal(json_object_get(khr, "mass") == NULL, cases[i].massless);
+    json_decref(root);
+    free(text);
+    qmat_writer_uninit(&data);
+  }
+}
+
 /* A motion of the asset, on the node or above it, a wall that stands still, and a trigger. */
 static void test_the_motion_that_the_asset_states_stays(void **state) {
   (void)state;
@@ -391,6 +448,8 @@ int main(void) {
       cmocka_unit_test(test_principal_moments_and_axes_make_the_tensor),
       cmocka_unit_test(test_khronos_shapes_have_all_members_and_slabs_are_hulls_of_hidden_nodes),
       cmocka_unit_test(test_a_body_follows_the_scales_above_it),
+      cmocka_unit_test(test_a_body_follows_matrices_that_are_no_scale),
+      cmocka_unit_test(test_animated_bodies_are_kinematic),
       cmocka_unit_test(test_the_motion_that_the_asset_states_stays),
       cmocka_unit_test(test_omi_has_convex_meshes_where_radii_differ),
       cmocka_unit_test(test_names_of_hulls_and_a_second_run_replaces_the_first),

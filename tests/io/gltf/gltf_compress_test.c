@@ -204,6 +204,7 @@ static void test_what_cannot_be_taken_stays_as_it_is(void **state) {
       {"'buffer':0,'byteLength':96", "'buffer':0,'byteOffset':1e30,'byteLength':96", "invalid or unsupported", 0},
       {"'asset'", "'extensionsUsed':['ACME_more'],'asset'", "ACME_more", 0},
       {"'asset'", "'extensionsUsed':['KHR_materials_unlit'],'asset'", "morph targets", 2},
+      {"'asset'", "'extensionsUsed':['KHR_mesh_quantization','OMI_physics_body'],'asset'", "morph targets", 2},
       {"'asset'", "'skins':[{'inverseBindMatrices':0}],'asset'", "used by something else", 0},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
