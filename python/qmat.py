@@ -12,6 +12,7 @@
 Graph runs any graph, with meshes and medial meshes in memory as values. Ctrl-C cancels a run. Errors are qmat.Error,
 whose text is the line that the program prints. Different threads may use different graphs at the same time.
 """
+import functools
 import json
 import os
 from collections import namedtuple
@@ -21,8 +22,8 @@ from pathlib import Path
 import cffi
 import numpy as np
 
-__all__ = ["mat", "Graph", "Mesh", "Medial", "MedialMesh", "Colliders", "Errors", "Value", "File", "Report", "Results", "Error",
-           "UsageError", "Cancelled", "nodes", "version"]
+__all__ = ["mat", "Graph", "Mesh", "Medial", "MedialMesh", "Colliders", "Errors", "Value", "File", "Report", "Items", "Results",
+           "Error", "UsageError", "Cancelled", "nodes", "version"]
 
 # The declarations of qmat.h; a test compares the two.
 _DECLARATIONS = """
@@ -113,6 +114,7 @@ const qmat_job_problem *qmat_job_error(const qmat_job *job);
 
 _ffi = cffi.FFI()
 _ffi.cdef(_DECLARATIONS)
+_ffi.cdef("void omp_set_max_active_levels(int levels);")  # of OpenMP, which the library uses
 
 
 def _open():
@@ -154,11 +156,12 @@ def nodes():
 class Error(Exception):
     """What went wrong, as the line that the program prints. Its parts are attributes; "", -1 and 0 do not apply."""
 
-    def __init__(self, problem):
-        super().__init__(_text(problem.text))
-        for name in ("status", "node", "type", "field", "element_kind", "file", "message", "hint"):
-            setattr(self, name, _text(getattr(problem, name)))
-        self.element, self.line, self.column = problem.element, problem.line, problem.column
+    status = node = type = field = element_kind = file = message = hint = ""
+    element, line, column = -1, 0, 0
+
+    def __init__(self, text, **parts):
+        super().__init__(text)
+        vars(self).update(parts)
 
 
 class UsageError(Error, ValueError):
@@ -166,10 +169,23 @@ class UsageError(Error, ValueError):
 
 
 class Cancelled(Error):
-    """The progress function returned False."""
+    """The progress function said so."""
 
 
 _ERRORS = {_lib.QMAT_RESULT_USAGE: UsageError, _lib.QMAT_RESULT_CANCELLED: Cancelled}
+
+
+def _error(problem):
+    parts = {name: _text(getattr(problem, name)) for name in
+             ("status", "node", "type", "field", "element_kind", "file", "message", "hint")}
+    numbers = {name: getattr(problem, name) for name in ("element", "line", "column")}
+    return _ERRORS.get(problem.result, Error)(_text(problem.text), **parts, **numbers)
+
+
+@functools.cache
+def _prepare_forks():
+    """A forked child lacks the threads of its parent, for which OpenMP would wait: there, it uses one."""
+    os.register_at_fork(after_in_child=lambda: _lib.omp_set_max_active_levels(0))
 
 
 class _Job:
@@ -183,8 +199,7 @@ class _Job:
 
     def check(self, result):
         if result != _lib.QMAT_RESULT_OK:
-            problem = _lib.qmat_job_error(self.job)
-            raise _ERRORS.get(result, Error)(problem)
+            raise _error(_lib.qmat_job_error(self.job))
 
     def call(self, function, *arguments):
         self.check(function(self.job, *arguments))
@@ -204,10 +219,12 @@ class _Job:
         def step(user, node, type, done, total, unit):
             if raised:
                 return False
-            return not progress or progress(_text(node), done, total, _text(unit)) is not False
+            answer = progress(_text(node), done, total, _text(unit)) if progress else None
+            return answer is None or bool(answer)
 
         signature = "bool(void *, const char *, const char *, uint64_t, uint64_t, const char *)"
         callback = _ffi.callback(signature, step, error=False, onerror=caught)
+        _prepare_forks()
         result = _lib.qmat_job_run(self.job, threads, callback, _ffi.NULL)
         if raised:
             raise raised[0]
@@ -361,21 +378,28 @@ class Report(dict):
         self._job, self._port = job, port
 
 
+class Items(list):
+    """The values of a scene with several meshes, one for each; one that could not be made is an exception."""
+
+    def __init__(self, job, port, count):
+        super().__init__()
+        self._job, self._port = job, port
+        for i in range(count):
+            try:
+                self.append(_value(job, f"{port}[{i}]"))
+            except Error as error:
+                self.append(error)
+
+
 _CLASSES = {"mesh": Mesh, "medial": Medial, "colliders": Colliders}
 
 
 def _value(job, port):
-    """The value of a port. That of a scene with several meshes is a list; its failed items are exceptions."""
+    """The value of a port."""
     view = job.value(port)
     kind, name = _text(view.type), _text(view.name)
     if view.item_count:
-        items = []
-        for i in range(view.item_count):
-            try:
-                items.append(_value(job, f"{port}[{i}]"))
-            except Error as error:
-                items.append(error)
-        return items
+        return Items(job, port, view.item_count)
     if kind == "report":
         return Report(job, port)
     if kind == "file":
@@ -421,7 +445,8 @@ class Graph:
 
     Without any of them it is qmat_plus, the graph of `qmat mat`.
 
-    A graph may be run many times; results stay as they are when the graph is changed or run again.
+    A graph may be run many times; results stay as they are when the graph is changed or run again. Each run reads the
+    file again, so it has to stay where it is.
     `cache`: a folder, or True for that of the command line. Without it nothing is stored.
     """
 
@@ -437,6 +462,9 @@ class Graph:
         self._calls = {}  # by what each one sets: function, arguments, what has to stay alive
         self._job = _Job(*self._make)
         described = self._job.json(_lib.qmat_job_graph)
+        if path is not None and os.path.exists(path):  # runs find it and what it names from any working folder
+            self._make = (_lib.qmat_job_new_from_file, os.path.join(os.getcwdb(), os.fsencode(path)))
+            self._job = None
         self.inputs = described["inputs"]
         self.outputs = {output["name"]: output["port"] for output in described["outputs"]}
         self._made = [output["name"] for output in described["outputs"] if not output["on_request"]]
@@ -452,9 +480,10 @@ class Graph:
     def _current(self):
         """The job of the next run."""
         if not self._job:
-            self._job = _Job(*self._make)
+            job = _Job(*self._make)
             for function, arguments, _ in self._calls.values():
-                self._job.call(function, *arguments)
+                job.call(function, *arguments)
+            self._job = job
         return self._job
 
     def _call(self, what, function, *arguments, alive=None):
@@ -470,10 +499,11 @@ class Graph:
         return self
 
     def give(self, port, value, *more, name=None):
-        """Gives the value of an output port, whose node then does not run: a result of any run, or arrays V, F of a
-        mesh, or spheres, cones, slabs of a medial mesh. `name` is that of the mesh. Returns the graph."""
+        """Gives the value of an output port, whose node then does not run: a result of any run, also that of a scene
+        with several meshes, or arrays V, F of a mesh, or spheres, cones, slabs of a medial mesh. `name` is that of the mesh.
+        Returns the graph."""
         place, what = port.encode(), ("give", port)
-        if isinstance(value, (Value, Report)):
+        if isinstance(value, (Value, Report, Items)):
             self._call(what, _lib.qmat_job_give_result, place, value._job.job, value._port.encode(), alive=value)
         elif port not in self.ports:
             self._current().call(_lib.qmat_job_want, place)  # says which port is meant
@@ -498,7 +528,8 @@ class Graph:
         their Results.
 
         `save`: paths by output, or one path, or a list: the ending chooses the output. `threads` 0: one per processor.
-        `progress(node, done, total, unit)` is called while nodes run; it cancels by returning False or by raising.
+        `progress(node, done, total, unit)` is called while nodes run. It cancels by raising, or by returning any false
+        value but None.
         """
         saves = save if isinstance(save, Mapping) else {} if save is None else {None: save}
         names = want or (() if saves else self._made)
@@ -582,17 +613,25 @@ def mat(V, F=None, *, epsilon=None, vertices=None, features=None, set=(), name=N
     file that V names.
 
     epsilon: the largest distance between surface and envelope, as a share of the diagonal of the model's bounding box
-    (.01), or a length with a unit ("5mm"). vertices: the largest number of spheres; without epsilon at any distance. features="sharp" keeps sharp edges.
-    set: other parameters by name ({"model.mesh": "merged"}). cache, threads, progress: as those of Graph.
+    (.01), or a length ("5mm") where the file has a unit; arrays have none. vertices: the number of spheres to stop at.
+    Without epsilon it is the most that are left, at the least distance that so few allow; with epsilon more are left where
+    it takes more, and no fewer where fewer would do. features="sharp" keeps sharp edges. set: other parameters by name
+    ({"model.mesh": "merged"}); with arrays none of the node model, which does not run. cache, threads, progress: as those
+    of Graph.
     """
     graph = Graph(cache=cache)
     settings = dict(set)
     settings.update({key: value for key, value in
                      (("epsilon", epsilon), ("vertices", vertices), ("features", features)) if value is not None})
-    if vertices is not None and epsilon is None:
-        settings["epsilon"] = 0  # that number of spheres at any distance
+    if vertices is not None and "epsilon" not in settings:
+        settings = {"epsilon": 0, **settings}  # that number of spheres at any distance
     graph.set(settings)
     if F is not None:
+        for key in settings:
+            node, _, field = key.partition(".")
+            if node == "model":
+                message = f"'{key}' cannot be set with arrays: the node 'model' does not run, and arrays have no unit"
+                raise UsageError(message, status="usage", node=node, field=field, message=message)
         graph.give("model.mesh", V, F, name=name)
     elif isinstance(V, (str, os.PathLike)):
         graph.set(model=V)

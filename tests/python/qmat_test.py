@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Python module: python3 qmat_test.py SOURCE_FOLDER PROGRAM, with $PYTHONPATH and $QMAT_LIBRARY."""
 import base64
+import copy
 import json
+import multiprocessing
 import os
+import pickle
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -168,6 +172,13 @@ class OfArrays(unittest.TestCase):
         m = qmat.mat(BOX_V, BOX_F, epsilon=.05)
         self.assertLess(abs(m.error_at(m.envelope().vertices)).max(), .02)
 
+    def test_vertices_stop_within_an_epsilon_of_any_kind(self):
+        coarse = {"samples.spacing": "30%"}
+        for given in ({"epsilon": .1, "set": coarse}, {"set": {"epsilon": "10%", **coarse}}):
+            m = qmat.mat(BOX_V, BOX_F, vertices=9, **given)
+            self.assertEqual((len(m.spheres), m.errors.epsilon), (9, .1 * m.errors.diagonal))
+        self.assertEqual(qmat.mat(BOX_V, BOX_F, vertices=9, set=coarse).errors.epsilon, 0)
+
     def test_vertices_and_features_are_inputs(self):
         coarse = {"samples.spacing": "30%"}
         self.assertEqual(len(qmat.mat(BOX_V, BOX_F, epsilon=.1, vertices=9, set=coarse).spheres), 9)
@@ -206,12 +217,25 @@ class OfFiles(InAFolder):
         self.assertEqual(list(graph.run()), ["asset"])
         self.assertFalse(os.path.exists("saved.ma"))
 
+    def test_a_graph_file_and_its_paths_are_found_from_any_folder(self):
+        os.mkdir("sub")
+        write_off("sub/box.off", BOX_V, BOX_F)
+        Path("sub/mine.yaml").write_text("qmat: 1\nnodes: { model: { type: scene.read, params: { path: box.off } } }\n"
+                                         "outputs: { mesh: model.mesh }\n")
+        graph, here = qmat.Graph("sub/mine.yaml"), os.getcwd()
+        for folder in ("/", here, "/"):
+            os.chdir(folder)
+            np.testing.assert_array_equal(graph.run()["mesh"].vertices, BOX_V)
+
     def test_a_scene_is_a_list_with_names_and_failures(self):
         write_gltf("scene.gltf", {"box": (BOX_V, BOX_F), "none": (BOX_V, np.array([[0, 0, 1]])),
                                   "long": (BOX_V * [4, 1, 1], BOX_F)})
         graph = qmat.Graph().set({"model.defects": "drop"}, model="scene.gltf", epsilon=.05)
         found = graph.run("simple.medial", "solid.mesh", "errors.report")
         medials = found["simple.medial"]
+        # The list is a value, too.
+        skins = qmat.Graph(text=OF_SPHERES).give("given.medial", medials).run()["skin"]
+        self.assertEqual([type(skin) for skin in skins], [qmat.Mesh, qmat.Error, qmat.Mesh])
         self.assertIsInstance(medials.pop(1), qmat.Error)
         self.assertEqual([medial.name for medial in medials], ["box", "long"])
         np.testing.assert_array_equal(medials[0].spheres, qmat.mat(BOX_V, BOX_F, epsilon=.05).spheres)
@@ -265,6 +289,23 @@ class Mistakes(InAFolder):
             qmat.mat(np.where(BOX_V == 2, np.nan, BOX_V), BOX_F)
         self.assertEqual((raised.exception.element_kind, raised.exception.element), ("vertex", 1))
 
+    def test_errors_survive_copies_and_pickles(self):
+        for wrong in (lambda: qmat.mat(BOX_V, np.vstack([BOX_F, [[0, 1, 8]]])), lambda: qmat.Graph(text="qmat: 1\nnodes: 3"),
+                      lambda: qmat.mat(BOX_V, BOX_F, progress=lambda *call: False)):
+            with self.assertRaises(qmat.Error) as raised:
+                wrong()
+            error = raised.exception
+            for other in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
+                self.assertEqual((type(other), str(other), vars(other)), (type(error), str(error), vars(error)))
+                self.assertEqual(len(vars(other)), 11)
+
+    def test_arrays_have_no_unit_and_no_model_to_set(self):
+        for name, value in (("model.unit", "mm"), ("model.mesh", "merged"), ("model", "box.off")):
+            with self.assertRaises(qmat.UsageError) as raised:
+                qmat.mat(BOX_V, BOX_F, set={name: value})
+            self.assertEqual((raised.exception.node, raised.exception.status), ("model", "usage"))
+            self.assertIn(f"'{name}'", str(raised.exception))
+
     def test_arrays_of_another_kind_are_refused_before_they_reach_the_library(self):
         for V, F, error in ((BOX_V[:, :2], BOX_F, ValueError), (BOX_V, BOX_F.astype(float), TypeError),
                             (BOX_V, -BOX_F, ValueError), (BOX_V, BOX_F + 2 ** 32, ValueError),
@@ -298,6 +339,34 @@ class Mistakes(InAFolder):
             graph.set(epsilon="much")
         self.assertTrue(len(graph.run("simple.medial")["simple.medial"].spheres))
 
+    def test_a_graph_keeps_its_settings_when_they_cannot_be_repeated(self):
+        graph = qmat.Graph(cache="cache").give("model.mesh", BOX_V, BOX_F).set(epsilon=.05)
+        right = graph.run("simple.medial")["simple.medial"].spheres
+        shutil.rmtree("cache")
+        Path("cache").touch()
+        for _ in range(2):
+            with self.assertRaises(qmat.UsageError) as raised:
+                graph.run("simple.medial")
+            self.assertIn("cache", str(raised.exception))
+        os.remove("cache")
+        np.testing.assert_array_equal(graph.run("simple.medial")["simple.medial"].spheres, right)
+
+
+class Forks(unittest.TestCase):
+    def test_a_forked_child_runs_and_reads_results_of_its_parent(self):
+        m = qmat.mat(BOX_V, BOX_F, epsilon=.05, threads=2)
+
+        def work():
+            m.error_at(BOX_V)
+            np.testing.assert_array_equal(qmat.mat(BOX_V, BOX_F, epsilon=.05, threads=2).spheres, m.spheres)
+
+        child = multiprocessing.get_context("fork").Process(target=work)
+        child.start()
+        child.join(60)
+        child.kill()
+        child.join()
+        self.assertEqual(child.exitcode, 0)
+
 
 class AtTheEnd(InAFolder):
     def test_results_and_threads_of_libraries_may_outlive_the_module(self):
@@ -320,8 +389,9 @@ class Progress(unittest.TestCase):
         self.assertTrue(all(done <= total or not total for _, done, total, _ in calls))
 
     def test_false_and_exceptions_cancel(self):
-        with self.assertRaises(qmat.Cancelled):
-            qmat.mat(self.V, self.F, progress=lambda *call: call[0] != "initial")
+        for false in (False, np.False_, 0):
+            with self.assertRaises(qmat.Cancelled):
+                qmat.mat(self.V, self.F, progress=lambda *call: false if call[0] == "initial" else None)
 
         class Enough(Exception):
             pass
