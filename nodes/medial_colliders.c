@@ -49,7 +49,7 @@ static qmat_shape_kind kind_of(const medial_colliders_params *p) {
   return p->kind == KIND_HULLS ? QMAT_SHAPES_ANY : (qmat_shape_kind)p->kind;
 }
 
-/* Whether hulls are made around parts of the solid and of sheets, and joined. Thick sheets have hulls of their shapes.
+/* Whether hulls are made around parts of the solid and of sheets, and joined. Thick sheets keep those of their shapes.
  */
 static bool has_hulls_of_solid(const work *w) {
   const qmat_mesh *mesh = qmat_surface_mesh(w->surface);

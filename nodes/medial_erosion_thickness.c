@@ -145,8 +145,7 @@ const qmat_node qmat_node_medial_erosion_thickness = {
         "Fires start at the borders of the medial sheets and at the ends of its curves, each at the time of the radius "
         "there, and burn with unit speed. Where sheets meet, a fire goes on only into the last one that is left. The "
         "erosion thickness is the time at which a point is burnt less its radius: a spike has little of it, however "
-        "long "
-        "it is seen from its tip, and a sheet of the shape as much as it is wider than thick.\n\n"
+        "long it is seen from its tip, and a sheet of the shape as much as it is wider than thick.\n\n"
         "What encloses a void or a loop never burns; it has the diagonal, or the largest thickness if that is larger. "
         "Pruning removes the thinnest parts first and keeps components, loops and voids. Sheets of the model stay. "
         "Samples of removed spheres then belong to no sphere.",

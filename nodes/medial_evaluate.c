@@ -25,7 +25,7 @@ typedef struct medial_evaluate_params {
 /* Centres this close to the surface count as inside. */
 static const double beside_surface = 1e-5;
 
-/* The surface and the envelope's boundary are searched up to so many times, the surface from the F found before. */
+/* The most searches of the surface, each from the largest F found before, and the most of the envelope's boundary. */
 enum { MOST_SEARCHES = 4 };
 /* Where epsilon is between the bounds, the tolerance is its distance from the lower one, at least this share of the
  * usual tolerance. */
@@ -327,8 +327,7 @@ const qmat_node qmat_node_medial_evaluate = {
         "certified means: the surface is closed and oriented, sheets aside, and both errors are at most epsilon. For "
         "an open surface, the errors are estimates. Surface deep inside the envelope, in a gap that the envelope "
         "fills, is not bounded; surface_depth_in_envelope_sampled shows it. sphere_errors bounds surface_to_envelope "
-        "for "
-        "each sphere, over the part of the surface that it answers for.\n\n"
+        "for each sphere, over the part of the surface that it answers for.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
         "are Betti numbers over Z/2; those of the solid and its sheets (_of_solid) are missing where the surface is "
         "open or has an edge of more than two triangles.",

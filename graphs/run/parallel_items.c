@@ -41,11 +41,11 @@ struct item_pool {
   int silent;      /* calls of the outer progress function since */
 };
 
-/* Sorts by size, the largest first; equal sizes keep their order. */
 typedef struct sized_item {
   size_t size, item;
 } sized_item;
 
+/* Sorts by size, the largest first; equal sizes keep their order. */
 static int by_falling_size(const void *a, const void *b) {
   const sized_item *first = a, *second = b;
   if (first->size != second->size) return first->size > second->size ? -1 : 1;

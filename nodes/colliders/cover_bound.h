@@ -31,8 +31,7 @@ typedef struct qmat_cover_bound {
  * shapes grew: what was covered then is not searched again. The surface must be closed and oriented; for others the
  * answer is an estimate. Rounding: distances are exact to 1e-9, and points within 1e-6 of the surface count as inside.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the answer does not depend on their number. Cost: the cubes are small
- * only where the boundary of the union has creases near the surface.
- */
+ * only where the boundary of the union has creases near the surface. */
 qmat_status qmat_cover_bound_measure(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                      double tolerance, bool only_parts, const qmat_cover_bound *before,
                                      qmat_cover_bound *result);

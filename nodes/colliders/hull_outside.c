@@ -7,8 +7,8 @@
 #include "core/geometry/convex_polygon.h"
 #include "core/geometry/vector.h"
 
-/* Facets between two looks whether the run is cancelled; corners of a triangle that is cut by three planes, at most. */
-enum { SLICE = 4096, MOST_CORNERS = 9 /* of a triangle after three qmat_convex_polygon_cut */ };
+/* Facets between two looks whether the run is cancelled; the most corners of a triangle that was cut three times. */
+enum { SLICE = 4096, MOST_CORNERS = 9 };
 
 /* A point is over a triangle where it is inside of the planes through its sides by more than this. */
 static const double rounding = 1e-9;

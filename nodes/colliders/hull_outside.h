@@ -6,12 +6,12 @@
 #include "core/geometry/surface.h"
 #include "core/value_types.h"
 
-/* How far the facets between two hulls leave a solid: of the triangles (3 ids of points each) of the hull of both,
- * those with points below `first`, which are of the one, and others. `points` (3 doubles each) are in the unit frame. A
- * triangle is halved `halvings` times at most. The result is a distance that is found. The largest one is below half of
- * `limit`, or at most that half above the result, unless the halvings do not suffice. The search ends where a distance
- * exceeds the limit. Cost: distances to the surface, at most some per square of half the limit. Safe from any thread.
- */
+/* How far the facets between two hulls leave a solid. `triangles` (3 ids of points each) are those of the hull of both.
+ * The points below `first` are of the one hull, the others of the other; a facet between the hulls has points of both.
+ * `points` (3 doubles each) are in the unit frame. A triangle is halved `halvings` times at most. The result is a
+ * distance that is found. The largest one is below half of `limit`, or at most that half above the result, unless the
+ * halvings do not suffice. The search ends where a distance exceeds the limit. Cost: distances to the surface, at most
+ * some per square of half the limit. Safe from any thread. */
 double qmat_joint_protrusion(const qmat_surface *solid, const double *points, size_t first, const uint32_t *triangles,
                              size_t triangle_count, double limit, int halvings);
 

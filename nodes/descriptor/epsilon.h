@@ -2,7 +2,8 @@
 #ifndef QMAT_NODES_DESCRIPTOR_EPSILON_H
 #define QMAT_NODES_DESCRIPTOR_EPSILON_H
 
-/* The epsilon, in diagonals, that tolerances are relative to where a node's own epsilon is 0: no bound. */
+/* The epsilon, in diagonals, that nodes of meshes and medial.simplify compute with where their own is 0 (no bound). For
+ * a number of spheres it is the first one tried, and the largest one that medial.refine refines for. */
 #define QMAT_DEFAULT_EPSILON 0.01
 
 /* The least epsilon, in diagonals, that is tried for a number of spheres. */

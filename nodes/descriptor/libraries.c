@@ -33,8 +33,7 @@ static void describe_opensubdiv(char *text, size_t size) {
   snprintf(text, size, "%s", qmat_opensubdiv_version());
 }
 
-/* The instruction set that Embree chooses on this processor. Embree does not report it, so its rules are repeated here.
- */
+/* The instruction set that Embree chooses on this processor. Embree does not report it: its rules are repeated here. */
 static const char *embree_instructions(void) {
 #if defined(__x86_64__)
   __builtin_cpu_init();

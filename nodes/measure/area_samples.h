@@ -16,8 +16,7 @@ typedef struct qmat_area_samples {
   size_t element_count, sample_count;
   uint64_t stream; /* of random numbers (core/hash.h) */
   const char *progress;
-  /* Adds one sample to `sums`: a point of `element`, chosen by two even random numbers in [0, 1). Runs in any thread.
-   */
+  /* Adds a sample to `sums`: a point of `element`, chosen by two even random numbers in [0, 1). Runs in any thread. */
   void (*add)(const void *data, size_t element, double x, double y, qmat_area_sums *sums);
   const void *data;
 } qmat_area_samples;
@@ -30,8 +29,7 @@ qmat_status qmat_area_samples_sum(qmat_context *context, const qmat_area_samples
 /* Fills `areas`, as above, for `count` triangles: 3 vertex ids each, 3 coordinates a vertex. */
 void qmat_running_areas(const double *positions, const uint32_t *triangles, size_t count, double *areas);
 
-/* The first of `count` (> 0) elements whose running area, `areas` as above, exceeds `area`; the last where none does.
- */
+/* The first of `count` (> 0) elements whose running area (`areas` as above) exceeds `area`; the last if none does. */
 size_t qmat_area_element_at(const double *areas, size_t count, double area);
 
 /* The point of the triangle abc (3 doubles each) for two even random numbers: even in its area. */

@@ -30,9 +30,9 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  * First, `sample_count` points are spread evenly over the features (nodes/measure/boundary_features.h); those on the
  * boundary give sampled figures and lower bounds. Then branch and bound runs over pieces of the features: the distance
  * to the surface is 1-Lipschitz, so over a piece of radius `reach` it exceeds the middle's by at most that. Pieces
- * deeper than QMAT_BOUNDARY_SKIN in the envelope are discarded. Cells of space replace the features where there are
- * more than 20,000. A level of pieces is compared with the lower bound of the levels before it, so that the answer does
- * not depend on threads.
+ * deeper than QMAT_BOUNDARY_SKIN in the envelope are discarded, and with `outside` those deeper than 1e-6. Cells of
+ * space replace the features where there are more than 65,536. A level of pieces is compared with the lower bound of
+ * the levels before it, so that the answer does not depend on threads.
  *
  * hi - lo is at most `tolerance` times epsilon or lo, the larger, and smaller where that decides whether hi is at most
  * `epsilon`. There are two exceptions. Errors below five times the tolerated share of epsilon are not resolved: hi is

@@ -120,7 +120,7 @@ static bool cone_side_ball(const qmat_boundary_features *f, const qmat_boundary_
   const double spread = 2 * side.across * sin(0.25 * (p->at[3] - p->at[2]));
   for (int e = 0; e < 2; e++) qmat_cone_side_sphere(&side, p->at[e], ends[e]);
   for (size_t i = f->apex_offsets[edge]; i < f->apex_offsets[edge + 1]; i++) {
-    /* Along the side n.c + r is constant and so is the excess. Its ends have the least radius and the largest distance.
+    /* Along the side n.c + r and so the excess are constant. Its ends have the least radius and the largest distance.
      */
     const double *apex = &f->spheres[4 * (size_t)f->apexes[i]];
     double excess = INFINITY, radius = INFINITY, square = 0;

@@ -8,8 +8,8 @@
 /* In place of a feature's number: the piece is a cube of space. */
 #define QMAT_CELL UINT32_MAX
 
-/* Points that lie this deep in the envelope, in diagonals, count as its boundary too, for upper bounds: a file in
- * single precision cannot tell them apart, nor can samples. */
+/* Points that lie this deep in the envelope, in diagonals, count as its boundary too, for upper bounds: samples cannot
+ * tell them apart, nor can a file in single precision. A search with `outside` (boundary_distance.h) takes 1e-6. */
 #define QMAT_BOUNDARY_SKIN 1e-4
 
 /* A piece of a feature's surface, or of space, that branch and bound halves. `at` depends on the kind: for a sphere

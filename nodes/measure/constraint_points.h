@@ -20,7 +20,7 @@ typedef struct qmat_constraint_points {
   double *points;              /* 3 per point, unit frame */
   uint32_t *witnesses;         /* 3 per point: vertices of one simplex of the medial mesh, QMAT_NONE where fewer */
   double *weights;             /* 3 per point */
-  double *distances;           /* per point: F at the witness */
+  double *distances;           /* per point: F at the witness; strict on the surface: 0 at most; given up: INFINITY */
 } qmat_constraint_points;
 
 /* The point that a sample is, or that stands for it. */
@@ -59,7 +59,7 @@ typedef struct qmat_extra_points {
   size_t surface_count, inner_count;
   const double *surface, *inner; /* 3 per point, unit frame */
   double required_depth;         /* the depth in the envelope that interior points need at most */
-  bool is_strict;                /* whether the limits are those of other points, whatever F is now */
+  bool is_strict;                /* for repairs: all points are kept, with limits that F may still exceed */
 } qmat_extra_points;
 
 /* Makes constraint points of `extra`, each with its nearest primitive of `complex` as the witness. Points inside the

@@ -113,9 +113,11 @@ static bool is_done(search *s, double bound, double size, bool last) {
   return true;
 }
 
-/* Larger pieces, in limits, are worth a bound of the whole piece: of second order where the depth is a distance, else a
- * closed formula, which need not be lower than the third share of the limit. Without a limit the formula is worth it
- * for pieces larger than so many tolerances: one that touches flat surface would end as thousands. */
+/* Pieces larger than `squares_size` limits are worth a bound of second order, where the depth is a distance.
+ * Pieces larger than `flat_size` limits are worth a closed formula.
+ * The bound of the formula need not be lower than `flat_share` of the limit.
+ * Without a limit, pieces larger than `flat_tolerances` tolerances are worth the formula: a piece that touches flat
+ * surface would end as thousands. */
 static const double squares_size = 0.3, flat_size = 1, flat_share = 0.25, flat_tolerances = 4;
 
 /* Whether a closed formula accepts a piece with a point inside the solid. It need not be lower than `lowest`. */

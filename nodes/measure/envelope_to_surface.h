@@ -38,7 +38,7 @@ qmat_status qmat_envelope_to_surface_init(qmat_context *context, qmat_envelope_t
 void qmat_envelope_to_surface_uninit(qmat_envelope_to_surface *tracker);
 
 /* Bounds the depth of the merged sphere's centre from below: from the ends where that proves it inside and within the
- * limit, else by a query. True when the centre is inside and the sphere is within the limit. */
+ * limit, else by a query. True when the sphere is within the limit and, unless it is of a sheet, its centre inside. */
 bool qmat_envelope_to_surface_test_sphere(qmat_envelope_to_surface *tracker, const qmat_complex *complex,
                                           const qmat_collapse *collapse, const double sphere[4]);
 

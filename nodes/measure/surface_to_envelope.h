@@ -5,8 +5,7 @@
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/medial_primitive.h"
 
-/* A growing list of prepared primitives. The balls around them are apart, since most primitives are rejected by them.
- * */
+/* A growing list of prepared primitives. The balls around them are apart, since they reject most primitives. */
 typedef struct qmat_star_primitives {
   struct qmat_star_primitive *items;
   qmat_primitive_ball *balls;
@@ -16,7 +15,8 @@ typedef struct qmat_star_primitives {
 /* Tracks the surface-to-envelope error while a medial mesh is simplified (eq. 9-12, with the signed F).
  *
  * Every constraint point has a witness: a point of the medial complex, as weights on one live simplex, whose medial
- * sphere is within the point's limit. A collapse maps simplices to simplices, so witnesses move along. A witness that
+ * sphere is within the point's limit. That of a strict point (qmat_extra_points) may exceed it at first; a point that
+ * is given up gets the limit INFINITY. A collapse maps simplices to simplices, so witnesses move along. A witness that
  * is still within the limit proves the new complex good at its point; otherwise the primitives around are searched for
  * another witness. The points whose witnesses are at a vertex are its responsible region. */
 typedef struct qmat_surface_to_envelope {

@@ -31,9 +31,8 @@ qmat_status qmat_topology_find_empty_triangles(qmat_context *context, const qmat
                                                size_t *count);
 
 /* Finds the edges that no triangle has and that are on a loop: the components stay when one of them is removed.
- * `*edges`:
- * `*count` numbers of edges, the shortest first, in the context's arena. QMAT_ERROR_MEMORY. Linear but for a sort and
- * for finding the edges of triangles. */
+ * `*edges`: `*count` numbers of edges, the shortest first, in the context's arena. QMAT_ERROR_MEMORY. Linear but for a
+ * sort and for finding the edges of triangles. */
 qmat_status qmat_topology_find_loop_edges(qmat_context *context, const qmat_medial *medial, uint32_t **edges,
                                           size_t *count);
 

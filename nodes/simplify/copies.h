@@ -12,8 +12,8 @@ typedef struct qmat_copy_depths {
 
 void qmat_copy_depths_uninit(qmat_copy_depths *depths);
 
-/* Sets up `to` as qmat_decimation_resume does, and runs it with copies on all threads (lookahead.h). `lattice` gives
- * `to` its known depths while it runs. Statuses as both. */
+/* Sets up `to` as qmat_decimation_resume does, and runs it with copies (lookahead.h): one a thread, at most
+ * QMAT_MOST_COPIES. A repair runs alone. `lattice` gives `to` its known depths while it runs. Statuses as both. */
 qmat_status qmat_decimation_run_copies(const qmat_decimation *from, const qmat_medial *left,
                                        const qmat_extra_points *extra, qmat_depth_lattice *lattice,
                                        qmat_copy_depths *depths, qmat_constraint_points *constraints,

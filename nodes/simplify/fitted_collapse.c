@@ -163,8 +163,7 @@ static qmat_status start_fit(qmat_decimation *s, const double sphere[4], bool al
 }
 
 /* Fits, places and tests the neighbourhood; the place of a refusal becomes a target of the next fit. If `*result`
- * allows it, the spheres are in place, and the collapse is the newest preview and test. Otherwise nothing has changed.
- */
+ * allows it, the spheres are in place, and the collapse is the newest preview and test. Else nothing has changed. */
 static qmat_status fit_and_test(qmat_decimation *s, uint32_t edge, qmat_collapse_outcome *result) {
   const uint32_t removed = s->collapse.removed;
   const bool is_move = edge == QMAT_NONE;
@@ -174,6 +173,7 @@ static qmat_status fit_and_test(qmat_decimation *s, uint32_t edge, qmat_collapse
   const int most = is_move ? QMAT_MOST_MOVE_FITS : QMAT_MOST_FITS;
   for (int i = 0; i < most && again && status == QMAT_OK && *result != QMAT_COLLAPSE_ALLOWED; i++) {
     double error;
+    /* The fits of a move go on with high weights. Those of a collapse do so every other time, and else start over. */
     qmat_neighbourhood_fit_run(&s->neighbourhood, &s->complex, is_move || i % 2 == 1, &error);
     if (!(error <= qmat_placement_ratio * s->threshold)) return status;
     s->saved_count = 0;

@@ -5,13 +5,14 @@
 #include "nodes/simplify/collapse_test.h"
 
 /* Tries the newest preview, of `edge`, with a sphere that is fitted to the surface from the best candidate, then with
- * the candidates themselves where their error is small. `sphere` is the one that `*result` allows. QMAT_ERROR_MEMORY.
- */
+ * the candidates themselves where their error is small. `*result` allows `sphere`, if any. QMAT_ERROR_MEMORY. */
 qmat_status qmat_decimation_try_fitted(qmat_decimation *decimation, uint32_t edge, const qmat_candidates *candidates,
                                        double sphere[4], qmat_collapse_outcome *result);
 
-/* After qmat_decimation_try_fitted was refused: tries the same collapse with the spheres around it fitted at the same
- * time, where they are few. Where `*result` allows it, all of these are in place, and the collapse is the newest
+/* After qmat_decimation_try_fitted was refused: tries the same collapse with further fits, unless a midpoint outside of
+ * the model refused it. The first fit moves its sphere alone, where the error was within qmat_test_ratio. The second
+ * also moves the spheres around it, where all are at most QMAT_COLLAPSE_SPHERES and the error was within
+ * qmat_neighbourhood_ratio. Where `*result` allows the collapse, all of these are in place, and it is the newest
  * preview and test; else nothing has changed. QMAT_ERROR_MEMORY. */
 qmat_status qmat_decimation_try_neighbourhoods(qmat_decimation *decimation, uint32_t edge,
                                                qmat_collapse_outcome *result);

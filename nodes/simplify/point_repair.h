@@ -7,11 +7,11 @@
 /* Frees the places. */
 void qmat_failed_places_uninit(qmat_failed_places *failed);
 
-/* Moves spheres so that the newest constraint points come within their limits. Each point that exceeds its limit is
- * tried with the spheres of its witness and their neighbours, fitted jointly; all other constraint points stay within
- * theirs. Points near several of `decimation->failed_places`, which must not be NULL, are passed over; a point that no
- * fit repairs becomes one of them. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: a joint fit or a few per point.
- */
+/* Moves spheres so that the newest constraint points come within their limits. For each point that exceeds its limit,
+ * every sphere of its witness is fitted alone, then each jointly with its neighbours, until a fit succeeds; all other
+ * constraint points stay within their limits. Points near several of `decimation->failed_places`, which must not be
+ * NULL, are passed over; a point that no fit repairs becomes one of them. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One
+ * thread. Cost: at most six fits a point. */
 qmat_status qmat_decimation_repair(qmat_decimation *decimation);
 
 /* Lifts the limits of the newest constraint points that exceed them, here and in `constraints`, which are those of the

@@ -291,10 +291,10 @@ static qmat_status mend_topology(const qmat_simplification *s, qmat_simplified *
   return status;
 }
 
-/* Continues from the result of the newest round with joint refits: each edge is tried with the spheres around it fitted
- * at the same time. Filled cavities of `found` become constraints, since a collapse may take away what fills them. A
- * result beyond epsilon is tried again with the points found, and with less of the error where there are none. The
- * result changes only where that makes it no worse. */
+/* Continues from the result of the newest round: each edge is tried again, also with the spheres around it fitted
+ * jointly (qmat_decimation_try_neighbourhoods). Filled cavities of `found` become constraints, since a collapse may
+ * take away what fills them. A result beyond epsilon is tried again with the points found, and with less of the error
+ * where there are none. The result changes only where that makes it no worse. */
 static qmat_status refit_once(qmat_simplification *s, const qmat_medial_errors *found, qmat_simplified *best,
                               bool *fewer) {
   *fewer = false;

@@ -22,7 +22,7 @@ typedef struct qmat_simplification {
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */
   qmat_decimation dense;              /* the start of each round */
-  /* Three places: for the newest round or its newest repair, for what that round continues, and a free one. */
+  /* Three places: for the newest round, which repairs replace, for the round that it continues, and a free one. */
   qmat_constraint_points round_constraints[3];
   qmat_decimation rounds[3];
   qmat_arena round_memory[3];
@@ -41,11 +41,11 @@ typedef struct qmat_simplified {
   bool has_right_topology; /* whether its Betti numbers are the solid's, as far as known */
 } qmat_simplified;
 
-/* Measures both errors of a medial mesh (unit frame) that differs from the newest round at most by added spheres or
- * removed slabs. `errors` gets them and the places beyond epsilon; free with qmat_medial_errors_uninit, also after a
- * failure. With `only_within` measuring ends with the first error above epsilon; one that is not measured then is 0,
- * or INFINITY where the search ended early. QMAT_ERROR_MEMORY,
- * QMAT_CANCELLED. All threads. */
+/* Measures both errors of a medial mesh (unit frame): the extract of the newest round, or that after edits. Where both
+ * errors are bounded, `errors->envelope_to_surface` is the bound that the round keeps if that is within epsilon; it
+ * leaves out what edits have added. `errors` also gets the places beyond epsilon; free with qmat_medial_errors_uninit,
+ * also after a failure. With `only_within` measuring ends with the first error above epsilon; one that is not measured
+ * then is 0, or INFINITY where the search ended early. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
                                         bool only_within, qmat_medial_errors *errors);
 

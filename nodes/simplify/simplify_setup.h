@@ -43,8 +43,8 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
       QMAT_FLOAT(qmat_simplify_params, most_cost, "1", 0, 0, 1e9,                                                     \
                  "Stop when the cheapest collapse costs more than this; 0: no limit"),                                \
       QMAT_ENUM(qmat_simplify_params, compat, qmat_compat_choices, QMAT_COMPAT_OFF,                                   \
-                "Collapse as the public Q-MAT code does: sets cost, k, topology, protect and features, and in "       \
-                "medial.simplify epsilon and on_exceed; there `vertices` stops it"),                                  \
+                "Collapse as the public Q-MAT code does: sets cost, k, topology, protect, features and on_exceed, "   \
+                "and in medial.simplify epsilon; there `vertices` stops it"),                                         \
       QMAT_ENUM(qmat_simplify_params, topology, qmat_topology_choices, QMAT_TOPOLOGY_GUARD,                           \
                 "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
                 "loops and voids of the result are corrected to those of the solid; the same as free where the "      \
@@ -91,7 +91,7 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
 qmat_decimation_rules qmat_simplify_rules(const qmat_simplify_params *params, const qmat_initial_medial *initial,
                                           uint64_t seed);
 
-/* Sets what `compat` sets. */
+/* With compat=qmat, sets the other parameters as the public Q-MAT code has them. */
 void qmat_simplify_apply_compatibility(qmat_simplify_params *params);
 
 /* Whether the parameters select collapses that do not depend on epsilon. */

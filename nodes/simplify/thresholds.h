@@ -2,10 +2,10 @@
 #ifndef QMAT_NODES_SIMPLIFY_THRESHOLDS_H
 #define QMAT_NODES_SIMPLIFY_THRESHOLDS_H
 
-/* The thresholds of medial.simplify that several files or passes share, in one table. "Derived" ones follow from
- * another number; the others were measured on the models of the ablation table (README.md). Steps within a solver, a
- * search or a repair are constants of its file. Chains and nodes share qmat_constraint_share (collapse_chain.h): the
- * share of epsilon that constraint points may use. */
+/* The thresholds of the passes of medial.simplify in one table, whether one file uses them or several. "Derived" ones
+ * follow from another number; the others were measured on the models of the ablation table (README.md). Steps within a
+ * solver, a search or a repair are constants of its file. Chains and nodes share qmat_constraint_share
+ * (collapse_chain.h): the share of epsilon that constraint points may use. */
 
 /* ---- shares of epsilon ---- */
 
@@ -55,7 +55,8 @@ enum {
   QMAT_FINAL_REFIT_POINTS = 1024,  /* of one sphere, where the error itself counts */
   QMAT_FITTED_TARGETS = 512,       /* of a neighbourhood */
   QMAT_NEIGHBOURHOOD_SPHERES = 12, /* 48 unknowns: a solve costs about as much as a pass over the targets */
-  /* Fitted jointly by a collapse: 54 of 1,729 such fits removed a sphere, 6 of 2,257 of more, for twice the time. */
+  /* Fitted jointly by a collapse. Of 1,729 joint fits of at most five spheres 54 removed one. Of 2,257 larger fits only
+   * 6 did, and those took twice as long. */
   QMAT_COLLAPSE_SPHERES = 5
 };
 
@@ -72,7 +73,7 @@ static const double qmat_neighbourhood_ratio = 1.3, qmat_placement_ratio = 1.02;
  * the last: none of 837 collapses that fits allowed had a larger one. */
 static const double qmat_give_up_ratios[] = {2.5, 2, 1.5, 1.2};
 
-/* The margin of a refused point that becomes a target; derived from qmat_placement_ratio. */
+/* The margin, in thresholds, of a refused point that becomes a target. Derived: qmat_placement_ratio less 1. */
 static const double qmat_target_margin = 0.02;
 
 /* Starts after the first multiply each cost by a factor between 1 and this one. */
