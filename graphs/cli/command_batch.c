@@ -111,32 +111,61 @@ static bool gives_format(const qmat_invocation *invocation, size_t output, const
   return false;
 }
 
+/* How many outputs of the graph are reports that every run saves. */
+static size_t report_count(const qmat_graph *graph) {
+  size_t count = 0;
+  for (size_t i = 0; i < graph->output_count; i++)
+    count += graph->outputs[i].path && qmat_graph_output_type(graph, i) == QMAT_REPORT;
+  return count;
+}
+
 static void add_output(const batch_call *call, word_list *list, const qmat_asset *asset, size_t output,
                        const char *ending) {
   const qmat_graph *graph = &call->invocation->graph;
   const char *name = graph->outputs[output].name;
   size_t last;
-  const bool several = qmat_graph_file_count(graph, &last) > 1; /* they differ by their names */
+  const bool is_report = qmat_graph_output_type(graph, output) == QMAT_REPORT;
+  const bool several = (is_report ? report_count(graph) : qmat_graph_file_count(graph, &last)) > 1;
+  /* Several differ by their names. */
   add_word(list, "--output=%s=%s/%s%s%s.%s", name, call->folder, asset->stem, several ? "-" : "", several ? name : "",
            ending);
 }
 
-/* Adds the paths of an asset's results: in each --format, or in the graph's. */
+/* The ending of an output as `qmat run` saves it: that of its path, else of its node's format. */
+static void find_ending(const batch_call *call, size_t output, const qmat_param *format, char ending[64]) {
+  const qmat_graph *graph = &call->invocation->graph;
+  const char *path = graph->outputs[output].path;
+  int choice = -1;
+  if (path) qmat_graph_output_format(call->context, graph, output, path, &choice); /* the reader has checked it */
+  if (choice >= 0)
+    snprintf(ending, 64, "%s", format->choices[choice]);
+  else if (qmat_graph_output_type(graph, output) == QMAT_REPORT)
+    snprintf(ending, 64, "json");
+  else
+    qmat_param_format(format, graph->nodes[graph->outputs[output].node].params, ending, 64);
+}
+
+/* Adds the paths of an asset's results: in each --format, or in the graph's. An output with a path is always saved, and
+ * it takes the asset's name. */
 static void add_outputs(const batch_call *call, word_list *list, const qmat_asset *asset) {
   const qmat_invocation *invocation = call->invocation;
   const qmat_graph *graph = &invocation->graph;
   const bool chosen = qmat_invocation_value(invocation, "format") != NULL;
   for (size_t i = 0; i < graph->output_count; i++) {
-    const qmat_graph_node *node = &graph->nodes[graph->outputs[i].node];
-    const qmat_param *param = qmat_output_format_param(node->type);
-    if (qmat_graph_output_type(graph, i) != QMAT_FILE || !param) continue;
+    const qmat_param *param = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
+    const qmat_value_type type = qmat_graph_output_type(graph, i);
+    const bool has_path = graph->outputs[i].path != NULL;
+    if (type == QMAT_FILE ? !param : !has_path) continue;
     char ending[64];
-    qmat_param_format(param, node->params, ending, sizeof ending);
-    for (int k = 0; param->choices[k]; k++)
-      if (gives_format(invocation, i, param->choices[k])) add_output(call, list, asset, i, param->choices[k]);
-    const bool on_request = qmat_graph_on_request(graph, i);
-    if (on_request ? call->pages && !gives_format(invocation, i, ending) : !chosen)
-      add_output(call, list, asset, i, ending);
+    bool given = false;
+    find_ending(call, i, param, ending);
+    for (int k = 0; type == QMAT_FILE && param->choices[k]; k++) {
+      if (!gives_format(invocation, i, param->choices[k])) continue;
+      add_output(call, list, asset, i, param->choices[k]);
+      given = true;
+    }
+    const bool wanted = qmat_graph_on_request(graph, i) ? call->pages && !gives_format(invocation, i, ending) : !chosen;
+    if (wanted || (has_path && !given)) add_output(call, list, asset, i, ending);
   }
 }
 
@@ -390,6 +419,43 @@ static qmat_status check_pages(const batch_call *call, const qmat_batch *batch) 
   return QMAT_OK;
 }
 
+/* "NAME=PATH" of a word that is an --output; NULL: it is another. */
+static const char *output_of(const char *word) {
+  static const char option[] = "--output=";
+  return strncmp(word, option, sizeof option - 1) == 0 ? word + sizeof option - 1 : NULL;
+}
+
+static const char *path_of(const char *output) {
+  return strchr(output, '=') + 1;
+}
+
+static int by_path(const void *a, const void *b) {
+  const char *first = *(const char *const *)a, *second = *(const char *const *)b;
+  const int order = strcmp(path_of(first), path_of(second));
+  return order != 0 ? order : strcmp(first, second);
+}
+
+/* Refuses two results of one path. */
+static qmat_status check_outputs(const batch_call *call, const qmat_batch *batch) {
+  size_t count = 0, most = 0;
+  for (size_t i = 0; i < batch->count; i++)
+    for (char **word = batch->assets[i].words; *word; word++) most += output_of(*word) != NULL;
+  const char **sorted = qmat_alloc(most, sizeof *sorted);
+  if (!sorted) return qmat_fail_memory(call->context, "outputs");
+  for (size_t i = 0; i < batch->count; i++)
+    for (char **word = batch->assets[i].words; *word; word++)
+      if (output_of(*word)) sorted[count++] = output_of(*word);
+  if (count > 1) qsort(sorted, count, sizeof *sorted, by_path);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 1; i < count && status == QMAT_OK; i++)
+    if (strcmp(path_of(sorted[i - 1]), path_of(sorted[i])) == 0)
+      status = qmat_fail(call->context, QMAT_ERROR_USAGE, "outputs '%.*s' and '%.*s' would have the same path '%s'",
+                         (int)strcspn(sorted[i - 1], "="), sorted[i - 1], (int)strcspn(sorted[i], "="), sorted[i],
+                         path_of(sorted[i]));
+  qmat_free(sorted);
+  return status;
+}
+
 /* Makes a folder for the reports of the assets. On a cluster it is inside the results, the one folder that is shared.
  */
 static qmat_status make_report_folder(batch_call *call) {
@@ -457,6 +523,7 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   if (status == QMAT_OK) status = prepare(&call);
   if (status == QMAT_OK && call.pages) status = check_pages(&call, &batch);
   for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
+  if (status == QMAT_OK) status = check_outputs(&call, &batch);
   bool started = status == QMAT_OK;
   if (started && call.slurm)
     status =

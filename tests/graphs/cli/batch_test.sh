@@ -132,6 +132,36 @@ holds "without --pages there are none" test "$(ls plain)" = b.glb
 timeout 100 "$qmat" run pages.yaml --set model=models/box1.off -o alone.png --no-cache --report alone.json --quiet
 holds "a picture alone makes nothing else" sh -c 'grep -q report.picture alone.json && ! grep -q "scene.write\|report.page" alone.json'
 
+# Outputs with paths of their own: each model has its own files, as `qmat run` would write them.
+cat >paths.yaml <<'END'
+qmat: 1
+inputs:
+  model: model.path
+nodes:
+  model: { type: scene.read }
+  ball: { type: medial.read, params: { path: ball.ma } }
+  picture: { type: report.picture, in: { mesh: model.mesh, medial: ball.medial }, params: { width: 32, height: 16 } }
+  asset: { type: scene.write, in: { medial: ball.medial } }
+outputs:
+  asset: { from: asset.file, path: own/asset.MA }
+  picture: { from: picture.file, path: own/picture.svg }
+  read: { from: model.report, path: own/read.json }
+END
+expect 0 "2 done" "$qmat" batch paths.yaml several/b.off models/box1.off --out pathed
+holds "the names are the models'" test "$(cd pathed && find . -type f | sort | tr '\n' ' ')" = \
+  "./models/box1.json ./models/box1.ma ./models/box1.svg ./several/b.json ./several/b.ma ./several/b.svg "
+holds "nothing is beside the graph" test ! -e own
+expect 0 "2 done" "$qmat" batch paths.yaml several/b.off models/box1.off --out pathed/ply --format ply
+holds "another format is that of the outputs that have it" test "$(ls pathed/ply/several | tr '\n' ' ')" = "b.json b.ply b.svg "
+holds "nothing is beside the graph, in another format" test ! -e own
+sed 's/^  read:.*/&\n  size: { from: model.report, path: size.json }/' paths.yaml >reports.yaml
+expect 0 "1 done" "$qmat" batch reports.yaml several/b.off --out pathed/reports
+holds "two reports differ by their names" test "$(ls pathed/reports | tr '\n' ' ')" = "b-read.json b-size.json b.ma b.svg "
+sed 's/^  read:.*/  front: { from: picture.file, path: front.svg }/' paths.yaml >pictures.yaml
+expect 2 "outputs 'front' and 'picture' would have the same path 'pictured/b.svg'" \
+  "$qmat" batch pictures.yaml several/b.off --out pictured
+holds "nothing is run" test -z "$(ls pictured)"
+
 # A list, relative to its folder.
 printf '\357\273\277# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
 batch --inputs models/list.txt --out listed --quiet
