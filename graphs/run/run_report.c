@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "core/json_text.h"
 #include "graphs/cache/cache_key.h"
@@ -163,25 +164,52 @@ static void put_escaped(qmat_writer *writer, const char *path) {
   }
 }
 
+/* Adds a dependency, and an empty rule for it: without one, Make stops where the file is missing. */
+static void put_dependency(qmat_writer *dependencies, qmat_writer *rules, const char *path) {
+  qmat_put_text(dependencies, " \\\n  ");
+  put_escaped(dependencies, path);
+  put_escaped(rules, path);
+  qmat_put_text(rules, ":\n");
+}
+
+/* Whether two paths differ by one number of the file's name alone. */
+static bool differ_by_number(const char *a, const char *b) {
+  size_t same = 0;
+  while (a[same] && a[same] == b[same]) same++;
+  while (same > 0 && a[same - 1] >= '0' && a[same - 1] <= '9') same--;
+  const size_t first = strspn(a + same, "0123456789"), second = strspn(b + same, "0123456789");
+  a += same + first;
+  b += same + second;
+  return first > 0 && second > 0 && strcmp(a, b) == 0 && !strchr(a, '/');
+}
+
+/* Whether the saved files are made anew when this file changes, and when a missing one appears. Not those that may stay
+ * missing: the tiles of a texture with a number in its name, and materials that a renderer has in a folder of its own.
+ */
+static bool is_dependency(const qmat_run *run, size_t index) {
+  const char *path = run->hashed[index].path, *ending = strrchr(path, '.');
+  if (run->hashed[index].readable) return true;
+  if (ending && strcasecmp(ending, ".mdl") == 0) return false;
+  for (size_t i = 0; i < run->hashed_count; i++)
+    if (i != index && differ_by_number(path, run->hashed[i].path)) return false;
+  return true;
+}
+
 qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path) {
-  qmat_writer writer = {0};
+  qmat_writer writer = {0}, rules = {0};
   qmat_file *file = NULL;
   for (size_t i = 0; i < run->file_count; i++) {
     if (i > 0) qmat_put_text(&writer, " ");
     put_escaped(&writer, run->files[i].path);
   }
   qmat_put_text(&writer, ":");
-  if (run->graph->is_file) {
-    qmat_put_text(&writer, " ");
-    put_escaped(&writer, run->graph->file);
-  }
-  for (size_t i = 0; i < run->hashed_count; i++) {
-    /* Make cannot make a missing file. */
-    if (!run->hashed[i].readable) continue;
-    qmat_put_text(&writer, " \\\n  ");
-    put_escaped(&writer, run->hashed[i].path);
-  }
+  if (run->graph->is_file) put_dependency(&writer, &rules, run->graph->file);
+  for (size_t i = 0; i < run->hashed_count; i++)
+    if (is_dependency(run, i)) put_dependency(&writer, &rules, run->hashed[i].path);
   qmat_put_text(&writer, "\n");
+  qmat_put_bytes(&writer, rules.bytes, rules.size);
+  writer.failed |= rules.failed;
+  qmat_writer_uninit(&rules);
   qmat_status status = qmat_writer_to_file(context, &writer, "d", &file);
   if (status == QMAT_OK) status = qmat_file_save(context, file, path);
   if (file) qmat_value_release(&file->base);

@@ -12,7 +12,8 @@
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run);
 
 /* Writes a rule for Make and Ninja: the saved files of a finished run depend on the graph file and on every file that
- * the run read or that a cached result was made from. Through a temporary. */
+ * the run read, looked for and did not find, or that a cached result was made from. Each of these has an empty rule, so
+ * that Make does not stop where it is missing. Through a temporary. */
 qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path);
 
 /* {"error": {...}} with the fields of the error and "text", the printed line. NULL when memory is short. */

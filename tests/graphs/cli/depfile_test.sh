@@ -38,6 +38,45 @@ for tool in make ninja; do
   made no "after an edited side file"
 done
 
+# A missing image is looked for at each build, until it appears; then it may go again. So may the model, which is told.
+# Make still makes a model by a pattern.
+for tool in make ninja; do
+  rm -f roof.ma roof.ma.d late.png
+  sed '0,/{/s//{"images": [{"uri": "late.png"}],/' "$source/examples/game/models/roof.gltf" >roof.gltf
+  holds "the model has an image" grep -q 'late.png' roof.gltf
+  made yes "a missing image, the first time"
+  holds "$tool: the missing image is listed" grep -q '^  late.png' roof.ma.d
+  printf '\211PNG\r\n\032\n' >late.png
+  made yes "an image that appears"
+  made no "after an image that appears"
+  rm late.png
+  made yes "an image that is gone"
+  cp roof.gltf kept.gltf
+  rm roof.gltf
+  if $tool >out.txt 2>err.txt; then fail "$tool: a model that is gone is told"; fi
+  holds "$tool: qmat tells it" grep -q 'roof.gltf: .*cannot open the file' out.txt err.txt
+  cp kept.gltf roof.gltf
+done
+printf '%%.gltf: %%.source\n\tcp $< $@\n' >>Makefile
+mv roof.gltf roof.source
+tool=make
+made yes "a model that another rule makes"
+holds "the other rule runs" test -s roof.gltf
+
+# The tiles of a texture have gaps, which are no files that could appear.
+cat >tiles.usda <<'END'
+#usda 1.0
+def Cube "box" {}
+def Shader "image" {
+  asset inputs:file = @tile.<UDIM>.png@
+  asset info:mdl:sourceAsset = @OmniPBR.mdl@
+}
+END
+printf '\211PNG\r\n\032\n' >tile.1002.png
+expect 0 "" "$qmat" mat tiles.usda -o tiles.glb --depfile tiles.d --epsilon 20% --set samples.spacing=20%
+holds "the tile that is there is listed, and no other" test "$(grep -c '^  ' tiles.d)" -eq 2
+rm -f Makefile build.ninja
+
 # Names with what Make and Ninja read as something else.
 for tool in make ninja; do
   name='at 12:30 #2.off'
