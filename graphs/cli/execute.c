@@ -178,7 +178,8 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
     if (qmat_same_file(path, invocation->arguments[i])) return false;
   for (size_t i = 0; i < invocation->given_count; i++) {
     const char *value = invocation->given[i].value, *equals = strchr(value, '=');
-    if (strcmp(invocation->given[i].name, "output") != 0 && strcmp(invocation->given[i].name, "set") != 0) continue;
+    const char *name = invocation->given[i].name;
+    if (strcmp(name, "output") != 0 && strcmp(name, "set") != 0 && strcmp(name, "depfile") != 0) continue;
     if (qmat_same_file(path, value) || (equals && qmat_same_file(path, equals + 1))) return false;
   }
   const qmat_graph *graph = &invocation->graph;
@@ -279,7 +280,10 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
   if (status == QMAT_OK && report_path) status = qmat_make_folders(context, report_path);
   if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
+  if (status == QMAT_OK && depfile) status = qmat_make_folders(context, depfile);
   if (status == QMAT_OK && depfile) status = qmat_run_check_path(context, run, "the depfile", depfile);
+  if (status == QMAT_OK && report_path && depfile && qmat_same_file(depfile, report_path))
+    status = qmat_fail(context, QMAT_ERROR_USAGE, "the depfile '%s' would overwrite the report", depfile);
   bool ready = status == QMAT_OK, reported = false;
   if (ready && dry) {
     qmat_run_foresee(run);

@@ -130,6 +130,14 @@ expect 0 "a medial mesh of" "$qmat" info over.usda --node medial_0
 expect 1 "no prim of this name" "$qmat" info over.usda --node nosuch
 rm layer.usda kept.usda scene.usda over*
 
+# The report and the depfile: not in one file, and both in a folder that is made.
+expect 2 "would overwrite the report" "$qmat" mat box.off -o over.ma --epsilon 5% $coarse \
+  --report both/r.json --depfile both/../both/r.json
+holds "neither is written" test ! -e both/r.json -a ! -e over.ma
+expect 0 "" "$qmat" mat box.off -o over.ma --epsilon 5% $coarse --depfile made/for/d.d
+holds "the folder of the depfile is made" grep -q '^over.ma:' made/for/d.d
+rm -r both made over.ma
+
 # The extras of this node are no object, so that the medial mesh is on a child of it.
 cat >list.gltf <<'END'
 {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "n", "extras": [1], "scale": [2, 2, 2]}], "meshes": [{"name": "b", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}], "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}, {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}], "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}], "buffers": [{"byteLength": 168, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAgD8AAAAAAAAAAAAAAAAAAIA/AACAPwAAAAAAAIA/AAAAAAAAgD8AAIA/AACAPwAAgD8AAIA/AAACAAMAAAADAAEABAAFAAcABAAHAAYAAAABAAUAAAAFAAQAAgAGAAcAAgAHAAMAAAAEAAYAAAAGAAIAAQADAAcAAQAHAAUA"}]}
