@@ -101,6 +101,19 @@ static bool same_folder(const char *a, const char *b) {
   return length == qmat_folder_length(b) && memcmp(a, b, length) == 0;
 }
 
+/* Makes an output and its side files as new as the run. Files with the same bytes are not written again; build tools go
+ * by their times. */
+static qmat_status touch_file(qmat_context *context, const qmat_run_file *file) {
+  (void)utimensat(AT_FDCWD, file->path, NULL, 0);
+  for (size_t part = 1; part < file->written->part_count; part++) {
+    char *side = qmat_path_beside(file->path, file->written->parts[part].name);
+    if (!side) return qmat_fail_memory(context, "output path");
+    (void)utimensat(AT_FDCWD, side, NULL, 0);
+    qmat_free(side);
+  }
+  return QMAT_OK;
+}
+
 static qmat_status write_group(qmat_context *context, qmat_run *run, size_t first) {
   part_group group = {0};
   qmat_status status = QMAT_OK;
@@ -111,9 +124,8 @@ static qmat_status write_group(qmat_context *context, qmat_run *run, size_t firs
     const qmat_file together = {.base = {.type = QMAT_FILE}, .part_count = group.count, .parts = group.parts};
     status = qmat_file_save(context, &together, path);
   }
-  /* Files with the same bytes are not written again; build tools go by their times. */
   for (size_t i = first; i < run->file_count && status == QMAT_OK; i++)
-    if (same_folder(path, run->files[i].path)) (void)utimensat(AT_FDCWD, run->files[i].path, NULL, 0);
+    if (same_folder(path, run->files[i].path)) status = touch_file(context, &run->files[i]);
   qmat_free(group.parts);
   return status;
 }

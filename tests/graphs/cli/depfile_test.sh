@@ -104,4 +104,10 @@ touch -d 2001-01-01 two.ma two.ply
 "$qmat" mat roof.gltf -o two.ma -o two.ply --quiet --epsilon 10% --set samples.spacing=10%
 holds "both results are new" test two.ma -nt roof.gltf -a two.ply -nt roof.gltf
 
+# So are side files, which a rule may declare.
+"$qmat" mat roof.gltf -o sides.gltf --quiet --epsilon 10% --set samples.spacing=10%
+touch -d 2001-01-01 sides.gltf sides.bin
+"$qmat" mat roof.gltf -o sides.gltf --quiet --epsilon 10% --set samples.spacing=10%
+holds "a side file is new" test sides.bin -nt roof.gltf -a sides.gltf -nt roof.gltf
+
 finish
