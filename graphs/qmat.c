@@ -138,7 +138,7 @@ qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
   return finish_new(*job, qmat_graph_read_text(&(*job)->context, &(qmat_registry){qmat_nodes, qmat_node_count}, "graph",
-                                               text, size, &(*job)->graph));
+                                               text ? text : "", text ? size : 0, &(*job)->graph));
 }
 
 void qmat_job_forget(qmat_job *job) {

@@ -62,7 +62,8 @@ QMAT_API qmat_result qmat_job_new(qmat_job **job);
 /* The same with a graph file, or where there is none of that name a built-in graph: "qmat_plus", "colliders", "lod".
  * Relative paths of a file are relative to its folder. */
 QMAT_API qmat_result qmat_job_new_from_file(qmat_job **job, const char *path);
-/* The same with `size` bytes of graph text, YAML or JSON. Its relative paths are relative to the working folder. */
+/* The same with `size` bytes of graph text, YAML or JSON; NULL is an empty text. Its relative paths are relative to the
+ * working folder. */
 QMAT_API qmat_result qmat_job_new_from_text(qmat_job **job, const char *text, size_t size);
 /* Frees a job and everything that it returned; NULL is allowed. */
 QMAT_API void qmat_job_free(qmat_job *job);

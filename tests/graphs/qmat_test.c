@@ -459,6 +459,13 @@ static void test_a_bad_graph_keeps_its_error(void **state) {
   assert_int_equal(qmat_job_new_from_file(&job, "/nowhere.yaml"), QMAT_RESULT_USAGE);
   assert_string_equal(qmat_job_error(job)->file, "/nowhere.yaml");
   qmat_job_free(job);
+  char empty[1024];
+  assert_int_equal(qmat_job_new_from_text(&job, "", 0), QMAT_RESULT_USAGE);
+  snprintf(empty, sizeof empty, "%s", qmat_job_error(job)->text);
+  qmat_job_free(job);
+  assert_int_equal(qmat_job_new_from_text(&job, NULL, 0), QMAT_RESULT_USAGE);
+  assert_string_equal(qmat_job_error(job)->text, empty);
+  qmat_job_free(job);
 }
 
 static void test_a_job_takes_from_the_cache_what_another_has_made(void **state) {
