@@ -115,7 +115,7 @@ QMAT_API void qmat_job_forget(qmat_job *job);
 /* Sets the folder of the cache, which is made if it is missing; NULL, the default: no cache. A cached result is used
  * instead of running its node; a mesh in memory counts by its content. Any number of jobs, threads and processes may
  * share a folder. A failure of the cache never fails a run; qmat_job_run_report has it under "cache".
- * QMAT_RESULT_USAGE: the path is a file. */
+ * QMAT_RESULT_USAGE: the path is a file. qmat_job_run has this result, too, where it has become one meanwhile. */
 QMAT_API qmat_result qmat_job_cache(qmat_job *job, const char *folder);
 /* The cache folder of the command line: $QMAT_CACHE, $XDG_CACHE_HOME/qmat or ~/.cache/qmat. NULL: $QMAT_CACHE is "off",
  * or there is no home folder. Free with qmat_text_free. */

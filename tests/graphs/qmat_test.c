@@ -502,6 +502,27 @@ static void test_a_job_takes_from_the_cache_what_another_has_made(void **state) 
   assert_int_equal(system(command), 0);
 }
 
+static void test_a_cache_that_has_become_a_file_is_a_usage_error_of_the_run(void **state) {
+  (void)state;
+  char path[] = "/tmp/qmat-job-XXXXXX";
+  const int file = mkstemp(path);
+  assert_true(file >= 0);
+  close(file);
+  unlink(path);
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_want(job, "model.mesh"));
+  ok(job, qmat_job_cache(job, path));
+  fclose(fopen(path, "we"));
+  assert_int_equal(qmat_job_run(job, 1, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_string_equal(qmat_job_error(job)->file, path);
+  unlink(path);
+  ok(job, qmat_job_run(job, 1, NULL, NULL));
+  qmat_job_free(job);
+  char command[64];
+  snprintf(command, sizeof command, "rm -rf %s", path);
+  assert_int_equal(system(command), 0);
+}
+
 static void test_the_shipped_graph_is_the_built_in_one(void **state) {
   (void)state;
   /* Tests run in the folder of the source. */
@@ -539,6 +560,7 @@ int main(void) {
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
       cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),
+      cmocka_unit_test(test_a_cache_that_has_become_a_file_is_a_usage_error_of_the_run),
       cmocka_unit_test(test_the_shipped_graph_is_the_built_in_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
