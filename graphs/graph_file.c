@@ -385,6 +385,8 @@ static qmat_status read_graph(graph_reader *reader) {
     reader->context->error = reader->pending;
     return QMAT_ERROR_USAGE;
   }
+  /* Another failure is the error then, and the newest mistake has not been told. */
+  if (status != QMAT_OK && reader->mistakes > 0) reader->mistake(&reader->pending);
   if (status == QMAT_OK) status = qmat_graph_order_nodes(reader->context, reader->graph);
   if (status == QMAT_OK) status = qmat_graph_check_reached(reader->context, reader->graph);
   return status;

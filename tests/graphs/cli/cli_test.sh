@@ -71,6 +71,14 @@ expect 2 "did you mean 'scene.read'?" "$qmat" check mistakes.yaml
 sed 's/^qmat: mistakes.yaml:\([0-9]*:[0-9]*\): .*/\1/' err.txt | tr '\n' ' ' >places.txt
 holds "all mistakes, and nothing that follows from them: $(cat places.txt)" grep -qx \
   '2:1 4:14 5:56 5:65 5:77 6:44 6:3 8:29 7:31 ' places.txt
+printf 'qmat: 1\nnode:\n  m: { type: scene.read }\noutput: { a: m.mesh }\n' >nodes.yaml
+expect 2 "nodes.yaml:2:1: a graph has no key 'node' (did you mean 'nodes'?)" "$qmat" check nodes.yaml
+holds "the key before the last" grep -q "nodes.yaml:4:1: a graph has no key 'output' (did you mean 'outputs'?)" err.txt
+holds "what ends the reading" grep -q "the graph has no nodes" err.txt
+awk 'BEGIN { print "qmat: 1\nnodes:"; for (i = 0; i < 60; i++) print "  n" i ": { type: foo }" }' >many.yaml
+expect 2 "there is no node type 'foo'" "$qmat" check many.yaml
+holds "at the limit no mistake is left out" test "$(sed 's/^qmat: many.yaml:\([0-9]*\):.*/\1/' err.txt | tr '\n' ' ')" = \
+  "$(seq 3 53 | tr '\n' ' ')"
 expect 2 "did you mean '--set'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --sat model=box.off
 expect 2 "did you mean '--set features=...'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --features auto
 expect 2 "did you mean 'epsilon'?" "$qmat" run "$source/graphs/qmat_plus.yaml" --set simple.epsilom=1
