@@ -23,25 +23,28 @@ static void on_interrupt(int number) {
   interrupted = 1;
 }
 
-static sigset_t interrupts(void) {
+static const int interrupts[] = {SIGHUP, SIGINT, SIGTERM};
+enum { INTERRUPT_COUNT = sizeof interrupts / sizeof *interrupts };
+
+static sigset_t interrupt_set(void) {
   sigset_t set;
   sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
+  for (int i = 0; i < INTERRUPT_COUNT; i++) sigaddset(&set, interrupts[i]);
   return set;
 }
 
 void qmat_hold_interrupts(void) {
-  const sigset_t set = interrupts();
+  const sigset_t set = interrupt_set();
   sigprocmask(SIG_BLOCK, &set, NULL);
 }
 
 void qmat_catch_interrupts(void) {
-  struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)(SA_RESETHAND | SA_RESTART)};
+  struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)(SA_RESETHAND | SA_RESTART)}, before;
   sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, NULL);
-  sigaction(SIGTERM, &action, NULL);
-  const sigset_t set = interrupts();
+  for (int i = 0; i < INTERRUPT_COUNT; i++)
+    if (sigaction(interrupts[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+      sigaction(interrupts[i], &action, NULL);
+  const sigset_t set = interrupt_set();
   sigprocmask(SIG_UNBLOCK, &set, NULL);
 }
 

@@ -56,11 +56,13 @@ void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context,
 /* Erases the line. */
 void qmat_progress_view_end(qmat_progress_view *view);
 
-/* Holds SIGINT and SIGTERM back until qmat_catch_interrupts, also in the program that this one becomes. */
+/* Holds SIGHUP, SIGINT and SIGTERM back until qmat_catch_interrupts, also in the program that this one becomes. */
 void qmat_hold_interrupts(void);
 
-/* Makes SIGINT and SIGTERM cancel the run, also those that were held back. A second signal ends the program at once. */
+/* Makes these signals cancel the run, also those that were held back. A second signal ends the program at once. A
+ * signal that is ignored stays ignored, as nohup and the shell want it. */
 void qmat_catch_interrupts(void);
+
 /* Whether a signal has come. */
 bool qmat_interrupted(void);
 

@@ -199,6 +199,27 @@ wait $running
 code=$?
 holds "exit code 3 after a signal, not $code" test $code -eq 3
 holds "nothing goes on after a signal" test ! -e rest/box9.glb
+"$qmat" batch graph.yaml --inputs 'models/*.off' --out hung --jobs 1 --set samples.spacing=2% --no-cache \
+  >out.txt 2>err.txt &
+running=$!
+child_of $running
+kill -INT $running # the shell makes the background ignore it
+kill -HUP $running
+wait $running
+code=$?
+holds "exit code 3 after the terminal is gone, not $code" test $code -eq 3
+holds "nothing goes on without the terminal" test ! -e "/proc/$child" -a -z "$(ls -d qmat-batch-* hung/*.glb 2>/dev/null)"
+(
+  trap '' HUP # as nohup does
+  exec "$qmat" batch graph.yaml --inputs 'models/box*.off' --out kept --jobs 1 --no-cache >out.txt 2>err.txt
+) &
+running=$!
+child_of $running
+kill -HUP $running
+kill -INT $running
+wait $running
+code=$?
+holds "ignored signals stay ignored: exit code 0, not $code" test $code -eq 0
 cp models/aaa_torus.off several/c_torus.off
 "$qmat" batch pages.yaml --inputs 'several/*.off' --out half --pages --jobs 1 --set picture.width=2000 \
   --set picture.height=1000 --no-cache >out.txt 2>err.txt &

@@ -175,7 +175,7 @@ until timeout 5 squeue --noheader --states=running 2>/dev/null | grep -q .; do
   sleep 0.1
 done
 [ -n "$(ls -d cancelled/.qmat-batch-*)" ] || die "what the machines tell is in the folder that they share"
-kill -INT $batch
+kill -TERM $batch # the shell makes the background ignore SIGINT
 wait $batch
 code=$?
 [ $code -eq 3 ] || die "exit code 3 after a signal, not $code"
