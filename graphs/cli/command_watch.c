@@ -17,7 +17,6 @@ typedef struct watched_file {
   int folder;       /* the watch of its folder; -1: the folder cannot be watched */
   bool readable;
   qmat_digest digest;
-  bool is_link;      /* to a file whose folder is not watched */
   struct stat about; /* what the system said of it last */
 } watched_file;
 
@@ -33,26 +32,21 @@ static void forget_files(watcher *watcher) {
   watcher->count = 0;
 }
 
-/* Updates what the system says of a file: zeros where there is none. */
-static void update_about(watched_file *file) {
+/* Updates what the system says of a file: zeros where there is none. True: it says something else than before. */
+static bool update_about(watched_file *file) {
+  const struct stat before = file->about;
   struct stat about;
-  file->is_link = lstat(file->path, &about) == 0 && S_ISLNK(about.st_mode);
-  file->about = (struct stat){0};
-  if (stat(file->path, &about) == 0) file->about = about;
+  file->about = stat(file->path, &about) == 0 ? about : (struct stat){0};
+  return file->about.st_dev != before.st_dev || file->about.st_ino != before.st_ino ||
+         file->about.st_size != before.st_size || file->about.st_mtim.tv_sec != before.st_mtim.tv_sec ||
+         file->about.st_mtim.tv_nsec != before.st_mtim.tv_nsec;
 }
 
-/* Whether a file has changed of which the folder tells nothing: a link, or one whose folder is missing. */
+/* Whether a file has changed. Its folder does not tell when it is a link, or when a folder on the way is missing or is
+ * replaced. */
 static bool has_changed_elsewhere(watcher *watcher) {
   bool changed = false;
-  for (size_t i = 0; i < watcher->count; i++) {
-    watched_file *file = &watcher->files[i];
-    const watched_file before = *file;
-    update_about(file);
-    if (file->folder >= 0 && !before.is_link && !file->is_link) continue;
-    changed = changed || file->about.st_ino != before.about.st_ino || file->about.st_size != before.about.st_size ||
-              file->about.st_mtim.tv_sec != before.about.st_mtim.tv_sec ||
-              file->about.st_mtim.tv_nsec != before.about.st_mtim.tv_nsec;
-  }
+  for (size_t i = 0; i < watcher->count; i++) changed = update_about(&watcher->files[i]) || changed;
   return changed;
 }
 

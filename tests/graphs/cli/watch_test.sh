@@ -69,6 +69,25 @@ runs 7 "a link to a model"
 sed 's/^2 1 1$/2 1 1.2/' elsewhere/box.off >new.off
 mv new.off elsewhere/box.off
 runs 8 "a model in another folder, behind the link"
+write_box new.off 3
+mv new.off models/box.off
+runs 9 "a file in place of the link"
+mv models before
+runs 10 "a folder that is gone"
+mkdir next
+write_box next/box.off 4
+mv next models
+runs 11 "another folder in its place"
+sed 's/^4 1 1$/4 1 1.1/' models/box.off >new.off
+mv new.off models/box.off
+runs 12 "a model in the new folder"
+mv models after
+runs 13 "this folder is gone, too"
+ln -s before models
+runs 14 "a link in place of the folder"
+ln -s after next
+mv -T next models
+runs 15 "a link that leads elsewhere"
 kill -TERM $watching
 wait $watching
 code=$?
