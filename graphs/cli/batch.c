@@ -127,8 +127,8 @@ json_t *qmat_asset_json(const qmat_asset *asset) {
                       json_integer((json_int_t)json_array_size(json_object_get(asset->result, "nodes"))));
   json_object_set_new(
       json, "hits", json_integer(json_integer_value(json_object_get(json_object_get(asset->result, "cache"), "hits"))));
-  static const char *const kept[] = {"outputs", "summary"};
-  for (int i = 0; i < 2; i++) {
+  static const char *const kept[] = {"outputs", "summary", "warnings"};
+  for (int i = 0; i < 3; i++) {
     json_t *value = json_object_get(asset->result, kept[i]);
     json_object_set_new(json, kept[i], value ? json_incref(value) : json_null());
   }

@@ -61,7 +61,7 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
                                  bool (*stop)(void), qmat_batch_observer *observer, void *user);
 
 /* An asset as a JSON object: input, result ("ok", "failed", "not run"), exit_code, seconds, nodes, hits, outputs,
- * summary, error. NULL when memory is short; the caller calls json_decref. */
+ * summary, warnings, error. NULL when memory is short; the caller calls json_decref. */
 json_t *qmat_asset_json(const qmat_asset *asset);
 
 /* Writes why an asset failed, in one line; "" for one that succeeded. `text` holds `size` bytes. */

@@ -70,7 +70,8 @@ static void put_picture(qmat_writer *writer, const char *page, const char *pictu
   qmat_put_text(writer, "</td>");
 }
 
-/* Why an asset failed, or what it came to. Sorting by it gives: failed, not run, not certified, good. */
+/* Why an asset failed, or what it came to, and the warnings of its run. Sorting by it gives: failed, not run, not
+ * certified, good. */
 static void put_result(qmat_writer *writer, const qmat_asset *asset) {
   const json_t *certified = json_object_get(json_object_get(asset->result, "summary"), "certified");
   char error[2048] = "";
@@ -89,6 +90,11 @@ static void put_result(qmat_writer *writer, const qmat_asset *asset) {
   qmat_put_integer(writer, order);
   qmat_put_text(writer, "\">");
   put_name(writer, text);
+  const json_t *warnings = json_object_get(asset->result, "warnings");
+  for (size_t i = 0; i < json_array_size(warnings); i++) {
+    qmat_put_text(writer, "<br>");
+    qmat_put_markup(writer, json_string_value(json_array_get(warnings, i)));
+  }
   qmat_put_text(writer, "</td>");
 }
 

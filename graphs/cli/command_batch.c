@@ -265,21 +265,18 @@ static void print_asset_line(const batch_call *call, const qmat_batch *batch, co
   qmat_put_wrapped(stderr, line, 0, 2, width, true);
 }
 
-/* Tells which meshes of a scene have failed, and once what is wrong with the cache. */
+/* Tells the warnings of an asset's run, a quiet batch which meshes have failed, and once what is wrong with the cache.
+ */
 static void print_warnings(batch_call *call, const qmat_asset *asset) {
-  const char *of = json_string_value(json_object_get(json_object_get(asset->result, "summary"), "node"));
-  const json_t *nodes = json_object_get(asset->result, "nodes"), *node, *mesh;
-  size_t i, k;
-  json_array_foreach(nodes, i, node) {
-    const char *id = json_string_value(json_object_get(node, "id"));
-    if (!id || !of || strcmp(id, of) != 0) continue;
-    json_array_foreach(json_object_get(json_object_get(node, "report"), "meshes"), k, mesh) {
-      const char *name = json_string_value(json_object_get(mesh, "name"));
-      const char *failure = json_string_value(json_object_get(mesh, "failure"));
-      if (name && failure)
-        fprintf(stderr, "qmat: warning: %s: mesh '%s' cannot be described: %s\n", qmat_show(asset->input).text,
-                qmat_show(name).text, failure);
-    }
+  const json_t *warnings = json_object_get(asset->result, "warnings");
+  for (size_t i = 0; i < json_array_size(warnings); i++) {
+    const char *text = json_string_value(json_array_get(warnings, i));
+    if (!text || (call->quiet && strncmp(text, "mesh ", 5) != 0)) continue;
+    fputs("qmat: warning: ", stderr);
+    qmat_put_shown(stderr, asset->input);
+    fputs(": ", stderr);
+    qmat_put_shown(stderr, text);
+    fputc('\n', stderr);
   }
   const char *of_cache = json_string_value(json_object_get(json_object_get(asset->result, "cache"), "warning"));
   if (!of_cache || call->quiet || call->has_told_of_cache) return;

@@ -194,38 +194,14 @@ static bool may_write_error(const qmat_invocation *invocation, const char *path)
   return true;
 }
 
-/* Whether an earlier step reported the same failure of the same mesh. Later nodes repeat it. */
-static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
-  for (size_t i = 0; i < step; i++) {
-    const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
-    const char *before = json_string_value(json_object_get(of_mesh, "failure"));
-    if (before && strcmp(before, failure) == 0) return true;
-  }
-  return false;
-}
-
-/* Prints the meshes that failed and, unless `quiet`, the warnings in the steps' reports, such as what a reader left
- * out. */
 static void print_warnings(const qmat_run *run, bool quiet) {
-  for (size_t i = 0; i < run->step_count; i++) {
-    const char *id = run->graph->nodes[run->steps[i].node].id;
-    const json_t *warnings = json_object_get(run->steps[i].report, "warnings");
-    for (size_t k = 0; k < json_array_size(warnings) && !quiet; k++) {
-      const char *text = json_string_value(json_array_get(warnings, k));
-      if (!text) continue;
-      fprintf(stderr, "qmat: warning: node '%s': ", id);
-      qmat_put_shown(stderr, text);
-      fputc('\n', stderr);
-    }
-    const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
-    for (size_t k = 0; k < json_array_size(meshes); k++) {
-      const json_t *of_mesh = json_array_get(meshes, k);
-      const char *name = json_string_value(json_object_get(of_mesh, "name"));
-      const char *failure = json_string_value(json_object_get(of_mesh, "failure"));
-      if (name && failure && !was_told(run, i, k, failure))
-        fprintf(stderr, "qmat: warning: mesh '%s' cannot be described: %s\n", qmat_show(name).text, failure);
-    }
+  json_t *warnings = qmat_run_warnings(run, quiet);
+  for (size_t i = 0; i < json_array_size(warnings); i++) {
+    fputs("qmat: warning: ", stderr);
+    qmat_put_shown(stderr, json_string_value(json_array_get(warnings, i)));
+    fputc('\n', stderr);
   }
+  json_decref(warnings);
 }
 
 /* Copies what goes to the standard output there, and gives it its name in reports. */
@@ -317,6 +293,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     /* A failure to write the report must not replace this error. */
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);
+    if (ready && !dry) json_object_set_new(report, "warnings", qmat_run_warnings(run, false));
     qmat_save_json(context, report, report_path);
     json_decref(report);
     context->error = error;

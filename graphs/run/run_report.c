@@ -107,6 +107,40 @@ static json_t *cache_json(const qmat_run *run) {
   return json;
 }
 
+/* Whether an earlier step reported the same failure of the same mesh. Later nodes repeat it. */
+static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *failure) {
+  for (size_t i = 0; i < step; i++) {
+    const json_t *of_mesh = json_array_get(json_object_get(run->steps[i].report, "meshes"), mesh);
+    const char *before = json_string_value(json_object_get(of_mesh, "failure"));
+    if (before && strcmp(before, failure) == 0) return true;
+  }
+  return false;
+}
+
+json_t *qmat_run_warnings(const qmat_run *run, bool only_failures) {
+  json_t *all = json_array();
+  bool done = all != NULL;
+  for (size_t i = 0; i < run->step_count; i++) {
+    const char *id = run->graph->nodes[run->steps[i].node].id;
+    const json_t *own = json_object_get(run->steps[i].report, "warnings");
+    for (size_t k = 0; k < json_array_size(own) && !only_failures; k++) {
+      const char *text = json_string_value(json_array_get(own, k));
+      if (text) done = json_array_append_new(all, json_sprintf("node '%s': %s", id, text)) == 0 && done;
+    }
+    const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
+    for (size_t k = 0; k < json_array_size(meshes); k++) {
+      const char *name = json_string_value(json_object_get(json_array_get(meshes, k), "name"));
+      const char *failure = json_string_value(json_object_get(json_array_get(meshes, k), "failure"));
+      if (!name || !failure || was_told(run, i, k, failure)) continue;
+      json_t *text = json_sprintf("mesh '%s' cannot be described: %s", qmat_show(name).text, failure);
+      done = json_array_append_new(all, text) == 0 && done;
+    }
+  }
+  if (done) return all;
+  json_decref(all);
+  return NULL;
+}
+
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   json_t *nodes = json_array(), *outputs = json_array();
   for (size_t i = 0; i < run->step_count; i++) json_array_append_new(nodes, step_json(run, &run->steps[i]));
@@ -117,10 +151,11 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run) {
   if (second) snprintf(line, sizeof line, "%.*s; %s", (int)(second - text), text, second + 1);
   if (summary) json_object_set_new(summary, "text", qmat_json_string(second ? line : text));
   const bool whole = json_array_size(nodes) == run->step_count && json_array_size(outputs) == run->file_count;
-  json_t *report = json_pack("{s:s, s:o, s:o, s:f, s:i, s:o, s:o, s:o, s:o}", "qmat", QMAT_VERSION, "graph",
-                             qmat_json_string(run->graph->file), "input", input_json(run), "seconds", run->seconds,
-                             "threads", qmat_threads(context), "cache", cache_json(run), "nodes", nodes, "outputs",
-                             outputs, "summary", summary ? summary : json_null());
+  json_t *report =
+      json_pack("{s:s, s:o, s:o, s:f, s:i, s:o, s:o, s:o, s:o, s:o}", "qmat", QMAT_VERSION, "graph",
+                qmat_json_string(run->graph->file), "input", input_json(run), "seconds", run->seconds, "threads",
+                qmat_threads(context), "cache", cache_json(run), "nodes", nodes, "outputs", outputs, "summary",
+                summary ? summary : json_null(), "warnings", qmat_run_warnings(run, false));
   if (whole) return report;
   json_decref(report);
   return NULL;

@@ -8,8 +8,13 @@
 /* The results of a run, as JSON for programs. */
 
 /* A run that was executed and written, as a JSON object: qmat, graph, input, seconds, threads, cache, nodes, outputs,
- * summary. NULL when memory is short; the caller calls json_decref. */
+ * summary, warnings. NULL when memory is short; the caller calls json_decref. */
 json_t *qmat_run_report(const qmat_context *context, const qmat_run *run);
+
+/* The warnings in the steps' reports, such as what a reader left out ("node 'model': ..."), and the meshes that failed
+ * ("mesh 'roof' cannot be described: ..."), or these alone. A list of texts; NULL when memory is short; the caller
+ * calls json_decref. */
+json_t *qmat_run_warnings(const qmat_run *run, bool only_failures);
 
 /* Writes a rule for Make and Ninja: the saved files of a finished run depend on the graph file and on every file that
  * the run read, looked for and did not find, or that a cached result was made from. Each of these has an empty rule, so

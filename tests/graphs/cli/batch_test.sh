@@ -93,6 +93,20 @@ END
 "$qmat" mat scenes -o told --epsilon 20% --set samples.spacing=20% --quiet >out.txt 2>err.txt
 holds "the scene is made, not $?" test -s told/two.glb
 holds "a mesh that cannot be described is told" grep -q "two.usda: mesh .*bad.* cannot be described" err.txt
+
+# The warnings of a run are told with its model.
+printf '#usda 1.0\n(\n  subLayers = [@gone.usda@]\n)\ndef Cube "good" {}\n' >scenes/two.usda
+coarse='--set epsilon=20% --set samples.spacing=20%'
+expect 0 "qmat: warning: scenes/two.usda: node 'model': /: the sublayer @gone.usda@ is skipped" "$qmat" batch scenes --out told $coarse
+"$qmat" mat scenes/two.usda -o told/alone.glb $coarse 2>alone.txt >out.txt
+holds "they are those of 'qmat mat'" test "$(sed 's,scenes/two.usda: ,,' err.txt | grep warning:)" = "$(grep warning: alone.txt)"
+expect 0 "" "$qmat" batch scenes --out told $coarse --quiet
+holds "a quiet batch does not tell them" test ! -s err.txt
+expect 0 '"warnings":["node' "$qmat" batch scenes --out told $coarse --json
+expect 0 "" "$qmat" batch scenes --out told $coarse --pages
+holds "the page has them" grep -q "<br>node .*gone.usda" told/index.html
+expect 1 "qmat: warning: scenes/two.usda: node 'model': /: the sublayer @gone.usda@ is skipped" "$qmat" batch scenes --out told --set epsilon=0 \
+  --set vertices=1 --set require=certified --set samples.spacing=20%
 rm -r scenes told
 
 cp models/box1.off Index.off
