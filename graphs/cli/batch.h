@@ -35,13 +35,13 @@ typedef struct qmat_batch {
 } qmat_batch;
 
 /* Finds the models that `count` arguments name: files, folders with all models in and below them, and patterns with *,
- * ?, [ or ** for any folders. `list` (may be NULL) is another folder or pattern, or a file with one path a line,
- * relative to its folder; empty lines and lines that start with # are skipped. A model that is named twice is taken
- * once. Nothing is looked for in the folder `results` (may be NULL). QMAT_ERROR_USAGE: a pattern without a match, a
- * folder without a model, an empty list, two models whose results would have the same name. QMAT_ERROR_IO,
- * QMAT_ERROR_MEMORY. Free with qmat_batch_uninit, also after a failure. */
-qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments, size_t count, const char *list,
-                            const char *results, qmat_batch *batch);
+ * ?, [ or ** for any folders. Each of `lists` is another folder or pattern, or a file with one path a line, relative to
+ * its folder; empty lines and lines that start with # are skipped. A model that is named twice is taken once. Nothing
+ * is looked for in the folder `results` (may be NULL). QMAT_ERROR_USAGE: a pattern without a match, a folder without a
+ * model, an empty list, two models whose results would have the same name. QMAT_ERROR_IO, QMAT_ERROR_MEMORY. Free with
+ * qmat_batch_uninit, also after a failure. */
+qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments, size_t count, const char *const *lists,
+                            size_t list_count, const char *results, qmat_batch *batch);
 void qmat_batch_uninit(qmat_batch *batch);
 
 /* Called when an asset has ended. */

@@ -254,13 +254,18 @@ static qmat_status check_stems(qmat_context *context, const qmat_batch *batch) {
   return status;
 }
 
-qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments, size_t count, const char *list,
-                            const char *results, qmat_batch *batch) {
+static qmat_status add_list(finder *f, const char *list) {
+  struct stat about;
+  const bool is_list = !strpbrk(list, "*?[") && !(stat(list, &about) == 0 && S_ISDIR(about.st_mode));
+  return is_list ? read_list(f, list) : add_argument(f, list);
+}
+
+qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments, size_t count, const char *const *lists,
+                            size_t list_count, const char *results, qmat_batch *batch) {
   *batch = (qmat_batch){0};
   finder f = {.context = context, .batch = batch, .results = results};
-  struct stat about;
-  const bool is_list = list && !strpbrk(list, "*?[") && !(stat(list, &about) == 0 && S_ISDIR(about.st_mode));
-  qmat_status status = is_list ? read_list(&f, list) : list ? add_argument(&f, list) : QMAT_OK;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < list_count && status == QMAT_OK; i++) status = add_list(&f, lists[i]);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) status = add_argument(&f, arguments[i]);
   if (status == QMAT_OK) status = drop_repeated(context, batch);
   for (size_t i = 0; i < batch->count && status == QMAT_OK; i++) status = name_results(&f, &batch->assets[i]);

@@ -498,6 +498,18 @@ static qmat_status prepare(batch_call *call) {
   return make_report_folder(call);
 }
 
+static qmat_status find_models(const batch_call *call, const char *const *inputs, size_t count, qmat_batch *batch) {
+  const qmat_invocation *invocation = call->invocation;
+  const char **lists = qmat_alloc(invocation->given_count, sizeof *lists);
+  size_t list_count = 0;
+  if (!lists) return qmat_fail_memory(call->context, "lists of models");
+  for (size_t i = 0; i < invocation->given_count; i++)
+    if (strcmp(invocation->given[i].name, "inputs") == 0) lists[list_count++] = invocation->given[i].value;
+  const qmat_status status = qmat_batch_find(call->context, inputs, count, lists, list_count, call->folder, batch);
+  qmat_free(lists);
+  return status;
+}
+
 qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, const char *graph,
                            const char *const *inputs, size_t count, const char *results) {
   batch_call call = {.context = context,
@@ -515,8 +527,7 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   for (size_t i = 0; i < invocation->given_count && status == QMAT_OK; i++)
     if (strcmp(invocation->given[i].name, "set") == 0)
       status = qmat_graph_assign(context, &invocation->graph, invocation->given[i].value);
-  if (status == QMAT_OK)
-    status = qmat_batch_find(context, inputs, count, qmat_invocation_value(invocation, "inputs"), results, &batch);
+  if (status == QMAT_OK) status = find_models(&call, inputs, count, &batch);
   if (status == QMAT_OK) status = prepare(&call);
   if (status == QMAT_OK && call.pages) status = check_pages(&call, &batch);
   for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
@@ -575,7 +586,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 
 static const qmat_option options[] = {
     {"inputs", 'i', "GLOB|LIST",
-     "More models: a folder, a quoted pattern, or a file with one path a line (# starts a comment)"},
+     "More models: a folder, a quoted pattern, or a file with one path a line (# starts a comment); may be repeated"},
     {"out", 'o', "DIR", "Folder of the results, which get the models' names; made if it is missing"},
     {"format", 'f', "ENDING", "Format of the results; default the graph's; may be repeated"},
     {"pages", 0, NULL, "Also save a page and a picture of each model, and DIR/index.html with all of them"},

@@ -181,6 +181,8 @@ printf '\357\273\277# two of them\nbox1.off\r\n\nbox2.off\n' >models/list.txt
 batch --inputs models/list.txt --out listed --quiet
 holds "a list" test "$code" -eq 0 -a "$(ls listed | wc -l)" -eq 2
 holds "quiet" test ! -s out.txt -a ! -s err.txt
+batch -i models/list.txt -i 'models/box[34].off' --out twice --quiet
+holds "each --inputs counts" test "$(ls twice | tr '\n' ' ')" = "box1.glb box2.glb box3.glb box4.glb "
 
 # A process that crashes, and a batch that is interrupted and goes on.
 awk 'BEGIN {
