@@ -84,7 +84,7 @@ qmat_status qmat_batch_run(qmat_context *context, qmat_batch *batch, int jobs, b
     if (stopped && running == 0) break;
     if (!stopped && running < jobs && next < batch->count) {
       qmat_asset *asset = &batch->assets[next++];
-      if (start(asset))
+      if (asset->state == QMAT_ASSET_WAITING && start(asset))
         running++;
       else
         observer(user, batch, asset);

@@ -19,7 +19,7 @@ typedef enum qmat_asset_state {
 typedef struct qmat_asset {
   char *input;  /* the model's path */
   char *stem;   /* its path below the folder that all models share, without the ending: the name of its results */
-  char **words; /* the command that processes it, ended by NULL */
+  char **words; /* the command that processes it, ended by NULL; NULL: it is a folder that cannot be read */
   char *report; /* the report file of this command */
   qmat_asset_state state;
   pid_t process; /* while it runs */
@@ -37,9 +37,10 @@ typedef struct qmat_batch {
 /* Finds the models that `count` arguments name: files, folders with all models in and below them, and patterns with *,
  * ?, [ or ** for any folders. Each of `lists` is another folder or pattern, or a file with one path a line, relative to
  * its folder; empty lines and lines that start with # are skipped. A model that is named twice is taken once. Nothing
- * is looked for in the folder `results` (may be NULL). QMAT_ERROR_USAGE: a pattern without a match, a folder without a
- * model, an empty list, two models whose results would have the same name. QMAT_ERROR_IO, QMAT_ERROR_MEMORY. Free with
- * qmat_batch_uninit, also after a failure. */
+ * is looked for in the folder `results` (may be NULL). A folder below another that cannot be read is an asset that has
+ * failed. QMAT_ERROR_USAGE: a pattern without a match, a folder without a model, an empty list, two models whose
+ * results would have the same name. QMAT_ERROR_IO, QMAT_ERROR_MEMORY. Free with qmat_batch_uninit, also after a
+ * failure. */
 qmat_status qmat_batch_find(qmat_context *context, const char *const *arguments, size_t count, const char *const *lists,
                             size_t list_count, const char *results, qmat_batch *batch);
 void qmat_batch_uninit(qmat_batch *batch);

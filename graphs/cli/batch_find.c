@@ -56,6 +56,17 @@ static qmat_status add_model(finder *f, const char *path) {
   return QMAT_OK;
 }
 
+/* Adds a folder below an argument that cannot be read: it fails like a model, and the others run. */
+static qmat_status add_unreadable(finder *f, const char *folder, const char *reason) {
+  const qmat_status status = add_model(f, folder);
+  if (status != QMAT_OK) return status;
+  qmat_asset *asset = &f->batch->assets[f->batch->count - 1];
+  asset->state = QMAT_ASSET_FAILED;
+  asset->exit_code = -1;
+  asset->result = json_pack("{s:{s:o}}", "error", "text", json_sprintf("cannot read the folder: %s", reason));
+  return QMAT_OK;
+}
+
 static int by_name(const struct dirent **a, const struct dirent **b) {
   return strcmp((*a)->d_name, (*b)->d_name);
 }
@@ -80,6 +91,7 @@ static qmat_status add_matches(finder *f, const char *folder, const char *rest, 
   const int count = scandir(*folder ? folder : ".", &entries, NULL, by_name);
   if (count < 0) {
     if (errno == ENOENT || errno == ENOTDIR) return QMAT_OK;
+    if (depth > 0) return add_unreadable(f, folder, strerror(errno));
     qmat_fail(f->context, QMAT_ERROR_IO, "cannot read the folder: %s", strerror(errno));
     return qmat_fail_at(f->context, folder, 0, 0);
   }
@@ -198,7 +210,8 @@ static void fold_dots(char *path) {
 static qmat_status name_results(finder *f, qmat_asset *asset) {
   const char *path = without_dots(asset->input);
   if (strncmp(path, f->root, strlen(f->root)) == 0) path += strlen(f->root);
-  char *name = qmat_model_name(path);
+  char *name =
+      asset->state == QMAT_ASSET_FAILED ? qmat_strdup("") : qmat_model_name(path); /* a folder keeps its path */
   const size_t folder = qmat_folder_length(path), length = name ? strlen(name) : 0;
   asset->stem = name ? qmat_alloc(folder + length + 1, 1) : NULL;
   if (asset->stem) {
@@ -226,6 +239,7 @@ static qmat_status drop_repeated(qmat_context *context, qmat_batch *batch) {
   for (size_t i = batch->count; i-- > 1;) {
     if (strcmp(sorted[i - 1]->input, sorted[i]->input) != 0) continue;
     qmat_free(sorted[i]->input);
+    json_decref(sorted[i]->result);
     sorted[i]->input = NULL;
   }
   size_t kept = 0;

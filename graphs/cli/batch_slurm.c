@@ -43,7 +43,7 @@ static qmat_status write_script(qmat_context *context, const qmat_batch *batch, 
   for (size_t i = 0; i < batch->count; i++) {
     qmat_put_integer(&writer, (int64_t)i);
     qmat_put_text(&writer, ") ");
-    for (char **word = batch->assets[i].words; *word; word++) put_quoted(&writer, *word);
+    for (char **word = batch->assets[i].words; word && *word; word++) put_quoted(&writer, *word);
     qmat_put_text(&writer, ";;\n");
   }
   qmat_put_text(&writer, "esac\ncode=$?\n(cd ");
@@ -158,6 +158,11 @@ qmat_status qmat_batch_run_slurm(qmat_context *context, qmat_batch *batch, int j
     status = qmat_fail_hint(context, "without --engine slurm the batch runs on this machine");
   }
   size_t left = status == QMAT_OK ? batch->count : 0;
+  for (size_t i = 0; i < batch->count && status == QMAT_OK; i++) {
+    if (batch->assets[i].state != QMAT_ASSET_FAILED) continue;
+    left--;
+    observer(user, batch, &batch->assets[i]);
+  }
   for (int patience = PATIENCE; left > 0 && patience > 0;) {
     if (stop()) {
       cancel(job);

@@ -436,11 +436,11 @@ static int by_path(const void *a, const void *b) {
 static qmat_status check_outputs(const batch_call *call, const qmat_batch *batch) {
   size_t count = 0, most = 0;
   for (size_t i = 0; i < batch->count; i++)
-    for (char **word = batch->assets[i].words; *word; word++) most += output_of(*word) != NULL;
+    for (char **word = batch->assets[i].words; word && *word; word++) most += output_of(*word) != NULL;
   const char **sorted = qmat_alloc(most, sizeof *sorted);
   if (!sorted) return qmat_fail_memory(call->context, "outputs");
   for (size_t i = 0; i < batch->count; i++)
-    for (char **word = batch->assets[i].words; *word; word++)
+    for (char **word = batch->assets[i].words; word && *word; word++)
       if (output_of(*word)) sorted[count++] = output_of(*word);
   if (count > 1) qsort(sorted, count, sizeof *sorted, by_path);
   qmat_status status = QMAT_OK;
@@ -530,7 +530,8 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
   if (status == QMAT_OK) status = find_models(&call, inputs, count, &batch);
   if (status == QMAT_OK) status = prepare(&call);
   if (status == QMAT_OK && call.pages) status = check_pages(&call, &batch);
-  for (size_t i = 0; i < batch.count && status == QMAT_OK; i++) status = make_command(&call, i, &batch.assets[i]);
+  for (size_t i = 0; i < batch.count && status == QMAT_OK; i++)
+    if (batch.assets[i].state == QMAT_ASSET_WAITING) status = make_command(&call, i, &batch.assets[i]);
   if (status == QMAT_OK) status = check_outputs(&call, &batch);
   bool started = status == QMAT_OK;
   if (started && call.slurm)

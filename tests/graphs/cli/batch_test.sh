@@ -184,6 +184,26 @@ holds "quiet" test ! -s out.txt -a ! -s err.txt
 batch -i models/list.txt -i 'models/box[34].off' --out twice --quiet
 holds "each --inputs counts" test "$(ls twice | tr '\n' ' ')" = "box1.glb box2.glb box3.glb box4.glb "
 
+# A folder that cannot be read is one failure. For root it needs another user.
+user=
+if [ "$(id -u)" -eq 0 ]; then user="setpriv --reuid 65534 --clear-groups"; fi
+mkdir -p open/closed
+cp models/box1.off open/
+cp models/box1.off open/closed.off
+chmod -R a+rX "$work"
+chmod 0 open/closed
+mkdir -m 777 theirs
+if $user test -x "$qmat" -a ! -r open/closed 2>/dev/null; then
+  expect 1 "2 done, 1 failed, 0 not run" $user env TMPDIR="$work/theirs" QMAT_CACHE=off "$qmat" batch graph.yaml open --out theirs
+  holds "the folder is told" grep -q '^open/closed/: cannot read the folder: Permission denied' out.txt
+  holds "the others are made" test "$(ls theirs | tr '\n' ' ')" = "box1.glb closed.glb "
+  expect 1 "open/closed/: cannot read the folder" $user env TMPDIR="$work/theirs" "$qmat" batch graph.yaml open/closed --out theirs
+else
+  echo "skipped: a folder that cannot be read (another user and setpriv are needed)"
+fi
+chmod 700 open/closed
+rm -r open theirs
+
 # A process that crashes, and a batch that is interrupted and goes on.
 awk 'BEGIN {
   n = 300; m = 150; pi = 3.14159265358979
