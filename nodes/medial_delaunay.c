@@ -46,15 +46,16 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_delaunay = {
     .name = "medial.delaunay",
-    .version = 19,
+    .version = 20,
     .summary = "Makes the initial medial mesh of a solid from the Delaunay tetrahedra of its surface samples",
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
         "Otherwise it is the incentre, with the distance to the surface as radius; this completes parts that are too "
         "thin for circumcentres. Medial edges are dual to the facets between such tetrahedra, and medial slabs to the "
         "Delaunay edges that they surround.\n\n"
-        "A sliver on the surface can be on the wrong side of it, which makes a loop or a void. Where incentres is all, "
-        "the tetrahedra nearest to the surface change sides until the loops and voids are those of the solid.\n\n"
+        "A sliver on the surface can be on the wrong side of it, and where thin walls meet, tetrahedra between the "
+        "samples of both are outside. That makes loops and voids, or opens voids. Where incentres is all, the "
+        "tetrahedra nearest to the surface change sides until the loops and voids are those of the solid.\n\n"
         "Across a wall thinner than a quarter of the distance between samples, or a gap narrower than half of it, each "
         "sample has a point on the other side that is triangulated too, and so on through a stack of such walls. "
         "Otherwise the tetrahedra would not fill such a wall, and would join the sides of such a gap. Where adjacent "

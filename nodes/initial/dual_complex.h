@@ -17,6 +17,7 @@ typedef struct qmat_dual_complex {
   qmat_context *context;
   const qmat_voronoi_dual_params *params; /* NULL where tetrahedra are not selected */
   double merge;                           /* adjacent medial vertices so near become one */
+  double epsilon;                         /* QMAT_FINE_EPSILON where it is not known */
   double thinning_tolerance;
   double link_limit; /* components are not linked by edges that leave the solid by more */
   const qmat_mesh *mesh;

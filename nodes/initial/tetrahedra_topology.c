@@ -10,14 +10,22 @@
 #include "nodes/initial/medial_vertices.h"
 #include "nodes/measure/topology.h"
 
-/* The largest distance between the surface and the incentre of a tetrahedron that changes sides, in diagonals, and
- * between the solid and the middles of the edges of one that is kept then. The nearest change first, so a larger value
- * only adds work. */
-static const double most_gap = 0.005;
+/* The largest distance between the surface and the incentre of a tetrahedron that is dropped, in diagonals: a sliver on
+ * the surface. */
+static const double most_sliver_gap = 0.005;
+
+/* The same of one that is kept, and between the solid and the middles of its edges; epsilon where that is less. Where
+ * thin walls meet, the samples of both are nearer to each other than to those on the edge between, which leaves a hole
+ * in the walls. */
+static const double most_hole_gap = 0.01;
 
 /* The most samples of a pocket: samples that dropped tetrahedra connect with each other and not with the outside. A
  * larger set counts as connected with the outside, since those of slivers have a handful. */
 enum { MOST_POCKET = 64 };
+
+/* Tetrahedra are kept, first only where that closes a loop or a void, then also where it makes way for others. Dropping
+ * comes last and makes no way: all of a thin wall is near the surface, and holes in it would become slits. */
+static const struct { bool keep, neutral; } passes[] = {{true, false}, {true, true}, {false, false}};
 
 /* A pass repeats while a round changes more than this share of what the pass has changed. A round tries every
  * tetrahedron beside the surface, and late rounds change few. */
@@ -42,7 +50,7 @@ typedef struct mending {
   uint32_t *pockets;      /* per sample: sets that dropped tetrahedra connect, while tetrahedra are dropped */
   uint8_t *pocket_sizes;  /* of those that lead a set; MOST_POCKET + 1: connected with the outside */
   uint32_t *marks, stamp; /* per sample or tetrahedron: those of the newest search */
-  uint32_t *found;        /* 2 per tetrahedron: those of a search from two sides */
+  uint32_t *found;        /* 2 per tetrahedron, or one per sample: those of the newest search */
   uint32_t *changed;      /* tetrahedra that changed sides, in order */
   size_t changed_count;
   qmat_item_queue queue;
@@ -162,9 +170,9 @@ static int64_t distance_between(betti a, betti b) {
 
 /* ---- searches ---- */
 
-/* Whether dropped tetrahedra connect a sample with the outside. */
-static bool reaches_outside(mending *m, uint32_t sample) {
-  uint32_t found[MOST_POCKET];
+/* Whether dropped tetrahedra connect a sample with the outside, or with `most` samples. */
+static bool reaches_outside(mending *m, uint32_t sample, size_t most) {
+  uint32_t *found = m->found;
   size_t count = 0;
   found[count++] = sample;
   m->marks[sample] = ++m->stamp;
@@ -175,7 +183,7 @@ static bool reaches_outside(mending *m, uint32_t sample) {
       for (size_t k = 0; k < 4 && !m->d->kinds[cell]; k++) {
         const uint32_t corner = m->d->cells.corners[4 * (size_t)cell + k];
         if (m->marks[corner] == m->stamp) continue;
-        if (count == MOST_POCKET || m->on_hull[corner]) return true;
+        if (count == most || m->on_hull[corner]) return true;
         m->marks[corner] = m->stamp;
         found[count++] = corner;
       }
@@ -183,12 +191,12 @@ static bool reaches_outside(mending *m, uint32_t sample) {
   return false;
 }
 
-/* Whether other dropped tetrahedra connect all corners of a dropped one with the outside. */
-static bool all_reach_outside(mending *m, uint32_t cell) {
+/* Whether other dropped tetrahedra connect all corners of a dropped one with the outside, or with `most` samples. */
+static bool all_reach_outside(mending *m, uint32_t cell, size_t most) {
   const uint8_t kind = m->d->kinds[cell];
   bool reach = true;
   m->d->kinds[cell] = QMAT_CELL_INCENTRE;
-  for (size_t k = 0; k < 4 && reach; k++) reach = reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k]);
+  for (size_t k = 0; k < 4 && reach; k++) reach = reaches_outside(m, m->d->cells.corners[4 * (size_t)cell + k], most);
   m->d->kinds[cell] = kind;
   return reach;
 }
@@ -250,7 +258,13 @@ static bool is_bridged(mending *m, uint32_t cell, cell_link link) {
 /* Whether keeping a tetrahedron closes loops and no void. */
 static bool closes_loops(mending *m, uint32_t cell, cell_link link) {
   return link.parts == 1 && link.loops > 0 && m->now.loops - link.loops >= m->wanted.loops &&
-         all_reach_outside(m, cell);
+         all_reach_outside(m, cell, MOST_POCKET);
+}
+
+/* Whether keeping a tetrahedron closes the last hole around a void that the solid has. */
+static bool closes_void(mending *m, uint32_t cell, cell_link link) {
+  return link.parts == 1 && link.loops == 1 && m->now.loops == m->wanted.loops && m->now.voids < m->wanted.voids &&
+         !all_reach_outside(m, cell, m->d->point_count);
 }
 
 /* Whether dropping a tetrahedron opens a void or a loop, and does nothing else. */
@@ -260,6 +274,10 @@ static bool opens(mending *m, uint32_t cell, cell_link link) {
   return link.parts == 2 && link.loops == 0 && m->now.loops > m->wanted.loops && is_bridged(m, cell, link);
 }
 
+static double most_gap(const mending *m, bool keep) {
+  return keep ? fmin(m->d->epsilon, most_hole_gap) : most_sliver_gap;
+}
+
 /* The distance of a tetrahedron's incentre from the surface. A needle between distant parts of the surface leaves the
  * solid far while its incentre does not, so the middles of the edges count too, where the tetrahedron is outside. */
 static double gap_of(const mending *m, uint32_t cell) {
@@ -267,9 +285,10 @@ static double gap_of(const mending *m, uint32_t cell) {
   const uint32_t *corners = &d->cells.corners[4 * (size_t)cell];
   double centre[3];
   qmat_medial_vertex_incentre(d, cell, centre);
-  double gap = qmat_surface_distance(d->surface, centre, most_gap, NULL, NULL);
-  for (int e = 0; e < 6 && gap <= most_gap && !m->before[cell]; e++)
-    gap = fmax(gap, qmat_dual_edge_outside(d, corners[edges[e][0]], corners[edges[e][1]], gap, most_gap));
+  const double most = fmax(most_gap(m, true), most_sliver_gap);
+  double gap = qmat_surface_distance(d->surface, centre, most, NULL, NULL);
+  for (int e = 0; e < 6 && gap <= most && !m->before[cell]; e++)
+    gap = fmax(gap, qmat_dual_edge_outside(d, corners[edges[e][0]], corners[edges[e][1]], gap, most));
   return gap;
 }
 
@@ -284,7 +303,7 @@ static qmat_status queue_side(mending *m, bool kept) {
     if (borders && is_kept(d, (uint32_t)i) == kept && m->gaps[i] < 0) m->gaps[i] = gap_of(m, (uint32_t)i);
   }
   for (size_t i = 0; i < d->cells.count; i++)
-    if (is_kept(d, (uint32_t)i) == kept && m->gaps[i] >= 0 && m->gaps[i] <= most_gap &&
+    if (is_kept(d, (uint32_t)i) == kept && m->gaps[i] >= 0 && m->gaps[i] <= most_gap(m, !kept) &&
         qmat_queue_push(&m->queue, m->gaps[i], i))
       return qmat_fail_memory(d->context, "the tetrahedra");
   return QMAT_OK;
@@ -297,8 +316,11 @@ static bool is_mended(const mending *m) {
 /* Changes the side of a tetrahedron if that helps or, with `neutral`, leaves the homotopy type as it is. */
 static bool change(mending *m, uint32_t cell, bool keep, bool neutral) {
   const cell_link link = link_of(m->d, cell);
-  if (!(neutral && is_tree(link)) && !(keep ? closes_loops(m, cell, link) : opens(m, cell, link))) return false;
-  if (keep)
+  const bool no_change = neutral && is_tree(link), makes_void = !no_change && keep && closes_void(m, cell, link);
+  if (!no_change && !makes_void && !(keep ? closes_loops(m, cell, link) : opens(m, cell, link))) return false;
+  if (makes_void)
+    m->now.voids++;
+  else if (keep)
     m->now.loops -= link.loops;
   else if (link.parts == 2)
     m->now.loops--;
@@ -345,7 +367,7 @@ static qmat_status change_side(mending *m, bool keep, bool neutral) {
         const uint32_t j = d->cells.neighbours[4 * (size_t)cell + k];
         if (j == QMAT_NO_TETRAHEDRON || is_kept(d, j) == keep) continue;
         if (m->gaps[j] < 0) m->gaps[j] = gap_of(m, j);
-        if (m->gaps[j] <= most_gap && qmat_queue_push(&m->queue, m->gaps[j], j))
+        if (m->gaps[j] <= most_gap(m, keep) && qmat_queue_push(&m->queue, m->gaps[j], j))
           status = qmat_fail_memory(d->context, "the tetrahedra");
       }
     }
@@ -419,7 +441,7 @@ static qmat_status start(mending *m) {
   m->pockets = qmat_arena_alloc(arena, samples, sizeof *m->pockets);
   m->pocket_sizes = qmat_arena_alloc(arena, samples, sizeof *m->pocket_sizes);
   m->marks = qmat_arena_calloc(arena, count > samples ? count : samples, sizeof *m->marks);
-  m->found = qmat_arena_alloc(arena, 2 * count, sizeof *m->found);
+  m->found = qmat_arena_alloc(arena, 2 * count > samples ? 2 * count : samples, sizeof *m->found);
   m->changed = qmat_arena_alloc(arena, 2 * count, sizeof *m->changed);
   if (!m->before || !m->gaps || !m->starts || !m->around || !m->on_hull || !m->pockets || !m->pocket_sizes ||
       !m->marks || !m->found || !m->changed)
@@ -438,7 +460,7 @@ static qmat_status start(mending *m) {
 
 qmat_status qmat_tetrahedra_mend(qmat_dual_complex *d, qmat_mended_tetrahedra *mended) {
   mending m = {.d = d};
-  betti first, last;
+  betti first;
   qmat_topology solid;
   *mended = (qmat_mended_tetrahedra){0, 0};
   qmat_status status = qmat_topology_of_solid(d->context, d->surface, &solid);
@@ -448,11 +470,13 @@ qmat_status qmat_tetrahedra_mend(qmat_dual_complex *d, qmat_mended_tetrahedra *m
   m.now = first;
   if (is_mended(&m)) return QMAT_OK;
   status = start(&m);
-  for (int i = 0; i < 4 && status == QMAT_OK && !is_mended(&m); i++) status = change_side(&m, i < 2, i % 2 == 1);
+  for (size_t i = 0; i < sizeof passes / sizeof *passes && status == QMAT_OK && !is_mended(&m); i++) {
+    status = change_side(&m, passes[i].keep, passes[i].neutral);
+    if (status == QMAT_OK) status = count_betti(d, &m.now); /* a large pocket may have been taken for the outside */
+  }
   qmat_free(m.queue.items);
-  if (status == QMAT_OK) status = count_betti(d, &last);
   if (status != QMAT_OK) return status;
-  if (last.components == first.components && distance_between(last, m.wanted) < distance_between(first, m.wanted))
+  if (m.now.components == first.components && distance_between(m.now, m.wanted) < distance_between(first, m.wanted))
     set_spheres(&m, mended);
   else
     memcpy(d->kinds, m.before, d->cells.count);

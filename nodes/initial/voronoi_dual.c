@@ -347,6 +347,7 @@ qmat_status qmat_voronoi_dual_make(qmat_context *context, const qmat_voronoi_dua
   const double epsilon = params->epsilon > 0 ? params->epsilon : QMAT_FINE_EPSILON;
   qmat_dual_complex d = {.context = context,
                          .params = params,
+                         .epsilon = epsilon,
                          .merge = params->merge * epsilon,
                          .thinning_tolerance = params->thinning_tolerance * epsilon,
                          .link_limit = params->epsilon > 0 ? params->epsilon : INFINITY,

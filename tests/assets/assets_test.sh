@@ -57,6 +57,10 @@ asset creased_capsule 136 solids=0 sheets=8
 # letter, and its links went through air.
 asset letter_b 30 solids=1 sheets=0
 asset pierced_letter_b 30 solids=1 sheets=0
+# Walls thinner than the distance between samples: tubes keep their handle, a box its void, a shelf its openings.
+asset thin_tube 9 solids=1 sheets=0 loops=1
+asset thin_box 9 solids=2 sheets=0 loops=0 voids=1
+asset shelf 22 solids=1 sheets=0 loops=4
 asset card 4 solids=0 sheets=1 sheet_triangles=120
 
 # The cap is the disc that cut the neck: of 32 sides, in a circle of the radius sin(3/16 pi).

@@ -876,6 +876,26 @@ static void test_void_is_no_gap_between_solids(void **state) {
   }
 }
 
+/* Where thin walls meet, tetrahedra between samples of both are outside, which leaves holes: they are kept, also the
+ * one that closes the last hole around a void. No hole is widened to a slit. */
+static void test_thin_walls_around_a_void_are_closed(void **state) {
+  (void)state;
+  static const double walls[] = {0.01, 0.012};
+  for (size_t i = 0; i < sizeof walls / sizeof *walls; i++) {
+    qmat_mesh *mesh = shape_new(), *inner = shape_box(1, 1, 1);
+    shape_map(inner, 1 - 2 * walls[i], walls[i], walls[i], walls[i]);
+    add_part(mesh, shape_box(1, 1, 1), false);
+    add_part(mesh, inner, true);
+    pipeline p;
+    pipeline_make(&p, mesh, "", "epsilon=0.02");
+    const qmat_topology topology = topology_of(&p);
+    assert_int_equal(topology.components, 1);
+    assert_int_equal(topology.loops, 0);
+    assert_int_equal(topology.voids, 1);
+    pipeline_free(&p);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_regular_tetrahedron),
@@ -911,6 +931,7 @@ int main(void) {
       cmocka_unit_test(test_no_needle_closes_a_loop),
       cmocka_unit_test(test_solids_with_a_narrow_gap_stay_apart),
       cmocka_unit_test(test_void_is_no_gap_between_solids),
+      cmocka_unit_test(test_thin_walls_around_a_void_are_closed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
