@@ -147,20 +147,9 @@ timeout 100 "$qmat" run pages.yaml --set model=models/box1.off -o alone.png --no
 holds "a picture alone makes nothing else" sh -c 'grep -q report.picture alone.json && ! grep -q "scene.write\|report.page" alone.json'
 
 # Outputs with paths of their own: each model has its own files, as `qmat run` would write them.
-cat >paths.yaml <<'END'
-qmat: 1
-inputs:
-  model: model.path
-nodes:
-  model: { type: scene.read }
-  ball: { type: medial.read, params: { path: ball.ma } }
-  picture: { type: report.picture, in: { mesh: model.mesh, medial: ball.medial }, params: { width: 32, height: 16 } }
-  asset: { type: scene.write, in: { medial: ball.medial } }
-outputs:
-  asset: { from: asset.file, path: own/asset.MA }
-  picture: { from: picture.file, path: own/picture.svg }
-  read: { from: model.report, path: own/read.json }
-END
+sed '/page/d; s,: asset.file,: { from: asset.file\, path: own/asset.MA },; s,: picture.file,: { from: picture.file\, path: own/picture.svg },' \
+  pages.yaml >paths.yaml
+echo '  read: { from: model.report, path: own/read.json }' >>paths.yaml
 expect 0 "2 done" "$qmat" batch paths.yaml several/b.off models/box1.off --out pathed
 holds "the names are the models'" test "$(cd pathed && find . -type f | sort | tr '\n' ' ')" = \
   "./models/box1.json ./models/box1.ma ./models/box1.svg ./several/b.json ./several/b.ma ./several/b.svg "
