@@ -22,10 +22,10 @@ void qmat_principal_inertia(const double body[10], double moments[3], double rot
  * the map mirrors. The identity's where they are zero. */
 void qmat_rotation_in(double linear[3][3], double rotation[3][3]);
 
-/* A body (the 10 numbers of qmat_colliders) that a place maps by `linear`, row by row. body[0] is the
- * mass where a unit of the colliders is as long as `scale` units of the place; 0: at every place. `made` has the mass
- * at this place, the centre as it is, and the inertia along the axes that the rotation matrix `rotation` turns to, in
- * the place's lengths. The map may stretch and mirror: the second moments of the mass follow. */
+/* A body (the 10 numbers of qmat_colliders) that a place maps by `linear`, row by row. body[0] is the mass where a
+ * unit of the colliders is as long as `scale` units of the place; 0: at every place. `made` has the mass at this place,
+ * the centre as it is, and the inertia along the axes that the rotation matrix `rotation` turns to, in the place's
+ * lengths. The map may stretch and mirror: the second moments of the mass follow. */
 void qmat_placed_body(const double body[10], double linear[3][3], double rotation[3][3], double scale, double made[10]);
 
 #endif

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "core/geometry/vector.h"
+
 double qmat_largest_stretch(const double *m) {
   double a[3][3], spread = 0;
   for (int i = 0; i < 3; i++)
@@ -15,10 +17,7 @@ double qmat_largest_stretch(const double *m) {
   }
   spread = sqrt(spread / 6);
   if (!(spread > 1e-12 * mean)) return sqrt(mean); /* it scales evenly */
-  const double determinant = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
-                             a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-                             a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-  const double half = fmax(-1, fmin(1, determinant / (spread * spread * spread) / 2));
+  const double half = fmax(-1, fmin(1, qmat_determinant(a) / (spread * spread * spread) / 2));
   return sqrt(fmax(mean + 2 * spread * cos(acos(half) / 3), 0));
 }
 

@@ -125,8 +125,8 @@ static void add_output(const batch_call *call, word_list *list, const qmat_asset
   const char *name = graph->outputs[output].name;
   size_t last;
   const bool is_report = qmat_graph_output_type(graph, output) == QMAT_REPORT;
-  const bool several = (is_report ? report_count(graph) : qmat_graph_file_count(graph, &last)) > 1;
   /* Several differ by their names. */
+  const bool several = (is_report ? report_count(graph) : qmat_graph_file_count(graph, &last)) > 1;
   add_word(list, "--output=%s=%s/%s%s%s.%s", name, call->folder, asset->stem, several ? "-" : "", several ? name : "",
            ending);
 }

@@ -38,9 +38,8 @@ qmat_status qmat_gltf_colliders_init(qmat_context *context, json_t *root, json_i
 void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added);
 
 /* Makes a node the body of the colliders, a kinematic one where an animation moves it: they become children of it, and
- * replace those of an earlier run. `shift` is
- * the origin of the node's space relative to that of the colliders, in the colliders' space. False when out of memory.
- */
+ * replace those of an earlier run. `shift` is the origin of the node's space relative to that of the colliders, in the
+ * colliders' space. False when out of memory. */
 bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added, const double shift[3]);
 
 /* Makes the colliders of a skinned mesh follow its joints: each becomes a child of a node below the joint that moves

@@ -30,9 +30,8 @@ void qmat_usd_put_body_schemas(qmat_writer *writer, size_t depth) {
   qmat_put_text(writer, "prepend apiSchemas = [\"PhysicsRigidBodyAPI\", \"PhysicsMassAPI\"]\n");
 }
 
-void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double *body, const double origin[3],
+void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double body[10], const double origin[3],
                        double kilograms) {
-  if (!body) return;
   double moments[3], rotation[4], centre[3];
   qmat_principal_inertia(body, moments, rotation);
   for (int k = 0; k < 3; k++) moments[k] /= kilograms;

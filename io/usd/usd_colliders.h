@@ -9,9 +9,10 @@
 
 /* The metadata of a prim that becomes a rigid body, indented by `depth` levels. */
 void qmat_usd_put_body_schemas(qmat_writer *writer, size_t depth);
-/* Its attributes for a body as qmat_colliders has them, the mass in units of `kilograms`; indented by `depth` levels.
- * NULL: the mass is not known, and nothing is put. */
-void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double *body, const double origin[3], double kilograms);
+/* Its attributes for a body (the 10 numbers of qmat_colliders), the mass in units of `kilograms`; indented by `depth`
+ * levels. */
+void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double body[10], const double origin[3],
+                       double kilograms);
 
 /* A child "colliders" of a root prim with a Sphere, Capsule_1 or Mesh (approximated by its convex hull) for each shape,
  * of purpose "guide". */

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/vector.h"
+
 static const double PI = 3.14159265358979323846;
 
 typedef qmat_usd_transform transform;
@@ -27,8 +29,9 @@ transform qmat_usd_product(const transform *a, const transform *b) {
 }
 
 double qmat_usd_volume(const transform *t) {
-  const double *m = t->m;
-  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
+  double cross[3];
+  qmat_cross(&t->m[4], &t->m[8], cross);
+  return qmat_dot(t->m, cross);
 }
 
 bool qmat_usd_mirrors(const transform *t) {

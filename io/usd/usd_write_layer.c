@@ -177,8 +177,8 @@ static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, con
   carrier *carriers = qmat_alloc(scene->placement_count, sizeof *carriers);
   if (!carriers) return fail_shortage(context);
   const double kilograms = qmat_usd_number(qmat_usd_field_value(original->root, "kilogramsPerUnit"), 1);
-  size_t count = 0, open = 0,
-         body = SIZE_MAX; /* the depth of the open prim that is a body: one below is a part of it */
+  size_t count = 0, open = 0;
+  size_t body = SIZE_MAX; /* the depth of the open prim that is a body: one below is a part of it */
   for (size_t i = 0; i < scene->placement_count; i++)
     if (additions[scene->placed[i]].medial && has_valid_names(scene->placement_paths[i]))
       carriers[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i], .place = i};
