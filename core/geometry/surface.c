@@ -344,6 +344,9 @@ static double excess_of_sheet(const qmat_surface *surface, const double *const s
   return excess;
 }
 
+/* Bounds of the excess are at most this share of a radius, and at least so large: far more than rounding. */
+static const double below_radius = 0.99, least_excess = 1e-6;
+
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
                                  double limit, uint32_t *failed) {
   if (qmat_surface_half_thickness(surface) > 0) {
@@ -355,9 +358,11 @@ double qmat_surface_excess_bound(const qmat_surface *surface, const double *cons
     if (!qmat_surface_inside(surface, centre)) return INFINITY;
   }
   if (!surface->blocks || surface->leaf_count > 0) return INFINITY;
-  for (int i = 0; i < count; i++) /* the distance then stays positive, so that no point of the simplex is outside */
-    if (!(spheres[i][3] > limit)) return INFINITY;
-  return qmat_triangle_blocks_excess(surface->blocks, spheres, count, lowest, limit, failed);
+  /* A bound below every radius keeps the distance positive, so that no point of the simplex is outside. */
+  for (int i = 0; i < count; i++) limit = fmin(limit, below_radius * spheres[i][3]);
+  if (!(limit > least_excess)) return INFINITY;
+  const double least = fmin(lowest, limit / 2);
+  return fmax(lowest, qmat_triangle_blocks_excess(surface->blocks, spheres, count, least, limit, failed));
 }
 
 /* --- building --------------------------------------------------------------------------------------------------- */

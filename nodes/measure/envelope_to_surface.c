@@ -176,6 +176,13 @@ static bool is_below(search *s, const piece *p) {
   return true;
 }
 
+/* Whether the centre of a wide piece is inside and the closed formula may save more than it takes. Where bounds of
+ * second order hold it does so for whole primitives only. The lattice does not see the inside of thin walls. */
+static bool is_worth_formula(const search *s, const double *centre, double near, double gap, int level) {
+  if (near > gap) return level == 0 || !s->by_squares;
+  return near + gap > 0 && qmat_depth_lattice_exact_near(s->lattice, centre, near, gap) > 0;
+}
+
 static bool search_piece(search *s, const piece *p, int level) {
   double centre[4] = {0, 0, 0, 0}, size = 0, farthest = -INFINITY;
   const double share = 1.0 / p->count;
@@ -200,8 +207,7 @@ static bool search_piece(search *s, const piece *p, int level) {
     if (is_done(s, farthest - near + gap, size, last)) return true;
     is_large = size > squares_size * s->limit && near > gap;
     if (is_large && s->by_squares && is_below(s, p)) return true;
-    /* Where bounds of second order hold, a second formula per piece takes longer than it saves. */
-    if (size > flat_size * s->limit && (level == 0 || !s->by_squares) && near > gap &&
+    if (size > flat_size * s->limit && is_worth_formula(s, centre, near, gap, level) &&
         is_flat(s, p, flat_share * s->limit, s->accepted))
       return true;
     ask = size <= s->smallest || last;

@@ -2,6 +2,8 @@
 #ifndef QMAT_NODES_SIMPLIFY_SIMPLIFICATION_STATE_H
 #define QMAT_NODES_SIMPLIFY_SIMPLIFICATION_STATE_H
 
+#include <stdatomic.h>
+
 #include "nodes/measure/medial_errors.h"
 #include "nodes/measure/topology.h"
 #include "nodes/simplify/copies.h"
@@ -18,6 +20,8 @@ typedef struct qmat_simplification {
   qmat_initial_medial state;
   uint64_t seed;               /* of the start; 0: costs as they are */
   bool may_end_without_result; /* where the initial medial mesh is not within epsilon */
+  /* The spheres of a certified result with the right topology that another start has; 0: not known yet; NULL: none. */
+  const _Atomic size_t *rival_count;
   qmat_surface *surface;
   qmat_topology solid;                /* of the solid; not known for every input */
   qmat_constraint_points constraints; /* of `dense` */

@@ -97,7 +97,10 @@ static qmat_status run_start(all_starts *all, qmat_context *own, size_t start, b
   s.context = own;
   s.params = *all->params;
   s.seed = start / all->rule_count;
-  if (keeps_creases(all, start)) s.params.features = QMAT_FEATURES_SHARP;
+  if (keeps_creases(all, start)) {
+    s.params.features = QMAT_FEATURES_SHARP;
+    s.rival_count = &all->free_counts[start / 2];
+  }
   if (leaves_creases(all, start)) {
     s.params.features = QMAT_FEATURES_NONE;
     s.initial = all->bare;

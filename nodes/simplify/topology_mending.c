@@ -101,6 +101,12 @@ static bool allows(const qmat_simplification *s, const qmat_simplified *result, 
   return share == 0 || s->params.vertices == 0 || result->medial->sphere_count < (size_t)s->params.vertices;
 }
 
+/* Whether another start has a result with fewer spheres and the right topology. Edits remove no spheres. */
+static bool is_beaten(const qmat_simplification *s, const qmat_simplified *result) {
+  const size_t rival = s->rival_count ? atomic_load(s->rival_count) : 0;
+  return rival > 0 && rival < result->medial->sphere_count;
+}
+
 /* ---- voids ---- */
 
 /* Removes a wall, or with `share` > 0 a part of it: a sphere on the wall divides it into three triangles, and that with
@@ -142,7 +148,7 @@ qmat_status qmat_simplification_open_voids(const qmat_simplification *s, qmat_si
     qmat_topology topology;
     bool opened;
     qmat_status status = qmat_topology_of_medial(s->context, result->medial, &topology);
-    if (status != QMAT_OK || !topology.known || topology.voids <= s->solid.voids) return status;
+    if (status != QMAT_OK || !topology.known || topology.voids <= s->solid.voids || is_beaten(s, result)) return status;
     status = open_void(s, &topology, result, &opened);
     if (status != QMAT_OK || !opened) return status;
   }
@@ -223,7 +229,7 @@ qmat_status qmat_simplification_close_loops(const qmat_simplification *s, qmat_s
     qmat_topology topology;
     bool closed;
     qmat_status status = qmat_topology_of_medial(s->context, result->medial, &topology);
-    if (status != QMAT_OK || !topology.known || topology.loops <= s->solid.loops) return status;
+    if (status != QMAT_OK || !topology.known || topology.loops <= s->solid.loops || is_beaten(s, result)) return status;
     status = fill_loop(s, &topology, result, &closed);
     if (status == QMAT_OK && !closed) status = cut_loop(s, &topology, result, &closed);
     if (status != QMAT_OK || !closed) return status;

@@ -795,7 +795,7 @@ static qmat_mesh *box_and_thick_roof(void) {
 
 static void test_excess_bounds_hold_between_the_spheres(void **state) {
   (void)state;
-  assert_true(check_excess(shape_seal(shape_box(1, 2, 3)), 9000) > 0.5); /* linear: only thin spheres have none */
+  assert_true(check_excess(shape_seal(shape_box(1, 2, 3)), 9000) > 0.5);
   assert_true(check_excess(shape_seal(shape_l()), 9000) > 0.2);
   assert_true(check_excess(shape_seal(shape_torus(1, 0.3, 40, 20)), 6000) > 0.05);
   assert_true(check_excess(nested_shell(), 9000) > 0.1);
@@ -813,6 +813,26 @@ static void test_excess_in_a_box_is_exact(void **state) {
   assert_near(qmat_surface_excess_bound(surface, &slab[1], 2, 0.001, 0.02, &failed), 0.004, 1e-12);
   assert_near(qmat_surface_excess_bound(surface, slab, 3, 0.015, 0.02, &failed), 0.015, 0);
   assert_true(isinf(qmat_surface_excess_bound(surface, slab, 3, 0.001, 0.009, &failed)));
+  release(surface);
+}
+
+/* A slab may be thinner than the limit, as in a thin wall: no bound reaches its least radius, so that it cannot leave
+ * the solid. */
+static void test_excess_bounds_stay_below_the_radius(void **state) {
+  (void)state;
+  qmat_surface *surface = surface_of(shape_seal(shape_box(2, 2, 1)));
+  const double top = 1.0 / 6; /* the diagonal is 3 long */
+  const double a[4] = {-0.1, -0.1, top - 0.03, 0.031}, b[4] = {0.1, -0.1, top - 0.04, 0.03},
+               c[4] = {0, 0.1, top - 0.03, 0.03}, edge[4] = {0, 0.1, top - 0.0001, 0.03},
+               outside[4] = {0, 0.1, top + 0.01, 0.03}, point[4] = {0, 0.1, top, 0};
+  const double *const slab[3] = {a, b, c}, *const high[3] = {a, b, edge}, *const crossing[3] = {a, b, outside},
+                      *const sharp[3] = {a, b, point};
+  uint32_t failed = UINT32_MAX;
+  assert_near(qmat_surface_excess_bound(surface, slab, 3, 0.0001, 0.05, &failed), 0.001, 1e-12);
+  assert_near(qmat_surface_excess_bound(surface, slab, 3, 0.02, 0.05, &failed), 0.02, 0);
+  assert_true(isinf(qmat_surface_excess_bound(surface, high, 3, 0.0001, 0.05, &failed)));
+  assert_true(isinf(qmat_surface_excess_bound(surface, crossing, 3, 0.0001, 0.05, &failed)));
+  assert_true(isinf(qmat_surface_excess_bound(surface, sharp, 3, 0.0001, 0.05, &failed)));
   release(surface);
 }
 
@@ -857,6 +877,7 @@ int main(void) {
       cmocka_unit_test(test_unused_vertices_do_not_widen_the_frame),
       cmocka_unit_test(test_excess_bounds_hold_between_the_spheres),
       cmocka_unit_test(test_excess_in_a_box_is_exact),
+      cmocka_unit_test(test_excess_bounds_stay_below_the_radius),
       cmocka_unit_test(test_surfaces_that_are_not_closed_have_no_excess_bound),
       cmocka_unit_test(test_thickness_takes_minimum_at_vertices_and_facet_value_at_samples),
   };
