@@ -33,7 +33,8 @@ static bool on_progress(void *user, const char *node_id, const char *node_type, 
 
 /* Takes the medial mesh over. */
 static void make_scene(scene *s, qmat_medial *medial) {
-  *s = (scene){.context = {.progress = on_progress, .progress_user = s}, .mesh = shape_seal(shape_box(1, 1, 1))};
+  *s = (scene){.context = {.progress = on_progress, .progress_user = s, .threads = 1},
+               .mesh = shape_seal(shape_box(1, 1, 1))};
   s->simplification = (qmat_simplification){.context = &s->context,
                                             .params = {.epsilon = 0.01, .error = QMAT_ERROR_ONE_SIDED},
                                             .solid = {.known = true, .components = 1, .euler = 1}};
