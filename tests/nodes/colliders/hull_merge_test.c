@@ -12,7 +12,7 @@
 #include "tests/shapes.h"
 #include "tests/shortage.h"
 
-enum { BALLS = 2, MOST_POINTS = 16, STRIDE = 13 };
+enum { BALLS = 2, MOST_POINTS = 16, STRIDE = 23 };
 
 /* A bar that is divided between two balls, each with a hull of its own to be replaced. */
 typedef struct bar {
